@@ -45,6 +45,7 @@ def doctor(options: argparse.Namespace) -> int:
     checks = [
         *_versions(),
         _cache(),
+        _dynamics(),
         _threads(),
         _browser(),
         *_real_time(),
@@ -100,6 +101,16 @@ def _cache() -> Check:
             "name a folder in NUMBA_CACHE_DIR",
         )
     return Check(topic, "ok", f"kept, those of the law in {folder}")
+
+
+def _dynamics() -> Check:
+    """Look whether Pinocchio is called without its Python bindings."""
+    from hsp_control.robot.pinocchio_calls import unknown
+
+    if reason := unknown():
+        found = "called through its Python bindings: a step takes a fifth longer"
+        return Check("Pinocchio", "note", found, reason)
+    return Check("Pinocchio", "ok", "called natively")
 
 
 def _threads() -> Check:

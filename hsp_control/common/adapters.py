@@ -168,6 +168,49 @@ def _unpacked(typing: Any, words: Any, kind: Any) -> Any:
     return values(types.int64, kind), code
 
 
+@cache
+def foreign_adapter(count: int) -> int:
+    """Return the address of what calls a C function whose arguments are words.
+
+    The words are the function's address and its arguments: integers and pointers.
+
+    Args:
+        count: The number of arguments.
+    """
+    place = {
+        "__name__": __name__,
+        "words_of_call": cast("Any", types).UniTuple(types.int64, count + 1),
+        "_called": _called,
+    }
+    call = FunctionType(cast("FunctionType", _call_c).__code__, place)
+    call.__qualname__ = f"c_function_{count}"
+    code = callback(types.float64(types.int64, types.float64), call)
+    _codes.append(code)
+    return int(code.address)
+
+
+def _call_c(words: int, t: float) -> float:
+    return _called(words, words_of_call)  # type: ignore # noqa
+
+
+@intrinsic
+def _called(typing: Any, words: Any, kind: Any) -> Any:
+    """Call the C function that comes first at an address, with what follows there."""
+    count = kind.instance_type.count
+
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        word = ir.IntType(64)
+        table = builder.inttoptr(arguments[0], ir.ArrayType(word, count).as_pointer())
+        function, *given = (
+            builder.extract_value(builder.load(table), k) for k in range(count)
+        )
+        kind = ir.FunctionType(ir.VoidType(), [word] * (count - 1))
+        builder.call(builder.inttoptr(function, kind.as_pointer()), given)
+        return context.get_constant(types.float64, 0.0)
+
+    return types.float64(types.int64, kind), code
+
+
 @intrinsic
 def _invoke(typing: Any, address: Any, words: Any, t: Any) -> Any:
     """Call what `adapter` made."""
@@ -194,13 +237,20 @@ def run(calls: Indices, when: Array, t: float) -> float:
     return value
 
 
+def entry_point(function: Callable[..., Any], kinds: tuple[Any, ...]) -> Any:
+    """Return a kernel for these types, as Python calls it without asking for them."""
+    compiled = cast("Any", function)
+    compiled.compile(kinds)
+    return compiled.overloads[kinds].entry_point
+
+
 @cache
 def entry() -> Callable[..., float]:
-    """Return `run` as Python calls it without asking for types."""
-    kinds = types.int64[:, ::1], types.float64[:, ::1], types.float64
-    compiled_run = cast("Any", run)
-    compiled_run.compile(kinds)
-    return cast("Callable[..., float]", compiled_run.overloads[kinds].entry_point)
+    """Return `run` as Python calls it."""
+    return cast(
+        "Callable[..., float]",
+        entry_point(run, (types.int64[:, ::1], types.float64[:, ::1], types.float64)),
+    )
 
 
 def _available() -> bool:

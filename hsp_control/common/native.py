@@ -52,6 +52,19 @@ class NativeCall(partial[float]):
         call.recipe = cls.of, (kernel, arguments, timed)
         return call
 
+    @classmethod
+    def of_function(
+        cls, address: int, words: Sequence[int], recipe: tuple[Any, tuple[Any, ...]]
+    ) -> Self:
+        """Return a call of a C function whose arguments are integers and pointers."""
+        from hsp_control.common import adapters
+
+        table = np.array([address, *words], dtype=np.int64)
+        row = adapters.foreign_adapter(len(words)), table.ctypes.data
+        call = cls(adapters.entry(), np.array([row]), np.array([FOREVER]), 0.0)
+        call.row, call.words, call.recipe = row, table, recipe
+        return call
+
     def __reduce__(self) -> tuple[Any, ...]:
         return self.recipe
 
@@ -89,13 +102,16 @@ def bind(
     return partial(function, *arguments)
 
 
-def sequence(calls: Sequence[Timed]) -> Callable[[float], float]:
-    """Return one call of the time that makes several; it returns the last result."""
+def sequence(calls: Sequence[Timed], *free: float) -> NativeCall:
+    """Return one call of the time that makes several; it returns the last result.
+
+    With a time as ``free`` it is a call without arguments.
+    """
     from hsp_control.common import adapters
 
     when = np.array([[each.start, each.end] for each in calls])
     call = NativeCall(
-        adapters.entry(), np.array([each.call.row for each in calls]), when
+        adapters.entry(), np.array([each.call.row for each in calls]), when, *free
     )
-    call.recipe = sequence, (calls,)
+    call.recipe = sequence, (calls, *free)
     return call

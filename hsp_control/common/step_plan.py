@@ -1,6 +1,6 @@
 """Step plans: the calls of a step, decided once, that know where to read and write."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import groupby
 from typing import Any, NamedTuple
 
@@ -62,6 +62,20 @@ class TimeWindow:
             self.call(t)
 
 
+def one_call(
+    first: Callable[[], object], last: Callable[[float], float]
+) -> Callable[[float], float]:
+    """Return one call of the time [s] for two, with the result of the last one."""
+    if isinstance(first, NativeCall) and isinstance(last, NativeCall):
+        return sequence([Timed(each, *FOREVER) for each in (first, last)])
+
+    def both(t: float) -> float:
+        first()
+        return last(t)
+
+    return both
+
+
 def steps(
     plans: Iterable[StepPlan], last: Callable[[], Any]
 ) -> list[Callable[[float], Any]]:
@@ -84,6 +98,11 @@ def steps(
         else:
             found += [_when(*part) for part in group]
     return found
+
+
+def in_order(calls: Sequence[Callable[[], object]]) -> list[Callable[[float], Any]]:
+    """Return calls without arguments as calls of the time, native ones as one."""
+    return steps([StepPlan(write=tuple(calls[:-1]))], calls[-1])
 
 
 class _Part(NamedTuple):

@@ -5,6 +5,7 @@ from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.step_plan import StepPlan, steps
@@ -17,6 +18,7 @@ from hsp_control.law.outcome import EXACT, outcome_of
 from hsp_control.null_space.fields import FieldSample, FieldSum, NullSpaceField
 from hsp_control.null_space.metrics import Metric
 from hsp_control.robot import Robot, RobotState
+from hsp_control.robot.state import Move
 from hsp_control.tasks import Task, TaskSample
 from hsp_control.tasks.task import InForce
 
@@ -132,14 +134,24 @@ class ActiveStack:
         code = 0.0
         for step in self._steps:
             code = step(t)
-        if code == 0.0:
-            return EXACT
+        return EXACT if code == 0.0 else self._outcome(code)
+
+    def move(self, t: float, q: ArrayLike, v: ArrayLike) -> Outcome:
+        """Update the state, and resolve there; see `RobotState.update`."""
+        code = self._state.advance(self._move, t, q, v)
+        return EXACT if code == 0.0 else self._outcome(code)
+
+    def _outcome(self, code: float) -> Outcome:
         self.damped_level = int(code)
         return outcome_of(code)
 
     def prepare(self) -> None:
-        """Compile what `resolve` calls, now instead of at its first call."""
-        self._steps  # noqa: B018 (compiled, and kept)
+        """Compile what `resolve` and `move` call, now instead of at the first call."""
+        self._move  # noqa: B018 (compiled, and kept)
+
+    @cached_property
+    def _move(self) -> Move:
+        return self._state.bind_move(self._steps)
 
     @cached_property
     def _steps(self) -> list[Callable[[float], Any]]:

@@ -253,18 +253,18 @@ class Controller:
             ControllerError: If the state belongs to another robot.
         """
         with self._lock:
-            state = self._state
-            if q is not None and v is not None:
-                state.update(t, q, v)  # type: ignore[arg-type]
-            elif t is not state:
-                self._adopt(t)
-            mixture = self._mixture
+            state, mixture = self._state, self._mixture
             active = mixture.active
             if active is None or not mixture.steady:
+                self._observe(t, q, v)
                 a, outcome = self._resolve()
                 active = self.active_stack
             else:
-                outcome = active.resolve(state.t)
+                if q is not None and v is not None:
+                    outcome = active.move(t, q, v)  # type: ignore[arg-type]
+                else:
+                    self._observe(t, q, v)
+                    outcome = active.resolve(state.t)
                 a = active.acceleration
             if outcome is NOT_FINITE:
                 self._raise_not_finite()
@@ -297,19 +297,27 @@ class Controller:
             out.status, out.relaxation = status, relaxation
             return out
 
-    def _adopt(self, state: object) -> None:
-        """Copy the values of a state."""
-        if not isinstance(state, RobotState):
+    def _observe(
+        self,
+        t: float | RobotState,
+        q: ArrayLike | None = None,
+        v: ArrayLike | None = None,
+    ) -> None:
+        """Move the state; see `compute`."""
+        if q is not None and v is not None:
+            self._state.update(t, q, v)  # type: ignore[arg-type]
+        elif not isinstance(t, RobotState):
             raise ControllerError(
                 "compute needs t, q and v, or a RobotState; got "
-                f"{type(state).__name__} alone"
+                f"{type(t).__name__} alone"
             )
-        if state.robot is not self._declared.robot:
+        elif t.robot is not self._declared.robot:
             raise ControllerError(
-                f"the state is of another robot object ({state.robot.name}); "
+                f"the state is of another robot object ({t.robot.name}); "
                 f"this controller is for {self._declared.robot.name}"
             )
-        self._state.update(state.t, state.q, state.v)
+        elif t is not self._state:
+            self._state.update(t.t, t.q, t.v)
 
     def applied(self, tau: ArrayLike, period: float) -> None:
         """Store the effort that was sent to the robot.
@@ -391,8 +399,7 @@ class Controller:
             without: The names of the tasks that do not count.
         """
         with self._lock:
-            if state is not self._state:
-                self._adopt(state)
+            self._observe(state)
             self._mixture.prepare(self._mixture.stack_without(lifted, without))
 
     # -- changes while running --------------------------------------------------------
@@ -601,8 +608,7 @@ class Controller:
     def stack(self, state: RobotState) -> TaskSample:
         """Return the rows of all active contacts and tasks at a state."""
         with self._lock:
-            if state is not self._state:
-                self._adopt(state)
+            self._observe(state)
             self._resolve()
             return self.active_stack.rows
 

@@ -7,6 +7,7 @@ with δ' = v for single-dof joints and δ' = J_r(δ)⁻¹ v for a root.
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -15,8 +16,10 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HspControlError, SimulationError
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
+from hsp_control.common.step_plan import in_order
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Positive
+from hsp_control.robot.acceleration import Acceleration
 from hsp_control.robot.robot import Robot
 
 Dynamics = Callable[[float, Array, Array], Array]
@@ -80,9 +83,8 @@ class Chart:
         return not self.robot.flat and largest > CHART_RADIUS
 
 
-Bind = Callable[[Array, Array], Callable[[float], Array]]
-"""(q, v) ↦ (t ↦ v'): what computes the acceleration for the values that these two
-arrays have when it is called."""
+Bind = Callable[[Array, Array], Acceleration]
+"""(q, v) ↦ v', computed for the values that these two arrays have then."""
 
 Advance = Callable[[float, float, Array, Array], tuple[Array, Array]]
 """(t, end, q, v) ↦ (q, v) at the end, in new arrays."""
@@ -97,7 +99,7 @@ class Integrator(Part, ABC, family="integrators", error=SimulationError):
 
         Args:
             robot: The robot.
-            bind_dynamics: Makes t ↦ v', shape (nv,), of the arrays q and v.
+            bind_dynamics: Makes v' of the arrays q and v.
         """
 
     def advance(
@@ -123,7 +125,16 @@ class Integrator(Part, ABC, family="integrators", error=SimulationError):
 
 def bound(dynamics: Dynamics) -> Bind:
     """Return dynamics as integrators call them: of arrays that stay the same."""
-    return lambda q, v: lambda t: dynamics(t, q, v)
+
+    def bind_dynamics(q: Array, v: Array) -> Acceleration:
+        value = np.zeros_like(v)
+
+        def compute(t: float) -> None:
+            value[:] = dynamics(t, q, v)
+
+        return Acceleration(compute, value)
+
+    return bind_dynamics
 
 
 class FixedStep(Integrator):
@@ -155,21 +166,25 @@ class SemiImplicitEuler(FixedStep, type="semi_implicit_euler"):
         return _SemiImplicitEuler(robot, bind_dynamics, self.step).advance
 
 
-class _Steps(ABC):
+class _Steps:
     """Takes steps of equal length: the memory of a `FixedStep`.
 
     Attributes:
         q: Configuration where v' is computed, shape (nq,).
         v: Velocity there, shape (nv,).
-        acceleration: t ↦ v' there.
+        acceleration: v' there.
         h: The step [s], shape (1,).
+        calls: The calls of a step, each of its first instant [s].
     """
+
+    calls: list[Callable[[float], Any]]
 
     def __init__(self, robot: Robot, bind_dynamics: Bind, longest: float) -> None:
         self.robot, self._longest = robot, longest
         self.q, self.v = robot.neutral(), np.zeros(robot.nv)
         self.acceleration = bind_dynamics(self.q, self.v)
         self.h = np.zeros(1)
+        self._t = 0.0
 
     def advance(self, t: float, end: float, q: Array, v: Array) -> tuple[Array, Array]:
         """Return (q, v) at ``end``; see `Integrator.advance`."""
@@ -177,26 +192,29 @@ class _Steps(ABC):
         h = self.h[0] = (end - t) / steps
         self.q[:], self.v[:] = q, v
         for k in range(steps):
-            self.step(t + k * h, h)
+            self._t = t + k * h
+            for call in self.calls:
+                call(self._t)
         return self.q.copy(), self.v.copy()
 
-    @abstractmethod
-    def step(self, t: float, h: float) -> None:
-        """Move q and v on from time t [s] by h [s]."""
+    def compute_at(self, fraction: float) -> Callable[[], object]:
+        """Return the call that writes v' at this fraction of the step."""
+        compute, _, native = self.acceleration
+        return native or (lambda: compute(self._t + fraction * self.h[0]))
 
 
 class _SemiImplicitEuler(_Steps):
     def __init__(self, robot: Robot, bind_dynamics: Bind, longest: float) -> None:
         super().__init__(robot, bind_dynamics, longest)
-        self._a, self._moved = np.zeros((2, robot.nv))
-        q = self.q if robot.linear else np.zeros(0)
-        self._move = bind(_euler, self.h, self._a, q, self.v, self._moved)
+        self._moved = np.zeros(robot.nv)
+        q, a = self.q if robot.linear else np.zeros(0), self.acceleration.value
+        parts = [self.compute_at(0.0), bind(_euler, self.h, a, q, self.v, self._moved)]
+        if not robot.linear:
+            parts.append(self._place)
+        self.calls = in_order(parts)
 
-    def step(self, t: float, h: float) -> None:
-        self._a[:] = self.acceleration(t)
-        self._move()
-        if not self.robot.linear:
-            self.q[:] = self.robot.integrate(self.q, self._moved)
+    def _place(self) -> None:
+        self.q[:] = self.robot.integrate(self.q, self._moved)
 
 
 class _Rk4(_Steps):
@@ -207,38 +225,41 @@ class _Rk4(_Steps):
 
     def __init__(self, robot: Robot, bind_dynamics: Bind, longest: float) -> None:
         super().__init__(robot, bind_dynamics, longest)
-        self._D, self._A = np.zeros((2, 4, robot.nv))
-        self._delta, self._v0 = np.zeros((2, robot.nv))
+        self._D, A = np.zeros((2, 4, robot.nv))
+        self._delta, v0 = np.zeros((2, robot.nv))
         self._chart = Chart(robot, self.q)
         self._base = self._chart.base
-        linear = robot.linear
-        slopes = self.h, self._D, self._A
-        base = self._base if linear else np.zeros(0)
-        point = self._delta, self.q if linear else np.zeros(0), self.v
-        self._stages = [
-            (i, c, bind(_next_stage, i, c, *slopes, base, self._v0, *point))
-            for i, c in enumerate((0.5, 0.5, 1.0))
-        ]
-        self._finish = bind(_weighted_step, *slopes, base, self._v0, *point)
-
-    def step(self, t: float, h: float) -> None:
-        q, v, A = self.q, self.v, self._A
-        self._base[:], self._v0[:], self._D[0] = q, v, v
-        A[0] = self.acceleration(t)
-        for i, fraction, move in self._stages:
-            move()
-            self._place(i + 1)
-            A[i + 1] = self.acceleration(t + fraction * h)
-        self._finish()
-        self._place(None)
+        base, q = self._base, self.q
+        begin = bind(_begin, q, self.v, base, v0, self._D)
+        if not robot.linear:
+            base = q = np.zeros(0)
+        slopes = self.h, self._D, A, self.acceleration.value
+        point = base, v0, self._delta, q, self.v
+        parts = [begin, self.compute_at(0.0)]
+        for i, fraction in enumerate((0.5, 0.5, 1.0)):
+            parts.append(bind(_next_stage, i, fraction, *slopes, *point))
+            if not robot.linear:
+                parts.append(partial(self._place, i + 1))
+            parts.append(self.compute_at(fraction))
+        parts.append(bind(_weighted_step, *slopes, *point))
+        if not robot.linear:
+            parts.append(partial(self._place, None))
+        self.calls = in_order(parts)
 
     def _place(self, stage: int | None) -> None:
         """Compute what the chart of a robot that is not linear needs."""
-        if self.robot.linear:
-            return
         self.q[:] = self.robot.integrate(self._base, self._delta)
         if stage is not None and not self.robot.flat:
             self._D[stage] = self._chart.velocity(self._delta, self.v)
+
+
+@kernel
+def _begin(q: Array, v: Array, base: Array, v0: Array, D: Array) -> None:
+    """Begin a step: keep q and v, and write the first slope of δ."""
+    for i in range(q.shape[0]):
+        base[i] = q[i]
+    for i in range(v.shape[0]):
+        v0[i] = D[0, i] = v[i]
 
 
 @kernel
@@ -258,6 +279,7 @@ def _next_stage(
     h: Array,
     D: Array,
     A: Array,
+    a: Array,
     base: Array,
     v0: Array,
     delta: Array,
@@ -272,6 +294,7 @@ def _next_stage(
         h: The step [s], shape (1,).
         D: Slopes of δ, shape (4, nv).
         A: Slopes of v, shape (4, nv).
+        a: The slope of v at this stage, shape (nv,).
         base: q where δ = 0, shape (nq,); empty if q is no vector.
         v0: v at the beginning, shape (nv,).
         delta: Written, shape (nv,).
@@ -279,6 +302,7 @@ def _next_stage(
         v: Written, shape (nv,).
     """
     for i in range(v.shape[0]):
+        A[stage, i] = a[i]
         delta[i] = fraction * h[0] * D[stage, i]
         v[i] = v0[i] + fraction * h[0] * A[stage, i]
         D[stage + 1, i] = v[i]
@@ -291,6 +315,7 @@ def _weighted_step(
     h: Array,
     D: Array,
     A: Array,
+    a: Array,
     base: Array,
     v0: Array,
     delta: Array,
@@ -299,6 +324,7 @@ def _weighted_step(
 ) -> None:
     """Write the end of a step, by all slopes; the arguments are `_next_stage`'s."""
     for i in range(v.shape[0]):
+        A[3, i] = a[i]
         delta[i] = h[0] / 6.0 * (D[0, i] + 2.0 * D[1, i] + 2.0 * D[2, i] + D[3, i])
         slopes = A[0, i] + 2.0 * A[1, i] + 2.0 * A[2, i] + A[3, i]
         v[i] = v0[i] + h[0] / 6.0 * slopes
@@ -368,7 +394,8 @@ def _of_new_arrays(robot: Robot, bind_dynamics: Bind) -> Dynamics:
 
     def dynamics(t: float, q_new: Array, v_new: Array) -> Array:
         q[:], v[:] = q_new, v_new
-        return acceleration(t)
+        acceleration.compute(t)
+        return acceleration.value
 
     return dynamics
 

@@ -1,7 +1,6 @@
 """The robot: a model that was loaded, taken from a scene, or combined."""
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
 
@@ -15,8 +14,10 @@ from hsp_control.common.exceptions import (
     JointNotFoundError,
     ModelError,
 )
+from hsp_control.common.native import NativeCall
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.declaration import within
+from hsp_control.robot.acceleration import Acceleration
 from hsp_control.robot.configuration_space import ConfigurationSpace
 from hsp_control.robot.description.access import ANYWHERE, Access
 from hsp_control.robot.description.combining import Part, combine, placement
@@ -29,6 +30,7 @@ from hsp_control.robot.description.mujoco.selection import select
 from hsp_control.robot.description.mujoco.source import load_mjcf, load_selection
 from hsp_control.robot.description.robot_description import RobotDescription, ToolFrame
 from hsp_control.robot.description.sources import RobotSource, Root
+from hsp_control.robot.pinocchio_calls import bind_pinocchio
 from hsp_control.robot.state import RobotState
 
 _LIMB = 4
@@ -349,16 +351,18 @@ class Robot(ConfigurationSpace):
             return np.array(pin.aba(self.model, self._data, q, v, tau))
         return self._forward_dynamics_of_mimics(q, v, tau)
 
-    def bind_forward_dynamics(
-        self, q: Array, v: Array, tau: Array
-    ) -> Callable[[], Array]:
-        """Return `forward_dynamics` for what these arrays hold when it is called.
-
-        The result is overwritten by the next call.
-        """
+    def bind_forward_dynamics(self, q: Array, v: Array, tau: Array) -> Acceleration:
+        """Return `forward_dynamics` for what these arrays hold when it is computed."""
         if not self.mimics:
-            return partial(pin.aba, self.model, self._data, q, v, tau)
-        return partial(self._forward_dynamics_of_mimics, q, v, tau)
+            call = bind_pinocchio("aba", self.model, self._data, q, v, tau)
+            native = call if isinstance(call, NativeCall) else None
+            return Acceleration(lambda t: call(), self._data.ddq, native)
+        value = np.zeros(self.nv)
+
+        def compute(t: float) -> None:
+            value[:] = self._forward_dynamics_of_mimics(q, v, tau)
+
+        return Acceleration(compute, value)
 
     def _forward_dynamics_of_mimics(self, q: Array, v: Array, tau: Array) -> Array:
         mass_matrix = pin.crba(self.model, self._data, q)

@@ -6,9 +6,10 @@ for what a state does not offer: loading and checks of models, integration, coll
 geometry, derivatives of gravity, plants with models of their own, and the viewer.
 """
 
-from collections.abc import Callable
-from functools import cache, partial
-from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
+from collections.abc import Callable, Sequence
+from functools import partial
+from itertools import takewhile
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -16,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import NonFiniteError
-from hsp_control.common.kernels import is_compiled, kernel
+from hsp_control.common.native import NativeCall
 from hsp_control.robot.centroidal import CentroidalMotion
 from hsp_control.robot.configuration_space import as_numbers
 from hsp_control.robot.kinematics import (
@@ -26,11 +27,16 @@ from hsp_control.robot.kinematics import (
     mass_matrix_difference,
 )
 from hsp_control.robot.matrix_view import matrix_view
+from hsp_control.robot.pinocchio_calls import bind_pinocchio
+from hsp_control.robot.valid_state import REFUSED, copy_valid
 
 if TYPE_CHECKING:  # `Robot.state` makes a state, and a state names its robot
     from hsp_control.robot.robot import Robot
 
 Made = TypeVar("Made")
+
+Move = Callable[[float, Array, Array], float]
+"""(t, q, v) ↦ what the last of its calls returned, or `REFUSED`."""
 
 _DOUBLE = np.dtype(np.float64)
 _PACKED = (8,)
@@ -53,6 +59,7 @@ class RobotState:
         q: Configuration, shape (nq,).
         v: Velocity, shape (nv,).
         stamp_array: `stamp` as an array of shape (1,), for kernels.
+        effort: What `inverse_dynamics` wrote last, shape (nv,) [N·m or N].
         data: Pinocchio's data at (q, v), for terms that this class does not offer.
     """
 
@@ -63,17 +70,15 @@ class RobotState:
         self.q: Array = robot.neutral()
         self.v: Array = np.zeros(robot.nv)
         self.data: pin.Data = robot.model.createData()
-        self._compute_jacobians = partial(
-            pin.computeJointJacobiansTimeVariation,
-            robot.model,
-            self.data,
-            self.q,
-            self.v,
+        self.effort: Array = self.data.tau
+        self._compute_jacobians = bind_pinocchio(
+            "jacobians", robot.model, self.data, self.q, self.v
         )
-        self._inverse_dynamics = partial(
-            pin.rnea, robot.model, self.data, self.q, self.v
+        self._acceleration: Array = np.zeros(robot.nv)
+        self._inverse_dynamics = self.bind_inverse_dynamics(self._acceleration)
+        self._compute_mass_matrix = bind_pinocchio(
+            "crba", robot.model, self.data, self.q
         )
-        self._compute_mass_matrix = partial(pin.crba, robot.model, self.data, self.q)
         self._mass_matrix = matrix_view(self.data.M)
         self._world: WorldKinematics | None = None
         self._unit_blocks = np.array(robot.unit_blocks, dtype=np.int64).reshape(-1, 2)
@@ -85,7 +90,7 @@ class RobotState:
         self._mass_matrix_rate: Array = np.zeros((robot.nv, robot.nv))
         self._displaced: RobotState | None = None
         self._made: dict[tuple[int, str], tuple[object, Any]] = {}
-        _compile_once()
+        self._move = self.bind_move()
 
     def update(self, t: float, q: ArrayLike, v: ArrayLike) -> Self:
         """Move to time t [s], configuration q (nq,) and velocity v (nv,), in place.
@@ -95,6 +100,11 @@ class RobotState:
             NonFiniteError: If t, q or v contains NaN or inf.
             ConfigurationError: If a quaternion or a (cos, sin) pair is not of norm 1.
         """
+        self.advance(self._move, t, q, v)
+        return self
+
+    def advance(self, move: Move, t: float, q: ArrayLike, v: ArrayLike) -> float:
+        """`update`, with the calls of `bind_move`; return what the last one returns."""
         q_in: Any = q
         v_in: Any = v
         try:
@@ -104,20 +114,33 @@ class RobotState:
             )
         except AttributeError:  # a list, for example
             packed = False
-        if not packed:  # a kernel would be compiled anew for each kind of array
+        if not packed:
             q_in = as_numbers(q, self.robot.nq, "configuration q", self.robot)
             v_in = as_numbers(v, self.robot.nv, "velocity v", self.robot)
+        before, self.t = self.t, t  # calls in Python read it
         try:
-            accepted = _copy_valid(
-                t, q_in, v_in, self.q, self.v, self._unit_blocks, self.stamp_array
-            )
-        except TypeError:  # t is no number
-            accepted = False
-        if not accepted:
+            value = move(t, q_in, v_in)
+        except TypeError:
+            if isinstance(t, float | int | np.number):
+                raise
+            value = REFUSED
+        if value == REFUSED:
+            self.t = before
             self._refuse(t, q, v)
-        self.t = t
-        self._compute_jacobians()
-        return self
+        return value
+
+    def bind_move(self, calls: Sequence[Callable[[float], Any]] = ()) -> Move:
+        """Return how `advance` moves this state, with calls of the time that follow."""
+        first = self._compute_jacobians
+        memory = self.q, self.v, self._unit_blocks, self.stamp_array
+        if isinstance(first, NativeCall):
+            native = tuple(takewhile(lambda call: isinstance(call, NativeCall), calls))
+            from hsp_control.robot.native_move import NativeMove
+
+            move: Move = NativeMove.of((first, *native), *memory)
+            rest = tuple(calls[len(native) :])
+            return partial(_and_then, move, rest) if rest else move
+        return partial(_move, memory, first, tuple(calls))
 
     def _refuse(self, t: float, q: ArrayLike, v: ArrayLike) -> None:
         """Raise the error that says what is wrong with t, q and v."""
@@ -201,7 +224,15 @@ class RobotState:
 
     def inverse_dynamics(self, acceleration: Array) -> Array:
         """Return the effort M a + N, shape (nv,), for an acceleration (nv,) (RNEA)."""
-        return self._inverse_dynamics(acceleration)  # type: ignore[no-any-return]
+        self._acceleration[:] = acceleration
+        self._inverse_dynamics()
+        return self.effort
+
+    def bind_inverse_dynamics(self, acceleration: Array) -> Callable[[], object]:
+        """Return a call that writes `effort` for what this array (nv,) then holds."""
+        return bind_pinocchio(
+            "rnea", self.robot.model, self.data, self.q, self.v, acceleration
+        )
 
     @property
     def stamp(self) -> int:
@@ -265,55 +296,30 @@ class RobotState:
         return self.displaced(dt, self.v * dt)
 
 
-@cache
-def _compile_once() -> None:
-    """Compile `_copy_valid` for packed doubles, and for nothing else, ever.
-
-    Numba takes an array that may be written for one that may not, but looks it up for
-    longer; so there is a version for both.
-    """
-    if is_compiled(_copy_valid):
-        from numba import types
-
-        own, kernel = types.float64[::1], cast("Any", _copy_valid)
-        given = own, types.Array(types.float64, 1, "C", readonly=True)
-        rest = own, own, types.int64[:, ::1], types.int64[::1]
-        for each in given:
-            kernel.compile((types.float64, each, each, *rest))
-        kernel.disable_compile()
-
-
-@kernel
-def _copy_valid(
+def _move(
+    memory: tuple[Array, Array, Indices, Indices],
+    first: Callable[[], object],
+    calls: tuple[Callable[[float], Any], ...],
     t: float,
-    q_in: Array,
-    v_in: Array,
     q: Array,
     v: Array,
-    unit_blocks: Indices,
-    stamp: Indices,
-) -> bool:
-    """Copy q and v if they are valid; return whether they are.
+) -> float:
+    """`NativeMove`, where calls are made one by one."""
+    if not copy_valid(t, q, v, *memory):
+        return REFUSED
+    first()
+    value = 0.0
+    for call in calls:
+        value = call(t)
+    return value
 
-    Valid means of the right size, finite, and of norm 1 in the unit blocks.
-    """
-    if q_in.shape[0] != q.shape[0] or v_in.shape[0] != v.shape[0]:
-        return False
-    total = t
-    for i in range(q.shape[0]):
-        total += q_in[i]
-    for i in range(v.shape[0]):
-        total += v_in[i]
-    ok = np.isfinite(total)
-    for k in range(unit_blocks.shape[0]):
-        square = 0.0
-        for i in range(unit_blocks[k, 0], unit_blocks[k, 0] + unit_blocks[k, 1]):
-            square += q_in[i] * q_in[i]
-        ok = ok and abs(square - 1.0) < 2e-6
-    if ok:
-        for i in range(q.shape[0]):
-            q[i] = q_in[i]
-        for i in range(v.shape[0]):
-            v[i] = v_in[i]
-        stamp[0] += 1
-    return bool(ok)
+
+def _and_then(
+    move: Move, calls: tuple[Callable[[float], Any], ...], t: float, q: Array, v: Array
+) -> float:
+    """Move, then make calls."""
+    value = move(t, q, v)
+    if value != REFUSED:
+        for call in calls:
+            value = call(t)
+    return value

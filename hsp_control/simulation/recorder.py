@@ -76,6 +76,7 @@ class Recorder:
         self._descriptions: dict[str, dict[str, str]] = {}
         self._logged: dict[str, Task] = {}
         self._levels: dict[str, int] = {}
+        self._streams: dict[str, tuple[tuple[str, Streamed], ...]] = {}
         robot = controller.robot
         nv, units = robot.nv, dict.fromkeys(robot.units)
         self._joint_unit = joint_unit = " or ".join(units)
@@ -161,7 +162,9 @@ class Recorder:
             what = " and ".join(part.name for part in parts)
             column(f"{prefix}.error", (m,), unit, f"error e: {what}")
             column(f"{prefix}.error_rate", (m,), rate_unit, "error rate e'")
-            for stream, _ in _streams_of(task, name):
+            # To look for streams in every row would cost more than the row.
+            self._streams[name] = tuple(_streams_of(task, name))
+            for stream, _ in self._streams[name]:
                 for what, meaning in STREAM_CHANNELS.items():
                     unit_of = "s" if what == "age" else "-"
                     column(f"{stream}.{what}", (), unit_of, meaning)
@@ -236,7 +239,7 @@ class Recorder:
             reference, actual = task.measure(state)
             columns[f"task.{name}.reference"][i] = reference
             columns[f"task.{name}.actual"][i] = actual
-            for prefix, stream in _streams_of(task, name):
+            for prefix, stream in self._streams[name]:
                 for what, value in stream.counts().items():
                     columns[f"{prefix}.{what}"][i] = value
         for k, (frame, joint) in enumerate(self._points):

@@ -456,6 +456,8 @@ def told_until(page: Any, values: dict[str, Any], expression: str) -> None:
 
 
 def test_a_refused_value_goes_back(page: Any) -> None:
+    """Whether a word of the program is older is a matter of time: here it stands."""
+    page.evaluate("window.echo = Play.ECHO; Play.ECHO = 1e9")
     slider, shown = page.locator("#play-stiffness"), page.locator(".slider output")
     before = slider.input_value()
     slider.fill("0.5")  # the middle, on a logarithmic scale
@@ -463,18 +465,21 @@ def test_a_refused_value_goes_back(page: Any) -> None:
     assert shown.inner_text() == "200 N/m"
     tell(page, "play_values", values={"stiffness": 400.0})
     assert shown.inner_text() == "200 N/m"  # the program had not heard of it yet
+    page.evaluate("Play.ECHO = 0")
     told_until(page, {"stiffness": 400.0}, "document.querySelector('#play-stiffness')"
                ".getAttribute('aria-valuetext') === '400 N/m'")  # fmt: skip
     assert slider.input_value() == before
-    page.evaluate("sent.length = 0")
+    page.evaluate("sent.length = 0; Play.ECHO = 1e9")
     page.get_by_role("switch", name="Friction").click()
     until_sent(page, "set")
     assert [message["value"] for message in sent(page)] == [True]
     tell(page, "play_values", values={"friction": False})
     assert page.get_by_role("switch", name="Friction").is_checked()
+    page.evaluate("Play.ECHO = 0")
     told_until(
         page, {"friction": False}, "!document.querySelector('.switch input').checked"
     )
+    page.evaluate("Play.ECHO = window.echo")
 
 
 def test_a_target_and_an_obstacle_return_to_their_paths(page: Any) -> None:

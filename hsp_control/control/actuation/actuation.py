@@ -22,6 +22,7 @@ from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.identity_cache import IdentityCache
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
+from hsp_control.common.step_plan import one_call
 from hsp_control.constraints.limits.acceleration_bounds import (
     EFFORT,
     MOTION,
@@ -130,7 +131,6 @@ class Actuation:
             or planned.distances
             or any(each.static_effort for each in planned.sets if each is not None)
         )
-        self._free = self.limits is None and self._only_box_limits
 
     def update_limits(self, t: float) -> None:
         """Compute the limits in force at time t [s], if they change."""
@@ -233,13 +233,9 @@ class Actuation:
             offset: Effort besides M a + N, for friction for example, shape (nv,)
                 [N·m or N]; None: none. The limits hold for the sum.
         """
-        wanted = state.inverse_dynamics(a)  # M a + N
+        violated = self._check.get(state, a, self.limits is None)(state.t)
+        wanted = state.effort  # M a + N
         unsupported = self._only_box_limits and not support.size
-        if self._free and unsupported and offset is None:
-            return wanted, a, self._no_forces, EXACT, 0.0
-        violated = 0.0
-        if self.limits is not None:
-            violated = self._check.get(state, a)(state.t)
         if offset is None and unsupported:
             if not violated:
                 return wanted, a, self._no_forces, EXACT, 0.0
@@ -264,24 +260,32 @@ class Actuation:
             return tau, a, forces, EXACT, 0.0
         return self._limit(state, wanted, a, motion_ok, resolution, support, barriers)
 
-    def _compile_check(self, state: RobotState, a: Array) -> Callable[[float], float]:
-        """Return the call of the time that writes the bounds on the acceleration.
+    def _compile_check(
+        self, state: RobotState, a: Array, unlimited: bool
+    ) -> Callable[[float], float]:
+        """Return the call of the time that writes M a + N and the bounds on a.
 
         It returns 0, `MOTION` if a violates its bounds, `EFFORT` if the effort without
-        contacts does (read from Pinocchio's data), or the sum of both.
+        contacts does, or the sum of both.
         """
-        return bind(
-            _check,
-            state.q,
-            state.v,
-            a,
-            state.data.tau,
-            self._robot.dof_indices,
-            self._motion,
-            self._held.memory_of_kernels,
-            self._bounds,
-            timed=True,
+        dynamics = state.bind_inverse_dynamics(a)
+        check = (
+            bind(_nothing, timed=True)
+            if unlimited
+            else bind(
+                _check,
+                state.q,
+                state.v,
+                a,
+                state.effort,
+                self._robot.dof_indices,
+                self._motion,
+                self._held.memory_of_kernels,
+                self._bounds,
+                timed=True,
+            )
         )
+        return one_call(dynamics, check)
 
     def _barriers(self, state: RobotState, support: Support) -> Barriers:
         """Return the rows A a ≥ lower for distances and static efforts, by kind."""
@@ -375,6 +379,12 @@ class Actuation:
             1 << (count - 1).bit_length() if count else 0,
         )
         return self._steps[resolution]
+
+
+@kernel
+def _nothing(t: float) -> int:
+    """Return that nothing is violated."""
+    return 0
 
 
 @kernel

@@ -147,16 +147,13 @@ class Command:
             self._observe(self._observer, t, q, v, last)
         if own.predictor is not None:
             t, q, v = self._predict(own.predictor, t, q, v, period)
-        state = self.state.update(t, q, v)
-        if own.start_up_ramp is not None and self._ramp is None:
-            self._ramp = own.start_up_ramp.begin(state)
         if self.feels_contacts:
             assert self._force_feedback is not None
             self._force_feedback.measure(wrenches, pressed=last > 0.0)
-        self.output = output = self._law(state)
+        self.output = output = self._law(t, q, v)
         self._friction_sent = self._friction
         if self._changes_state:
-            self._shown = state.q.copy(), state.v.copy()
+            self._shown = self.state.q.copy(), self.state.v.copy()
         tau = self._tau
         tau[:] = output.tau
         clipped = self._clip is not None and self._clip.apply(tau, last)
@@ -165,7 +162,7 @@ class Command:
             self._integrate(self._integral, output, period, clipped)
         if self._force_feedback is not None:
             hindered = output.status >= Status.LIMITED or clipped
-            self._force_feedback.advance(state.t, period, output.forces, hindered)
+            self._force_feedback.advance(self.state.t, period, output.forces, hindered)
         if self._observer is not None or own.predictor is not None:
             self._pressing = self._expected(output)
             self._record_sent(tau - self._friction_sent + self._pressing)
@@ -194,7 +191,7 @@ class Command:
             q: Configuration, shape (nq,).
             v: Velocity, shape (nv,).
         """
-        return self._law(self.state.update(t, q, v))
+        return self._law(t, q, v)
 
     def log_channels(self) -> Mapping[str, LogChannel]:
         """Return the log channels of the active compensators, by name."""
@@ -284,14 +281,16 @@ class Command:
         q, v = self._predictor.predict(q, v, efforts, period)
         return t + predictor.effort_delay * period, q, v
 
-    def _law(self, state: RobotState) -> ControlOutput:
+    def _law(self, t: float, q: Array, v: Array) -> ControlOutput:
         modifier = self._modify if self._changes_effort else None
-        return self.controller.compute(state, modifier=modifier)
+        return self.controller.compute(t, q, v, modifier=modifier)
 
     def _modify(
         self, state: RobotState, active: ActiveStack, a: Array
     ) -> tuple[Array, Array | None]:
         """Return the acceleration to deliver, and the effort besides M a + N."""
+        if self._ramp is None and self.compensation.start_up_ramp is not None:
+            self._ramp = self.compensation.start_up_ramp.begin(state)
         if self._ramp is not None:
             a = self._ramp.blend(state, a)
         offset = self._zero

@@ -1,6 +1,6 @@
 """Prediction of the state at which an effort will act."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from hsp_control.control.compensation.checks import check_fixed_base
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Count
 from hsp_control.robot import Robot
+from hsp_control.robot.acceleration import Acceleration
 from hsp_control.robot.integrators import Rk4
 
 
@@ -84,6 +85,5 @@ class RunningPredictor:
             q, v = self._advance(0.0, period, q, v)
         return np.asarray(q), np.asarray(v)
 
-    def _bind(self, q: Array, v: Array) -> Callable[[float], Array]:
-        dynamics = self._robot.bind_forward_dynamics(q, v, self._tau)
-        return lambda t: dynamics()
+    def _bind(self, q: Array, v: Array) -> Acceleration:
+        return self._robot.bind_forward_dynamics(q, v, self._tau)

@@ -1,7 +1,7 @@
 """The interfaces of plants: simulated robots that an effort moves."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from hsp_control.common.exceptions import SimulationError
 from hsp_control.control.log_channel import LogChannel
 from hsp_control.control.measurement import NO_WRENCHES, Inertial
 from hsp_control.robot import Robot
+from hsp_control.robot.acceleration import Acceleration
 
 
 class Plant:
@@ -84,12 +85,14 @@ class ContinuousPlant(Plant, ABC):
         The arrays may be overwritten after the call: copy what is to be kept.
         """
 
-    def bind(self, q: Array, v: Array, tau: Array) -> Callable[[float], Array]:
-        """Return t ↦ v' for what these arrays hold when it is called.
+    def bind(self, q: Array, v: Array, tau: Array) -> Acceleration:
+        """Return v' for what these arrays hold when it is computed."""
+        value = np.zeros(self.robot.nv)
 
-        The result may be overwritten by the next call.
-        """
-        return lambda t: self.acceleration(t, q, v, tau)
+        def compute(t: float) -> None:
+            value[:] = self.acceleration(t, q, v, tau)
+
+        return Acceleration(compute, value)
 
 
 class SampledPlant(Plant, ABC):

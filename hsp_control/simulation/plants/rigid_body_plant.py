@@ -1,10 +1,11 @@
 """The ideal plant: rigid bodies without friction, by the articulated-body algorithm."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from hsp_control.common.arrays import Array
 from hsp_control.robot import Robot
+from hsp_control.robot.acceleration import Acceleration
 from hsp_control.simulation.plants.json_data import to_json_data
 from hsp_control.simulation.plants.plant import ContinuousPlant
 from hsp_control.simulation.plants.push import Push, Pushes
@@ -32,14 +33,13 @@ class RigidBodyPlant(ContinuousPlant):
             tau = tau + self.pushes.effort(t, q)
         return self.robot.forward_dynamics(q, v, tau)
 
-    def bind(self, q: Array, v: Array, tau: Array) -> Callable[[float], Array]:
-        """Return t ↦ v'; see `ContinuousPlant.bind`."""
+    def bind(self, q: Array, v: Array, tau: Array) -> Acceleration:
+        """Return v'; see `ContinuousPlant.bind`."""
         changed = type(self).acceleration is not RigidBodyPlant.acceleration
         pushed = self.pushes.pushes or self.pushes.reachable
         if pushed or changed:  # a subclass has another one
             return super().bind(q, v, tau)
-        forward_dynamics = self.robot.bind_forward_dynamics(q, v, tau)
-        return lambda t: forward_dynamics()
+        return self.robot.bind_forward_dynamics(q, v, tau)
 
     def describe(self) -> dict[str, Any]:
         """Return its pushes."""

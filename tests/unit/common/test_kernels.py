@@ -414,10 +414,8 @@ def test_no_allocation_in_a_field(name: str, chain: Robot) -> None:
 
 
 @pytest.mark.slow
-def test_a_step_allocates_what_pinocchio_returns_and_nothing_else(
-    chain: Robot,
-) -> None:
-    """Pinocchio hands out a copy of its Jacobians' rates, and of the effort."""
+def test_a_step_allocates_nothing(chain: Robot) -> None:
+    """Neither the law nor Pinocchio, which is called without its Python bindings."""
     name, q, v = f"link{JOINTS}", chain.home() + 0.1, np.full(JOINTS, 1e-3)
     frame = chain.state(0.1, q, v).frame(name)
     here = HoldPose(frame.position, frame.rotation)
@@ -430,7 +428,7 @@ def test_a_step_allocates_what_pinocchio_returns_and_nothing_else(
     assert out.status == Status.EXACT
 
     peak, left = allocated(lambda: state.update(0.1, q, v), 500)
-    assert 6 * VECTOR <= peak < 7 * VECTOR
+    assert peak < VECTOR
     assert left < 50
 
     def compute() -> None:
@@ -438,7 +436,7 @@ def test_a_step_allocates_what_pinocchio_returns_and_nothing_else(
         controller.compute(state, out=out)
 
     peak, left = allocated(compute, 500)
-    assert VECTOR <= peak < 2 * VECTOR
+    assert peak < VECTOR
     assert left < 50
 
 

@@ -47,7 +47,7 @@ from hsp_control.null_space.metrics import (
     Metric,
 )
 from hsp_control.null_space.metrics.metric import CONSTANT, IDENTITY, raise_covector
-from hsp_control.robot import kinematics, state
+from hsp_control.robot import kinematics, valid_state
 from hsp_control.tasks import TaskSample
 from hsp_control.trajectories import HoldOrientation
 
@@ -368,7 +368,7 @@ def arguments(name: str) -> tuple[Any, ...]:
             ),
             *(normal(19, n - 1), kinematics.FrameMotion.allocate(n - 1), np.zeros(6)),
         ),
-        "_copy_valid": (
+        "copy_valid": (
             *(0.5, np.array([0.6, 0.8, 3.0]), sample[0], np.zeros(3), np.zeros(n)),
             *(np.array([[0, 2]]), np.array([4])),
         ),
@@ -383,7 +383,7 @@ KERNELS: dict[str, Callable[..., Any]] = {
     },
     "acceleration": law.acceleration,
     "frame_kinematics": kinematics.frame_kinematics,
-    "_copy_valid": state._copy_valid,
+    "copy_valid": valid_state.copy_valid,
 }
 
 

@@ -317,3 +317,46 @@ def test_a_frame_that_can_only_be_read_is_no_obstacle() -> None:
     q.setflags(write=False)
     v.setflags(write=False)
     np.testing.assert_array_equal(RobotState(robot).update(0.0, q, v).q, q)
+
+
+# --- moves with calls that follow ----------------------------------------------------
+
+
+def test_calls_after_a_move_see_its_time_and_state() -> None:
+    """Also those that are Python, such as a field that somebody wrote."""
+    robot, q, v, _ = draw("panda", seed=31)
+    state, seen = robot.state(0.0, q, v), list[tuple[float, float, Array]]()
+
+    def call(t: float) -> float:
+        seen.append((t, state.t, state.q.copy()))
+        return 7.0
+
+    move = state.bind_move([call])
+    assert state.advance(move, 0.25, q + 0.1, v) == 7.0
+    ((t, own, where),) = seen
+    assert t == own == 0.25
+    np.testing.assert_array_equal(where, q + 0.1)
+
+
+def test_a_refused_move_changes_nothing_and_calls_nothing() -> None:
+    robot, q, v, _ = draw("panda", seed=32)
+    state, seen = robot.state(0.5, q, v), list[float]()
+    move = state.bind_move([lambda t: seen.append(t)])
+    with pytest.raises(NonFiniteError, match="velocity v"):
+        state.advance(move, 1.0, q, np.full(robot.nv, np.nan))
+    with pytest.raises(NonFiniteError, match="time t is None"):
+        state.advance(move, None, q, v)  # type: ignore[arg-type]
+    assert (state.t, seen) == (0.5, [])
+    np.testing.assert_array_equal(state.v, v)
+
+
+def test_a_type_error_of_a_call_is_its_own() -> None:
+    """It is not taken for one about the time."""
+    robot, q, v, _ = draw("panda", seed=33)
+    state = robot.state(0.0, q, v)
+
+    def call(t: float) -> float:
+        raise TypeError("a field's own mistake")
+
+    with pytest.raises(TypeError, match="a field's own mistake"):
+        state.advance(state.bind_move([call]), 1.0, q, v)

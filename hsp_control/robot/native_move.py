@@ -1,0 +1,74 @@
+"""A state's move and the calls that follow it, as one call from Python."""
+
+from collections.abc import Callable, Sequence
+from functools import cache, partial
+from typing import Self
+
+import numpy as np
+from numba import types
+
+from hsp_control.common.adapters import entry_point, run
+from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.kernels import kernel
+from hsp_control.common.native import NativeCall
+from hsp_control.robot.valid_state import REFUSED, copy_valid
+
+
+class NativeMove(partial[float]):
+    """Copies q and v, if they are valid, and makes native calls at the time.
+
+    From Python: (t, q, v) ↦ what the last call returned, or `REFUSED`.
+
+    Attributes:
+        calls: The calls, which own the memory of their arguments.
+    """
+
+    calls: Sequence[NativeCall]
+
+    @classmethod
+    def of(
+        cls,
+        calls: Sequence[NativeCall],
+        q: Array,
+        v: Array,
+        unit_blocks: Indices,
+        stamp: Indices,
+    ) -> Self:
+        """Put the calls' rows together.
+
+        Args:
+            calls: The calls.
+            q: Where the configuration is kept, shape (nq,).
+            v: Where the velocity is kept, shape (nv,).
+            unit_blocks: (start, size) of what is of norm 1 in q, shape (blocks, 2).
+            stamp: Counted up, shape (1,).
+        """
+        rows, when = (np.concatenate([c.args[k] for c in calls]) for k in (0, 1))
+        move = cls(_entry(), rows, when, q, v, unit_blocks, stamp)
+        move.calls = calls
+        return move
+
+
+@kernel
+def _move(
+    calls: Indices,
+    when: Array,
+    q: Array,
+    v: Array,
+    unit_blocks: Indices,
+    stamp: Indices,
+    t: float,
+    q_in: Array,
+    v_in: Array,
+) -> float:
+    """Copy q and v and make the calls; see `NativeMove`."""
+    if not copy_valid(t, q_in, v_in, q, v, unit_blocks, stamp):
+        return REFUSED
+    return run(calls, when, t)
+
+
+@cache
+def _entry() -> Callable[..., float]:
+    own, table = types.float64[::1], types.int64[:, ::1]
+    rest = own, own, table, types.int64[::1], types.float64, own, own
+    return entry_point(_move, (table, types.float64[:, ::1], *rest))

@@ -1,0 +1,175 @@
+"""Pinocchio's functions as native calls, without its Python bindings in between.
+
+The bindings convert arguments and results at each call: for an arm with seven joints
+that costs as much as the dynamics themselves. Here the very functions that the bindings
+call are found in Pinocchio's library by their C++ names, and the model and the data in
+its Python objects by Boost.Python's own registry. So there is one dynamics, and its
+results are the same to the last bit.
+
+What this relies on is looked at before the first call (`unknown_layout`). Where it is
+not as known, and without Numba, the bindings are called.
+"""
+
+import ctypes
+from collections.abc import Callable
+from functools import cache, partial
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from pinocchio import pinocchio_pywrap_default
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.kernels import PLAIN, kernel
+from hsp_control.common.native import FOREVER, NativeCall, Timed, bind, sequence
+from hsp_control.robot.matrix_view import matrix_view
+
+_MODEL = b"N9pinocchio8ModelTplIdLi0ENS_25JointCollectionDefaultTplEEE"
+_DATA = b"N9pinocchio7DataTplIdLi0ENS_25JointCollectionDefaultTplEEE"
+"""The C++ names of the types `pin.Model` and `pin.Data`."""
+
+# Of the templates, Pinocchio's library has those for Eigen::Ref<const VectorXd>.
+_TEMPLATE = "IdLi0ENS_25JointCollectionDefaultTplEN5Eigen3RefI"
+_IN_IMPL = "KNS3_6MatrixIdLin1ELi1ELi0ELin1ELi1EEELi0ENS3_11InnerStrideILi1EEEEE"
+_OUTSIDE = "KNS2_6MatrixIdLin1ELi1ELi0ELin1ELi1EEELi0ENS2_11InnerStrideILi1EEEEE"
+_NAMES = {
+    "jacobians": (
+        f"_ZN9pinocchio4impl34computeJointJacobiansTimeVariation{_TEMPLATE}{_IN_IMPL}"
+        "SA_EERKNS_7DataTplIT_XT0_ET1_E8Matrix6xERKNS_8ModelTplISC_XT0_ESD_EERSE_"
+        "RKNS3_10MatrixBaseIT2_EERKNSN_IT3_EE"
+    ),
+    "rnea": (
+        f"_ZN9pinocchio4impl4rnea{_TEMPLATE}{_IN_IMPL}"
+        "SA_SA_EERKNS_7DataTplIT_XT0_ET1_E17TangentVectorTypeERKNS_8ModelTplISC_XT0_"
+        "ESD_EERSE_RKNS3_10MatrixBaseIT2_EERKNSN_IT3_EERKNSN_IT4_EE"
+    ),
+    "crba": (
+        f"_ZN9pinocchio4crba{_TEMPLATE}{_OUTSIDE}"
+        "EERKNS_7DataTplIT_XT0_ET1_E8MatrixXsERKNS_8ModelTplISB_XT0_ESC_EERSD_"
+        "RKNS2_10MatrixBaseIT2_EENS_10ConventionE"
+    ),
+    "aba": (
+        f"_ZN9pinocchio3aba{_TEMPLATE}{_OUTSIDE}"
+        "S9_S9_EERKNS_7DataTplIT_XT0_ET1_E17TangentVectorTypeERKNS_8ModelTplISB_XT0_"
+        "ESC_EERSD_RKNS2_10MatrixBaseIT2_EERKNSM_IT3_EERKNSM_IT4_EENS_10ConventionE"
+    ),
+}
+"""The C++ names of the functions; ``c++filt`` reads them."""
+
+_BINDINGS: dict[str, Callable[..., object]] = {
+    "jacobians": pin.computeJointJacobiansTimeVariation,
+    "rnea": pin.rnea,
+    "crba": pin.crba,
+    "aba": pin.aba,
+}
+
+_QUERY = "_ZN5boost6python9converter8registry5queryENS0_9type_infoE"
+_EXTRACT = (
+    "_ZN5boost6python9converter22get_lvalue_from_pythonEP7_objectRKNS1_12registrationE"
+)
+
+_LOCAL = int(pin.Convention.LOCAL)
+"""The bindings' default."""
+
+
+class _TypeName(ctypes.Structure):
+    """`boost::python::type_info`."""
+
+    _fields_ = (("name", ctypes.c_char_p),)
+
+
+@cache
+def _library() -> ctypes.CDLL:
+    """Return the module of the bindings: a look-up finds what it is linked to, too."""
+    return ctypes.CDLL(pinocchio_pywrap_default.__file__)
+
+
+def _address(name: str) -> int:
+    """Return the address of a function, 0 if there is none of this C++ name."""
+    try:
+        function = _library()[name]
+    except AttributeError:
+        return 0
+    return ctypes.cast(function, ctypes.c_void_p).value or 0
+
+
+def _object_address(owner: object, kind: bytes) -> int:
+    """Return where the C++ object of a Python object of Pinocchio is."""
+    query, extract = _library()[_QUERY], _library()[_EXTRACT]
+    query.argtypes, query.restype = [_TypeName], ctypes.c_void_p
+    extract.argtypes = [ctypes.py_object, ctypes.c_void_p]
+    extract.restype = ctypes.c_void_p
+    registration = query(_TypeName(kind))
+    return (registration and extract(owner, registration)) or 0
+
+
+def _reference(vector: Array) -> Array:
+    """Return an ``Eigen::Ref<const VectorXd>`` of a vector: its data and its size."""
+    words = np.zeros(8, dtype=np.int64)  # the rest is room for a copy, not made here
+    words[:2] = vector.ctypes.data, vector.size
+    return words
+
+
+def unknown() -> str:
+    """Return what keeps Pinocchio from being called natively, or nothing."""
+    if PLAIN:
+        return "kernels run as plain Python"
+    from hsp_control.common import adapters
+
+    if not adapters.AVAILABLE:
+        return "kernels are called one by one"
+    return _missing()
+
+
+@cache
+def _missing() -> str:
+    """Return which function the library has not, or nothing."""
+    for name in (*_NAMES.values(), _QUERY, _EXTRACT):
+        if not _address(name):
+            return f"Pinocchio {pin.__version__} has no function {name}"
+    return ""
+
+
+def bind_pinocchio(
+    what: str, model: pin.Model, data: pin.Data, *vectors: Array
+) -> Callable[[], object]:
+    """Return a call that computes from what these arrays then hold, into the data.
+
+    Args:
+        what: ``jacobians`` (q, v), into J and dJ; ``rnea`` (q, v, a), into tau;
+            ``crba`` (q), into M, both triangles; ``aba`` (q, v, tau), into ddq.
+        model: The model.
+        data: Its data.
+        vectors: The arrays, contiguous and of the model's sizes; they are kept.
+    """
+    if unknown():
+        return partial(_BINDINGS[what], model, data, *vectors)
+    addresses = _object_address(model, _MODEL), _object_address(data, _DATA)
+    if not all(addresses):
+        return partial(_BINDINGS[what], model, data, *vectors)
+    return _native(what, addresses, (model, data, *vectors))
+
+
+def _native(
+    what: str, addresses: tuple[int, int], arguments: tuple[Any, ...]
+) -> NativeCall:
+    _, data, *vectors = arguments
+    references = [_reference(vector) for vector in vectors]
+    words = [*addresses, *(words.ctypes.data for words in references)]
+    if what in ("crba", "aba"):
+        words.append(_LOCAL)
+    recipe = bind_pinocchio, (what, *arguments)
+    call = NativeCall.of_function(_address(_NAMES[what]), words, recipe)
+    call.kept = references
+    if what == "crba":  # writes one triangle
+        both = bind(_mirror, matrix_view(data.M))
+        return sequence([Timed(each, *FOREVER) for each in (call, both)], 0.0)
+    return call
+
+
+@kernel
+def _mirror(M: Array) -> None:
+    """Copy the upper triangle of a matrix to the lower one."""
+    for i in range(M.shape[0]):
+        for j in range(i):
+            M[i, j] = M[j, i]

@@ -1,0 +1,100 @@
+"""Check native calls of Pinocchio against its Python bindings, to the last bit."""
+
+import copy
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from numpy.typing import NDArray
+from robot_cases import ROBOTS, assert_equal_terms, draw, everything
+
+from hsp_control.common.kernels import PLAIN
+from hsp_control.common.native import NativeCall
+from hsp_control.robot import pinocchio_calls
+from hsp_control.robot.pinocchio_calls import bind_pinocchio
+
+Array = NDArray[np.float64]
+
+compiled = pytest.mark.skipif(PLAIN, reason="plain Python has no native calls")
+
+
+def both(
+    what: str, model: pin.Model, *vectors: Array
+) -> tuple[pin.Data, pin.Data, Any]:
+    """Return the data after the native call and after the bindings', and the call."""
+    native, bound = model.createData(), model.createData()
+    call = bind_pinocchio(what, model, native, *vectors)
+    call()
+    pinocchio_calls._BINDINGS[what](model, bound, *vectors)
+    return native, bound, call
+
+
+@compiled
+@pytest.mark.parametrize("case", ROBOTS)
+def test_native_calls_equal_the_bindings(case: str) -> None:
+    """And they read the arrays anew each time: the second state is another one."""
+    robot, q, v, rng = draw(case, seed=21)
+    a, model = rng.standard_normal(robot.nv), robot.model
+    calls = {
+        "jacobians": ((q, v), ("J", "dJ", "ov")),
+        "rnea": ((q, v, a), ("tau",)),
+        "crba": ((q,), ("M",)),
+    }
+    if not robot.mimics:
+        calls["aba"] = ((q, v, a), ("ddq",))
+    for what, (vectors, results) in calls.items():
+        native, bound, call = both(what, model, *vectors)
+        assert isinstance(call, NativeCall), pinocchio_calls.unknown()
+        for name in results:
+            np.testing.assert_array_equal(
+                np.array(getattr(native, name)), np.array(getattr(bound, name))
+            )
+        q[:], v[:] = robot.random_configuration(rng), rng.standard_normal(robot.nv)
+        a[:] = rng.standard_normal(robot.nv)
+        call()
+        again = model.createData()
+        pinocchio_calls._BINDINGS[what](model, again, *vectors)
+        for name in results[-1:]:
+            found, expected = getattr(native, name), getattr(again, name)
+            np.testing.assert_array_equal(np.array(found), np.array(expected))
+
+
+@compiled
+def test_a_copied_call_computes_into_its_own_data() -> None:
+    """A copy has its own model, data and arrays; the first call's stay as they are."""
+    robot, q, v, rng = draw("panda", seed=22)
+    native, bound, call = both("rnea", robot.model, q, v, rng.standard_normal(robot.nv))
+    copied = copy.deepcopy(call)
+    q[:] = robot.random_configuration(rng)
+    copied()
+    np.testing.assert_array_equal(native.tau, bound.tau)
+    what, _, own, *_ = copied.recipe[1]
+    assert what == "rnea"
+    np.testing.assert_array_equal(own.tau, bound.tau)
+
+
+@pytest.fixture
+def no_library(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Let Pinocchio's library have none of the functions."""
+    monkeypatch.setattr(pinocchio_calls, "_address", lambda name: 0)
+    pinocchio_calls._missing.cache_clear()
+    yield
+    pinocchio_calls._missing.cache_clear()
+
+
+@pytest.mark.parametrize("case", ["panda", "solo12"])
+def test_without_the_functions_the_bindings_are_called(
+    case: str, request: pytest.FixtureRequest
+) -> None:
+    """The same terms to the last bit, and the reason names what is missing."""
+    robot, q, v, _ = draw(case, seed=23)
+    frame = robot.frame_names[-1]
+    expected = everything(robot.state(0.0, q, v), frame)
+    request.getfixturevalue("no_library")
+    state = robot.state(0.0, q, v)
+    assert not isinstance(state._compute_jacobians, NativeCall)
+    if not PLAIN:
+        assert "computeJointJacobiansTimeVariation" in pinocchio_calls.unknown()
+    assert_equal_terms(everything(state, frame), expected)
