@@ -20,6 +20,7 @@ from hsp_control.plans.pendulum import (
     Phase,
     dcm_of,
     error_after,
+    in_step,
     plan_dcm,
 )
 from hsp_control.plans.plan import RunningPlan
@@ -50,6 +51,8 @@ _SHORTEST = 0.55
 """The shortest swing that an adjustment may choose, in swings [-]."""
 _LONGEST = 1.25
 """The longest one, in swings [-]."""
+_SHIFTS = 0.5, 2.0
+"""The shortest and the longest shift of the weight after a step, in those planned."""
 _CALM = 0.02
 """Error of the divergent component with which a walk that was held goes on [m]."""
 
@@ -241,14 +244,20 @@ class RunningWalk(RunningPlan):
         Across the standing foot no leg can step: a divergent component that is still
         within both soles, but would leave the one, is brought back where it is.
         """
-        swing, standing = self.walk.swing, self._feet[-self._side]
+        swing = self.walk.swing
         window = _SHORTEST * swing, _LONGEST * swing
         left = self._best_step(0.0, swing, window).left
-        local = standing.place.local(standing.place.point + left)
+        return self._is_too_far(left) and self._is_within(self._soles(1.0))
+
+    def _is_too_far(self, left: Array) -> bool:
+        """Return whether the sole of the next step cannot hold an error, (2,) [m]."""
+        standing = self._feet[-self._side].place
         reach = self.walk.margin * self._feet[self._side].reach
-        if (np.abs(local) <= reach).all():
-            return False
-        return bool((nearest_inside(self._soles(1.0), self._dcm) == self._dcm).all())
+        return bool((np.abs(standing.local(standing.point + left)) > reach).any())
+
+    def _is_within(self, corners: Array) -> bool:
+        """Return whether the divergent component is in a polygon, (m, 2) [m]."""
+        return bool((nearest_inside(corners, self._dcm) == self._dcm).all())
 
     def _hold(self, t: float) -> None:
         """Keep both feet on the ground, and bring the mass back between them."""
@@ -257,6 +266,20 @@ class RunningWalk(RunningPlan):
         self._now, self._held = Velocity(0.0, 0.0, 0.0), True
         self._stand(t)
         self._hull = self._soles(1.0)  # as far as they reach
+
+    def _put_down(self, t: float) -> None:
+        """Stand on one foot, and put the other one down where it is."""
+        assert self._swing is not None
+        foot, standing = self._feet[self._side], self._feet[-self._side]
+        self._now, self._held = Velocity(0.0, 0.0, 0.0), True
+        x, y = self._state.position(foot.frame)[:2].tolist()
+        here = foot.place_of(Footstep(x, y, foot.place.yaw))
+        place = self._stance.kept(standing.place, self._side, here)
+        end = t + 0.5 * self.walk.swing
+        self._swing.redirect(t, foot.origin_of(place), end)
+        rest = standing.place.point
+        self._follow(t, [Phase(1.0, rest, rest)], [True])
+        self._hull = standing.corners(1.0)  # as far as it reaches
 
     def _is_calm(self) -> bool:
         """Return whether a walk that was held may go on."""
@@ -304,12 +327,16 @@ class RunningWalk(RunningPlan):
         foot.contact.throw(True, t, LANDING * walk.double_support)
         foot.task.throw(False, t)
         foot.stand(self._state)
-        self._taken += 1
         self._swing, self._mode = None, "double"
+        if self._held:  # it was put down; it swings again later
+            self._stand(t)
+            self._hull = self._soles(1.0)
+            return
+        self._taken += 1
         self._side = -self._side
         self._plan(t, [], walk.double_support, self._feet[self._side].place.point)
         if any(self._swings):
-            self._feet[self._side].contact.throw(False, t, walk.double_support)
+            self._feet[self._side].contact.throw(False, t, self._phases[0].duration)
 
     def _plan(self, t: float, before: list[Phase], shift: float, point: Array) -> None:
         """Plan the steps to come, from a phase on two feet on, until it stands.
@@ -326,8 +353,14 @@ class RunningWalk(RunningPlan):
         self._now = preview.velocity
         if preview.target is not None:
             self._target = preview.target
-        none = [False] * len(before)
-        self._follow(t, [*before, *preview.phases], [*none, *preview.swings])
+        phases, none = preview.phases, [False] * len(before)
+        if not before and self.walk.adjusts:
+            starts, (least, most) = plan_dcm(phases, self._frequency), _SHIFTS
+            bounds = least * phases[0].duration, most * phases[0].duration
+            phases[0] = in_step(
+                phases[0], starts[1], self._dcm, self._frequency, bounds
+            )
+        self._follow(t, [*before, *phases], [*none, *preview.swings])
 
     def _follow(self, t: float, phases: list[Phase], swings: list[bool]) -> None:
         """Follow phases from now on."""
@@ -347,7 +380,7 @@ class RunningWalk(RunningPlan):
         walk, swing = self.walk, self._swing
         phase, first = self._phases[self._index], self._dcm_starts[self._index]
         remaining = swing.end - t
-        if remaining < _COMMITTED:
+        if remaining < _COMMITTED or self._held:
             return
         since = t - self._times[self._index]
         planned = swing.start + walk.swing - t
@@ -363,6 +396,10 @@ class RunningWalk(RunningPlan):
         latest = swing.start + _LONGEST * walk.swing - t
         window = earliest, max(latest, earliest)
         chosen = self._best_step(since, planned, window)
+        standing = self._feet[-self._side]
+        if self._is_too_far(chosen.left) and self._is_within(standing.corners(1.0)):
+            self._put_down(t)
+            return
         swing.redirect(t, foot.origin_of(chosen.target), t + chosen.remaining)
 
     def _best_step(
