@@ -129,6 +129,7 @@ def sampled_loop(
             ).copy()
             if k == 0:
                 output, state = command.output, command.state
+                sent = float(output.status)
                 if not (t == state.t and _equal(state.q, q) and _equal(state.v, v)):
                     output = command.evaluate(t, q, v)
                 channels = command.log_channels()
@@ -136,6 +137,13 @@ def sampled_loop(
                     channels = {**channels, **plan.log_channels()}
                 for each in estimators:
                     channels = {**channels, **each.log_channels(q, v)}
+                if estimators:
+                    channels = {
+                        **channels,
+                        "estimate.status": LogChannel(
+                            sent, "-", "status of the step at the estimated state"
+                        ),
+                    }
                 yield Instant(state, output, tau, channels)
             if end == start:  # the last row
                 return
