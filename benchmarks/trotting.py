@@ -99,7 +99,9 @@ def said(robot: str, case: dict[str, Any], *, estimated: bool) -> str:
     ways = np.diff(points if case["plan"].get("turn") else points[[0, -1]], axis=0)
     mean = np.hypot(*ways.T).sum() / (0.3 * (len(points) - 1))
     stands = run["plan.phase"][-1] == 0 and np.abs(run.v[-1]).max() < 0.3
-    limited, relaxed = ((run["status"] == s).mean() for s in (2, 3))
+    # The law of the log is that at the true state, away from estimated references.
+    status = run["estimate.status" if estimated else "status"]
+    limited, relaxed = ((status == s).mean() for s in (2, 3))
     return (
         f"{'stands' if stands else 'does not stand'} | {mean:.2f} m/s | "
         f"{run['plan.steps'][-1]:.0f} swings | limited {100 * limited:.0f} %, relaxed "

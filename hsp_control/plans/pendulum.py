@@ -31,6 +31,10 @@ GRAVITY = 9.81
 """Gravity [m/s²]."""
 
 
+_DURATIONS = 201
+"""How many durations of a phase are compared."""
+
+
 class Phase(NamedTuple):
     """A time in which the repellent point moves on a line at constant speed.
 
@@ -85,6 +89,28 @@ def plan_dcm(phases: Sequence[Phase], frequency: float) -> list[Array]:
         last = phase.first_dcm(last, frequency)
         starts.append(last)
     return starts[::-1]
+
+
+def in_step(
+    phase: Phase, last: Array, dcm: Array, frequency: float, bounds: tuple[float, float]
+) -> Phase:
+    """Return a phase with the duration that fits where the DCM is when it begins.
+
+    A foot that lands early or late leaves the DCM beside its plan, but on its way: by
+    a duration that is as much longer or shorter the plan is in step again.
+
+    Args:
+        phase: The phase.
+        last: ξ(T), which is to be reached at its end, shape (2,) [m].
+        dcm: ξ where it begins, shape (2,) [m].
+        frequency: ω [1/s].
+        bounds: The shortest and the longest duration [s].
+    """
+    T = np.linspace(*bounds, _DURATIONS)[:, None]
+    m = (phase.end - phase.start) / (frequency * T)
+    first = phase.start + m + (last - phase.end - m) * np.exp(-frequency * T)
+    away = ((first - dcm) ** 2).sum(axis=1)
+    return phase._replace(duration=float(T[int(away.argmin()), 0]))
 
 
 def error_after(

@@ -1,4 +1,4 @@
-"""The convex hull of points of the ground, and its nearest point."""
+"""The convex hull of points of the ground: its nearest point, and ways out of it."""
 
 from collections.abc import Sequence
 
@@ -36,6 +36,25 @@ def nearest_inside(corners: Array, point: Array) -> Array:
     nearest = corners + shares[:, None] * edges
     distances = ((nearest - point) ** 2).sum(axis=1)
     return np.asarray(nearest[int(distances.argmin())])
+
+
+def last_inside(corners: Array, start: Array, end: Array) -> Array:
+    """Return the last point of a way that is in a convex polygon, shape (2,).
+
+    Args:
+        corners: The corners, anticlockwise, shape (m, 2) [m].
+        start: Where the way begins, in the polygon, shape (2,) [m].
+        end: Where it ends, shape (2,) [m].
+    """
+    edges = np.roll(corners, -1, axis=0) - corners
+    way, away = end - start, start - corners
+    # How far each edge is to the right of the start, and how fast the way goes there.
+    room = np.maximum(edges[:, 0] * away[:, 1] - edges[:, 1] * away[:, 0], 0.0)
+    rate = edges[:, 1] * way[0] - edges[:, 0] * way[1]
+    leaves = rate > room
+    if not leaves.any():
+        return end
+    return np.asarray(start + (room[leaves] / rate[leaves]).min() * way)
 
 
 def _chain(points: Sequence[tuple[float, ...]]) -> list[tuple[float, ...]]:

@@ -39,10 +39,12 @@ class Adjustment(NamedTuple):
     Attributes:
         target: Where the foot lands.
         remaining: Time until it does [s].
+        left: What error of the divergent component is left then, shape (2,) [m].
     """
 
     target: Footstep
     remaining: float
+    left: Array
 
 
 def shift_gain(frequency: float, double_support: float) -> float:
@@ -77,7 +79,7 @@ def adjust(
         allowed: The nearest place that the legs reach.
     """
     times = np.append(np.linspace(*window, _TIMES), remaining)
-    best, least = Adjustment(planned, remaining), np.inf
+    best, least = Adjustment(planned, remaining, np.zeros(2)), np.inf
     share = WEIGHT_DCM * shift / (1.0 + WEIGHT_DCM * shift * shift)
     for T in times.tolist():
         missing = dcm_at(T) - wanted
@@ -91,5 +93,5 @@ def adjust(
             + WEIGHT_TIME * (T - remaining) ** 2
         )
         if cost < least:
-            best, least = Adjustment(place, T), cost
+            best, least = Adjustment(place, T, left), cost
     return best

@@ -17,6 +17,10 @@ READY = 0.2
 """Time on four feet before the first swing; the body waits for it [s]."""
 LEASH = 0.1
 """How far the reference may be from the centre of mass [m]."""
+RETURN = 1.0
+"""Rate at which it returns to its line [1/s]."""
+RETURN_SPEED = 0.1
+"""How fast it returns at most [m/s]."""
 CLOSING = 2
 """Swings without velocity before it stands, which bring the feet below the hips."""
 _COMMITTED = 0.05
@@ -36,6 +40,7 @@ class RunningTrot(RunningQuadruped):
         self._time_constant = float(np.sqrt((mass[2] - lowest) / GRAVITY))
         self._check_stride(state, 0.5 * (self.gait.swing + 2.0 * self.gait.stance))
         self._reference: Array = mass[:2].copy()
+        self._line: Array = mass[:2].copy()
         self._since = state.t
         self._mode: Mode = "standing"
         self._swings, self._idle = 0, 0
@@ -76,7 +81,7 @@ class RunningTrot(RunningQuadruped):
         acceleration = self._drive(t)
         self._go_on(measured)
         self._place(t)
-        self._body.write(t, self._reference, self._world_velocity(), acceleration)
+        self._body.write(t, self._reference, self._wanted(), acceleration)
 
     def _drive(self, t: float) -> Array:
         """Advance velocity and reference; return the acceleration [m/s²]."""
@@ -86,12 +91,29 @@ class RunningTrot(RunningQuadruped):
         before = self._world_velocity()
         self._accelerate(t)
         now = self._world_velocity()
-        self._reference = self._reference + 0.5 * h * (before + now)
+        self._reference = self._reference + 0.5 * h * (before + now) + h * self._back()
+        self._line = self._line + 0.5 * h * (before + now)
         away = self._state.centroidal.position[:2] - self._reference
         far = float(np.hypot(*away))
         if far > LEASH:  # somebody pushes it: the reference comes along
-            self._reference = self._reference + away * (1.0 - LEASH / far)
+            pulled = away * (1.0 - LEASH / far)
+            self._reference = self._reference + pulled
+            speed = float(np.hypot(*now))
+            if speed > 0.0:  # what it lost along its line, it does not make up for
+                pulled = now * float(now @ pulled) / speed**2
+            self._line = self._line + pulled
         return (now - before) / h
+
+    def _back(self) -> Array:
+        """Return the velocity back to the line from which it was pushed (2,) [m/s]."""
+        off = self._line - self._reference
+        return np.asarray(off * min(RETURN, RETURN_SPEED / max(np.hypot(*off), 1e-12)))
+
+    def _wanted(self) -> Array:
+        """Return the velocity of the reference, shape (2,) [m/s]."""
+        if self._mode in {"standing", "ready"}:
+            return self._world_velocity()
+        return np.asarray(self._world_velocity() + self._back())
 
     def _go_on(self, measured: Measurement) -> None:
         t, trot = measured.t, self.gait
@@ -128,7 +150,7 @@ class RunningTrot(RunningQuadruped):
     def _place(self, t: float) -> None:
         """Let the feet that swing go to where the body will be."""
         mass, trot = self._state.centroidal, self.gait
-        velocity, wanted = mass.velocity[:2], self._world_velocity()
+        velocity, wanted = mass.velocity[:2], self._wanted()
         axes = Footstep(0.0, 0.0, self._yaw)
         for foot in self._pair:
             swing = foot.swing

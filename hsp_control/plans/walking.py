@@ -1,6 +1,7 @@
 """A biped that walks: one run, from phase to phase."""
 
 from collections.abc import Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -19,12 +20,13 @@ from hsp_control.plans.pendulum import (
     Phase,
     dcm_of,
     error_after,
+    in_step,
     plan_dcm,
 )
 from hsp_control.plans.plan import RunningPlan
-from hsp_control.plans.polygon import convex_hull, nearest_inside
+from hsp_control.plans.polygon import convex_hull, last_inside, nearest_inside
 from hsp_control.plans.quintic import at_rest, to_rest
-from hsp_control.plans.step_adjustment import adjust, shift_gain
+from hsp_control.plans.step_adjustment import Adjustment, adjust, shift_gain
 from hsp_control.plans.step_planner import StepPlanner, stance_of
 from hsp_control.plans.swing import Swing, turned
 from hsp_control.robot import RobotState
@@ -49,6 +51,10 @@ _SHORTEST = 0.55
 """The shortest swing that an adjustment may choose, in swings [-]."""
 _LONGEST = 1.25
 """The longest one, in swings [-]."""
+_SHIFTS = 0.5, 2.0
+"""The shortest and the longest shift of the weight after a step, in those planned."""
+_CALM = 0.02
+"""Error of the divergent component with which a walk that was held goes on [m]."""
 
 Mode = Literal["standing", "double", "single"]
 
@@ -191,7 +197,7 @@ class RunningWalk(RunningPlan):
         )
         frames = feet[0].frame, feet[1].frame
         self._falling = FallDetector(self._trunk_frame, frames, state)
-        self._taken, self._side = 0, 1.0
+        self._taken, self._side, self._held = 0, 1.0, False
         self._now = Velocity(0.0, 0.0, 0.0)
         self._swing: Swing | None = None
         self._dcm = self._dcm_wanted = self._point = self._middle()
@@ -213,12 +219,15 @@ class RunningWalk(RunningPlan):
                 break  # a swing ends when the foot has landed
             self._index += 1
             if self._mode == "double" and self._swings[self._index]:
-                self._lift_off(t)
+                if self.walk.adjusts and self._is_to_hold():
+                    self._hold(t)
+                else:
+                    self._lift_off(t)
         if self._mode == "single":
             if self._has_landed(measured):
                 self._land(t)
         elif self._mode == "standing":
-            if self._planner.sets_out(t, self._taken):
+            if self._is_calm() and self._planner.sets_out(t, self._taken):
                 self._set_out(t)
         elif self._index + 1 == len(self._phases):
             self._mode = "standing"
@@ -230,12 +239,63 @@ class RunningWalk(RunningPlan):
 
     def _set_out(self, t: float) -> None:
         """Shift the weight for the first step."""
-        self._side = self._planner.first_side(t, self._taken)
+        if not self._held:  # else it goes on with the foot that was to swing
+            self._side = self._planner.first_side(t, self._taken)
+        self._held = False
         ready, shift = FIRST_SHIFT
         middle = self._middle()
         self._mode = "double"
         self._plan(t, [Phase(ready, middle, middle)], shift, middle)
         self._feet[self._side].contact.throw(False, t + ready, shift)
+
+    def _is_to_hold(self) -> bool:
+        """Return whether both soles hold a push that one sole and a step do not.
+
+        Across the standing foot no leg can step: a divergent component that is still
+        within both soles, but would leave the one, is brought back where it is.
+        """
+        swing = self.walk.swing
+        window = _SHORTEST * swing, _LONGEST * swing
+        left = self._best_step(0.0, swing, window).left
+        return self._is_too_far(left) and self._is_within(self._soles(1.0))
+
+    def _is_too_far(self, left: Array) -> bool:
+        """Return whether the sole of the next step cannot hold an error, (2,) [m]."""
+        standing = self._feet[-self._side].place
+        reach = self.walk.margin * self._feet[self._side].reach
+        return bool((np.abs(standing.local(standing.point + left)) > reach).any())
+
+    def _is_within(self, corners: Array) -> bool:
+        """Return whether the divergent component is in a polygon, (m, 2) [m]."""
+        return bool((nearest_inside(corners, self._dcm) == self._dcm).all())
+
+    def _hold(self, t: float) -> None:
+        """Keep both feet on the ground, and bring the mass back between them."""
+        foot = self._feet[self._side]
+        foot.contact.throw(True, t, LANDING * self.walk.double_support)
+        self._now, self._held = Velocity(0.0, 0.0, 0.0), True
+        self._stand(t)
+        self._hull = self._soles(1.0)  # as far as they reach
+
+    def _put_down(self, t: float) -> None:
+        """Stand on one foot, and put the other one down where it is."""
+        assert self._swing is not None
+        foot, standing = self._feet[self._side], self._feet[-self._side]
+        self._now, self._held = Velocity(0.0, 0.0, 0.0), True
+        x, y = self._state.position(foot.frame)[:2].tolist()
+        here = foot.place_of(Footstep(x, y, foot.place.yaw))
+        place = self._stance.kept(standing.place, self._side, here)
+        end = t + 0.5 * self.walk.swing
+        self._swing.redirect(t, foot.origin_of(place), end)
+        rest = standing.place.point
+        self._follow(t, [Phase(1.0, rest, rest)], [True])
+        self._hull = standing.corners(1.0)  # as far as it reaches
+
+    def _is_calm(self) -> bool:
+        """Return whether a walk that was held may go on."""
+        if not self._held:
+            return True
+        return float(np.abs(self._dcm - self._dcm_wanted).max()) < _CALM
 
     def _lift_off(self, t: float) -> None:
         """Let the foot swing that bears no more."""
@@ -277,12 +337,16 @@ class RunningWalk(RunningPlan):
         foot.contact.throw(True, t, LANDING * walk.double_support)
         foot.task.throw(False, t)
         foot.stand(self._state)
-        self._taken += 1
         self._swing, self._mode = None, "double"
+        if self._held:  # it was put down; it swings again later
+            self._stand(t)
+            self._hull = self._soles(1.0)
+            return
+        self._taken += 1
         self._side = -self._side
         self._plan(t, [], walk.double_support, self._feet[self._side].place.point)
         if any(self._swings):
-            self._feet[self._side].contact.throw(False, t, walk.double_support)
+            self._feet[self._side].contact.throw(False, t, self._phases[0].duration)
 
     def _plan(self, t: float, before: list[Phase], shift: float, point: Array) -> None:
         """Plan the steps to come, from a phase on two feet on, until it stands.
@@ -299,8 +363,14 @@ class RunningWalk(RunningPlan):
         self._now = preview.velocity
         if preview.target is not None:
             self._target = preview.target
-        none = [False] * len(before)
-        self._follow(t, [*before, *preview.phases], [*none, *preview.swings])
+        phases, none = preview.phases, [False] * len(before)
+        if not before and self.walk.adjusts:
+            starts, (least, most) = plan_dcm(phases, self._frequency), _SHIFTS
+            bounds = least * phases[0].duration, most * phases[0].duration
+            phases[0] = in_step(
+                phases[0], starts[1], self._dcm, self._frequency, bounds
+            )
+        self._follow(t, [*before, *phases], [*none, *preview.swings])
 
     def _follow(self, t: float, phases: list[Phase], swings: list[bool]) -> None:
         """Follow phases from now on."""
@@ -310,53 +380,78 @@ class RunningWalk(RunningPlan):
         # A control period that begins a rounding error early belongs to the next phase.
         self._times = t + np.cumsum(durations) - 1e-9
         self._index = 0
-        self._hull = self._soles()
+        self._hull = self._soles(self.walk.margin)
 
     # -- feedback ---------------------------------------------------------------------
 
     def _adjust(self, t: float) -> None:
         """Move the step, in place and in time, if the sole cannot hold a push."""
         assert self._swing is not None
-        walk, swing, phase = self.walk, self._swing, self._phases[self._index]
+        walk, swing = self.walk, self._swing
+        phase, first = self._phases[self._index], self._dcm_starts[self._index]
         remaining = swing.end - t
-        if remaining < _COMMITTED:
+        if remaining < _COMMITTED or self._held:
             return
-        standing, reaches = self._feet[-self._side], self._feet[-self._side].reach
-        frequency, gain = self._frequency, walk.feedback
         since = t - self._times[self._index]
-        first = self._dcm_starts[self._index]
-        wanted = phase.dcm(first, since, frequency)
-        error = standing.place.local(standing.place.point + self._dcm - wanted)
-
-        def dcm_at(T: float) -> Array:
-            left = [
-                error_after(float(e), T, frequency, gain, walk.margin * r)
-                for e, r in zip(error, reaches, strict=True)
-            ]
-            axes = standing.place.world(np.array(left)) - standing.place.point
-            return np.asarray(phase.dcm(first, since + T, frequency) + axes)
-
         planned = swing.start + walk.swing - t
-        landing = phase.dcm(first, since + planned, frequency)
         # What the swing foot goes to now, after earlier adjustments.
         foot = self._feet[self._side]
         now = foot.place_of(swing.target)
-        shift = shift_gain(frequency, walk.double_support)
+        shift = shift_gain(self._frequency, walk.double_support)
+        landing = phase.dcm(first, since + planned, self._frequency)
         needed = landing + shift * (now.point - self._target.point)
-        if float(np.abs(dcm_at(remaining) - needed).max()) < _DEADBAND:
+        if float(np.abs(self._dcm_after(since, remaining) - needed).max()) < _DEADBAND:
             return
         earliest = max(swing.start + _SHORTEST * walk.swing - t, _COMMITTED)
         latest = swing.start + _LONGEST * walk.swing - t
-        chosen = adjust(
+        window = earliest, max(latest, earliest)
+        chosen = self._best_step(since, planned, window)
+        standing = self._feet[-self._side]
+        if self._is_too_far(chosen.left) and self._is_within(standing.corners(1.0)):
+            self._put_down(t)
+            return
+        swing.redirect(t, foot.origin_of(chosen.target), t + chosen.remaining)
+
+    def _best_step(
+        self, since: float, planned: float, window: tuple[float, float]
+    ) -> Adjustment:
+        """Return where and when the swing foot is to land.
+
+        Args:
+            since: The present time, from when the swing was to begin [s].
+            planned: The time until the foot was to land [s].
+            window: The earliest and the latest touchdown from now [s].
+        """
+        standing, phase = self._feet[-self._side].place, self._phases[self._index]
+        first = self._dcm_starts[self._index]
+        return adjust(
             self._target,
             planned,
-            (earliest, max(latest, earliest)),
-            dcm_at,
-            landing,
-            shift,
-            lambda place: self._stance.kept(standing.place, self._side, place),
+            window,
+            partial(self._dcm_after, since),
+            phase.dcm(first, since + planned, self._frequency),
+            shift_gain(self._frequency, self.walk.double_support),
+            lambda place: self._stance.kept(standing, self._side, place),
         )
-        swing.redirect(t, foot.origin_of(chosen.target), t + chosen.remaining)
+
+    def _dcm_after(self, since: float, T: float) -> Array:
+        """Return what the divergent component will be, with feedback within the sole.
+
+        Args:
+            since: The present time, from when the swing was to begin [s].
+            T: Time from now, at most until touchdown [s].
+        """
+        standing, walk = self._feet[-self._side], self.walk
+        phase, frequency = self._phases[self._index], self._frequency
+        first = self._dcm_starts[self._index]
+        wanted = phase.dcm(first, since, frequency)
+        error = standing.place.local(standing.place.point + self._dcm - wanted)
+        left = [
+            error_after(float(e), T, frequency, walk.feedback, walk.margin * r)
+            for e, r in zip(error, standing.reach, strict=True)
+        ]
+        axes = standing.place.world(np.array(left)) - standing.place.point
+        return np.asarray(phase.dcm(first, since + T, frequency) + axes)
 
     def _write(self, t: float, position: Array, velocity: Array) -> None:
         """Write the references of this period."""
@@ -369,7 +464,10 @@ class RunningWalk(RunningPlan):
         point = phase.point(since)
         displaced = (1.0 + gain / frequency) * (self._dcm - wanted)
         self._dcm_wanted = wanted
-        self._point = nearest_inside(self._hull, point + displaced)
+        if self._mode == "single":  # along and across the sole, each for itself
+            self._point = nearest_inside(self._hull, point + displaced)
+        else:  # the error goes straight to zero, wherever it is in the hull
+            self._point = last_inside(self._hull, point, point + displaced)
         height, yaw = self._sinking.sample(t), self._yaw.sample(t)
         acceleration = frequency**2 * (position[:2] - self._point)
         self._body.write(
@@ -390,8 +488,9 @@ class RunningWalk(RunningPlan):
             foot.position.write(t, *self._swing.position(t))
             foot.orientation.write(t, *self._swing.orientation(t))
 
-    def _soles(self) -> Array:
-        corners = [each.corners(self.walk.margin) for each in self._feet.values()]
+    def _soles(self, share: float) -> Array:
+        """Return the corners of a share of both soles, shape (m, 2) [m]."""
+        corners = [each.corners(share) for each in self._feet.values()]
         return convex_hull(np.vstack(corners))
 
     @property

@@ -93,6 +93,7 @@ class ControlChain(Generic[Source_co]):
         self._plan, self._estimators = plan, tuple(estimators)
         self._estimating: list[RunningEstimator] = []
         self.plan: RunningPlan | None = None
+        self._status = 0.0
 
     @property
     def needs_sensors(self) -> bool:
@@ -140,7 +141,10 @@ class ControlChain(Generic[Source_co]):
             self.plan.update(measured)
         given = measured.t, measured.q, measured.v, period
         felt = (measured.wrenches,) if self._feels else ()
-        return self.command.effort(*given, *felt)
+        tau = self.command.effort(*given, *felt)
+        if self._estimating:
+            self._status = float(self.command.output.status)
+        return tau
 
     def log_channels(self, q: Array, v: Array) -> Mapping[str, LogChannel]:
         """Return what the command, the plan and the estimators log, by name.
@@ -154,6 +158,12 @@ class ControlChain(Generic[Source_co]):
             channels = {**channels, **self.plan.log_channels()}
         for each in self._estimating:
             channels = {**channels, **each.log_channels(q, v)}
+        if self._estimating:
+            # The law that is logged is that at the true state.
+            status = LogChannel(
+                self._status, "-", "status of the step at the estimated state"
+            )
+            channels = {**channels, "estimate.status": status}
         return channels
 
     @property

@@ -1,6 +1,7 @@
 """Robots walk and trot on an estimated base, with a noisy unit, on MuJoCo."""
 
 import re
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import yaml
 from places import ROOT
 
 from hsp_control import load_experiment
+from hsp_control.control.compensation import Command
 
 pytest.importorskip("example_robot_data")
 pytest.importorskip("mujoco")
@@ -40,11 +42,22 @@ def test_talos_takes_a_step_on_an_estimated_base():
 @pytest.mark.slow
 def test_solo_trots_on_an_estimated_base_and_again_the_same(tmp_path):
     given = ("estimators.base=true", "plan.until=0.6", "simulation.duration=1.2")
-    run = load_experiment("whole_body/solo12_trot", *given).run()
+    effort, sent = Command.effort, []
+
+    def spy(command, t, *rest):
+        tau = effort(command, t, *rest)
+        sent.append(float(command.output.status))
+        return tau
+
+    with patch.object(Command, "effort", spy):
+        run = load_experiment("whole_body/solo12_trot", *given).run()
     assert run.status == "completed"
     assert run["plan.steps"][-1] >= 3
     assert largest(run, "velocity_error") < 0.08
     assert largest(run, "rotation_error") < 0.03
+    # The status of what was sent is not that of the law at the true state.
+    assert np.array_equal(run["estimate.status"], sent[:: len(sent) // len(run.t)])
+    assert (run["estimate.status"] != run["status"]).any()
     again = load_experiment(run.save(tmp_path / "trot.npz")).run()
     assert np.array_equal(run.q, again.q)
     assert np.array_equal(run["estimate.base"], again["estimate.base"])

@@ -46,6 +46,19 @@ def test_diagonal_feet_swing_together_and_the_others_bear():
             assert (aloft > 0.7) if foot in swinging else (aloft < 0.1)
 
 
+def test_it_returns_to_its_line_after_a_push():
+    """Across it; what it loses along it, it does not make up for."""
+    push = "{frame: base_link, force: [-4, 8, 0], start: 1, duration: 0.1}"
+    settings = f"plant.pushes=[{push}]", "plan.until=4.4", "simulation.duration=4.8"
+    run = load_experiment("whole_body/solo12_trot", *settings).run()
+    assert run.status == "completed"
+    beside = run.q[:, 1]
+    assert beside.max() > 0.12  # farther than the reference lets it go
+    assert np.abs(beside[run.t > 4.2]).max() < 0.03
+    fast = (run.t > 2.5) & (run.t < 3.5)
+    assert np.ptp(run.q[fast, 0]) == pytest.approx(0.3, abs=0.05)
+
+
 def test_its_velocity_changes_no_faster_than_it_may():
     run = trot()
     rates = np.diff(run["plan.velocity"], axis=0) / np.diff(run.t)[:, None]

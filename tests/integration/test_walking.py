@@ -155,6 +155,29 @@ def test_a_push_that_fells_is_said():
     assert run.t[-1] < 2.0
 
 
+def test_a_push_that_one_sole_does_not_hold_is_held_by_both():
+    """To the left, just before the right foot swings, which cannot step across."""
+    push = "{frame: torso_2_link, force: [0, 200, 0], start: 1.62, duration: 0.1}"
+    settings = (f"plant.pushes=[{push}]", "simulation.duration=4.1")
+    run = load_experiment("whole_body/talos_walk", *settings).run()
+    assert run.status == "completed"
+    phase, t = run["plan.phase"], run.t
+    begins = t[np.flatnonzero(np.diff(phase)) + 1]
+    held = (t > 1.8) & (phase == 0.0)
+    assert held.any()
+    assert run["plan.steps"][held].max() == 1
+    assert (run["contact.right_foot.weight"][held][20:] == 1.0).all()
+    left = run["task.left_foot.actual"][held]
+    outer_edge = left[0, 1] + 0.05
+    dcm = run["plan.dcm"][held]
+    assert dcm[0, 1] == pytest.approx(outer_edge, abs=0.01)  # one sole just holds it
+    # It is calm below 20 mm, a row later.
+    assert np.abs(dcm[-1] - run["plan.dcm_reference"][held][-1]).max() < 0.022
+    # It goes on with the foot that was to swing.
+    assert phase[-1] == 3.0
+    assert begins[-1] > t[held][-1] + 0.5
+
+
 def test_the_page_s_yaml_and_python_run():
     text = (ROOT / "docs" / "plans.md").read_text(encoding="utf-8")
     yaml_text, felt = re.findall(r"^```yaml\n(.*?)^```", text, re.MULTILINE | re.DOTALL)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hsp_control.plans.pendulum import Phase, dcm_of, error_after, plan_dcm
+from hsp_control.plans.pendulum import Phase, dcm_of, error_after, in_step, plan_dcm
 
 W = 3.3
 H = 1e-6
@@ -87,3 +87,21 @@ def test_feedback_within_the_sole_is_a_task_with_these_gains():
     ours = W**2 * (c - p - (1 + k / W) * error)
     e, e_dot = r - c, r_dot - c_dot
     assert ours == pytest.approx(W**2 * (r - p) + (W + k) * e_dot + W * k * e)
+
+
+def test_a_phase_takes_as_long_as_the_component_needs():
+    """A foot that lands 30 ms early or late changes how long the weight shifts."""
+    phase = Phase(0.15, np.array([0.48, -0.08]), np.array([0.74, 0.08]))
+    last = phase.end + np.array([0.03, -0.02])
+    for duration in (0.12, 0.15, 0.18):
+        there = phase._replace(duration=duration).first_dcm(last, W)
+        found = in_step(phase, last, there, W, (0.075, 0.3))
+        assert found.duration == pytest.approx(duration, abs=0.6 * 0.225 / 200)
+        assert np.array_equal(found.end, phase.end)
+        # What lies beside the way changes little: the nearest point counts.
+        along = there - phase._replace(duration=duration - 1e-3).first_dcm(last, W)
+        beside = 0.02 * np.array([-along[1], along[0]]) / np.linalg.norm(along)
+        found = in_step(phase, last, there + beside, W, (0.075, 0.3))
+        assert found.duration == pytest.approx(duration, abs=0.01)
+    far = in_step(phase, last, phase.start - 10.0, W, (0.075, 0.3))
+    assert far.duration == 0.3
