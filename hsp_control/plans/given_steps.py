@@ -76,7 +76,9 @@ class GivenSteps(StepPlanner):
         side: float,
         places: Mapping[float, Footstep],
     ) -> Next:
-        if taken >= len(self._steps) or self.stopping:
+        if self.stopping:  # the feet come beside each other
+            return super()._next(velocity, t, taken, side, places)
+        if taken >= len(self._steps):
             return Next(REST, None)
         # A push may have moved the foot that stands.
         kept = self._stance.kept(places[-side], side, self._steps[taken])

@@ -151,7 +151,8 @@ class RunningWalk(RunningPlan):
     def stop(self) -> None:
         """Stand with the feet beside each other; see `RunningPlan.stop`."""
         super().stop()
-        self._planner.stopping = True
+        if self._begun:
+            self._planner.stopping = True
 
     @property
     def rests(self) -> bool:
@@ -189,6 +190,7 @@ class RunningWalk(RunningPlan):
             self._planner = StepPlanner(walk, self._stance, robot)
         else:
             self._planner = GivenSteps(walk, self._stance, robot, places)
+        self._planner.stopping = self.stopping
         self._trunk_rotation = trunk.copy()
         self._first_yaw = between(feet[0].place, feet[1].place).yaw
         self._yaw = to_rest(at_rest([self._first_yaw]), [self._first_yaw], t, 1.0)

@@ -5,6 +5,7 @@ import pytest
 
 from hsp_control import Rollout, load_experiment
 from hsp_control.cli.main import main
+from hsp_control.sweeps.metrics import measures
 
 pytest.importorskip("mujoco")
 TWIST = "{frame: panda_hand, moment: [0, 0, -60], start: 0.05, duration: 0.1}"
@@ -64,6 +65,7 @@ def test_a_joint_beyond_its_limit_is_told(case, tmp_path, capsys):
     for row in range(1, 31):
         since = outside[10 * row - 9 : 10 * row + 1].max(axis=0)
         np.testing.assert_allclose(told[row], since, atol=1e-9)
+    assert measures(run)["position_excess.max"].value == told.max()
     run.save(tmp_path / "run.npz")
     assert Rollout.load(tmp_path / "run.npz")["position_excess"].max() == told.max()
     # The summary names it, and when.

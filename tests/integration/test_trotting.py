@@ -7,9 +7,6 @@ import numpy as np
 import pytest
 
 from hsp_control import Experiment, Rollout, Stream, TargetPosture, load_experiment
-from hsp_control.cli.bench import bench
-from hsp_control.cli.options.command_line import command_line
-from hsp_control.common.exceptions import ConfigError
 from hsp_control.plans import Trot
 from hsp_control.play import Session
 from hsp_control.play.playable import playable
@@ -107,9 +104,3 @@ def test_it_trots_where_it_can_be_touched():
     same = untouched.t.searchsorted(run.t[rows])
     assert untouched.t[same] == pytest.approx(run.t[rows])
     assert run.q[rows] == pytest.approx(untouched.q[same], abs=1e-12)
-
-
-def test_a_plan_is_no_part_of_what_bench_measures():
-    words = ["bench", "--latency", "whole_body/solo12_trot"]
-    with pytest.raises(ConfigError, match=r"^whole_body/solo12_trot: plan: bench"):
-        bench(command_line().parse_args(words))

@@ -117,8 +117,6 @@ def test_a_row_is_what_a_single_run_gives(swept: Sweep) -> None:
         "distance.point_distance.min": distance.min(),
         "effort.max": np.abs(rollout.tau).max(),
         "speed.max": np.abs(rollout.v).max(),
-        "position_excess.max": rollout["position_excess"].max(),
-        "velocity_excess.max": rollout["velocity_excess"].max(),
         "simulated_time": rollout.t[-1],
     }
     assert {name: swept[name][row] for name in expected} == expected

@@ -131,6 +131,27 @@ def test_a_regular_end_lets_the_plan_come_to_rest(by: str) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    "plan",
+    [
+        "plan={type: walk, speed: 0.3}",
+        "plan={type: walk, footsteps: [[0.2, 0.1, 0], [0.4, -0.1, 0], [0.6, 0.1, 0], "
+        "[0.8, -0.1, 0]], first: left}",
+    ],
+)
+def test_a_walk_that_is_stopped_brings_its_feet_together(plan: str) -> None:
+    experiment = hsp.load_experiment("whole_body/talos_walk", plan)
+    report, robot = live(experiment, duration=2.0)
+    assert report.ended == "completed", report.reason
+    assert report.at_rest
+    end = experiment.robot.state(0.0, robot.robot.q, robot.robot.v)
+    left, right = (end.position(f"{side}_sole_link") for side in ("left", "right"))
+    assert left[0] > 0.2, "it walked"
+    assert abs(left[0] - right[0]) < 0.02
+    assert robot.robot.q[2] > 0.9 * experiment.q0[2]
+
+
+@pytest.mark.slow
 def test_a_fall_is_found_said_and_ends_with_damped_joints() -> None:
     push = "{frame: base_link, moment: [6, 0, 0], start: 0.3, duration: 0.3}"
     shove = f"plant.pushes=[{push}]"
