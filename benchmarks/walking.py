@@ -47,16 +47,24 @@ def cases() -> Iterator[tuple[str, dict[str, Any]]]:
             {
                 "plan.steps": 8,
                 "simulation.duration": 10,
-                "plant.inertias": "{mass_factor: 1.05, random_mass: 0.1}",
-                "plant.seed": seed,
-            },
+            }
+            | other_masses(seed),
         )
     for phase, start in (("swing", 2.7), ("on two feet", 3.15)):
         for k in range(8):
             force = [PUSH * cos(k * pi / 4), PUSH * sin(k * pi / 4), 0.0]
             push = f"frame: torso_2_link, force: {force}, start: {start}, duration: 0.1"
             values = {"plan.steps": 6, "simulation.duration": 12}
-            yield f"push {phase}, {45 * k}°", values | {"plant.pushes": f"[{{{push}}}]"}
+            values |= {"plant.pushes": f"[{{{push}}}]"}
+            yield f"push {phase}, {45 * k}°", values
+            other = values | other_masses(0) | slippery()
+            yield f"push {phase}, {45 * k}°, other masses, friction 0.4", other
+
+
+def other_masses(seed: int) -> dict[str, Any]:
+    """Return a robot of other masses, of which the controller does not know."""
+    draw = "{mass_factor: 1.05, random_mass: 0.1}"
+    return {"plant.inertias": draw, "plant.seed": seed}
 
 
 def slippery() -> dict[str, Any]:

@@ -75,20 +75,23 @@ class Swing:
         """Return how much of the swing has passed at time t [s]."""
         return (t - self.start) / (self.end - self.start)
 
-    def redirect(self, t: float, target: Footstep, end: float) -> None:
+    def redirect(
+        self, t: float, target: Footstep, end: float, *, rises: bool = True
+    ) -> None:
         """Go on to another place, of the same yaw, and touch at another time.
 
         Args:
             t: The present time [s].
             target: Where the foot is to stand.
             end: When it is to touch [s].
+            rises: Whether it still rises to its full height, if there is time.
         """
         along, vertical = self._along.sample(t), self._vertical(t)
         self.target, self.end = target, end
         until = self.start + APPROACH * (end - self.start)
         self._along = to_rest(along, self._there, t, max(until - t, 0.05))
         apex = 0.5 * (self.start + end)
-        if apex - t > 0.05 and t < self._up.end:
+        if rises and apex - t > 0.05 and t < self._up.end:
             self._up = to_rest(vertical, [self._top], t, apex - t)
             self._down = self._descending(at_rest([self._top]), self._up.end)
         else:

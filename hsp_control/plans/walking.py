@@ -288,7 +288,7 @@ class RunningWalk(RunningPlan):
         here = foot.place_of(Footstep(x, y, foot.place.yaw))
         place = self._stance.kept(standing.place, self._side, here)
         end = t + 0.5 * self.walk.swing
-        self._swing.redirect(t, foot.origin_of(place), end)
+        self._swing.redirect(t, foot.origin_of(place), end, rises=False)
         rest = standing.place.point
         self._follow(t, [Phase(1.0, rest, rest)], [True])
         self._hull = standing.corners(1.0)  # as far as it reaches
