@@ -39,7 +39,7 @@ def unknown_layout() -> str:
     return ""
 
 
-def packed(arguments: tuple[Any, ...]) -> tuple[tuple[types.Type, ...], Array]:
+def packed(arguments: tuple[Any, ...]) -> tuple[tuple[types.Type, ...], Indices]:
     """Return the types of arguments, and what stands for them in memory."""
     words: list[int] = []
     kinds = tuple(_pack(argument, words) for argument in arguments)

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from hsp_control.common.arrays import Array
+from hsp_control.common.arrays import Indices
 from hsp_control.common.kernels import is_compiled
 
 FOREVER = -np.inf, np.inf
@@ -28,13 +28,15 @@ class NativeCall(partial[float]):
     Attributes:
         row: The addresses of the adapter and of the words, as `run` reads them.
         words: The packed arguments.
+        kept: What the arguments point to besides, if anything.
         recipe: A function and its arguments that make this call. It keeps the arrays
             alive, and copies and pickles use it to bind the copied arrays.
     """
 
     row: tuple[int, int]
-    words: Array
+    words: Indices
     recipe: tuple[Callable[..., Any], tuple[Any, ...]]
+    kept: object
 
     @classmethod
     def of(

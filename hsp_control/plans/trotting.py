@@ -81,7 +81,7 @@ class RunningTrot(RunningQuadruped):
         acceleration = self._drive(t)
         self._go_on(measured)
         self._place(t)
-        self._body.write(t, self._reference, self._wanted(), acceleration)
+        self._body.write(t, self._reference, self._reference_velocity(), acceleration)
 
     def _drive(self, t: float) -> Array:
         """Advance velocity and reference; return the acceleration [m/s²]."""
@@ -109,7 +109,7 @@ class RunningTrot(RunningQuadruped):
         off = self._line - self._reference
         return np.asarray(off * min(RETURN, RETURN_SPEED / max(np.hypot(*off), 1e-12)))
 
-    def _wanted(self) -> Array:
+    def _reference_velocity(self) -> Array:
         """Return the velocity of the reference, shape (2,) [m/s]."""
         if self._mode in {"standing", "ready"}:
             return self._world_velocity()

@@ -27,10 +27,10 @@ class ComparedCommand(Command):
 
     operational = False
 
-    def _law(self, state: RobotState) -> ControlOutput:
+    def _law(self, t: float, q: Array, v: Array) -> ControlOutput:
         if not self.operational:
-            return super()._law(state)
-        return self.controller.compute(state, modifier=self._compared)
+            return super()._law(t, q, v)
+        return self.controller.compute(t, q, v, modifier=self._compared)
 
     def _compared(
         self, state: RobotState, active: ActiveStack, a: Array

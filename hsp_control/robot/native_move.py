@@ -71,4 +71,7 @@ def _move(
 def _entry() -> Callable[..., float]:
     own, table = types.float64[::1], types.int64[:, ::1]
     rest = own, own, table, types.int64[::1], types.float64, own, own
-    return entry_point(_move, (table, types.float64[:, ::1], *rest))
+    entry: Callable[..., float] = entry_point(
+        _move, (table, types.float64[:, ::1], *rest)
+    )
+    return entry

@@ -19,9 +19,9 @@ import numpy as np
 import pinocchio as pin
 from pinocchio import pinocchio_pywrap_default
 
-from hsp_control.common.arrays import Array
+from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import PLAIN, kernel
-from hsp_control.common.native import FOREVER, NativeCall, Timed, bind, sequence
+from hsp_control.common.native import FOREVER, NativeCall, Timed, sequence
 from hsp_control.robot.matrix_view import matrix_view
 
 _MODEL = b"N9pinocchio8ModelTplIdLi0ENS_25JointCollectionDefaultTplEEE"
@@ -103,7 +103,7 @@ def _object_address(owner: object, kind: bytes) -> int:
     return (registration and extract(owner, registration)) or 0
 
 
-def _reference(vector: Array) -> Array:
+def _reference(vector: Array) -> Indices:
     """Return an ``Eigen::Ref<const VectorXd>`` of a vector: its data and its size."""
     words = np.zeros(8, dtype=np.int64)  # the rest is room for a copy, not made here
     words[:2] = vector.ctypes.data, vector.size
@@ -162,7 +162,7 @@ def _native(
     call = NativeCall.of_function(_address(_NAMES[what]), words, recipe)
     call.kept = references
     if what == "crba":  # writes one triangle
-        both = bind(_mirror, matrix_view(data.M))
+        both = NativeCall.of(_mirror, (matrix_view(data.M),), timed=False)
         return sequence([Timed(each, *FOREVER) for each in (call, both)], 0.0)
     return call
 

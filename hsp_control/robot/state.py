@@ -8,7 +8,6 @@ geometry, derivatives of gravity, plants with models of their own, and the viewe
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from itertools import takewhile
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import numpy as np
@@ -134,12 +133,13 @@ class RobotState:
         first = self._compute_jacobians
         memory = self.q, self.v, self._unit_blocks, self.stamp_array
         if isinstance(first, NativeCall):
-            native = tuple(takewhile(lambda call: isinstance(call, NativeCall), calls))
             from hsp_control.robot.native_move import NativeMove
 
-            move: Move = NativeMove.of((first, *native), *memory)
-            rest = tuple(calls[len(native) :])
-            return partial(_and_then, move, rest) if rest else move
+            native, rest = [first], list(calls)
+            while rest and isinstance(rest[0], NativeCall):
+                native.append(rest.pop(0))
+            move: Move = NativeMove.of(native, *memory)
+            return partial(_and_then, move, tuple(rest)) if rest else move
         return partial(_move, memory, first, tuple(calls))
 
     def _refuse(self, t: float, q: ArrayLike, v: ArrayLike) -> None:
