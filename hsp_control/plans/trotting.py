@@ -150,7 +150,7 @@ class RunningTrot(RunningQuadruped):
     def _place(self, t: float) -> None:
         """Let the feet that swing go to where the body will be."""
         mass, trot = self._state.centroidal, self.gait
-        velocity, wanted = mass.velocity[:2], self._wanted()
+        velocity, wanted = mass.velocity[:2], self._reference_velocity()
         axes = Footstep(0.0, 0.0, self._yaw)
         for foot in self._pair:
             swing = foot.swing

@@ -135,11 +135,14 @@ class RobotState:
         if isinstance(first, NativeCall):
             from hsp_control.robot.native_move import NativeMove
 
-            native, rest = [first], list(calls)
-            while rest and isinstance(rest[0], NativeCall):
-                native.append(rest.pop(0))
+            native = [first]
+            for call in calls:
+                if not isinstance(call, NativeCall):
+                    break
+                native.append(call)
+            rest = tuple(calls[len(native) - 1 :])
             move: Move = NativeMove.of(native, *memory)
-            return partial(_and_then, move, tuple(rest)) if rest else move
+            return partial(_and_then, move, rest) if rest else move
         return partial(_move, memory, first, tuple(calls))
 
     def _refuse(self, t: float, q: ArrayLike, v: ArrayLike) -> None:
