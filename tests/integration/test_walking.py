@@ -213,3 +213,15 @@ def test_it_walks_on_footsteps_that_are_given():
     for name, place in (("left_foot", (0.15, 0.1)), ("right_foot", (0.15, -0.08))):
         there = run[f"task.{name}.actual"][-1][:2] - middle
         assert there == pytest.approx(place, abs=0.02), name
+
+
+def test_a_lighter_robot_walks_by_the_same_plan():
+    """G1 has a third of Talos' mass, and soles 5 cm wide."""
+    settings = "plan.steps=2", "simulation.duration=4.5"
+    run = load_experiment("whole_body/g1_walk", *settings).run()
+    assert run.status == "completed"
+    assert run["plan.phase"][-1] == 0
+    assert run.q[-1, 0] > 0.15
+    assert np.abs(run.v[-1]).max() < 0.05
+    error = run["plan.dcm"] - run["plan.dcm_reference"]
+    assert np.sqrt((error**2).sum(axis=1).mean()) < 0.01
