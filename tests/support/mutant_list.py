@@ -451,7 +451,7 @@ MUTANTS = (
     Mutant(
         "speed margin: error not covered",
         LIMITS + "acceleration_bounds.py",
-        "speed = velocity[i] - error[i] / (2.0 * bandwidth * _STEEPER)",
+        "speed = velocity[i] - _GROWTH * error[i] / (2.0 * bandwidth * _STEEPER)",
         "speed = velocity[i]",
         OF_LIMITS + "margin_of_the_speed",
     ),
@@ -682,7 +682,7 @@ MUTANTS = (
         "tests/integration/test_limit_configurations.py -k swing",
     ),
     Mutant(
-        "limits: a direction that is being lost is all the task's",
+        "limits: a lost direction is all the task's",
         CONTROL + "actuation/deviation_cost.py",
         "share[count] = lost * lost",
         "share[count] = 0.0",

@@ -10,6 +10,10 @@ from hsp_control.common.kernels import kernel
 _STEEPER = 4.0
 """How much steeper the velocity barrier is beyond the guarded speed."""
 
+_GROWTH = 1.25
+"""How much larger the error of the acceleration may be in the next period than it was
+in the last ones. At 100 Hz it grew by a tenth within a period (docs/limits.md)."""
+
 
 MOTION, EFFORT = 1, 2
 """Flags of what is violated: bounds on the acceleration, bounds on the effort."""
@@ -71,8 +75,8 @@ def acceleration_bounds(
         where: Index in q of the coordinate of each degree of freedom, -1 for none,
             shape (nv,).
         limits: What the barriers keep.
-        error: Error that the acceleration is expected to have, shape (nv,); the margin
-            of the speed covers it, up to half the speed.
+        error: Largest error that the acceleration had of late, shape (nv,); the margin
+            of the speed covers it and its growth, up to half the speed.
         a_lower: Written: lower bound on the acceleration, shape (nv,).
         a_upper: Written: upper bound on the acceleration, shape (nv,).
     """
@@ -85,7 +89,7 @@ def acceleration_bounds(
             damping = 2.0 * bandwidth * v[i]
             low = -bandwidth * bandwidth * (position - lower[i]) - damping
             high = bandwidth * bandwidth * (upper[i] - position) - damping
-        speed = velocity[i] - error[i] / (2.0 * bandwidth * _STEEPER)
+        speed = velocity[i] - _GROWTH * error[i] / (2.0 * bandwidth * _STEEPER)
         speed = max(speed, 0.5 * velocity[i])
         slowing = 2.0 * bandwidth * (-speed - v[i])
         rising = 2.0 * bandwidth * (speed - v[i])

@@ -82,7 +82,7 @@ def test_every_bundled_configuration_follows_the_exported_schema() -> None:
     for name, file in bundled_configs().items():
         data = yaml.safe_load(file.read_text(encoding="utf-8"))
         jsonschema.validate(data, schema)
-        assert load_experiment(name).scenario.title, name
+        assert data["title"], name
 
 
 def test_the_bundled_schema_is_the_exported_one() -> None:
