@@ -140,14 +140,21 @@ def bind_pinocchio(
             ``crba`` (q), into M, both triangles; ``aba`` (q, v, tau), into ddq.
         model: The model.
         data: Its data.
-        vectors: The arrays, contiguous and of the model's sizes; they are kept.
+        vectors: The arrays; they are kept. What is no packed vector of doubles of the
+            model's size is left to the bindings.
     """
-    if unknown():
-        return partial(_BINDINGS[what], model, data, *vectors)
-    addresses = _object_address(model, _MODEL), _object_address(data, _DATA)
-    if not all(addresses):
-        return partial(_BINDINGS[what], model, data, *vectors)
-    return _native(what, addresses, (model, data, *vectors))
+    sizes = model.nq, model.nv, model.nv
+    if not unknown() and all(map(_fits, vectors, sizes)):
+        addresses = _object_address(model, _MODEL), _object_address(data, _DATA)
+        if all(addresses):
+            return _native(what, addresses, (model, data, *vectors))
+    return partial(_BINDINGS[what], model, data, *vectors)
+
+
+def _fits(vector: Array, size: int) -> bool:
+    """Return whether native code may read a vector: C++ would not ask again."""
+    packed = vector.shape == (size,) and vector.flags.c_contiguous
+    return packed and vector.dtype == np.float64 and vector.flags.aligned
 
 
 def _native(

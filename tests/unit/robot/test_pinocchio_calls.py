@@ -75,6 +75,19 @@ def test_a_copied_call_computes_into_its_own_data() -> None:
     np.testing.assert_array_equal(own.tau, bound.tau)
 
 
+def test_what_is_not_packed_is_left_to_the_bindings() -> None:
+    """They read other layouts, and refuse other sizes, where native code would not."""
+    robot, q, v, _ = draw("panda", seed=24)
+    spread = np.zeros((robot.nv, 2))
+    spread[:, 0] = v
+    native, bound, call = both("jacobians", robot.model, q, spread[:, 0])
+    assert not isinstance(call, NativeCall)
+    np.testing.assert_array_equal(native.dJ, bound.dJ)
+    call = bind_pinocchio("crba", robot.model, native, q[:-1])
+    with pytest.raises(ValueError, match="size"):
+        call()
+
+
 @pytest.fixture
 def no_library(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Let Pinocchio's library have none of the functions."""
