@@ -178,7 +178,9 @@ def parts_table(case: Standing, states: list[State]) -> str:
         timed("contacts, tasks, field, metric and law", law)
         a = active.resolution.acceleration
         wanted = timed("inverse dynamics", lambda: state.inverse_dynamics(a).copy())  # noqa: B023
-        timed("map of the corner forces", lambda: support.update(state))
+        timed(
+            "map of the corner forces", lambda: support.update(state, active.resolution)
+        )
         base = actuation.base
         forces = timed(
             "minimum-norm forces",
