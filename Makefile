@@ -16,7 +16,6 @@ BIN := .venv/bin
 USE := .venv/.stamp-use# hsp_control and what it needs are installed
 STAMP := .venv/.stamp# what tests and development need, too
 WORKERS ?= 2# processes that `make test` uses
-BY_FILE := --dist loadfile --no-loadscope-reorder
 CONFIGS ?=# whose machine code `make wheel` compiles; by default that of all
 ARGS ?=# further arguments of pytest, as in `make test ARGS="-k spline"`
 
@@ -52,10 +51,10 @@ quick: $(STAMP) ## what to run after every edit: a minute of CPU
 
 # A file's tests stay in one process, which makes what they share once.
 test: $(STAMP) ## run the tests
-	@$(BIN)/python -m pytest -n $(WORKERS) $(BY_FILE) $(ARGS)
+	@$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile $(ARGS)
 
 thorough: $(STAMP) ## run the tests with more seeds, and every configuration's page
-	@HSP_THOROUGH=1 $(BIN)/python -m pytest -n $(WORKERS) $(BY_FILE) $(ARGS)
+	@HSP_THOROUGH=1 $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile $(ARGS)
 
 lint: $(STAMP) ## ruff, mypy --strict and the layers of the architecture
 	@$(BIN)/ruff check

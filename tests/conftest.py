@@ -3,7 +3,6 @@
 import signal
 from importlib.util import find_spec
 
-import pytest
 from hypothesis import settings
 
 settings.register_profile("proof", derandomize=True, deadline=None)
@@ -20,22 +19,3 @@ collect_ignore_glob = [
     for package, tests in (("cyclonedds", "*ros2*"), ("pylibfranka", "*franka*"))
     if find_spec(package) is None
 ]
-
-
-@pytest.hookimpl(trylast=True)  # after the shuffle of pytest-randomly
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put files with browsers and processes before the many small ones.
-
-    Workers take files in this order (`--no-loadscope-reorder`). With one of these files
-    last, one worker would wait for the other for minutes. Integration tests come first:
-    they compile what the other processes then find.
-    """
-    long = ("browser", "process")
-    slow = {item.path for item in items if any(map(item.get_closest_marker, long))}
-
-    def place(item: pytest.Item) -> int:
-        if item.path in slow:
-            return 1
-        return 0 if item.path.parent.name == "integration" else 2
-
-    items.sort(key=place)
