@@ -1,11 +1,16 @@
 """What all tests share: derandomised property tests, and signals that arrive."""
 
+import os
 import signal
 from importlib.util import find_spec
 
 from hypothesis import settings
 
-settings.register_profile("proof", derandomize=True, deadline=None)
+# Half of Hypothesis' own number of examples, but for `make thorough`.
+EXAMPLES = 100 if os.environ.get("HSP_THOROUGH") else 50
+settings.register_profile(
+    "proof", derandomize=True, deadline=None, max_examples=EXAMPLES
+)
 settings.load_profile("proof")
 
 # A shell may start the tests with these ignored (in the background, under nohup), which

@@ -279,6 +279,7 @@ def test_what_feet_feel_comes_over_the_wire(tmp_path: Path) -> None:
         "tasks.trunk.trajectory={type: hold}",
         "plan={type: sensed, contacts: {front_left: {force: 0.5, starts: true}}}",
         "simulation.control_period=0.001",
+        "live.watchdog=1000",  # others may have the cores
     )
     logs = tmp_path / "loop.journal", tmp_path / "robot.journal"
     with RobotProcess(experiment, log=logs[1], log_period=0.001) as robot:
