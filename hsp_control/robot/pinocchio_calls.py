@@ -169,8 +169,10 @@ def _native(
     call = NativeCall.of_function(_address(_NAMES[what]), words, recipe)
     call.kept = references
     if what == "crba":  # writes one triangle
-        both = NativeCall.of(_mirror, (matrix_view(data.M),), timed=False)
-        return sequence([Timed(each, *FOREVER) for each in (call, both)], 0.0)
+        both = call, NativeCall.of(_mirror, (matrix_view(data.M),), timed=False)
+        mirrored = sequence([Timed(each, *FOREVER) for each in both], 0.0)
+        mirrored.recipe, mirrored.kept = recipe, both
+        return mirrored
     return call
 
 
