@@ -21,6 +21,10 @@ from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.state import Move
 from hsp_control.tasks import Task, TaskSample
 from hsp_control.tasks.task import InForce
+from hsp_control.trajectories.streams.stream import Streamed
+
+Measure = Callable[[], tuple[Array, Array]]
+"""Returns reference and actual value of a task; see `Task.measure`."""
 
 
 class ActiveStack:
@@ -46,6 +50,7 @@ class ActiveStack:
         has_forces: Whether contacts exert forces.
         memory: The rows, the field and the law's results, in one block: see `Record`.
         acceleration: The law's acceleration, shape (nv,).
+        streamed: The streams that tasks follow, and what measures these tasks.
         term_samples: The weighted sample of each term of the field.
     """
 
@@ -90,6 +95,11 @@ class ActiveStack:
         )
         self.rows = self.resolution.problem.task
         self.row_count = len(self.rows.error)
+        self.streamed: list[tuple[Streamed, Measure]] = []
+        for task in (task for level in self.levels for task in level):
+            followed: object = task.followed
+            if isinstance(followed, Streamed):
+                self.streamed.append((followed, partial(task.measure, state)))
         self.has_forces = support.size > 0
         self.memory = self.resolution.problem.record.memory
         self.acceleration = self.resolution.acceleration

@@ -24,6 +24,7 @@ from hsp_control.common.kernels import kernel
 from hsp_control.constraints.limits.acceleration_bounds import Bounds
 from hsp_control.control.actuation.deviation_cost import (
     Directions,
+    freedom,
     null_space_scale,
     write_directions,
     write_inverse_root,
@@ -227,12 +228,12 @@ def _write_law_factor(
 def _scale_null_space(
     directions: Directions, scale: float, count: int, problem: Problem
 ) -> None:
-    """Scale the rows of Jᵀ by the null space's share; ``count`` are the law's."""
+    """Scale the rows of Jᵀ as far as they are free; ``count`` are the law's."""
     n = directions.share.shape[0]
     for row in range(count):  # the directions of contacts have no rows
-        share = directions.share[n - count + row]
-        if share > 0.0:
-            factor = scale**share
+        free = freedom(directions, n - count + row)
+        if free > 0.0:
+            factor = scale**free
             for j in range(problem.JT.shape[1]):
                 problem.JT[row, j] *= factor
 
