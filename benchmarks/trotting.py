@@ -68,11 +68,9 @@ def configuration(
         },
         "plan": {"type": "trot", "until": UNTIL, **case["plan"]},
         "null_space": {"fields": [{"type": "target_posture", "target": "start"}]},
-        "limits": {"velocity": "none", "position": "none"},
         "simulation": {
             "duration": case.get("duration", DURATION),
             "control_period": 0.001,
-            "integrator": {"type": "rk4", "step": 0.001},
         },
         "plant": {
             "type": "mujoco",

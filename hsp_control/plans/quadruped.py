@@ -1,22 +1,28 @@
 """Quadrupeds that walk: the tasks that they need, and their four feet."""
 
 from collections.abc import Sequence
-from dataclasses import KW_ONLY
+from dataclasses import KW_ONLY, replace
 from typing import ClassVar
 
 from hsp_control.common.exceptions import PlanError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.constraints.contacts import Contact
+from hsp_control.constraints.limits import Limits
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Names, Positive
 from hsp_control.plans.composing import composed
 from hsp_control.plans.footsteps import Velocity
-from hsp_control.plans.legs import root_frame
+from hsp_control.plans.legs import leg_joints, root_frame
 from hsp_control.plans.moving import MovingPlan
 from hsp_control.plans.plan import PlanParts
 from hsp_control.robot import Robot
 from hsp_control.tasks import CenterOfMass, FrameOrientation, FramePosition, Gains, Task
 from hsp_control.tasks.frame_task import TrackingTask
+
+BANDWIDTH = 30.0
+"""α of the limits' barriers, unless it is given [1/s]. A knee that swings accelerates
+by some 100 rad/s² with 1 rad left to its limit: with α = 10 1/s this is forbidden, and
+the robot falls."""
 
 
 class QuadrupedPlan(MovingPlan):
@@ -71,7 +77,15 @@ class QuadrupedPlan(MovingPlan):
                     "is fixed to the world"
                 )
             names = self.feet_of(contacts)
-        frames = {each.name: each.frame for each in contacts}
+            frames = {each.name: each.frame for each in contacts}
+            for name in names:
+                joints = len(leg_joints(robot, frames[name]))
+                if joints < 3:
+                    raise PlanError(
+                        f"the leg of {name!r} has {joints} joints between the root and "
+                        f"{frames[name]!r}; a quadruped {self.gait}s on legs of at "
+                        "least 3, which put a foot anywhere"
+                    )
         trunk = root_frame(robot) if self.trunk is None else self.trunk
         with within("plan", "trunk"):
             robot.frame_id(trunk)
@@ -90,6 +104,12 @@ class QuadrupedPlan(MovingPlan):
             gains = Gains(natural_frequency=40.0)
             own.append(FramePosition(frames[name], gains=gains, name=name, priority=1))
         return composed(own, tasks, contacts, names)
+
+    def limits(self, limits: Limits | None) -> Limits | None:
+        """Return limits whose barriers let legs swing; see `Plan.limits`."""
+        if limits is None or limits.bandwidth is not None:
+            return limits
+        return replace(limits, bandwidth=BANDWIDTH)
 
     def feet_of(self, contacts: Sequence[Contact]) -> tuple[str, ...]:
         """Return the names of the four contacts that walk.

@@ -2,12 +2,14 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from hsp_control import Robot, load_experiment
+from hsp_control import Limits, Robot, load_experiment
 from hsp_control.common.exceptions import HspControlError, PlanError
 from hsp_control.constraints.contacts import BallContact, SurfaceContact
 from hsp_control.plans import Trot
+from hsp_control.plans.quadruped import BANDWIDTH
 from hsp_control.tasks import CenterOfMass
 from hsp_control.trajectories import Hold, Stops
 from hsp_control.trajectories.switch import Switch
@@ -71,6 +73,27 @@ def test_it_adds_what_it_needs(solo):
 def test_what_does_not_fit_is_said(solo, trot, tasks, contacts, message):
     with pytest.raises(HspControlError, match=message):
         trot.parts(solo, tasks, contacts)
+
+
+def test_a_leg_needs_three_joints(solo):
+    with pytest.raises(PlanError, match=r"^plan: the leg of 'FL_FOOT' has 2 joints"):
+        Trot().parts(Robot.load("solo8"), [], FEET)
+    trunk = BallContact("base_link", radius=0.0165)
+    with pytest.raises(PlanError, match=r"^plan: the leg of 'base_link' has 0 joints"):
+        Trot().parts(solo, [], [*FEET[:3], trunk])
+
+
+def test_barriers_let_legs_swing():
+    """What is given stays; what changes later keeps it."""
+    controller = load_experiment(TROT).controller
+    assert controller.limits.bandwidth == BANDWIDTH
+    controller.at(0.1).ramp(0.0).limits(Limits(velocity=0.5))
+    controller.compute(0.2, controller.robot.home(), np.zeros(controller.robot.nv))
+    assert controller.limits.bandwidth == pytest.approx(BANDWIDTH, rel=1e-12)
+    assert (
+        load_experiment(TROT, "limits={bandwidth: 7}").controller.limits.bandwidth == 7
+    )
+    assert load_experiment(TROT, "limits=none").controller.limits is None
 
 
 def test_an_arm_cannot_trot():
