@@ -23,6 +23,8 @@ BANDWIDTH = 30.0
 """α of the limits' barriers, unless it is given [1/s]. A knee that swings accelerates
 by some 100 rad/s² with 1 rad left to its limit: with α = 10 1/s this is forbidden, and
 the robot falls."""
+STEEPEST = 0.7
+"""Smallest vertical part of the normal of the ground [-]."""
 
 
 class QuadrupedPlan(MovingPlan):
@@ -59,6 +61,14 @@ class QuadrupedPlan(MovingPlan):
     """How fast the velocity changes [m/s²]."""
     contact_force: Positive = 0.01
     """Normal force at which a swing foot counts as landed, in robot weights [-]."""
+
+    def _complete(self) -> None:
+        super()._complete()
+        if self.contact_force >= 0.25:
+            raise PlanError(
+                f"contact_force is {self.contact_force:g} robot weights; must be below "
+                "0.25, which each of four feet bears"
+            )
 
     def velocity_at(self, t: float) -> Velocity:
         """Return the velocity that is wanted at time t [s]; zero at the end."""
@@ -124,6 +134,12 @@ class QuadrupedPlan(MovingPlan):
                 raise PlanError(
                     f"there is no contact {name!r}{did_you_mean(name, there)} to "
                     f"{self.gait} on (there are {listing(there) or 'none'})"
+                )
+            if there[name].axes[2, 2] < STEEPEST:
+                raise PlanError(
+                    f"contact {name!r} has the normal {there[name].normal.tolist()}; a "
+                    f"quadruped {self.gait}s on ground, whose normal points upwards "
+                    f"(z at least {STEEPEST:g})"
                 )
             if there[name].rows != 3:
                 raise PlanError(

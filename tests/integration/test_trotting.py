@@ -76,6 +76,14 @@ def test_a_robot_that_is_nowhere_named_trots_within_its_limits():
     assert run.q[-1, 0] > 0.2
 
 
+def test_feet_that_find_no_ground_are_named_where_it_falls():
+    run = load_experiment("whole_body/solo12_trot", "plant={type: rigid_body}").run()
+    assert run.status == "stopped"
+    message = str(run.meta["message"])
+    assert message.startswith("the robot falls: at t = ")
+    assert "; no ground was ever felt at front_left, front_right, hind_" in message
+
+
 def test_its_velocity_changes_no_faster_than_it_may():
     run = trot()
     rates = np.diff(run["plan.velocity"], axis=0) / np.diff(run.t)[:, None]
