@@ -135,9 +135,10 @@ class QuadrupedPlan(MovingPlan):
                     f"there is no contact {name!r}{did_you_mean(name, there)} to "
                     f"{self.gait} on (there are {listing(there) or 'none'})"
                 )
-            if there[name].axes[2, 2] < STEEPEST:
+            normal = there[name].axes[:, 2]
+            if normal[2] < STEEPEST:
                 raise PlanError(
-                    f"contact {name!r} has the normal {there[name].normal.tolist()}; a "
+                    f"contact {name!r} has the normal {normal.tolist()}; a "
                     f"quadruped {self.gait}s on ground, whose normal points upwards "
                     f"(z at least {STEEPEST:g})"
                 )
