@@ -403,8 +403,10 @@ def build(document: Document) -> Experiment:
             found = InitialState(configuration=q0, velocity=scenario.start.velocity)
             scenario = replace(scenario, start=found)
     with document.at():
+        limits = scenario.limits
         if scenario.plan is not None:
             tasks, contacts = scenario.plan.parts(robot, tasks, contacts)
+            limits = scenario.plan.limits(limits)
         controller = Controller(
             robot,
             tasks,
@@ -412,7 +414,7 @@ def build(document: Document) -> Experiment:
             null_space_gain=null_space.gain,
             metric=null_space.metric,
             singularity_threshold=null_space.singularity_threshold,
-            limits=scenario.limits,
+            limits=limits,
             contacts=contacts,
             base=scenario.base,
             scene=scene,

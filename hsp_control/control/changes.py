@@ -275,7 +275,8 @@ class ChangeLimits(Change, type="limits"):
     """The limits change to other ones; each number goes there smoothly."""
 
     limits: LimitsOrNone
-    """The new limits; none: the old ones go."""
+    """The new limits; none: the old ones go. Without a bandwidth they keep that of the
+    old ones."""
 
     def apply(self, setup: Setup) -> Setup:
         """Return the setup with the limits; see `Change.apply`.
@@ -285,7 +286,9 @@ class ChangeLimits(Change, type="limits"):
         """
         robot = setup.start.state.robot
         with within("limits"):
-            new = self.limits
+            new, old = self.limits, setup.limits.sets[-1]
+            if new is not None and new.bandwidth is None and old is not None:
+                new = replace(new, bandwidth=old.bandwidth)
             numbers = None if new is None else new.placed(setup.start)
             limits = setup.limits.then(self.at, self.ramp, numbers, robot)
         return replace(setup, limits=limits)

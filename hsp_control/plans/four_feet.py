@@ -6,7 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import PlanError
+from hsp_control.common.exceptions import FallError, PlanError
+from hsp_control.common.suggestions import listing
 from hsp_control.control.controller import Controller
 from hsp_control.control.measurement import Measurement
 from hsp_control.plans.falling import FallDetector
@@ -48,6 +49,7 @@ class PointFoot:
         height: The height of its frame where it stands, or stood last [m].
         offset: Where it stands beside the middle of the feet at the start, in axes of
             the trunk, shape (2,) [m].
+        reach: How far before and behind its hip the leg puts it [m].
     """
 
     def __init__(self, name: str, controller: Controller) -> None:
@@ -70,6 +72,7 @@ class PointFoot:
                 "the plan's parts"
             )
         self.frame, self.normal = contact.frame, contact.axes[:, 2]
+        self.reach = np.inf
         self.contact, self.task = contact.schedule, task.schedule
         self.position = task.followed
         self.swing: Swing | None = None
@@ -82,6 +85,12 @@ class PointFoot:
         here = state.position(self.frame)
         self.height = float(here[2])
         self.offset: Array = middle.local(here)
+
+    def speed(self, velocity: Velocity) -> float:
+        """Return how fast the body moves above the foot at a velocity [m/s]."""
+        x, y = self.offset
+        forward, left, turn = velocity
+        return float(np.hypot(forward - turn * y, left + turn * x))
 
 
 class RunningQuadruped(RunningPlan):
@@ -144,6 +153,7 @@ class RunningQuadruped(RunningPlan):
         self._falling = FallDetector(self._trunk_frame, frames, state)
         self._velocity = Velocity(0.0, 0.0, 0.0)
         self._last = state.t
+        self._felt = {foot.name: False for foot in self._feet}
         self._controller.prepare(state, without=[foot.name for foot in self._feet])
         self._start_gait(state)
         for lifted in self._combinations():
@@ -174,7 +184,10 @@ class RunningQuadruped(RunningPlan):
         )
 
     def _check_stride(self, state: RobotState, time: float) -> None:
-        """Check that the legs are long enough for the speed.
+        """Check that the legs are long enough for the speed and for the lift.
+
+        A velocity that is a function of time is not checked: it is followed as far as
+        the legs reach (`_wanted`).
 
         Args:
             state: The state in which the robot stands.
@@ -183,19 +196,29 @@ class RunningQuadruped(RunningPlan):
         Raises:
             PlanError: If they are not.
         """
-        speed = float(np.hypot(self.gait.speed, self.gait.sideways))
-        excursion = speed * time
+        self._stride_time = time
         for foot in self._feet:
-            square = (
-                leg_length(state.robot, foot.frame) ** 2
-                - hip_height(state, foot.frame) ** 2
-            )
-            reach = 0.9 * float(np.sqrt(max(square, 0.0)))
-            if excursion > reach:
+            hip = hip_height(state, foot.frame)
+            if self.gait.lift >= hip:
                 raise PlanError(
-                    f"at {speed:.3g} m/s a foot is {excursion:.3g} m before and behind "
-                    f"its hip; the leg of {foot.name!r} reaches {reach:.3g} m. "
-                    f"{self.gait.gait.capitalize()} slower, or with a shorter swing"
+                    f"lift is {self.gait.lift:.3g} m, but the hip of {foot.name!r} is "
+                    f"only {hip:.3g} m above its foot"
+                )
+            square = leg_length(state.robot, foot.frame) ** 2 - hip**2
+            foot.reach = 0.9 * float(np.sqrt(max(square, 1e-6)))
+        if self.gait.velocity is not None:
+            return
+        velocity = Velocity(self.gait.speed, self.gait.sideways, self.gait.turn)
+        for foot in self._feet:
+            excursion = time * foot.speed(velocity)
+            if excursion > foot.reach:
+                speed = float(np.hypot(velocity.forward, velocity.left))
+                turning = f" and {velocity.turn:.3g} rad/s" if velocity.turn else ""
+                raise PlanError(
+                    f"at {speed:.3g} m/s{turning} a foot is {excursion:.3g} m before "
+                    f"and behind its hip; the leg of {foot.name!r} reaches "
+                    f"{foot.reach:.3g} m. {self.gait.gait.capitalize()} slower, or "
+                    "with a shorter swing"
                 )
 
     @abstractmethod
@@ -220,7 +243,11 @@ class RunningQuadruped(RunningPlan):
         state.update(t, measured.q, measured.v)
         if not self._begun:
             self.start(state)
-        self._falling.check(state)
+        self._feel(measured)
+        try:
+            self._falling.check(state)
+        except FallError as error:
+            raise FallError(f"{error}{self._groundless()}") from None
         self._step(t, measured)
         self._height.write(t, *self._rise.sample(t))
         rotation = turned(self._yaw - self._first_yaw, self._rotation)
@@ -230,11 +257,32 @@ class RunningQuadruped(RunningPlan):
                 foot.position.write(t, *foot.swing.position(t))
         self._last = t
 
+    def _feel(self, measured: Measurement) -> None:
+        """Keep what has been felt since the start."""
+        for foot in self._feet:
+            force = measured.normal_force(foot.frame, foot.normal)
+            self._felt[foot.name] |= force is not None and force > self._touch
+
+    def _groundless(self) -> str:
+        """Return what a message says of feet that never stood on anything."""
+        never = [name for name, felt in self._felt.items() if not felt]
+        if not never:
+            return ""
+        return (
+            f"; no ground was ever felt at {listing(never)}: do they have shapes in "
+            "plant.contacts, and is the ground at the height of start.ground?"
+        )
+
     # -- the body ---------------------------------------------------------------------
 
     def _wanted(self, t: float) -> Velocity:
-        """Return the velocity that is wanted."""
-        return Velocity(0.0, 0.0, 0.0) if self.stopping else self.gait.velocity_at(t)
+        """Return the velocity that is wanted, as far as the legs reach."""
+        if self.stopping:
+            return Velocity(0.0, 0.0, 0.0)
+        wanted = self.gait.velocity_at(t)
+        speeds = [foot.speed(wanted) / foot.reach for foot in self._feet]
+        excess = self._stride_time * max(speeds)
+        return wanted if excess <= 1.0 else Velocity(*(v / excess for v in wanted))
 
     def _accelerate(self, t: float) -> None:
         """Bring the velocity nearer to what is wanted, and turn with it."""

@@ -19,6 +19,13 @@ def root_frame(robot: Robot) -> str:
     raise PlanError(f"{robot.name} has no body at its root")
 
 
+def leg_joints(robot: Robot, foot: str) -> list[int]:
+    """Return the joints from the root to a foot, the root itself not among them."""
+    model = robot.model
+    joint = model.frames[robot.frame_id(foot)].parentJoint
+    return [int(each) for each in list(model.supports[joint])[2:]]
+
+
 def leg_length(robot: Robot, foot: str) -> float:
     """Return how far a foot can be from the first joint of its leg [m].
 
@@ -31,7 +38,7 @@ def leg_length(robot: Robot, foot: str) -> float:
     model = robot.model
     frame = model.frames[robot.frame_id(foot)]
     length = float(np.linalg.norm(frame.placement.translation))
-    for joint in list(model.supports[frame.parentJoint])[3:]:
+    for joint in leg_joints(robot, foot)[1:]:
         length += float(np.linalg.norm(model.jointPlacements[joint].translation))
     return length
 
@@ -43,7 +50,5 @@ def hip_height(state: RobotState, foot: str) -> float:
         state: The state.
         foot: The frame of the foot.
     """
-    model = state.robot.model
-    joint = list(model.supports[model.frames[state.robot.frame_id(foot)].parentJoint])
-    hip = state.data.oMi[joint[2]].translation[2]
+    hip = state.data.oMi[leg_joints(state.robot, foot)[0]].translation[2]
     return float(hip - state.position(foot)[2])

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from hsp_control.common.exceptions import PlanError
 from hsp_control.constraints.contacts import Contact
+from hsp_control.constraints.limits import Limits
 from hsp_control.control.controller import Controller
 from hsp_control.control.log_channel import LogChannel
 from hsp_control.control.measurement import Measurement
@@ -52,6 +53,17 @@ class Plan(Part, ABC, family="plans", error=PlanError):
         Raises:
             PlanError: If they do not fit the plan.
         """
+
+    def limits(self, limits: Limits | None) -> Limits | None:
+        """Return the limits of a controller that follows this plan.
+
+        What is given stays; a plan may choose what is not. By default it chooses
+        nothing.
+
+        Args:
+            limits: The limits that are given; None: no limits.
+        """
+        return limits
 
     @abstractmethod
     def begin(self, controller: Controller) -> "RunningPlan":

@@ -1,22 +1,30 @@
 """Quadrupeds that walk: the tasks that they need, and their four feet."""
 
 from collections.abc import Sequence
-from dataclasses import KW_ONLY
+from dataclasses import KW_ONLY, replace
 from typing import ClassVar
 
 from hsp_control.common.exceptions import PlanError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.constraints.contacts import Contact
+from hsp_control.constraints.limits import Limits
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Names, Positive
 from hsp_control.plans.composing import composed
 from hsp_control.plans.footsteps import Velocity
-from hsp_control.plans.legs import root_frame
+from hsp_control.plans.legs import leg_joints, root_frame
 from hsp_control.plans.moving import MovingPlan
 from hsp_control.plans.plan import PlanParts
 from hsp_control.robot import Robot
 from hsp_control.tasks import CenterOfMass, FrameOrientation, FramePosition, Gains, Task
 from hsp_control.tasks.frame_task import TrackingTask
+
+BANDWIDTH = 30.0
+"""α of the limits' barriers, unless it is given [1/s]. A knee that swings accelerates
+by some 100 rad/s² with 1 rad left to its limit: with α = 10 1/s this is forbidden, and
+the robot falls."""
+STEEPEST = 0.7
+"""Smallest vertical part of the normal of the ground [-]."""
 
 
 class QuadrupedPlan(MovingPlan):
@@ -54,6 +62,14 @@ class QuadrupedPlan(MovingPlan):
     contact_force: Positive = 0.01
     """Normal force at which a swing foot counts as landed, in robot weights [-]."""
 
+    def _complete(self) -> None:
+        super()._complete()
+        if self.contact_force >= 0.25:
+            raise PlanError(
+                f"contact_force is {self.contact_force:g} robot weights; must be below "
+                "0.25, which each of four feet bears"
+            )
+
     def velocity_at(self, t: float) -> Velocity:
         """Return the velocity that is wanted at time t [s]; zero at the end."""
         if self.until is not None and t >= self.until:
@@ -71,7 +87,15 @@ class QuadrupedPlan(MovingPlan):
                     "is fixed to the world"
                 )
             names = self.feet_of(contacts)
-        frames = {each.name: each.frame for each in contacts}
+            frames = {each.name: each.frame for each in contacts}
+            for name in names:
+                joints = len(leg_joints(robot, frames[name]))
+                if joints < 3:
+                    raise PlanError(
+                        f"the leg of {name!r} has {joints} joints between the root and "
+                        f"{frames[name]!r}; a quadruped {self.gait}s on legs of at "
+                        "least 3, which put a foot anywhere"
+                    )
         trunk = root_frame(robot) if self.trunk is None else self.trunk
         with within("plan", "trunk"):
             robot.frame_id(trunk)
@@ -91,6 +115,12 @@ class QuadrupedPlan(MovingPlan):
             own.append(FramePosition(frames[name], gains=gains, name=name, priority=1))
         return composed(own, tasks, contacts, names)
 
+    def limits(self, limits: Limits | None) -> Limits | None:
+        """Return limits whose barriers let legs swing; see `Plan.limits`."""
+        if limits is None or limits.bandwidth is not None:
+            return limits
+        return replace(limits, bandwidth=BANDWIDTH)
+
     def feet_of(self, contacts: Sequence[Contact]) -> tuple[str, ...]:
         """Return the names of the four contacts that walk.
 
@@ -104,6 +134,13 @@ class QuadrupedPlan(MovingPlan):
                 raise PlanError(
                     f"there is no contact {name!r}{did_you_mean(name, there)} to "
                     f"{self.gait} on (there are {listing(there) or 'none'})"
+                )
+            normal = there[name].axes[:, 2]
+            if normal[2] < STEEPEST:
+                raise PlanError(
+                    f"contact {name!r} has the normal {normal.tolist()}; a "
+                    f"quadruped {self.gait}s on ground, whose normal points upwards "
+                    f"(z at least {STEEPEST:g})"
                 )
             if there[name].rows != 3:
                 raise PlanError(

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hsp_control import Rollout, load_experiment
+from hsp_control.plans.legs import hip_height, leg_length
 
 pytest.importorskip("example_robot_data")
 pytest.importorskip("mujoco")
@@ -67,6 +68,24 @@ def test_it_could_stop_at_any_time():
                 np.vstack([corners.T, np.ones(3)]), np.append(mass[k], 1.0)
             )
             assert shares.min() > 0.05
+
+
+def test_a_velocity_in_time_is_followed_as_far_as_the_legs_reach():
+    velocity = "{type: hold, point: [0.5, 0.1, 0]}"
+    plan = f"plan={{type: crawl, acceleration: 1, velocity: {velocity}}}"
+    settings = "whole_body/solo12_trot", plan, "simulation.duration=1"
+    experiment = load_experiment(*settings)
+    run = experiment.run()
+    robot = experiment.robot
+    state = robot.state(0.0, run.q[0], run.v[0])
+    reach = 0.9 * min(
+        np.sqrt(leg_length(robot, foot) ** 2 - hip_height(state, foot) ** 2)
+        for foot in FEET.values()
+    )
+    fastest = reach / (2.0 * (0.35 + 0.45))  # half a cycle to each side of the hip
+    followed = run["plan.velocity"]
+    assert np.hypot(*followed[:, :2].T).max() == pytest.approx(fastest, rel=1e-9)
+    assert followed[-1, 1] / followed[-1, 0] == pytest.approx(0.2, rel=1e-9)
 
 
 def test_it_goes_up_a_step_of_two_centimetres():

@@ -56,6 +56,34 @@ def test_it_returns_to_its_line_after_a_push():
     assert np.ptp(run.q[fast, 0]) == pytest.approx(0.3, abs=0.05)
 
 
+def test_a_robot_that_is_nowhere_named_trots_within_its_limits():
+    """Go1 with nothing but defaults: barriers of 10 1/s would make it fall at 0.9 s."""
+    feet = ["FL_foot", "FR_foot", "RL_foot", "RR_foot"]
+    ball = {"shape": {"type": "sphere", "radius": 0.02}}
+    given = {
+        "robot": {"name": "go1"},
+        "start": {"ground": 0},
+        "contacts": {f: {"type": "ball", "frame": f, "radius": 0.02} for f in feet},
+        "plan": {"type": "trot", "speed": 0.4},
+        "null_space": {"fields": [{"type": "target_posture", "target": "start"}]},
+        "simulation": {"duration": 1.6, "control_period": 0.001},
+        "plant": {"type": "mujoco", "contacts": dict.fromkeys(feet, ball)},
+    }
+    run = load_experiment(given).run()
+    assert run.status == "completed"
+    assert (run["status"] < 3).all()
+    assert (run["position_excess"] == 0.0).all()
+    assert run.q[-1, 0] > 0.2
+
+
+def test_feet_that_find_no_ground_are_named_where_it_falls():
+    run = load_experiment("whole_body/solo12_trot", "plant={type: rigid_body}").run()
+    assert run.status == "stopped"
+    message = str(run.meta["message"])
+    assert message.startswith("the robot falls: at t = ")
+    assert "; no ground was ever felt at front_left, front_right, hind_" in message
+
+
 def test_its_velocity_changes_no_faster_than_it_may():
     run = trot()
     rates = np.diff(run["plan.velocity"], axis=0) / np.diff(run.t)[:, None]

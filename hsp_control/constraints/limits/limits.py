@@ -30,6 +30,9 @@ from hsp_control.geometry.scene import Scene
 from hsp_control.geometry.start import Start
 from hsp_control.robot import Robot
 
+BANDWIDTH = 10.0
+"""α of the barriers where nothing else is given [1/s]."""
+
 
 class Limits(Part, error=LimitError):
     """Limits on effort, joint motion and distances, which the controller keeps.
@@ -84,9 +87,10 @@ class Limits(Part, error=LimitError):
     """Margin inside the speed limits, as a fraction of the limit [-]."""
     distances: Annotated[Sequence[MinimumDistance], AfterValidator(tuple)] = ()
     """Minimum distances [m]."""
-    bandwidth: Positive = 10.0
-    """Bandwidth α of the barriers [1/s]. Motors can follow 5 to 20: faster barriers act
-    so late that they need more than the effort rate permits."""
+    bandwidth: Positive | None = None
+    """Bandwidth α of the barriers [1/s]: 10 by default, or what a plan needs. Motors
+    can follow 5 to 20: faster barriers act so late that they need more than the effort
+    rate permits. A joint at rest is allowed α² times what is left to its limit."""
     static_effort: Fraction | None = None
     """Fraction of the effort limit that gravity may use [-], so that an arm stays where
     its motors can hold it; for motors that carry no contact. Unlimited by default."""
@@ -139,7 +143,7 @@ class Limits(Part, error=LimitError):
                 read_only(upper - margin),
                 read_only((1.0 - self.velocity_margin) * velocity),
                 self._numbers("acceleration", robot),
-                read_only([self.bandwidth]),
+                read_only([BANDWIDTH if self.bandwidth is None else self.bandwidth]),
             ),
             distances=tuple(distances),
             static_effort=None if share is None else StaticEffort(effort, share),

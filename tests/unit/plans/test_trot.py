@@ -2,12 +2,14 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from hsp_control import Robot, load_experiment
+from hsp_control import Limits, Robot, load_experiment
 from hsp_control.common.exceptions import HspControlError, PlanError
 from hsp_control.constraints.contacts import BallContact, SurfaceContact
 from hsp_control.plans import Trot
+from hsp_control.plans.quadruped import BANDWIDTH
 from hsp_control.tasks import CenterOfMass
 from hsp_control.trajectories import Hold, Stops
 from hsp_control.trajectories.switch import Switch
@@ -66,11 +68,38 @@ def test_it_adds_what_it_needs(solo):
             FEET,
             "^tasks.center_of_mass: its axes are 'xyz'; the plan needs 'xy'",
         ),
+        (
+            Trot(),
+            [],
+            [*FEET[:3], BallContact("HR_FOOT", radius=0.0165, normal=[1, 0, 0])],
+            r"^plan: contact 'HR_FOOT' has the normal \[1.0, 0.0, 0.0\]; a quadrup",
+        ),
     ],
 )
 def test_what_does_not_fit_is_said(solo, trot, tasks, contacts, message):
     with pytest.raises(HspControlError, match=message):
         trot.parts(solo, tasks, contacts)
+
+
+def test_a_leg_needs_three_joints(solo):
+    with pytest.raises(PlanError, match=r"^plan: the leg of 'FL_FOOT' has 2 joints"):
+        Trot().parts(Robot.load("solo8"), [], FEET)
+    trunk = BallContact("base_link", radius=0.0165)
+    with pytest.raises(PlanError, match=r"^plan: the leg of 'base_link' has 0 joints"):
+        Trot().parts(solo, [], [*FEET[:3], trunk])
+
+
+def test_barriers_let_legs_swing():
+    """What is given stays; what changes later keeps it."""
+    controller = load_experiment(TROT).controller
+    assert controller.limits.bandwidth == BANDWIDTH
+    controller.at(0.1).ramp(0.0).limits(Limits(velocity=0.5))
+    controller.compute(0.2, controller.robot.home(), np.zeros(controller.robot.nv))
+    assert controller.limits.bandwidth == pytest.approx(BANDWIDTH, rel=1e-12)
+    assert (
+        load_experiment(TROT, "limits={bandwidth: 7}").controller.limits.bandwidth == 7
+    )
+    assert load_experiment(TROT, "limits=none").controller.limits is None
 
 
 def test_an_arm_cannot_trot():
@@ -81,6 +110,10 @@ def test_an_arm_cannot_trot():
 def test_what_the_robot_cannot_do_is_said_before_it_runs():
     with pytest.raises(PlanError, match=r"plan: at 3 m/s a foot is 0.525 m before and"):
         load_experiment(TROT, "plan.speed=3")
+    with pytest.raises(PlanError, match=r"at 0.3 m/s and 9 rad/s a foot is 0.374 m"):
+        load_experiment(TROT, "plan.turn=9")
+    with pytest.raises(PlanError, match=r"lift is 0.5 m, but the hip of 'front_left' "):
+        load_experiment(TROT, "plan.lift=0.5")
     shared = "contacts.hind_right.frame=HL_FOOT"
     with pytest.raises(PlanError, match=r"plan: the feet do not stand at the four cor"):
         load_experiment(TROT, shared)
@@ -95,6 +128,8 @@ def test_the_velocity_may_change_and_ends():
         replace(trot, speed=0.2)
     with pytest.raises(PlanError, match=r"velocity has dimension 1; needs 3"):
         Trot(velocity=Hold([0.1]))
+    with pytest.raises(PlanError, match=r"contact_force is 0.25 robot weights; must"):
+        Trot(contact_force=0.25)
 
 
 def test_a_recorded_velocity_is_read_with_the_configuration(tmp_path):
