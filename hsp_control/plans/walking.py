@@ -15,6 +15,7 @@ from hsp_control.plans.falling import FallDetector
 from hsp_control.plans.foot import Foot
 from hsp_control.plans.footsteps import Footstep, Velocity, between
 from hsp_control.plans.given_steps import GivenSteps
+from hsp_control.plans.leg_reaction import LegReaction
 from hsp_control.plans.pendulum import (
     GRAVITY,
     Phase,
@@ -183,6 +184,9 @@ class RunningWalk(RunningPlan):
                 f"crouch is {walk.crouch} m; the centre of mass is only "
                 f"{self._height - ground:.3g} m above the feet"
             )
+        sides = {side: foot.frame for side, foot in self._feet.items()}
+        self._legs = LegReaction(self._controller, self._trunk_frame, sides)
+        pendulum += self._legs.pendulum(state)
         self._frequency = float(np.sqrt(GRAVITY / pendulum))
         self._stance = stance_of(self._feet, state, walk.crouch)
         robot, places = state.robot.name, self._places
@@ -202,6 +206,7 @@ class RunningWalk(RunningPlan):
         self._taken, self._side, self._held = 0, 1.0, False
         self._now = Velocity(0.0, 0.0, 0.0)
         self._swing: Swing | None = None
+        self._legs.begin(state, self._first_yaw)
         self._dcm = self._dcm_wanted = self._point = self._middle()
         self._target = self._feet[1.0].place
         self._stand(t)
@@ -289,6 +294,7 @@ class RunningWalk(RunningPlan):
         place = self._stance.kept(standing.place, self._side, here)
         end = t + 0.5 * self.walk.swing
         self._swing.redirect(t, foot.origin_of(place), end, rises=False)
+        self._react(t)
         rest = standing.place.point
         self._follow(t, [Phase(1.0, rest, rest)], [True])
         self._hull = standing.corners(1.0)  # as far as it reaches
@@ -317,6 +323,9 @@ class RunningWalk(RunningPlan):
             self._feet[-self._side].frame_height,
             walk.lift,
         )
+        standing = self._feet[-self._side].place
+        self._legs.lifts(self._state, self._side, standing.yaw)
+        self._react(t)
         yaw = between(self._feet[-self._side].place, self._target).yaw
         self._yaw = to_rest(self._yaw.sample(t), [yaw], t, walk.swing)
         # The plan begins anew, because a phase ends at a control period.
@@ -339,6 +348,7 @@ class RunningWalk(RunningPlan):
         foot.contact.throw(True, t, LANDING * walk.double_support)
         foot.task.throw(False, t)
         foot.stand(self._state)
+        self._legs.lands(self._state, self._side, self._feet[-self._side].place.yaw)
         self._swing, self._mode = None, "double"
         if self._held:  # it was put down; it swings again later
             self._stand(t)
@@ -360,7 +370,7 @@ class RunningWalk(RunningPlan):
             point: Where the repellent point is, shape (2,) [m].
         """
         preview = self._planner.look_ahead(
-            t, self._taken, self._now, self._side, self._places, shift, point
+            t, self._taken, self._now, self._side, self._places, shift, point, self._lead
         )
         self._now = preview.velocity
         if preview.target is not None:
@@ -373,6 +383,32 @@ class RunningWalk(RunningPlan):
                 phases[0], starts[1], self._dcm, self._frequency, bounds
             )
         self._follow(t, [*before, *phases], [*none, *preview.swings])
+
+    def _lead(
+        self, side: float, places: Mapping[float, Footstep], target: Footstep
+    ) -> Array:
+        """Return what the swing of a step adds to ξ where it begins, shape (2,) [m]."""
+        walk, place, height = self.walk, places[side], self._feet[side].frame_height
+        swing = Swing(
+            0.0,
+            walk.swing,
+            np.array([place.x, place.y, height]),
+            np.eye(3),
+            target,
+            np.eye(3),
+            height,
+            walk.lift,
+        )
+        reaction = self._legs.of(swing, 0.0, side, places[-side], self._frequency)
+        return reaction.shift(0.0)
+
+    def _react(self, t: float) -> None:
+        """Make up for what the leg will do that swings."""
+        assert self._swing is not None
+        standing = self._feet[-self._side].place
+        self._reaction = self._legs.of(
+            self._swing, t, self._side, standing, self._frequency
+        )
 
     def _follow(self, t: float, phases: list[Phase], swings: list[bool]) -> None:
         """Follow phases from now on."""
@@ -413,6 +449,7 @@ class RunningWalk(RunningPlan):
             self._put_down(t)
             return
         swing.redirect(t, foot.origin_of(chosen.target), t + chosen.remaining)
+        self._react(t)
 
     def _best_step(
         self, since: float, planned: float, window: tuple[float, float]
@@ -446,7 +483,7 @@ class RunningWalk(RunningPlan):
         standing, walk = self._feet[-self._side], self.walk
         phase, frequency = self._phases[self._index], self._frequency
         first = self._dcm_starts[self._index]
-        wanted = phase.dcm(first, since, frequency)
+        wanted = phase.dcm(first, since, frequency) + self._beside
         error = standing.place.local(standing.place.point + self._dcm - wanted)
         left = [
             error_after(float(e), T, frequency, walk.feedback, walk.margin * r)
@@ -463,15 +500,16 @@ class RunningWalk(RunningPlan):
         if self._index + 1 == len(self._phases):
             since = min(since, phase.duration)
         wanted = phase.dcm(self._dcm_starts[self._index], since, frequency)
-        point = phase.point(since)
+        wanted, point = wanted + self._beside, phase.point(since)
         displaced = (1.0 + gain / frequency) * (self._dcm - wanted)
         self._dcm_wanted = wanted
         if self._mode == "single":  # along and across the sole, each for itself
             self._point = nearest_inside(self._hull, point + displaced)
+            repels = self._point + self._reaction.point(t)
         else:  # the error goes straight to zero, wherever it is in the hull
-            self._point = last_inside(self._hull, point, point + displaced)
+            self._point = repels = last_inside(self._hull, point, point + displaced)
         height, yaw = self._sinking.sample(t), self._yaw.sample(t)
-        acceleration = frequency**2 * (position[:2] - self._point)
+        acceleration = frequency**2 * (position[:2] - repels)
         self._body.write(
             t,
             np.append(position[:2], height.position),
@@ -489,6 +527,15 @@ class RunningWalk(RunningPlan):
             foot = self._feet[self._side]
             foot.position.write(t, *self._swing.position(t))
             foot.orientation.write(t, *self._swing.orientation(t))
+
+    @property
+    def _beside(self) -> Array:
+        """How far a leg that swings leads ξ from that of its phase, shape (2,) [m]."""
+        if self._mode == "single":
+            return self._reaction.shift(self._state.t)
+        if self._swings[self._index]:  # it is to swing
+            return self._phases[self._index].lead
+        return np.zeros(2)
 
     def _soles(self, share: float) -> Array:
         """Return the corners of a share of both soles, shape (m, 2) [m]."""
