@@ -19,6 +19,18 @@ def root_frame(robot: Robot) -> str:
     raise PlanError(f"{robot.name} has no body at its root")
 
 
+def joints_of_leg(robot: Robot, foot: str) -> int:
+    """Return how many freedoms of joints are between the root and a foot.
+
+    Args:
+        robot: The robot.
+        foot: The frame of the foot.
+    """
+    model = robot.model
+    joints = list(model.supports[model.frames[robot.frame_id(foot)].parentJoint])[2:]
+    return sum(int(model.joints[joint].nv) for joint in joints)
+
+
 def leg_length(robot: Robot, foot: str) -> float:
     """Return how far a foot can be from the first joint of its leg [m].
 

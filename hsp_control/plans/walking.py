@@ -167,12 +167,13 @@ class RunningWalk(RunningPlan):
         t, walk = state.t, self.walk
         trunk = state.frame(self._trunk_frame).rotation
         feet = list(self._feet.values())
-        # The left foot is the one on the left of the trunk.
-        left = trunk.T @ (state.position(feet[0].frame) - state.position(feet[1].frame))
-        if left[1] < 0.0:
+        # It walks where its feet point; the left one is on the left of that.
+        ahead = state.frame(feet[0].frame).rotation[:, 0]
+        away = state.position(feet[0].frame) - state.position(feet[1].frame)
+        if ahead[0] * away[1] < ahead[1] * away[0]:
             feet.reverse()
         self._feet = dict(zip((1.0, -1.0), feet, strict=True))
-        heading = float(np.arctan2(trunk[1, 0], trunk[0, 0]))
+        heading = float(np.arctan2(ahead[1], ahead[0]))
         for foot in feet:
             foot.begin(state, heading)
         mass = state.centroidal.position
@@ -323,8 +324,6 @@ class RunningWalk(RunningPlan):
             self._feet[-self._side].frame_height,
             walk.lift,
         )
-        standing = self._feet[-self._side].place
-        self._legs.lifts(self._state, self._side, standing.yaw)
         self._react(t)
         yaw = between(self._feet[-self._side].place, self._target).yaw
         self._yaw = to_rest(self._yaw.sample(t), [yaw], t, walk.swing)
@@ -349,6 +348,7 @@ class RunningWalk(RunningPlan):
         foot.task.throw(False, t)
         foot.stand(self._state)
         self._legs.lands(self._state, self._side, self._feet[-self._side].place.yaw)
+        self._legs.lifts(self._state, -self._side, foot.place.yaw)
         self._swing, self._mode = None, "double"
         if self._held:  # it was put down; it swings again later
             self._stand(t)
@@ -370,7 +370,14 @@ class RunningWalk(RunningPlan):
             point: Where the repellent point is, shape (2,) [m].
         """
         preview = self._planner.look_ahead(
-            t, self._taken, self._now, self._side, self._places, shift, point, self._lead
+            t,
+            self._taken,
+            self._now,
+            self._side,
+            self._places,
+            shift,
+            point,
+            self._lead,
         )
         self._now = preview.velocity
         if preview.target is not None:
