@@ -356,7 +356,8 @@ class RunningWalk(RunningPlan):
             return
         self._taken += 1
         self._side = -self._side
-        self._plan(t, [], walk.double_support, self._feet[self._side].place.point)
+        # From where the feet push now: a push has moved that within the sole.
+        self._plan(t, [], walk.double_support, self._point)
         if any(self._swings):
             self._feet[self._side].contact.throw(False, t, self._phases[0].duration)
 
