@@ -1,22 +1,26 @@
-"""What a swinging leg does to the centre of pressure, and how a plan makes up for it.
+"""What legs do to the centre of pressure, and how a plan makes up for it.
 
-The leg that swings has an angular momentum L about the centre of mass. Where the trunk
+A leg that swings has an angular momentum L about the centre of mass. Where the trunk
 does not turn, the feet must push beside the repellent point p, at
 
-    p + (-L_y', L_x') / (m g),
+    p + (-L_y', L_x') / (m g)
 
-by as much as the length of a sole for a long and fast step. A plan that keeps p in the
-middle of the sole leaves that to the sole, and where it ends to the arms. So here p
-moves the other way, by δ = K a, with a the acceleration of the swing foot: the centre of
-pressure stays in the middle. As ξ' = ω (ξ - p), the divergent component then is
+(Popovic, Goswami and Herr 2005, "Ground reference points in legged locomotion", Int. J.
+Robotics Research 24): by as much as a sole is long, for a long and fast step. A plan
+that keeps p in the middle of the sole leaves that to the sole, and where it ends to the
+arms. So here p moves the other way, by δ = K a with a the acceleration of the swing
+foot, and the centre of pressure stays in the middle. As ξ' = ω (ξ - p), the divergent
+component then is, beside where it is for p at rest,
 
     η(t) = ω ∫ exp(ω (t - τ)) δ(τ) dτ,   τ from t to touchdown,
 
-beside where it is for p at rest; it is zero at touchdown, because a foot that starts
-and ends at rest leaves nothing behind.
+which is zero at touchdown: a foot that starts and ends at rest leaves nothing behind.
 
-K is that of the law: from the accelerations by which its metric moves one foot while the
-other foot, the centre of mass and the trunk stay.
+The legs also turn as the centre of mass moves above feet that stand: with K_c of its
+acceleration, the centre of pressure is the p of a pendulum that is longer by g K_c.
+
+K and K_c are those of the law: from the accelerations by which its metric moves one
+foot, or the centre of mass, while the other foot and the trunk stay.
 """
 
 from typing import NamedTuple
@@ -66,7 +70,7 @@ class Reaction(NamedTuple):
         place = max((t - self.start) / self.step, 0.0)
         k = int(place)
         if k + 1 >= len(samples):
-            return np.zeros(2)
+            return np.zeros_like(samples[0])
         return np.asarray(samples[k] + (place - k) * (samples[k + 1] - samples[k]))
 
 
@@ -74,7 +78,7 @@ def reaction_of(points: Array, start: float, step: float, frequency: float) -> R
     """Return the reaction whose repellent point moves from point to point.
 
     Args:
-        points: δ, shape (n, 2) [m].
+        points: δ, shape (n, k) [m].
         start: When it is at the first of them [s].
         step: The time from one to the next [s].
         frequency: ω [1/s].
@@ -85,7 +89,7 @@ def reaction_of(points: Array, start: float, step: float, frequency: float) -> R
     own = points[:-1] + m - (points[1:] + m) * decay
     fades = decay ** np.arange(len(own))[:, None]
     later = np.cumsum((fades * own)[::-1], axis=0)[::-1] / fades
-    return Reaction(start, step, points, np.vstack([later, np.zeros(2)]))
+    return Reaction(start, step, points, np.vstack([later, 0.0 * points[:1]]))
 
 
 class LegReaction:
@@ -106,11 +110,29 @@ class LegReaction:
         self._first: dict[float, Array] = {}
         self._last: dict[float, Array] = {}
 
-    def begin(self, state: RobotState, yaw: float) -> None:
-        """Take both legs as they are; the feet stand with this yaw [rad]."""
+    def begin(
+        self, state: RobotState, yaw: float, duration: float, frequency: float
+    ) -> None:
+        """Take both legs as they are, before the first step.
+
+        Args:
+            state: The state.
+            yaw: That of the feet [rad].
+            duration: How long swings take as they are planned [s].
+            frequency: ω [1/s].
+        """
+        self._frequency = frequency
         for side in self._frames:
             self.lifts(state, side, yaw)
             self.lands(state, side, yaw)
+        # A lead is linear in how far a foot goes and in how high it is lifted.
+        place, one = Footstep(1.0, 1.0, 0.0), np.eye(3)
+        unit = Swing(0.0, duration, np.zeros(3), one, place, one, 0.0, 1.0)
+        times, step = _times(0.0, duration)
+        shape = unit.accelerations(times)
+        later = (times / duration)[:, None] * shape
+        self._share = reaction_of(shape, 0.0, step, frequency).shift(0.0)
+        self._later = reaction_of(later, 0.0, step, frequency).shift(0.0)
 
     def lifts(self, state: RobotState, side: float, yaw: float) -> None:
         """Take a leg as it is for where its swings begin.
@@ -126,9 +148,21 @@ class LegReaction:
         """Take a leg as it is for where its swings end; see `lifts`."""
         self._last[side] = self._gain(state, side, yaw)
 
-    def of(
-        self, swing: Swing, t: float, side: float, standing: Footstep, frequency: float
-    ) -> Reaction:
+    def lead(self, side: float, standing: Footstep, way: Array) -> Array:
+        """Return η where a planned swing begins, shape (2,) [m].
+
+        Args:
+            side: 1 if the left foot swings, -1 for the right one.
+            standing: Where the other one stands.
+            way: How far the foot goes, and how high it is lifted, shape (3,) [m].
+        """
+        turned = _turn(standing.yaw)
+        local, first = way @ turned, self._first[side]
+        own = first @ (self._share * local)
+        own = own + (self._last[side] - first) @ (self._later * local)
+        return np.asarray(turned[:2, :2] @ own)
+
+    def of(self, swing: Swing, t: float, side: float, standing: Footstep) -> Reaction:
         """Return the reaction of a swing from a time on.
 
         Args:
@@ -136,16 +170,16 @@ class LegReaction:
             t: From when on [s].
             side: 1 if the left foot swings, -1 for the right one.
             standing: Where the other one stands.
-            frequency: ω [1/s].
         """
-        times, step = np.linspace(t, max(swing.end, t + 1e-3), _SAMPLES, retstep=True)
-        shares = np.clip([swing.share(each) for each in times], 0.0, 1.0)
+        times, step = _times(t, max(swing.end, t + 1e-3))
+        shares = (times - swing.start)[:, None] / (swing.end - swing.start)
         turned = _turn(standing.yaw)
         local = swing.accelerations(times) @ turned
         first, last = self._first[side], self._last[side]
-        moved = local @ first.T + shares[:, None] * (local @ (last - first).T)
-        points = moved @ turned[:2, :2].T
-        return reaction_of(points, t, float(step), frequency)
+        points = (
+            local @ first.T + np.minimum(shares, 1.0) * (local @ (last - first).T)
+        ) @ turned[:2, :2].T
+        return reaction_of(points, t, step, self._frequency)
 
     def pendulum(self, state: RobotState) -> float:
         """Return how much longer than it is high the pendulum is, for the legs [m].
@@ -181,6 +215,11 @@ class LegReaction:
         return np.asarray(
             body.momentum_matrix @ raised @ np.linalg.pinv(rows @ raised, _SINGULAR)
         )
+
+
+def _times(first: float, last: float) -> tuple[Array, float]:
+    """Return the times of samples, and the time between two [s]."""
+    return np.linspace(first, last, _SAMPLES), (last - first) / (_SAMPLES - 1)
 
 
 def _turn(yaw: float) -> Array:

@@ -207,7 +207,7 @@ class RunningWalk(RunningPlan):
         self._taken, self._side, self._held = 0, 1.0, False
         self._now = Velocity(0.0, 0.0, 0.0)
         self._swing: Swing | None = None
-        self._legs.begin(state, self._first_yaw)
+        self._legs.begin(state, self._first_yaw, walk.swing, self._frequency)
         self._dcm = self._dcm_wanted = self._point = self._middle()
         self._target = self._feet[1.0].place
         self._stand(t)
@@ -396,27 +396,14 @@ class RunningWalk(RunningPlan):
         self, side: float, places: Mapping[float, Footstep], target: Footstep
     ) -> Array:
         """Return what the swing of a step adds to ξ where it begins, shape (2,) [m]."""
-        walk, place, height = self.walk, places[side], self._feet[side].frame_height
-        swing = Swing(
-            0.0,
-            walk.swing,
-            np.array([place.x, place.y, height]),
-            np.eye(3),
-            target,
-            np.eye(3),
-            height,
-            walk.lift,
-        )
-        reaction = self._legs.of(swing, 0.0, side, places[-side], self._frequency)
-        return reaction.shift(0.0)
+        way = np.append(target.point - places[side].point, self.walk.lift)
+        return self._legs.lead(side, places[-side], way)
 
     def _react(self, t: float) -> None:
         """Make up for what the leg will do that swings."""
         assert self._swing is not None
         standing = self._feet[-self._side].place
-        self._reaction = self._legs.of(
-            self._swing, t, self._side, standing, self._frequency
-        )
+        self._reaction = self._legs.of(self._swing, t, self._side, standing)
 
     def _follow(self, t: float, phases: list[Phase], swings: list[bool]) -> None:
         """Follow phases from now on."""
