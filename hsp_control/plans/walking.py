@@ -1,7 +1,6 @@
 """A biped that walks: one run, from phase to phase."""
 
 from collections.abc import Mapping
-from functools import partial
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -20,14 +19,13 @@ from hsp_control.plans.pendulum import (
     GRAVITY,
     Phase,
     dcm_of,
-    error_after,
     in_step,
     plan_dcm,
 )
 from hsp_control.plans.plan import RunningPlan
 from hsp_control.plans.polygon import convex_hull, last_inside, nearest_inside
+from hsp_control.plans.push_recovery import PlannedSwing, PushRecovery
 from hsp_control.plans.quintic import at_rest, to_rest
-from hsp_control.plans.step_adjustment import Adjustment, adjust, shift_gain
 from hsp_control.plans.step_planner import StepPlanner, stance_of
 from hsp_control.plans.swing import Swing, turned
 from hsp_control.robot import RobotState
@@ -44,14 +42,6 @@ EARLY = 0.6
 """Share of a swing before which no force counts as touchdown."""
 LANDING = 0.5
 """How long the force of a foot that lands takes to rise, in double supports [-]."""
-_DEADBAND = 0.005
-"""Error of the divergent component at touchdown that needs no adjustment [m]."""
-_COMMITTED = 0.12
-"""A step is not adjusted so shortly before it lands [s]."""
-_SHORTEST = 0.55
-"""The shortest swing that an adjustment may choose, in swings [-]."""
-_LONGEST = 1.25
-"""The longest one, in swings [-]."""
 _SHIFTS = 0.5, 2.0
 """The shortest and the longest shift of the weight after a step, in those planned."""
 _CALM = 0.02
@@ -190,6 +180,7 @@ class RunningWalk(RunningPlan):
         pendulum += self._legs.pendulum(state)
         self._frequency = float(np.sqrt(GRAVITY / pendulum))
         self._stance = stance_of(self._feet, state, walk.crouch)
+        self._recovery = PushRecovery(walk, self._stance, self._frequency)
         robot, places = state.robot.name, self._places
         if walk.footsteps is None:
             self._planner = StepPlanner(walk, self._stance, robot)
@@ -227,7 +218,8 @@ class RunningWalk(RunningPlan):
                 break  # a swing ends when the foot has landed
             self._index += 1
             if self._mode == "double" and self._swings[self._index]:
-                if self.walk.adjusts and self._is_to_hold():
+                plan, soles = self._planned_swing(0.0), self._soles(1.0)
+                if self.walk.adjusts and self._recovery.holds(plan, soles):
                     self._hold(t)
                 else:
                     self._lift_off(t)
@@ -255,27 +247,6 @@ class RunningWalk(RunningPlan):
         self._mode = "double"
         self._plan(t, [Phase(ready, middle, middle)], shift, middle)
         self._feet[self._side].contact.throw(False, t + ready, shift)
-
-    def _is_to_hold(self) -> bool:
-        """Return whether both soles hold a push that one sole and a step do not.
-
-        Across the standing foot no leg can step: a divergent component that is still
-        within both soles, but would leave the one, is brought back where it is.
-        """
-        swing = self.walk.swing
-        window = _SHORTEST * swing, _LONGEST * swing
-        left = self._best_step(0.0, swing, window).left
-        return self._is_too_far(left) and self._is_within(self._soles(1.0))
-
-    def _is_too_far(self, left: Array) -> bool:
-        """Return whether the sole of the next step cannot hold an error, (2,) [m]."""
-        standing = self._feet[-self._side].place
-        reach = self.walk.margin * self._feet[self._side].reach
-        return bool((np.abs(standing.local(standing.point + left)) > reach).any())
-
-    def _is_within(self, corners: Array) -> bool:
-        """Return whether the divergent component is in a polygon, (m, 2) [m]."""
-        return bool((nearest_inside(corners, self._dcm) == self._dcm).all())
 
     def _hold(self, t: float) -> None:
         """Keep both feet on the ground, and bring the mass back between them."""
@@ -420,72 +391,33 @@ class RunningWalk(RunningPlan):
     def _adjust(self, t: float) -> None:
         """Move the step, in place and in time, if the sole cannot hold a push."""
         assert self._swing is not None
-        walk, swing = self.walk, self._swing
-        phase, first = self._phases[self._index], self._dcm_starts[self._index]
-        remaining = swing.end - t
-        if remaining < _COMMITTED or self._held:
+        if self._held:
             return
-        since = t - self._times[self._index]
-        planned = swing.start + walk.swing - t
-        # What the swing foot goes to now, after earlier adjustments.
-        foot = self._feet[self._side]
-        now = foot.place_of(swing.target)
-        shift = shift_gain(self._frequency, walk.double_support)
-        landing = phase.dcm(first, since + planned, self._frequency)
-        needed = landing + shift * (now.point - self._target.point)
-        if float(np.abs(self._dcm_after(since, remaining) - needed).max()) < _DEADBAND:
+        plan = self._planned_swing(t - self._times[self._index])
+        step = self._recovery.step(plan, self._swing, t)
+        if step is None:
             return
-        earliest = max(swing.start + _SHORTEST * walk.swing - t, _COMMITTED)
-        latest = swing.start + _LONGEST * walk.swing - t
-        window = earliest, max(latest, earliest)
-        chosen = self._best_step(since, planned, window)
-        standing = self._feet[-self._side]
-        if self._is_too_far(chosen.left) and self._is_within(standing.corners(1.0)):
+        if self._recovery.is_better_put_down(plan, step):
             self._put_down(t)
             return
-        swing.redirect(t, foot.origin_of(chosen.target), t + chosen.remaining)
+        foot = self._feet[self._side]
+        self._swing.redirect(t, foot.origin_of(step.target), t + step.remaining)
         self._react(t)
 
-    def _best_step(
-        self, since: float, planned: float, window: tuple[float, float]
-    ) -> Adjustment:
-        """Return where and when the swing foot is to land.
-
-        Args:
-            since: The present time, from when the swing was to begin [s].
-            planned: The time until the foot was to land [s].
-            window: The earliest and the latest touchdown from now [s].
-        """
-        standing, phase = self._feet[-self._side].place, self._phases[self._index]
-        first = self._dcm_starts[self._index]
-        return adjust(
+    def _planned_swing(self, since: float) -> PlannedSwing:
+        """Return the swing of this phase, a time after it was to begin [s]."""
+        phase, first = self._phases[self._index], self._dcm_starts[self._index]
+        return PlannedSwing(
+            self._side,
+            self._feet[-self._side],
+            self._feet[self._side],
             self._target,
-            planned,
-            window,
-            partial(self._dcm_after, since),
-            phase.dcm(first, since + planned, self._frequency),
-            shift_gain(self._frequency, self.walk.double_support),
-            lambda place: self._stance.kept(standing, self._side, place),
+            phase,
+            first,
+            since,
+            phase.dcm(first, since, self._frequency) + self._beside,
+            self._dcm,
         )
-
-    def _dcm_after(self, since: float, T: float) -> Array:
-        """Return what the divergent component will be, with feedback within the sole.
-
-        Args:
-            since: The present time, from when the swing was to begin [s].
-            T: Time from now, at most until touchdown [s].
-        """
-        standing, walk = self._feet[-self._side], self.walk
-        phase, frequency = self._phases[self._index], self._frequency
-        first = self._dcm_starts[self._index]
-        wanted = phase.dcm(first, since, frequency) + self._beside
-        error = standing.place.local(standing.place.point + self._dcm - wanted)
-        left = [
-            error_after(float(e), T, frequency, walk.feedback, walk.margin * r)
-            for e, r in zip(error, standing.reach, strict=True)
-        ]
-        axes = standing.place.world(np.array(left)) - standing.place.point
-        return np.asarray(phase.dcm(first, since + T, frequency) + axes)
 
     def _write(self, t: float, position: Array, velocity: Array) -> None:
         """Write the references of this period."""
