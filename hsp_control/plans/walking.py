@@ -44,6 +44,9 @@ LANDING = 0.5
 """How long the force of a foot that lands takes to rise, in double supports [-]."""
 _SHIFTS = 0.5, 2.0
 """The shortest and the longest shift of the weight after a step, in those planned."""
+_HELD = 1.1
+"""Share of the soles that a walk uses that was held: what they do not reach themselves
+the law takes from the arms for a while [-]."""
 _CALM = 0.02
 """Error of the divergent component with which a walk that was held goes on [m]."""
 
@@ -254,7 +257,7 @@ class RunningWalk(RunningPlan):
         foot.contact.throw(True, t, LANDING * self.walk.double_support)
         self._now, self._held = Velocity(0.0, 0.0, 0.0), True
         self._stand(t)
-        self._hull = self._soles(1.0)  # as far as they reach
+        self._hull = self._soles(_HELD)
 
     def _put_down(self, t: float) -> None:
         """Stand on one foot, and put the other one down where it is."""
@@ -269,7 +272,7 @@ class RunningWalk(RunningPlan):
         self._react(t)
         rest = standing.place.point
         self._follow(t, [Phase(1.0, rest, rest)], [True])
-        self._hull = standing.corners(1.0)  # as far as it reaches
+        self._hull = standing.corners(_HELD)
 
     def _is_calm(self) -> bool:
         """Return whether a walk that was held may go on."""
@@ -323,7 +326,7 @@ class RunningWalk(RunningPlan):
         self._swing, self._mode = None, "double"
         if self._held:  # it was put down; it swings again later
             self._stand(t)
-            self._hull = self._soles(1.0)
+            self._hull = self._soles(_HELD)
             return
         self._taken += 1
         self._side = -self._side
