@@ -26,6 +26,11 @@ def leg_joints(robot: Robot, foot: str) -> list[int]:
     return [int(each) for each in list(model.supports[joint])[2:]]
 
 
+def leg_freedoms(robot: Robot, foot: str) -> int:
+    """Return how many freedoms the joints from the root to a foot have."""
+    return sum(robot.model.joints[joint].nv for joint in leg_joints(robot, foot))
+
+
 def leg_length(robot: Robot, foot: str) -> float:
     """Return how far a foot can be from the first joint of its leg [m].
 

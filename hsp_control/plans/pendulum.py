@@ -42,11 +42,14 @@ class Phase(NamedTuple):
         duration: T > 0 [s].
         start: a, where it begins, shape (2,) [m].
         end: b, where it ends, shape (2,) [m].
+        lead: How far ξ is beside that where the phase begins, because the point moves
+            beside the line, and is on it again at the end, shape (2,) [m].
     """
 
     duration: float
     start: Array
     end: Array
+    lead: Array = np.zeros(2)
 
     def point(self, t: float) -> Array:
         """Return p(t), t in s from the start of the phase; at rest before and after."""
@@ -54,7 +57,7 @@ class Phase(NamedTuple):
         return self.start + share * (self.end - self.start)
 
     def dcm(self, first: Array, t: float, frequency: float) -> Array:
-        """Return ξ(t), t in s from the start of the phase.
+        """Return ξ(t), t in s from the start of the phase, without what moves beside.
 
         Args:
             first: ξ(0), shape (2,) [m].
@@ -63,13 +66,14 @@ class Phase(NamedTuple):
         """
         m = (self.end - self.start) / (frequency * self.duration)
         at = self.start + (t / self.duration) * (self.end - self.start)
-        return np.asarray(at + m + (first - self.start - m) * exp(frequency * t))
+        own = first - self.lead
+        return np.asarray(at + m + (own - self.start - m) * exp(frequency * t))
 
     def first_dcm(self, last: Array, frequency: float) -> Array:
         """Return the ξ(0) from which ξ(T) is reached, shape (2,) [m]."""
         m = (self.end - self.start) / (frequency * self.duration)
         decay = exp(-frequency * self.duration)
-        return np.asarray(self.start + m + (last - self.end - m) * decay)
+        return np.asarray(self.start + m + (last - self.end - m) * decay + self.lead)
 
 
 def dcm_of(position: Array, velocity: Array, frequency: float) -> Array:

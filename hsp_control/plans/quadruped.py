@@ -12,7 +12,7 @@ from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Names, Positive
 from hsp_control.plans.composing import composed
 from hsp_control.plans.footsteps import Velocity
-from hsp_control.plans.legs import leg_joints, root_frame
+from hsp_control.plans.legs import leg_freedoms, root_frame
 from hsp_control.plans.moving import MovingPlan
 from hsp_control.plans.plan import PlanParts
 from hsp_control.robot import Robot
@@ -89,7 +89,7 @@ class QuadrupedPlan(MovingPlan):
             names = self.feet_of(contacts)
             frames = {each.name: each.frame for each in contacts}
             for name in names:
-                joints = len(leg_joints(robot, frames[name]))
+                joints = leg_freedoms(robot, frames[name])
                 if joints < 3:
                     raise PlanError(
                         f"the leg of {name!r} has {joints} joints between the root and "

@@ -45,6 +45,12 @@ class Quintic(NamedTuple):
         x_ddot = 2 * c[2] + s * (6 * c[3] + s * (12 * c[4] + s * 20 * c[5]))
         return Motion(x, x_dot, x_ddot)
 
+    def accelerations(self, times: Array) -> Array:
+        """Return x'' at many times, shape (m,) [s], as shape (m, n)."""
+        c, s = self.coefficients, (times - self.start)[:, None]
+        x_ddot = 2 * c[2] + s * (6 * c[3] + s * (12 * c[4] + s * 20 * c[5]))
+        return np.asarray(np.where((s >= 0.0) & (s < self.duration), x_ddot, 0.0))
+
 
 def to_rest(now: Motion, target: ArrayLike, start: float, duration: float) -> Quintic:
     """Return the quintic from a motion to rest at a target, C² at its start.

@@ -1,6 +1,6 @@
 """The steps to come: places, phases, and when a walk stands again."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from math import hypot
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -100,6 +100,7 @@ class StepPlanner:
         places: Mapping[float, Footstep],
         shift: float,
         point: Array,
+        lead: Callable[[float, Mapping[float, Footstep], Footstep], Array],
     ) -> Preview:
         """Return what is to come, from a phase on two feet on.
 
@@ -111,6 +112,8 @@ class StepPlanner:
             places: Where the feet stand, by side.
             shift: How long the weight takes to shift to the standing foot [s].
             point: Where the repellent point is, shape (2,) [m].
+            lead: What `Phase.lead` is for the foot of a side, where the feet stand, and
+                where it goes.
         """
         walk, places = self._walk, dict(places)
         phases, swings = list[Phase](), list[bool]()
@@ -122,7 +125,11 @@ class StepPlanner:
             if target is None:
                 break
             center = places[-side].point
-            phases += [Phase(shift, point, center), Phase(walk.swing, center, center)]
+            beside = lead(side, places, target)
+            phases += [
+                Phase(shift, point, center),
+                Phase(walk.swing, center, center, beside),
+            ]
             swings += [False, True]
             places[side] = target
             side, point, shift = -side, center, walk.double_support

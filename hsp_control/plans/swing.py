@@ -105,6 +105,14 @@ class Swing:
             *(np.append(a[:2], z) for a, z in zip(along, vertical, strict=True))
         )
 
+    def accelerations(self, times: Array) -> Array:
+        """Return x'' of the foot's frame at times until touchdown, shape (m, 3)."""
+        up = times < self._up.end
+        vertical = np.where(
+            up[:, None], self._up.accelerations(times), self._down.accelerations(times)
+        )
+        return np.hstack([self._along.accelerations(times)[:, :2], vertical])
+
     def orientation(self, t: float) -> Motion:
         """Return R, ω and ω', shapes (3, 3), (3,) and (3,)."""
         s, s_dot, s_ddot = (float(each[2]) for each in self._along.sample(t))

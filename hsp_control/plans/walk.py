@@ -19,7 +19,7 @@ from hsp_control.declaration.quantities import (
     PositiveCount,
 )
 from hsp_control.plans.composing import composed
-from hsp_control.plans.legs import root_frame
+from hsp_control.plans.legs import leg_freedoms, root_frame
 from hsp_control.plans.moving import MovingPlan
 from hsp_control.plans.plan import PlanParts
 from hsp_control.plans.walking import RunningWalk
@@ -29,6 +29,8 @@ from hsp_control.tasks.frame_task import TrackingTask
 
 BODY, TRUNK = "center_of_mass", "trunk"
 """The names of the tasks that every walk has, besides one for each foot."""
+_SIX = 6
+"""Freedoms of a sole, which stands flat or swings."""
 
 
 class Walk(MovingPlan, type="walk"):
@@ -95,7 +97,14 @@ class Walk(MovingPlan, type="walk"):
                     "to the world"
                 )
             names = self._feet(contacts)
-        frames = {each.name: each.frame for each in contacts}
+            frames = {each.name: each.frame for each in contacts}
+            for name in names:
+                joints = leg_freedoms(robot, frames[name])
+                if joints < _SIX:
+                    raise PlanError(
+                        f"the leg of {name!r} has {joints} joints; a sole that is put "
+                        f"down flat, anywhere, needs {_SIX}"
+                    )
         trunk = root_frame(robot) if self.trunk is None else self.trunk
         with within("plan", "trunk"):
             robot.frame_id(trunk)

@@ -1,7 +1,6 @@
 """A biped that walks: one run, from phase to phase."""
 
 from collections.abc import Mapping
-from functools import partial
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -15,18 +14,18 @@ from hsp_control.plans.falling import FallDetector
 from hsp_control.plans.foot import Foot
 from hsp_control.plans.footsteps import Footstep, Velocity, between
 from hsp_control.plans.given_steps import GivenSteps
+from hsp_control.plans.leg_reaction import LegReaction
 from hsp_control.plans.pendulum import (
     GRAVITY,
     Phase,
     dcm_of,
-    error_after,
     in_step,
     plan_dcm,
 )
 from hsp_control.plans.plan import RunningPlan
 from hsp_control.plans.polygon import convex_hull, last_inside, nearest_inside
+from hsp_control.plans.push_recovery import PlannedSwing, PushRecovery
 from hsp_control.plans.quintic import at_rest, to_rest
-from hsp_control.plans.step_adjustment import Adjustment, adjust, shift_gain
 from hsp_control.plans.step_planner import StepPlanner, stance_of
 from hsp_control.plans.swing import Swing, turned
 from hsp_control.robot import RobotState
@@ -43,16 +42,11 @@ EARLY = 0.6
 """Share of a swing before which no force counts as touchdown."""
 LANDING = 0.5
 """How long the force of a foot that lands takes to rise, in double supports [-]."""
-_DEADBAND = 0.005
-"""Error of the divergent component at touchdown that needs no adjustment [m]."""
-_COMMITTED = 0.12
-"""A step is not adjusted so shortly before it lands [s]."""
-_SHORTEST = 0.55
-"""The shortest swing that an adjustment may choose, in swings [-]."""
-_LONGEST = 1.25
-"""The longest one, in swings [-]."""
 _SHIFTS = 0.5, 2.0
 """The shortest and the longest shift of the weight after a step, in those planned."""
+_HELD = 1.1
+"""Share of the soles that a walk uses that was held: what they do not reach themselves
+the law takes from the arms for a while [-]."""
 _CALM = 0.02
 """Error of the divergent component with which a walk that was held goes on [m]."""
 
@@ -166,12 +160,13 @@ class RunningWalk(RunningPlan):
         t, walk = state.t, self.walk
         trunk = state.frame(self._trunk_frame).rotation
         feet = list(self._feet.values())
-        # The left foot is the one on the left of the trunk.
-        left = trunk.T @ (state.position(feet[0].frame) - state.position(feet[1].frame))
-        if left[1] < 0.0:
+        # It walks where its feet point; the left one is on the left of that.
+        ahead = state.frame(feet[0].frame).rotation[:, 0]
+        away = state.position(feet[0].frame) - state.position(feet[1].frame)
+        if ahead[0] * away[1] < ahead[1] * away[0]:
             feet.reverse()
         self._feet = dict(zip((1.0, -1.0), feet, strict=True))
-        heading = float(np.arctan2(trunk[1, 0], trunk[0, 0]))
+        heading = float(np.arctan2(ahead[1], ahead[0]))
         for foot in feet:
             foot.begin(state, heading)
         mass = state.centroidal.position
@@ -183,8 +178,12 @@ class RunningWalk(RunningPlan):
                 f"crouch is {walk.crouch} m; the centre of mass is only "
                 f"{self._height - ground:.3g} m above the feet"
             )
+        sides = {side: foot.frame for side, foot in self._feet.items()}
+        self._legs = LegReaction(self._controller, self._trunk_frame, sides)
+        pendulum += self._legs.pendulum(state)
         self._frequency = float(np.sqrt(GRAVITY / pendulum))
         self._stance = stance_of(self._feet, state, walk.crouch)
+        self._recovery = PushRecovery(walk, self._stance, self._frequency)
         robot, places = state.robot.name, self._places
         if walk.footsteps is None:
             self._planner = StepPlanner(walk, self._stance, robot)
@@ -202,6 +201,7 @@ class RunningWalk(RunningPlan):
         self._taken, self._side, self._held = 0, 1.0, False
         self._now = Velocity(0.0, 0.0, 0.0)
         self._swing: Swing | None = None
+        self._legs.begin(state, self._first_yaw, walk.swing, self._frequency)
         self._dcm = self._dcm_wanted = self._point = self._middle()
         self._target = self._feet[1.0].place
         self._stand(t)
@@ -221,7 +221,8 @@ class RunningWalk(RunningPlan):
                 break  # a swing ends when the foot has landed
             self._index += 1
             if self._mode == "double" and self._swings[self._index]:
-                if self.walk.adjusts and self._is_to_hold():
+                plan, soles = self._planned_swing(0.0), self._soles(1.0)
+                if self.walk.adjusts and self._recovery.holds(plan, soles):
                     self._hold(t)
                 else:
                     self._lift_off(t)
@@ -250,34 +251,13 @@ class RunningWalk(RunningPlan):
         self._plan(t, [Phase(ready, middle, middle)], shift, middle)
         self._feet[self._side].contact.throw(False, t + ready, shift)
 
-    def _is_to_hold(self) -> bool:
-        """Return whether both soles hold a push that one sole and a step do not.
-
-        Across the standing foot no leg can step: a divergent component that is still
-        within both soles, but would leave the one, is brought back where it is.
-        """
-        swing = self.walk.swing
-        window = _SHORTEST * swing, _LONGEST * swing
-        left = self._best_step(0.0, swing, window).left
-        return self._is_too_far(left) and self._is_within(self._soles(1.0))
-
-    def _is_too_far(self, left: Array) -> bool:
-        """Return whether the sole of the next step cannot hold an error, (2,) [m]."""
-        standing = self._feet[-self._side].place
-        reach = self.walk.margin * self._feet[self._side].reach
-        return bool((np.abs(standing.local(standing.point + left)) > reach).any())
-
-    def _is_within(self, corners: Array) -> bool:
-        """Return whether the divergent component is in a polygon, (m, 2) [m]."""
-        return bool((nearest_inside(corners, self._dcm) == self._dcm).all())
-
     def _hold(self, t: float) -> None:
         """Keep both feet on the ground, and bring the mass back between them."""
         foot = self._feet[self._side]
         foot.contact.throw(True, t, LANDING * self.walk.double_support)
         self._now, self._held = Velocity(0.0, 0.0, 0.0), True
         self._stand(t)
-        self._hull = self._soles(1.0)  # as far as they reach
+        self._hull = self._soles(_HELD)
 
     def _put_down(self, t: float) -> None:
         """Stand on one foot, and put the other one down where it is."""
@@ -289,9 +269,10 @@ class RunningWalk(RunningPlan):
         place = self._stance.kept(standing.place, self._side, here)
         end = t + 0.5 * self.walk.swing
         self._swing.redirect(t, foot.origin_of(place), end, rises=False)
+        self._react(t)
         rest = standing.place.point
         self._follow(t, [Phase(1.0, rest, rest)], [True])
-        self._hull = standing.corners(1.0)  # as far as it reaches
+        self._hull = standing.corners(_HELD)
 
     def _is_calm(self) -> bool:
         """Return whether a walk that was held may go on."""
@@ -317,6 +298,7 @@ class RunningWalk(RunningPlan):
             self._feet[-self._side].frame_height,
             walk.lift,
         )
+        self._react(t)
         yaw = between(self._feet[-self._side].place, self._target).yaw
         self._yaw = to_rest(self._yaw.sample(t), [yaw], t, walk.swing)
         # The plan begins anew, because a phase ends at a control period.
@@ -339,14 +321,17 @@ class RunningWalk(RunningPlan):
         foot.contact.throw(True, t, LANDING * walk.double_support)
         foot.task.throw(False, t)
         foot.stand(self._state)
+        self._legs.lands(self._state, self._side, self._feet[-self._side].place.yaw)
+        self._legs.lifts(self._state, -self._side, foot.place.yaw)
         self._swing, self._mode = None, "double"
         if self._held:  # it was put down; it swings again later
             self._stand(t)
-            self._hull = self._soles(1.0)
+            self._hull = self._soles(_HELD)
             return
         self._taken += 1
         self._side = -self._side
-        self._plan(t, [], walk.double_support, self._feet[self._side].place.point)
+        # From where the feet push now: a push has moved that within the sole.
+        self._plan(t, [], walk.double_support, self._point)
         if any(self._swings):
             self._feet[self._side].contact.throw(False, t, self._phases[0].duration)
 
@@ -360,7 +345,14 @@ class RunningWalk(RunningPlan):
             point: Where the repellent point is, shape (2,) [m].
         """
         preview = self._planner.look_ahead(
-            t, self._taken, self._now, self._side, self._places, shift, point
+            t,
+            self._taken,
+            self._now,
+            self._side,
+            self._places,
+            shift,
+            point,
+            self._lead,
         )
         self._now = preview.velocity
         if preview.target is not None:
@@ -373,6 +365,19 @@ class RunningWalk(RunningPlan):
                 phases[0], starts[1], self._dcm, self._frequency, bounds
             )
         self._follow(t, [*before, *phases], [*none, *preview.swings])
+
+    def _lead(
+        self, side: float, places: Mapping[float, Footstep], target: Footstep
+    ) -> Array:
+        """Return what the swing of a step adds to ξ where it begins, shape (2,) [m]."""
+        way = np.append(target.point - places[side].point, self.walk.lift)
+        return self._legs.lead(side, places[-side], way)
+
+    def _react(self, t: float) -> None:
+        """Make up for what the leg will do that swings."""
+        assert self._swing is not None
+        standing = self._feet[-self._side].place
+        self._reaction = self._legs.of(self._swing, t, self._side, standing)
 
     def _follow(self, t: float, phases: list[Phase], swings: list[bool]) -> None:
         """Follow phases from now on."""
@@ -389,71 +394,33 @@ class RunningWalk(RunningPlan):
     def _adjust(self, t: float) -> None:
         """Move the step, in place and in time, if the sole cannot hold a push."""
         assert self._swing is not None
-        walk, swing = self.walk, self._swing
-        phase, first = self._phases[self._index], self._dcm_starts[self._index]
-        remaining = swing.end - t
-        if remaining < _COMMITTED or self._held:
+        if self._held:
             return
-        since = t - self._times[self._index]
-        planned = swing.start + walk.swing - t
-        # What the swing foot goes to now, after earlier adjustments.
-        foot = self._feet[self._side]
-        now = foot.place_of(swing.target)
-        shift = shift_gain(self._frequency, walk.double_support)
-        landing = phase.dcm(first, since + planned, self._frequency)
-        needed = landing + shift * (now.point - self._target.point)
-        if float(np.abs(self._dcm_after(since, remaining) - needed).max()) < _DEADBAND:
+        plan = self._planned_swing(t - self._times[self._index])
+        step = self._recovery.step(plan, self._swing, t)
+        if step is None:
             return
-        earliest = max(swing.start + _SHORTEST * walk.swing - t, _COMMITTED)
-        latest = swing.start + _LONGEST * walk.swing - t
-        window = earliest, max(latest, earliest)
-        chosen = self._best_step(since, planned, window)
-        standing = self._feet[-self._side]
-        if self._is_too_far(chosen.left) and self._is_within(standing.corners(1.0)):
+        if self._recovery.is_better_put_down(plan, step):
             self._put_down(t)
             return
-        swing.redirect(t, foot.origin_of(chosen.target), t + chosen.remaining)
+        foot = self._feet[self._side]
+        self._swing.redirect(t, foot.origin_of(step.target), t + step.remaining)
+        self._react(t)
 
-    def _best_step(
-        self, since: float, planned: float, window: tuple[float, float]
-    ) -> Adjustment:
-        """Return where and when the swing foot is to land.
-
-        Args:
-            since: The present time, from when the swing was to begin [s].
-            planned: The time until the foot was to land [s].
-            window: The earliest and the latest touchdown from now [s].
-        """
-        standing, phase = self._feet[-self._side].place, self._phases[self._index]
-        first = self._dcm_starts[self._index]
-        return adjust(
+    def _planned_swing(self, since: float) -> PlannedSwing:
+        """Return the swing of this phase, a time after it was to begin [s]."""
+        phase, first = self._phases[self._index], self._dcm_starts[self._index]
+        return PlannedSwing(
+            self._side,
+            self._feet[-self._side],
+            self._feet[self._side],
             self._target,
-            planned,
-            window,
-            partial(self._dcm_after, since),
-            phase.dcm(first, since + planned, self._frequency),
-            shift_gain(self._frequency, self.walk.double_support),
-            lambda place: self._stance.kept(standing, self._side, place),
+            phase,
+            first,
+            since,
+            phase.dcm(first, since, self._frequency) + self._beside,
+            self._dcm,
         )
-
-    def _dcm_after(self, since: float, T: float) -> Array:
-        """Return what the divergent component will be, with feedback within the sole.
-
-        Args:
-            since: The present time, from when the swing was to begin [s].
-            T: Time from now, at most until touchdown [s].
-        """
-        standing, walk = self._feet[-self._side], self.walk
-        phase, frequency = self._phases[self._index], self._frequency
-        first = self._dcm_starts[self._index]
-        wanted = phase.dcm(first, since, frequency)
-        error = standing.place.local(standing.place.point + self._dcm - wanted)
-        left = [
-            error_after(float(e), T, frequency, walk.feedback, walk.margin * r)
-            for e, r in zip(error, standing.reach, strict=True)
-        ]
-        axes = standing.place.world(np.array(left)) - standing.place.point
-        return np.asarray(phase.dcm(first, since + T, frequency) + axes)
 
     def _write(self, t: float, position: Array, velocity: Array) -> None:
         """Write the references of this period."""
@@ -463,15 +430,16 @@ class RunningWalk(RunningPlan):
         if self._index + 1 == len(self._phases):
             since = min(since, phase.duration)
         wanted = phase.dcm(self._dcm_starts[self._index], since, frequency)
-        point = phase.point(since)
+        wanted, point = wanted + self._beside, phase.point(since)
         displaced = (1.0 + gain / frequency) * (self._dcm - wanted)
         self._dcm_wanted = wanted
         if self._mode == "single":  # along and across the sole, each for itself
             self._point = nearest_inside(self._hull, point + displaced)
+            repels = self._point + self._reaction.point(t)
         else:  # the error goes straight to zero, wherever it is in the hull
-            self._point = last_inside(self._hull, point, point + displaced)
+            self._point = repels = last_inside(self._hull, point, point + displaced)
         height, yaw = self._sinking.sample(t), self._yaw.sample(t)
-        acceleration = frequency**2 * (position[:2] - self._point)
+        acceleration = frequency**2 * (position[:2] - repels)
         self._body.write(
             t,
             np.append(position[:2], height.position),
@@ -489,6 +457,15 @@ class RunningWalk(RunningPlan):
             foot = self._feet[self._side]
             foot.position.write(t, *self._swing.position(t))
             foot.orientation.write(t, *self._swing.orientation(t))
+
+    @property
+    def _beside(self) -> Array:
+        """How far a leg that swings leads ξ from that of its phase, shape (2,) [m]."""
+        if self._mode == "single":
+            return self._reaction.shift(self._state.t)
+        if self._swings[self._index]:  # it is to swing
+            return self._phases[self._index].lead
+        return np.zeros(2)
 
     def _soles(self, share: float) -> Array:
         """Return the corners of a share of both soles, shape (m, 2) [m]."""

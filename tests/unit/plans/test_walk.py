@@ -93,6 +93,16 @@ def test_what_does_not_fit_is_said(talos, walk, tasks, contacts, message):
         walk.parts(talos, tasks, contacts)
 
 
+def test_a_leg_of_five_joints_cannot_walk(talos):
+    """As that of Unitree's H1, or of Talos without the joint that rolls its ankle."""
+    locked = {"leg_left_6_joint": 0.0}
+    robot = Robot.load("talos", locked=locked)
+    with pytest.raises(
+        PlanError, match=r"^plan: the leg of 'left_foot' has 5 joints; a sole that is"
+    ):
+        Walk().parts(robot, [], FEET)
+
+
 def test_an_arm_cannot_walk():
     with pytest.raises(
         PlanError, match=r"^plan: panda cannot walk: it has no free-fly"
@@ -203,7 +213,7 @@ def test_footsteps_are_taken_from_the_middle_between_the_feet():
     assert not planner.sets_out(0.0, 3)
     middle = running._middle()
     point = places[1.0].point
-    given = (0.0, 0, running._now, 1.0, places, 0.5, point)
+    given = (0.0, 0, running._now, 1.0, places, 0.5, point, running._lead)
     preview = planner.look_ahead(*given)
     assert preview.target.point - middle == pytest.approx([0.2, 0.085], abs=1e-6)
     assert preview.swings.count(True) == 3
