@@ -82,7 +82,7 @@ def test_what_pypi_shows_links_to_no_file() -> None:
 def included() -> set[str]:
     """Return what the source distribution has, at the top."""
     listed = PROJECT["tool"]["hatch"]["build"]["targets"]["sdist"]["include"]
-    always = {"README.md", "LICENSE", "pyproject.toml"}
+    always = {"LICENSE", "pyproject.toml"}
     return {name.lstrip("/") for name in listed} | always
 
 
