@@ -48,18 +48,25 @@ def run(options: argparse.Namespace) -> int:
     _warn_of_rates(experiment)
     log = options.out / f"{experiment.name}.npz"
     log.parent.mkdir(parents=True, exist_ok=True)  # fails before the work, not after
+    tell = _tell_json if options.json else _tell
     if not options.view:
-        return _run_and_save(experiment, log, None)
+        return _run_and_save(experiment, log, tell, None)
     from hsp_control.cli.screen import Screen
 
-    screen = Screen.open(experiment, options, _out.print)
+    said = _errors if options.json else _out
+    screen = Screen.open(experiment, options, said.print)
     if screen is None:
-        return max(_run_and_save(experiment, log, None), 2)
+        return max(_run_and_save(experiment, log, tell, None), 2)
     with closing(screen):
-        return _run_and_save(experiment, log, screen)
+        return _run_and_save(experiment, log, tell, screen)
 
 
-def _run_and_save(experiment: Experiment, log: Path, screen: "Screen | None") -> int:
+def _run_and_save(
+    experiment: Experiment,
+    log: Path,
+    tell: Callable[[Rollout, Path, Stopwatch], None],
+    screen: "Screen | None",
+) -> int:
     status = 0
     stopwatch = Stopwatch()
     with DeferredInterrupt() as interrupts:
@@ -86,14 +93,29 @@ def _run_and_save(experiment: Experiment, log: Path, screen: "Screen | None") ->
             log = rollout.save(log)
         except LogError as error:
             log, status = _saved_elsewhere(rollout, log, error), 2
+    tell(rollout, log, stopwatch)
+    if screen is not None:
+        screen.finish(rollout)
+    return status
+
+
+def _tell(rollout: Rollout, log: Path, stopwatch: Stopwatch) -> None:
+    """Print what a run did, as a table."""
     summary = _summary(rollout)
     for line in stopwatch.table_rows(rollout):
         summary.add_row(*line)
     _out.print(summary)
     _out.print(f"Log: {log}")
-    if screen is not None:
-        screen.finish(rollout)
-    return status
+
+
+def _tell_json(rollout: Rollout, log: Path, stopwatch: Stopwatch) -> None:
+    """Print what a run did, by the names of a sweep's columns; null where undefined."""
+    from hsp_control.sweeps.metrics import measures
+
+    found = {name: each.value for name, each in measures(rollout).items()}
+    numbers = {name: x if np.isfinite(x) else None for name, x in found.items()}
+    told = {"log": str(log), "status": rollout.status, "rows": len(rollout)} | numbers
+    print(json.dumps(told, indent=2, ensure_ascii=False))
 
 
 def _saved_elsewhere(rollout: Rollout, log: Path, error: LogError) -> Path:
