@@ -50,6 +50,7 @@ def command_line() -> argparse.ArgumentParser:
 
     check = _command(commands, "check", "check a configuration without running it")
     add_configuration(check)
+    check.add_argument("--json", action="store_true", help="print the summary as JSON")
 
     play = _command(commands, "play", "touch a simulated robot in a browser")
     add_configuration(play, "a robot's name, or ")

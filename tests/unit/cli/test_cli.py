@@ -53,6 +53,21 @@ def test_run_tells_a_program_what_it_did(
     assert told["tracking.tip.max"] == pytest.approx(error.max(), rel=1e-12)
 
 
+def test_check_tells_a_program_what_a_configuration_is(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["check", MOVING, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["robot"] == {"name": "planar3r", "nq": 6, "nv": 3}
+    assert (told["tasks"]["tip"]["type"], told["tasks"]["tip"]["rows"]) == (
+        "FramePosition",
+        2,
+    )
+    assert told["null_space"]["degrees_of_freedom"] == 1
+    assert len(told["singular_values"]) == 2
+    assert told["advice"] == []
+
+
 def test_what_a_run_lacks_is_null_and_not_nan(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
