@@ -94,6 +94,13 @@ sims: $(STAMP) ## robosuite's own arms and our law in them, in .venv-sims
 	  $(call new-venv,$(BIN)/python,.venv-sims); fi
 	@.venv-sims/bin/python tools/simulators.py $(ARGS)
 
+release: wheel ## beside the wheel the sources with their tests; check what PyPI shows
+	@dir=$$(mktemp -d); trap 'rm -rf "$$dir"' EXIT; \
+	$(call new-venv,$(BIN)/python,"$$dir"); \
+	"$$dir/bin/python" -m pip install --quiet build twine; \
+	"$$dir/bin/python" -m build --sdist --outdir dist . > /dev/null; \
+	"$$dir/bin/python" -m twine check --strict dist/*
+
 wheel-test: wheel ## build the wheel, install it elsewhere, use it from there
 	@dir=$$(mktemp -d); trap 'rm -rf "$$dir"' EXIT; mkdir "$$dir/cwd"; \
 	echo "Installing the wheel into a fresh environment ..."; \
@@ -141,7 +148,8 @@ constraints: ## refresh constraints.txt with the newest version of everything
 	unset PIP_CONSTRAINT PIP_BUILD_CONSTRAINT; \
 	echo "Resolving with $$python, without constraints ..."; \
 	$(call new-venv,"$$python","$$dir"); \
-	"$$dir/bin/python" -m pip install --quiet '.[test,dev]' hatchling editables uv; \
+	"$$dir/bin/python" -m pip install --quiet '.[test,dev]' hatchling \
+	  hatch-fancy-pypi-readme editables uv; \
 	sed '/^[^#]/d' constraints.txt > "$$dir/new"; \
 	"$$dir/bin/python" -m pip list --format=freeze --exclude hsp_control --exclude pip \
 	  --exclude setuptools --exclude wheel >> "$$dir/new"; \
@@ -151,7 +159,7 @@ clean: ## remove caches, builds and the demo's output; .venv stays
 	@rm -rf build dist machine_code docs/_build docs/_static/replays docs/reference/generated out/demo .coverage .*_cache .hypothesis
 	@find hsp_control tests -name __pycache__ -prune -exec rm -rf {} +
 
-.PHONY: help docs links figures screenshots animations notebooks demo quick sims test thorough lint coverage fuzz mutants wheel wheel-test format constraints clean
+.PHONY: help docs links figures screenshots animations notebooks demo quick sims test thorough lint coverage fuzz mutants wheel wheel-test release format constraints clean
 
 # ------------------------------------------------------------------- the environment
 

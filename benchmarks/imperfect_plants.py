@@ -31,7 +31,7 @@ imperfections of the plant. The controller keeps its nominal model for every pla
 | `rigid_body` | Pinocchio's articulated-body algorithm, under the simulation's integrator. With `friction`, joints stick and slip (stiction): each step solves for the velocity at its end |
 | `rigid_contacts` | the same, with contacts that neither slip nor break and are switched by time; their forces are in the log. For verification on floating bases |
 | `mujoco` | MuJoCo with its own integrator, friction, joint limits and contacts, built from the Pinocchio model; `pip install 'hsp_control[mujoco]'`. `plant: mujoco` is enough |
-| `mujoco_scene` | the MuJoCo scene of the robot's own MJCF, as it is, with its objects and contacts: [mujoco.md](mujoco.md) |
+| `mujoco_scene` | the MuJoCo scene of the robot's own MJCF, as it is, with its objects and contacts: [MuJoCo](mujoco.md) |
 
 ```yaml
 robot: {name: panda}
@@ -60,7 +60,7 @@ true state. The inertias of the plant's bodies are in the log's `meta`, key `pla
 
 `sensors: {imu: base_link}` is an inertial measurement unit at a frame, with noise and biases that
 walk: `imu: {frame: base_link, gyroscope_noise: 1.7e-4, ...}`. It reports the mean angular velocity
-and specific force of each period, for `estimators` ([estimation.md](estimation.md)); q and v stay as
+and specific force of each period, for `estimators` ([estimation](estimation.md)); q and v stay as
 they are.
 
 Frames named in `contacts` touch MuJoCo's ground, with a given shape or with the link's
@@ -84,7 +84,7 @@ simulation: {duration: 1, control_period: 0.001}
 
 `solids` are things that these frames may touch besides: boxes, spheres, cylinders and capsules, as
 walls, tables, slopes and stairs (`copies`, `spacing`), or loose ones with a `mass`, whose poses
-`plant.solid.<name>.position` and `.quaternion` are logged ([forces.md](forces.md)). The view draws
+`plant.solid.<name>.position` and `.quaternion` are logged ([forces](forces.md)). The view draws
 them.
 
 ## Effect of each imperfection

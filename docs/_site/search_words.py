@@ -42,6 +42,9 @@ WORDS: dict[str, str] = {
     "explanation/glossary": "glossary",
     "paper": "paper, figures",
     "configurations": "obstacle, obstacle avoidance, bundled configurations",
+    "reference/generated/hsp.errors": "error, errors, error messages, exception",
+    "reference/generated/yaml": "yaml, configuration file, keys",
+    "reference/generated/commands": "command, command line, options",
     "development/families": "plugin, own task, own field, extend",
 }
 """Words of each page, separated by commas."""

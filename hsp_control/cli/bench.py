@@ -1,9 +1,12 @@
 """``hsp bench --latency``: a real-time loop, compared with an empty loop."""
 
 import argparse
+import json
 import sys
 from pathlib import Path
+from typing import Any
 
+from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
@@ -13,6 +16,7 @@ from hsp_control.cli.loading import load
 from hsp_control.cli.startup import INTERRUPTED
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
+from hsp_control.config import Scenario
 from hsp_control.live.latency import (
     ControlLoop,
     Latency,
@@ -39,6 +43,32 @@ def bench(options: argparse.Namespace) -> int:
         scenario.estimators,
     )
     found = _measure(loop, options)
+    if options.json:
+        print(json.dumps(_numbers(found), indent=2))
+    else:
+        _print(found, options, scenario)
+    if options.plot is not None:
+        title = f"{experiment.name}: a loop at {options.rate:g} Hz"
+        _draw(found, options.plot, title, errors if options.json else out)
+    if len(found.step) < round(options.seconds * options.rate):
+        print("hsp: stopped by the user", file=sys.stderr)
+        return INTERRUPTED
+    return 0
+
+
+def _numbers(found: Latency) -> dict[str, Any]:
+    """Return the quantiles of all times [s], and the counts."""
+    names = ("step", "back_to_back", "wake", "empty", "response")
+    times = {name: Quantiles.of(getattr(found, name))._asdict() for name in names}
+    counts = ("missed", "empty_missed", "compilations")
+    return {
+        "periods": len(found.step),
+        **{name: getattr(found, name) for name in counts},
+        **times,
+    }
+
+
+def _print(found: Latency, options: argparse.Namespace, scenario: Scenario) -> None:
     out.print(
         f"{options.config} at {options.rate:g} Hz: {len(found.step)} periods, "
         "alternating with as many of an empty loop; times in microseconds"
@@ -55,12 +85,6 @@ def bench(options: argparse.Namespace) -> int:
     )
     if found.compilations:
         out.print(f"{found.compilations} kernels were compiled during the measurement")
-    if options.plot is not None:
-        _draw(found, options.plot, f"{experiment.name}: a loop at {options.rate:g} Hz")
-    if len(found.step) < round(options.seconds * options.rate):
-        print("hsp: stopped by the user", file=sys.stderr)
-        return INTERRUPTED
-    return 0
 
 
 def _measure(loop: ControlLoop, options: argparse.Namespace) -> Latency:
@@ -101,8 +125,8 @@ def _table(found: Latency, step: str) -> Table:
     return table
 
 
-def _draw(found: Latency, file: Path, title: str) -> None:
+def _draw(found: Latency, file: Path, title: str, said: Console) -> None:
     from hsp_control.visualization.plots import latency_figure, save_figure
 
     save_figure(latency_figure(found, title), file, file.suffix.lstrip(".") or "png")
-    out.print(f"Figure: {file}")
+    said.print(f"Figure: {file}")

@@ -20,8 +20,8 @@ from rich.progress import (
 )
 from rich.table import Table
 
+from hsp_control.cli import check as checks
 from hsp_control.cli import robot_table
-from hsp_control.cli.advice import robot_advice, start_advice
 from hsp_control.cli.consoles import errors as _errors
 from hsp_control.cli.consoles import message_of, renamed_keys_printed, working
 from hsp_control.cli.consoles import out as _out
@@ -45,21 +45,28 @@ if TYPE_CHECKING:
 def run(options: argparse.Namespace) -> int:
     """Simulate, save the log and print a summary; rows computed so far are kept."""
     experiment = load(options)
-    _warn_of_rates(experiment)
+    checks.warn_of_rates(experiment)
     log = options.out / f"{experiment.name}.npz"
     log.parent.mkdir(parents=True, exist_ok=True)  # fails before the work, not after
+    tell = _tell_json if options.json else _tell
     if not options.view:
-        return _run_and_save(experiment, log, None)
+        return _run_and_save(experiment, log, tell, None)
     from hsp_control.cli.screen import Screen
 
-    screen = Screen.open(experiment, options, _out.print)
+    said = _errors if options.json else _out
+    screen = Screen.open(experiment, options, said.print)
     if screen is None:
-        return max(_run_and_save(experiment, log, None), 2)
+        return max(_run_and_save(experiment, log, tell, None), 2)
     with closing(screen):
-        return _run_and_save(experiment, log, screen)
+        return _run_and_save(experiment, log, tell, screen)
 
 
-def _run_and_save(experiment: Experiment, log: Path, screen: "Screen | None") -> int:
+def _run_and_save(
+    experiment: Experiment,
+    log: Path,
+    tell: Callable[[Rollout, Path, Stopwatch], None],
+    screen: "Screen | None",
+) -> int:
     status = 0
     stopwatch = Stopwatch()
     with DeferredInterrupt() as interrupts:
@@ -86,14 +93,29 @@ def _run_and_save(experiment: Experiment, log: Path, screen: "Screen | None") ->
             log = rollout.save(log)
         except LogError as error:
             log, status = _saved_elsewhere(rollout, log, error), 2
+    tell(rollout, log, stopwatch)
+    if screen is not None:
+        screen.finish(rollout)
+    return status
+
+
+def _tell(rollout: Rollout, log: Path, stopwatch: Stopwatch) -> None:
+    """Print what a run did, as a table."""
     summary = _summary(rollout)
     for line in stopwatch.table_rows(rollout):
         summary.add_row(*line)
     _out.print(summary)
     _out.print(f"Log: {log}")
-    if screen is not None:
-        screen.finish(rollout)
-    return status
+
+
+def _tell_json(rollout: Rollout, log: Path, stopwatch: Stopwatch) -> None:
+    """Print what a run did, by the names of a sweep's columns; null where undefined."""
+    from hsp_control.sweeps.metrics import measures
+
+    found = {name: each.value for name, each in measures(rollout).items()}
+    numbers = {name: x if np.isfinite(x) else None for name, x in found.items()}
+    told = {"log": str(log), "status": rollout.status, "rows": len(rollout)} | numbers
+    print(json.dumps(told, indent=2, ensure_ascii=False))
 
 
 def _saved_elsewhere(rollout: Rollout, log: Path, error: LogError) -> Path:
@@ -149,46 +171,7 @@ def view(options: argparse.Namespace) -> int:
 @renamed_keys_printed()
 def check(options: argparse.Namespace) -> int:
     """Build all objects, evaluate the law once, and print a summary."""
-    with np.errstate(all="ignore"):  # as compiled kernels do; `hsp check` runs plain
-        experiment = load(options)
-        robot, controller = experiment.robot, experiment.controller
-        output = controller.compute(0.0, experiment.q0, experiment.v0)
-        diagnostics = controller.diagnose()
-    table = Table(show_header=False, box=None, pad_edge=False)
-    rows = sum(task.rows for task in controller.tasks)
-    table.add_row("robot", f"{robot.name}: nq = {robot.nq}, nv = {robot.nv}")
-    for task in controller.tasks:
-        rows_on = controller.task_rows.get(task.name)  # not before its schedule begins
-        error = "not yet active"
-        if rows_on is not None:
-            error = f"|e| = {np.linalg.norm(output.task.error[rows_on]):.3g}"
-        table.add_row(
-            f"task {task.name}",
-            f"{type(task).__name__}, {task.rows} rows, {error} at the start",
-        )
-    dofs = f"{robot.nv - rows} degrees of freedom"
-    table.add_row("null space", f"{dofs}, {controller.field.name}")
-    table.add_row("plant", experiment.plant.describe()["type"])
-    table.add_row("compensation", ", ".join(experiment.compensation.names) or "none")
-    values = ", ".join(f"{value:.3g}" for value in diagnostics.singular_values)
-    table.add_row("singular values", f"{values} at the start")
-    table.add_row("largest effort", f"{np.abs(output.tau).max():.3g} at the start")
-    _out.print(table)
-    _warn_of_rates(experiment)
-    advice = [
-        *robot_advice(experiment.robot),
-        *start_advice(experiment, damped=output.damped),
-    ]
-    for line in advice:
-        _out.print(line, markup=False)
-    _out.print(f"{options.config}: OK")
-    return 0
-
-
-def _warn_of_rates(experiment: Experiment) -> None:
-    for finding in experiment.rate_findings:
-        place = ".".join(finding.path)
-        print(f"hsp: {place}: {finding.message}", file=sys.stderr)
+    return checks.check(options)
 
 
 @renamed_keys_printed()

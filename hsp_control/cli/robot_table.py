@@ -53,7 +53,7 @@ _PREFACE = """\
 
 The robots that `Robot.load` finds by name, as printed by `hsp robots` and `hsp robots
 --markdown`. Any other robot is loaded by the path of its URDF:
-[own_robot.md](own_robot.md), or from an MJCF: [mujoco.md](mujoco.md).
+[your own robot](own_robot.md), or from an MJCF: [MuJoCo](mujoco.md).
 
 The end effector is the frame that the robot's source names; if it names none, it is the
 most likely frame in the tree of joints (`Robot.end_effector`). *Position* and *pose*

@@ -117,7 +117,8 @@ PAGES = sorted(
     page.relative_to(ROOT).as_posix()
     for folder in ("docs", "robots", "examples")
     for page in (ROOT / folder).rglob("*.md")
-    if commands(page.read_text(encoding="utf-8")) and "_build" not in page.parts
+    if not {"_build", "generated"} & set(page.parts)
+    and commands(page.read_text(encoding="utf-8"))
 )
 
 

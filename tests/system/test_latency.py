@@ -1,6 +1,7 @@
 """A loop against the clock, and what a start costs: cold, cached, read-only."""
 
 import gc
+import json
 import os
 from pathlib import Path
 from typing import Any
@@ -301,6 +302,17 @@ def test_bench_tells_and_draws(
     numbers = [float(word) for word in row.split()[-4:]]
     assert 0.0 < numbers[0] <= numbers[1] <= numbers[2] <= numbers[3]
     assert picture.is_file()
+
+
+def test_bench_tells_a_program_seconds(capsys: pytest.CaptureFixture[str]) -> None:
+    quick = ["--seconds", "0.1", "--rate", "500", "--json"]
+    assert main(["bench", "--latency", MOVING, *quick]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["periods"] == 50
+    for name in ("step", "back_to_back", "wake", "empty", "response"):
+        times = [told[name][part] for part in ("median", "p99", "p999", "worst")]
+        assert times == sorted(times)
+        assert 0.0 < times[0] < 1.0
 
 
 @pytest.mark.slow

@@ -18,6 +18,9 @@ if not (ROOT / "pyproject.toml").is_file():
 
 PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text())
 
+SHOWN = PROJECT["tool"]["hatch"]["metadata"]["hooks"]["fancy-pypi-readme"]
+"""What PyPI shows."""
+
 IN_CONDA = {
     "pin": "pinocchio",
     "matplotlib": "matplotlib-base",
@@ -64,10 +67,22 @@ def test_every_file_has_the_package_s_version() -> None:
     assert newest.groups() == (__version__, str(citation["date-released"]))
 
 
+def test_what_pypi_shows_links_to_no_file() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    for each in SHOWN["substitutions"]:
+        changed = re.sub(each["pattern"], each["replacement"], text)
+        assert changed != text
+        text = changed
+    links = re.findall(r"\]\(([^)]*)\)|(?:src|href)=\"([^\"]*)\"", text)
+    assert links
+    assert all("".join(link).startswith("https://") for link in links)
+    assert "The site" in text
+
+
 def included() -> set[str]:
     """Return what the source distribution has, at the top."""
     listed = PROJECT["tool"]["hatch"]["build"]["targets"]["sdist"]["include"]
-    always = {"README.md", "LICENSE", "pyproject.toml"}
+    always = {"LICENSE", "pyproject.toml"}
     return {name.lstrip("/") for name in listed} | always
 
 
@@ -101,7 +116,7 @@ def test_the_container_has_what_the_wheel_is_built_of() -> None:
         "pyproject.toml",
         "constraints.txt",
         "tools",
-        PROJECT["project"]["readme"],
+        *(each["path"] for each in SHOWN["fragments"]),
     }
     assert copied >= needed | set(targets["wheel"]["only-include"]) - made
     assert {

@@ -38,3 +38,6 @@ def add_bench(bench: argparse.ArgumentParser) -> None:
     bench.add_argument(
         "--plot", type=Path, metavar="FILE", help="draw the distributions (.png, ...)"
     )
+    bench.add_argument(
+        "--json", action="store_true", help="print the times as JSON, in seconds"
+    )

@@ -45,10 +45,12 @@ def command_line() -> argparse.ArgumentParser:
         default=False,
         help="show the run in a browser, while it is computed and after",
     )
+    run.add_argument("--json", action="store_true", help="print the summary as JSON")
     add_page(run)
 
     check = _command(commands, "check", "check a configuration without running it")
     add_configuration(check)
+    check.add_argument("--json", action="store_true", help="print the summary as JSON")
 
     play = _command(commands, "play", "touch a simulated robot in a browser")
     add_configuration(play, "a robot's name, or ")

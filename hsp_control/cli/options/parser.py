@@ -11,6 +11,10 @@ from hsp_control.common.suggestions import did_you_mean
 class Parser(argparse.ArgumentParser):
     """An `argparse.ArgumentParser` for commands and for their options."""
 
+    def __init__(self, *args: Any, **options: Any) -> None:
+        """Take options by their full names: ``--st`` is no ``--strict``."""
+        super().__init__(*args, **{"allow_abbrev": False, **options})
+
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: Any = None
     ) -> tuple[Any, list[str]]:

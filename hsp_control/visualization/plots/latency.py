@@ -55,11 +55,11 @@ def _draw_exceedance(axes: Axes, latency: Latency) -> None:
 
 
 def _draw_course(axes: Axes, latency: Latency) -> None:
-    for name, times, color, marker in (
-        ("start of period to effort", latency.response, palette.OBSTACLE, "o"),
-        ("wake-up, empty loop", latency.empty, palette.MUTED, "x"),
+    for name, times, color, marker, dashes in (
+        ("start of period to effort", latency.response, palette.OBSTACLE, "o", "--"),
+        ("wake-up, empty loop", latency.empty, palette.MUTED, "x", "-."),
     ):
-        _draw_groups(axes, times, latency.period, (color, marker), name)
+        _draw_groups(axes, times, latency.period, (color, marker, dashes), name)
     axes.axhline(latency.period * 1e6, color=palette.INK, linewidth=1.0, label="period")
     axes.set_yscale("log")
     axes.set_xlabel("time in the loop [s]")
@@ -69,13 +69,14 @@ def _draw_course(axes: Axes, latency: Latency) -> None:
 
 
 def _draw_groups(
-    axes: Axes, times: Array, period: float, style: tuple[str, str], name: str
+    axes: Axes, times: Array, period: float, style: tuple[str, str, str], name: str
 ) -> None:
     """Draw median and maximum of groups of periods; all values would overlap."""
-    color, marker = style
+    color, marker, dashes = style
     groups = np.array_split(times * 1e6, min(len(times), 200))
     ends = np.cumsum([len(group) for group in groups]) * period
-    axes.plot(ends, [np.median(group) for group in groups], color=color, label=name)
+    medians = [np.median(group) for group in groups]
+    axes.plot(ends, medians, dashes, color=color, label=name)
     axes.plot(
         ends,
         [group.max() for group in groups],

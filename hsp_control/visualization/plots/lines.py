@@ -12,7 +12,7 @@ from hsp_control.visualization.plots.legends import literal_text, note
 
 MAX_NAMED, SELECTED = 14, 7
 """Of more than 14 lines, only the 7 that vary most get a colour and a name."""
-_DASHES = ("-", "--")
+_DASHES = ("-", "--", ":", "-.")  # neighbours differ without their colours, too
 
 
 def draw_lines(
@@ -52,7 +52,7 @@ def draw_lines(
             values[:, k],
             marker=point_marker(t),
             color=palette.series(place),
-            linestyle=_DASHES[place // len(palette.SERIES) % len(_DASHES)],
+            linestyle=_DASHES[place % len(_DASHES)],
             label=f"{name} [{units[k]}]" if len(kinds) > 1 else name,
         )
     if others:

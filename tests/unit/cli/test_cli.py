@@ -38,6 +38,48 @@ def test_run_leaves_a_log_that_numpy_alone_reads(
     assert meta["columns"]["tau"]["unit"] == "N·m"
 
 
+def test_run_tells_a_program_what_it_did(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The names are those of a sweep; what is told is what the log has."""
+    arguments = ["run", MOVING, "--out", str(tmp_path), "--json", *SHORT]
+    assert main([*arguments, "--no-view"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    rollout = Rollout.load(told["log"])
+    assert (told["status"], told["rows"]) == ("completed", 11)
+    assert told["effort.max"] == np.abs(rollout.tau).max()
+    assert told["null_space_error.end"] == rollout["null_space_norm"][-1]
+    error = np.linalg.norm(rollout["task.tip.error"], axis=1)
+    assert told["tracking.tip.max"] == pytest.approx(error.max(), rel=1e-12)
+
+
+def test_check_tells_a_program_what_a_configuration_is(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["check", MOVING, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["robot"] == {"name": "planar3r", "nq": 6, "nv": 3}
+    assert (told["tasks"]["tip"]["type"], told["tasks"]["tip"]["rows"]) == (
+        "FramePosition",
+        2,
+    )
+    assert told["null_space"]["degrees_of_freedom"] == 1
+    assert len(told["singular_values"]) == 2
+    assert told["advice"] == []
+
+
+def test_what_a_run_lacks_is_null_and_not_nan(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The task begins after the run's first rows: its error is NaN there."""
+    late = ["--set", "tasks.tip.schedule={intervals: [[0.05, null]], ramp: 0.01}"]
+    arguments = ["run", MOVING, "--out", str(tmp_path), "--json", *SHORT, *late]
+    assert main([*arguments, "--no-view"]) == 0
+    text = capsys.readouterr().out
+    assert "NaN" not in text
+    assert json.loads(text)["tracking.tip.rms"] is None
+
+
 @pytest.mark.slow
 def test_plot_draws_beside_the_log(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -154,6 +196,8 @@ def versions_without(package: str) -> Callable[[str], str]:
             "there is no '--veiw' here; did you mean '--view'?",
         ),
         (["check", MOVING, "twice"], "there is no 'twice' here"),
+        # Not taken for --strict.
+        (["run", MOVING, "--st", "a=1"], "no '--st' here; did you mean '--set'?"),
     ],
 )
 def test_what_was_mistyped_is_guessed(

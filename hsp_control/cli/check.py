@@ -1,0 +1,93 @@
+"""``hsp check``: what a configuration is made of, and its numbers at the start."""
+
+import argparse
+import json
+import sys
+from typing import Any
+
+import numpy as np
+from rich.table import Table
+
+from hsp_control.cli.advice import robot_advice, start_advice
+from hsp_control.cli.consoles import out
+from hsp_control.cli.loading import load
+from hsp_control.config import Experiment
+from hsp_control.control import ControlOutput, Diagnostics
+
+
+def check(options: argparse.Namespace) -> int:
+    """Build all objects, evaluate the law once, and print a summary."""
+    with np.errstate(all="ignore"):  # as compiled kernels do; `hsp check` runs plain
+        experiment = load(options)
+        output = experiment.controller.compute(0.0, experiment.q0, experiment.v0)
+        diagnostics = experiment.controller.diagnose()
+    found = _checked(experiment, output, diagnostics)
+    advice = [
+        *robot_advice(experiment.robot),
+        *start_advice(experiment, damped=output.damped),
+    ]
+    warn_of_rates(experiment)
+    if options.json:
+        print(json.dumps(found | {"advice": advice}, indent=2, ensure_ascii=False))
+        return 0
+    out.print(_check_table(found))
+    for line in advice:
+        out.print(line, markup=False)
+    out.print(f"{options.config}: OK")
+    return 0
+
+
+def _checked(
+    experiment: Experiment, output: ControlOutput, diagnostics: Diagnostics
+) -> dict[str, Any]:
+    """Return what a configuration is made of, and its numbers at the start."""
+    robot, controller = experiment.robot, experiment.controller
+    tasks = {}
+    for task in controller.tasks:
+        rows = controller.task_rows.get(task.name)  # not before its schedule begins
+        error = None if rows is None else np.linalg.norm(output.task.error[rows])
+        tasks[task.name] = {
+            "type": type(task).__name__,
+            "rows": task.rows,
+            "error": None if error is None else float(error),
+        }
+    return {
+        "robot": {"name": robot.name, "nq": robot.nq, "nv": robot.nv},
+        "tasks": tasks,
+        "null_space": {
+            "degrees_of_freedom": robot.nv - sum(t.rows for t in controller.tasks),
+            "field": controller.field.name,
+        },
+        "plant": experiment.plant.describe()["type"],
+        "compensation": list(experiment.compensation.names),
+        "singular_values": list(map(float, diagnostics.singular_values)),
+        "largest_effort": float(np.abs(output.tau).max()),
+    }
+
+
+def _check_table(found: dict[str, Any]) -> Table:
+    table = Table(show_header=False, box=None, pad_edge=False)
+    robot, null_space = found["robot"], found["null_space"]
+    table.add_row("robot", f"{robot['name']}: nq = {robot['nq']}, nv = {robot['nv']}")
+    for name, task in found["tasks"].items():
+        error = "not yet active"
+        if task["error"] is not None:
+            error = f"|e| = {task['error']:.3g}"
+        table.add_row(
+            f"task {name}", f"{task['type']}, {task['rows']} rows, {error} at the start"
+        )
+    dofs = f"{null_space['degrees_of_freedom']} degrees of freedom"
+    table.add_row("null space", f"{dofs}, {null_space['field']}")
+    table.add_row("plant", found["plant"])
+    table.add_row("compensation", ", ".join(found["compensation"]) or "none")
+    values = ", ".join(f"{value:.3g}" for value in found["singular_values"])
+    table.add_row("singular values", f"{values} at the start")
+    table.add_row("largest effort", f"{found['largest_effort']:.3g} at the start")
+    return table
+
+
+def warn_of_rates(experiment: Experiment) -> None:
+    """Print which gains are high for the control period."""
+    for finding in experiment.rate_findings:
+        place = ".".join(finding.path)
+        print(f"hsp: {place}: {finding.message}", file=sys.stderr)
