@@ -4,8 +4,9 @@
 
 Prints one line for each robot and speed: six steps on MuJoCo at 1 kHz, and a second of
 standing. Nothing is tuned: a robot has its joints bent a little, soles as large as its
-meshes or an estimate of them, and ``plan: {type: walk, speed: ...}``. ``--unitree`` is the folder ``robots``
-of github.com/unitreerobotics/unitree_ros, whose robots example-robot-data has not.
+meshes or an estimate of them, and ``plan: {type: walk, speed: ...}``. ``--unitree`` is
+the folder ``robots`` of github.com/unitreerobotics/unitree_ros, whose robots
+example-robot-data has not.
 """
 
 import argparse
