@@ -48,8 +48,10 @@ def springs(robot: hsp.Robot, target: Array, **waits: Any) -> hsp.tasks.Task:
     return hsp.FramePose("panda_tcp", stream, impedance=soft)
 
 
-def row(make: Any, count: int, threshold: float, waits: Any) -> str:
-    """Return a row of the table."""
+def row(
+    make: Any, count: int, threshold: float, waits: Any, rate: float | None = None
+) -> str:
+    """Return a row of the table; ``rate`` limits that of efforts [N·m/s]."""
     robot = hsp.Robot.load("panda")
     changes, restless, ahead, excess = [], 0, [], 0.0
     for target in targets(count):
@@ -59,6 +61,7 @@ def row(make: Any, count: int, threshold: float, waits: Any) -> str:
             hsp.JointCentering(),
             null_space_gain=8.0,
             singularity_threshold=threshold,
+            limits=hsp.Limits(effort_rate=rate),
         )
         run = hsp.simulate(
             controller,
@@ -78,7 +81,7 @@ def row(make: Any, count: int, threshold: float, waits: Any) -> str:
     task = "position" if make is position else "pose on springs"
     lead = "0.1 m" if not waits else "none"
     return (
-        f"| {task} | {threshold:g} | {lead} | "
+        f"| {task} | {threshold:g} | {lead} | {rate or 'none'} | "
         f"{np.median(changes):.0f} / {max(changes):.0f} | {max(ahead):.2f} | "
         f"{count - restless} of {count} |"
     )
@@ -87,9 +90,10 @@ def row(make: Any, count: int, threshold: float, waits: Any) -> str:
 def main() -> None:
     """Write the table."""
     lines = [
-        "| task | `singularity_threshold` | `lead` | largest change of an effort in "
-        "1 ms, median / most [N·m] | largest error [m] | comes to rest |",
-        "|---|---|---|--:|--:|--:|",
+        "| task | `singularity_threshold` | `lead` | `effort_rate` [N·m/s] | largest "
+        "change of an effort in 1 ms, median / most [N·m] | largest error [m] | comes "
+        "to rest |",
+        "|---|---|---|---|--:|--:|--:|",
     ]
     none = {"lead": None}
     for make, count, without in (
@@ -100,6 +104,9 @@ def main() -> None:
             for waits in (without, {}):
                 lines.append(row(make, count, threshold, waits))
                 print(lines[-1], flush=True)
+        for threshold in (0.03, 0.1):
+            lines.append(row(make, count, threshold, {}, rate=1000.0))
+            print(lines[-1], flush=True)
     replace_section(DOCS / "streams.md", "out_of_reach.py", "\n".join(lines) + "\n")
 
 

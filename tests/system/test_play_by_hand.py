@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from browsers import until
 from pages import Steering
+from places import THOROUGH
 from played import Played, wait_until
 
 import hsp_control as hsp
@@ -101,6 +102,7 @@ def test_hand_ball_and_elbow(browser: Any, played: Played, tmp_path: Path) -> No
     assert played.process.returncode == 0
 
 
+@pytest.mark.skipif(not THOROUGH, reason="takes most of a minute: make thorough")
 def test_a_page_closed_in_a_drag_and_one_that_stalls(
     browser: Any, played: Played
 ) -> None:
