@@ -125,7 +125,7 @@ def test_a_target_out_of_reach_is_approached_within_all_limits(
     ("goal", "largest"),
     # Without a share of the null space in a direction that is being lost, efforts jump
     # where it begins to be: by 80 and 57 N·m. The third is stopped by joint limits;
-    # where what is half lost counted as free, an effort changed there by 47 N·m.
+    # where what is half lost counted as free, an effort changed there by 27 N·m.
     [((0.0, 0.0, 2.0), 15.0), ((0.6, 0.6, 0.9), 20.0), ((-0.27, 1.1, -0.64), 20.0)],
 )
 def test_efforts_do_not_jump_on_the_way_to_a_target_out_of_reach(
