@@ -20,7 +20,13 @@ from hsp_control.trajectories.streams.bounds import MotionBounds
 from hsp_control.trajectories.streams.chart import Chart, State
 from hsp_control.trajectories.streams.governor import Lead
 from hsp_control.trajectories.streams.message import Message
-from hsp_control.trajectories.streams.segments import Coast, Goal, Joiner, Segment
+from hsp_control.trajectories.streams.segments import (
+    Coast,
+    Goal,
+    Joiner,
+    Quintic,
+    Segment,
+)
 from hsp_control.trajectories.streams.waypoints import Waypoints, derivatives
 
 _KEPT = 1.0
@@ -101,6 +107,17 @@ class RunningStream:
         self._starts = [-inf]
         self.taken = self.refused = 0
         self.waypoints = Waypoints()
+        self._compile(start)
+
+    def _compile(self, start: State) -> None:
+        """Compile what a message needs now, and not in a period of a live loop."""
+        chart, zeros = self.chart, np.zeros_like(start.x)
+        value = np.zeros(chart.linear + 4 * chart.rotational)
+        value[-1] = 1.0
+        chart.local(value[None], start.base)
+        chart.local_rate(start.x, zeros, start.base)
+        chart.rebased(start)
+        Quintic(0.0, 1.0, start.base, np.zeros((6, chart.size))).state(0.5)
 
     @property
     def age(self) -> float:
