@@ -62,20 +62,6 @@ class TimeWindow:
             self.call(t)
 
 
-def one_call(
-    first: Callable[[], object], last: Callable[[float], float]
-) -> Callable[[float], float]:
-    """Return one call of the time [s] for two, with the result of the last one."""
-    if isinstance(first, NativeCall) and isinstance(last, NativeCall):
-        return sequence([Timed(each, *FOREVER) for each in (first, last)])
-
-    def both(t: float) -> float:
-        first()
-        return last(t)
-
-    return both
-
-
 def steps(
     plans: Iterable[StepPlan], last: Callable[[], Any]
 ) -> list[Callable[[float], Any]]:

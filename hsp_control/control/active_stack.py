@@ -5,7 +5,6 @@ from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.step_plan import StepPlan, steps
@@ -14,11 +13,10 @@ from hsp_control.constraints.contacts.unactuated import UnactuatedRows, unactuat
 from hsp_control.control.actuation.support import Support
 from hsp_control.control.setup import PlannedTask
 from hsp_control.law import Outcome, Resolution
-from hsp_control.law.outcome import EXACT, outcome_of
+from hsp_control.law.outcome import outcome_of
 from hsp_control.null_space.fields import FieldSample, FieldSum, NullSpaceField
 from hsp_control.null_space.metrics import Metric
 from hsp_control.robot import Robot, RobotState
-from hsp_control.robot.state import Move
 from hsp_control.tasks import Task, TaskSample
 from hsp_control.tasks.task import InForce
 from hsp_control.trajectories.streams.stream import Streamed
@@ -45,8 +43,6 @@ class ActiveStack:
         rows: All rows stacked: J, J', e, e', a_x.
         row_count: Number of rows.
         level_names: The names of each level's tasks; ``contacts`` for those at the top.
-        damped_level: Where the last `resolve` was damped, the first level with a
-            bounded inverse, 1 the highest.
         has_forces: Whether contacts exert forces.
         memory: The rows, the field and the law's results, in one block: see `Record`.
         acceleration: The law's acceleration, shape (nv,).
@@ -123,7 +119,6 @@ class ActiveStack:
             plans.append(partial(each.task.compile_in_force, state, in_force, sample))
             row += each.task.rows
         self._plans = plans
-        self.damped_level = 0
         self.level_names = [
             *(["contacts"] if first else []),
             *(", ".join(task.name for task in level) for level in self.levels),
@@ -142,30 +137,27 @@ class ActiveStack:
             t: The time of the state [s].
         """
         code = 0.0
-        for step in self._steps:
-            code = step(t)
-        return EXACT if code == 0.0 else self._outcome(code)
-
-    def move(self, t: float, q: ArrayLike, v: ArrayLike) -> Outcome:
-        """Update the state, and resolve there; see `RobotState.update`."""
-        code = self._state.advance(self._move, t, q, v)
-        return EXACT if code == 0.0 else self._outcome(code)
-
-    def _outcome(self, code: float) -> Outcome:
-        self.damped_level = int(code)
+        for call in self.calls:
+            code = call(t)
         return outcome_of(code)
 
-    def prepare(self) -> None:
-        """Compile what `resolve` and `move` call, now instead of at the first call."""
-        self._move  # noqa: B018 (compiled, and kept)
+    @property
+    def damped_level(self) -> int:
+        """The first level with a bounded inverse in the last `resolve`; 0: none."""
+        return int(self.resolution.code[0])
+
+    @property
+    def damped(self) -> str:
+        """The names of that level's tasks, or ``contacts``; empty: none."""
+        level = self.damped_level
+        return self.level_names[level - 1] if level else ""
 
     @cached_property
-    def _move(self) -> Move:
-        return self._state.bind_move(self._steps)
+    def calls(self) -> list[Callable[[float], Any]]:
+        """The calls of `resolve`, each of the time [s]; compiled when first asked for.
 
-    @cached_property
-    def _steps(self) -> list[Callable[[float], Any]]:
-        """The calls of a step, each of the time, in order."""
+        The last one returns what `outcome_of` takes.
+        """
         state, metric, field = self._state, self._metric, self._field
         problem = self.resolution.problem
         plans = [plan() for plan in self._plans]

@@ -20,7 +20,8 @@ from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits, RobotLimits
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation import Actuation
-from hsp_control.control.actuation.status import RELAXED
+from hsp_control.control.actuation.actuation import CODES
+from hsp_control.control.actuation.status import EXACT, RELAXED
 from hsp_control.control.changes import Change, Changes
 from hsp_control.control.composition import Base, priority_of
 from hsp_control.control.declared import Declared
@@ -33,11 +34,11 @@ from hsp_control.control.read_only import read_only
 from hsp_control.control.time_line import TimeLine
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.start import Start
-from hsp_control.law import Outcome
-from hsp_control.law.outcome import DAMPED, NOT_FINITE
+from hsp_control.law.outcome import BEYOND_ANY_LEVEL, NOT_FINITE
 from hsp_control.null_space.fields import NullSpaceField
 from hsp_control.null_space.metrics import Metric
 from hsp_control.robot import Robot, RobotState
+from hsp_control.robot.state import Move
 from hsp_control.tasks import Task, TaskSample
 from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.impedance import parts_of
@@ -49,6 +50,8 @@ AccelerationModifier = Callable[
 """How compensators act between the law and the limits: a function of (state, active
 stack, a). It returns the acceleration to deliver, shape (nv,), and an additional effort
 besides M a + N, shape (nv,), or None."""
+
+_NO_FORCES: Array = np.zeros(0)
 
 _MEMORY = 1.0
 """Changes that were complete this long ago are forgotten [s]; an integrator may ask for
@@ -140,6 +143,9 @@ class Controller:
         self._modified = np.zeros(robot.nv)
         self._gains = GainsInForce(robot.nv)
         self._now, self._begun = -np.inf, False
+        # While nothing changes: the stack, all calls of a step as one, and whether the
+        # effort is M a + N wherever no limit is violated.
+        self._whole: tuple[ActiveStack, Move, bool] | None = None
         q = robot.home() if given is None else given
         state = robot.state(0.0, q, np.zeros(robot.nv))
         start = Start(state, self._declared.scene, known=given is not None)
@@ -165,6 +171,7 @@ class Controller:
 
     def _follow(self, time_line: TimeLine) -> None:
         """Let the steps follow a time line."""
+        self._whole = None
         self._time_line, self._setup = time_line, time_line.setup
         exchanged = self._gains.plan(self._setup, self._latest)
         self._mixture.plan(self._setup, exchanged=exchanged)
@@ -190,9 +197,18 @@ class Controller:
             self._actuation.remember(last_effort)
         self._begun = True
 
-    def _resolve(self) -> tuple[Array, Outcome]:
-        """Return the law's acceleration for what counts now, and its outcome."""
-        t = self._state.t
+    def _resolve(self) -> tuple[Array, str]:
+        """Return the law's acceleration for what counts now, and what is damped.
+
+        Raises:
+            NonFiniteError: If it contains NaN or inf.
+        """
+        t, whole = self._state.t, self._whole
+        if whole is not None:  # nothing changes
+            active, _, _ = whole
+            if active.resolve(t) is NOT_FINITE:
+                self._raise_not_finite()
+            return active.acceleration, active.damped
         if not self._begun:
             self._begin()
         self._now = max(self._now, t)
@@ -202,7 +218,21 @@ class Controller:
                 self._follow(self._time_line.settled_at(self._now - _MEMORY))
             self._gains.write(t)
             self._actuation.update_limits(t)
-        return self._mixture.resolve(t)
+        mixture = self._mixture
+        a, outcome = mixture.resolve(t)
+        if outcome is NOT_FINITE:
+            self._raise_not_finite()
+        if mixture.steady:
+            self._bind()
+        return a, mixture.damped
+
+    def _bind(self) -> None:
+        """Bind the move, the law and the check of its limits as one call."""
+        active, state = self.active_stack, self._state
+        code = active.resolution.code
+        checks = self._actuation.checks(state, active.acceleration, code)
+        move = state.bind_move([*active.calls, *checks])
+        self._whole = active, move, self._actuation.is_direct(active.support)
 
     # -- the step ---------------------------------------------------------------------
 
@@ -253,28 +283,32 @@ class Controller:
             ControllerError: If the state belongs to another robot.
         """
         with self._lock:
-            state, mixture = self._state, self._mixture
-            active = mixture.active
-            if active is None or not mixture.steady:
+            state, whole, offset = self._state, self._whole, None
+            direct, damped, violated = False, "", 0
+            if whole is None or modifier is not None or q is None or v is None:
                 self._observe(t, q, v)
-                a, outcome = self._resolve()
+                a, damped = self._resolve()
                 active = self.active_stack
+                if modifier is not None:
+                    self._modified[:], offset = modifier(state, active, a)
+                    a = self._modified
+                violated = self._actuation.violated(state, a, active.resolution.code)
             else:
-                if q is not None and v is not None:
-                    outcome = active.move(t, q, v)  # type: ignore[arg-type]
-                else:
-                    self._observe(t, q, v)
-                    outcome = active.resolve(state.t)
+                active, move, direct = whole
                 a = active.acceleration
-            if outcome is NOT_FINITE:
-                self._raise_not_finite()
-            offset = None
-            if modifier is not None:
-                self._modified[:], offset = modifier(state, active, a)
-                a = self._modified
-            tau, a, forces, status, relaxation = self._actuation.deliver(
-                state, a, active.resolution, active.support, offset
-            )
+                value = state.advance(move, t, q, v)  # type: ignore[arg-type]
+                if value != 0.0:
+                    code, violated = divmod(int(value), CODES)
+                    if code == BEYOND_ANY_LEVEL:
+                        self._raise_not_finite()
+                    damped = active.damped
+            if direct and violated == 0:
+                tau, forces = state.effort, _NO_FORCES
+                status, relaxation = EXACT, 0.0
+            else:
+                tau, a, forces, status, relaxation = self._actuation.deliver(
+                    state, a, violated, active.resolution, active.support, offset
+                )
             # Not on the controller itself: its own attributes cost 0.4 µs to set.
             self._actuation.delivered = a
             # The kernel of limited steps has looked at all efforts already.
@@ -291,10 +325,7 @@ class Controller:
             out._rows = active.row_count
             out._acceleration = None if a is active.acceleration else a.copy()
             out.forces = forces.copy() if active.has_forces else forces
-            out.damped = ""
-            if outcome is DAMPED:
-                out.damped = active.level_names[active.damped_level - 1]
-            out.status, out.relaxation = status, relaxation
+            out.damped, out.status, out.relaxation = damped, status, relaxation
             return out
 
     def _observe(
@@ -383,6 +414,7 @@ class Controller:
             self._actuation.forget()
             self._now, self._begun = -np.inf, False
             self._gains.forget()
+            self._whole = None
             self._mixture.active = None  # the next step places what is relative
             made = self._time_line.made
             if made or any(each.task.remembers for each in self._setup.tasks):

@@ -12,7 +12,7 @@ from hsp_control.control.gains_in_force import GainsInForce
 from hsp_control.control.planned_contact import PlannedContact
 from hsp_control.control.setup import PlannedTask, Setup, levels_of
 from hsp_control.law import Outcome
-from hsp_control.law.outcome import EXACT
+from hsp_control.law.outcome import DAMPED, EXACT
 from hsp_control.robot import RobotState
 
 
@@ -22,6 +22,8 @@ class Mixture:
     Attributes:
         active: The stack that was resolved last, with the fewest tasks of a mixture;
             None before.
+        damped: The tasks of the first level with a bounded inverse in the last
+            `resolve`, by name; empty: none.
         steady: Whether it is the same at all times.
         levels: The tasks of each level, the highest priority first.
         field: The field, placed.
@@ -52,6 +54,7 @@ class Mixture:
         self._gains, self._threshold = gains, threshold
         self._stacks: dict[tuple[frozenset[int], frozenset[int]], ActiveStack] = {}
         self._sum = np.zeros(state.robot.nv)
+        self.damped = ""
         self.field = setup.field
         self.plan(setup, exchanged=False)
 
@@ -99,10 +102,13 @@ class Mixture:
         shares = [1.0, *(weights[key] for key in coming), 0.0]
         mixed = self._sum
         mixed[:] = 0.0
-        outcome = EXACT
+        outcome, self.damped = EXACT, ""
         for k, (share, following) in enumerate(pairwise(shares)):
             self.active = active = self.stack_at(t, off - set(coming[:k]))
-            outcome = max(outcome, active.resolve(t))
+            found = active.resolve(t)
+            if found > outcome:
+                outcome = found
+                self.damped = active.damped if found is DAMPED else ""
             a = active.resolution.acceleration
             if not coming:
                 break
@@ -112,7 +118,7 @@ class Mixture:
 
     def prepare(self, stack: ActiveStack) -> None:
         """Compile what a step with a stack calls, now instead of in the step."""
-        stack.prepare()
+        stack.calls  # noqa: B018 (compiled, and kept)
         self._actuation.prepare(self._state, stack.resolution, stack.support)
 
     def stack_at(self, t: float, off: Set[int] = frozenset()) -> ActiveStack:

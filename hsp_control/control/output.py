@@ -2,8 +2,6 @@
 
 from typing import NamedTuple
 
-import numpy as np
-
 from hsp_control.common.arrays import Array
 from hsp_control.control.actuation.status import Status
 from hsp_control.law.problem import Record
@@ -77,7 +75,7 @@ class ControlOutput:
     def _keep(self, memory: Array) -> None:
         """Copy the record of a step, into the memory of the last one if it fits."""
         if self._memory.shape == memory.shape:
-            np.copyto(self._memory, memory)
+            self._memory[:] = memory
         else:
             self._memory = memory.copy()
 

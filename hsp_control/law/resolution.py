@@ -68,6 +68,7 @@ class Resolution:
         threshold: Singular value below which the inverse is bounded.
         acceleration: a of the last `resolve`, shape (nv,).
         null_space_error: e_N of the last `resolve`, shape (nv,).
+        code: What the last `resolve` returned, see `outcome_of`, shape (1,).
     """
 
     def __init__(
@@ -97,6 +98,7 @@ class Resolution:
         )
         self.acceleration = self.problem.record.acceleration
         self.null_space_error = self.problem.record.null_space_error
+        self.code: Indices = np.zeros(1, dtype=np.int64)
         self._norm = bind(norm, self.problem.metric.W, self.null_space_error)
         self._spectra: dict[int, tuple[Callable[[], float], Array]] = {}
 
@@ -127,7 +129,7 @@ class Resolution:
             *(problem.task, problem.field, problem.metric, self.form),
             *(v, problem.gain, self.threshold, controls),
             *(() if alone else (self.ends,)),
-            *(self._scratch, self.null_space_error, self.acceleration),
+            *(self._scratch, self.null_space_error, self.acceleration, self.code),
         )
 
     def spectrum(self, first: int = 0) -> tuple[Array, float]:
@@ -164,8 +166,9 @@ def _resolve_at_once(
     scratch: Scratch,
     e_N: Array,
     a: Array,
+    code: Indices,
 ) -> int:
-    """Write e_N and a of all tasks at once; return what `outcome_of` takes.
+    """Write e_N and a of all tasks at once; write and return the code of `outcome_of`.
 
     If the tasks of several levels are exact together, they are exact one after the
     other: this is the same then.
@@ -183,7 +186,8 @@ def _resolve_at_once(
         for i in range(n):
             u[i] = 0.0
     acceleration(task, metric.L, form, Q, X, v, u, rows, a)
-    return damped if _all_finite(a) else BEYOND_ANY_LEVEL
+    code[0] = damped if _all_finite(a) else BEYOND_ANY_LEVEL
+    return int(code[0])
 
 
 @kernel
@@ -200,12 +204,27 @@ def _resolve_levels(
     scratch: Scratch,
     e_N: Array,
     a: Array,
+    code: Indices,
 ) -> int:
-    """Write e_N and a: of all levels at once, or level by level if they conflict."""
+    """Write e_N and a: of all levels at once, or level by level if they conflict.
+
+    The code of `outcome_of` is written and returned.
+    """
     damped = 1
     if task.jacobian.shape[0] <= task.jacobian.shape[1]:
         damped = _resolve_at_once(
-            task, field, metric, form, v, K_N, threshold, controls, scratch, e_N, a
+            task,
+            field,
+            metric,
+            form,
+            v,
+            K_N,
+            threshold,
+            controls,
+            scratch,
+            e_N,
+            a,
+            code,
         )
     if damped > 0:
         levels = LevelScratch(
@@ -216,6 +235,7 @@ def _resolve_levels(
         )
         if not _all_finite(a):
             damped = BEYOND_ANY_LEVEL
+        code[0] = damped
     return damped
 
 

@@ -70,7 +70,8 @@ def _move(
 @cache
 def _entry() -> Callable[..., float]:
     own, table = types.float64[::1], types.int64[:, ::1]
-    rest = own, own, table, types.int64[::1], types.float64, own, own
+    given = types.float64[:]  # with any strides
+    rest = own, own, table, types.int64[::1], types.float64, given, given
     entry: Callable[..., float] = entry_point(
         _move, (table, types.float64[:, ::1], *rest)
     )

@@ -38,8 +38,6 @@ Move = Callable[[float, Array, Array], float]
 """(t, q, v) ↦ what the last of its calls returned, or `REFUSED`."""
 
 _DOUBLE = np.dtype(np.float64)
-_PACKED = (8,)
-"""Strides of a vector of doubles one after another."""
 
 _MADE_LIMIT = 1000
 """Number of parts whose memory a state keeps; then it starts anew."""
@@ -107,13 +105,10 @@ class RobotState:
         q_in: Any = q
         v_in: Any = v
         try:
-            packed = (
-                q_in.dtype is v_in.dtype is _DOUBLE
-                and q_in.strides == v_in.strides == _PACKED
-            )
+            known = q_in.dtype is v_in.dtype is _DOUBLE and q_in.ndim == v_in.ndim == 1
         except AttributeError:  # a list, for example
-            packed = False
-        if not packed:
+            known = False
+        if not known:
             q_in = as_numbers(q, self.robot.nq, "configuration q", self.robot)
             v_in = as_numbers(v, self.robot.nv, "velocity v", self.robot)
         before, self.t = self.t, t  # calls in Python read it

@@ -14,6 +14,7 @@ Contacts and floating bases, and Limits.
 """
 
 from collections.abc import Callable, Sequence
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -22,7 +23,7 @@ from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.identity_cache import IdentityCache
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
-from hsp_control.common.step_plan import one_call
+from hsp_control.common.step_plan import in_order
 from hsp_control.constraints.limits.acceleration_bounds import (
     EFFORT,
     MOTION,
@@ -48,6 +49,9 @@ from hsp_control.law import Resolution
 from hsp_control.robot import Robot, RobotState
 
 _NO_ROWS: Barriers = {}
+
+CODES = 4
+"""The law's code counts so much, so that flags of violated limits fit below it."""
 
 Delivered = tuple[Array, Array, Array, Status, float]
 """What the actuation delivers: effort, shape (nv,) [N·m or N], zero where there is no
@@ -103,7 +107,7 @@ class Actuation:
         self._motion = MotionLimits(
             zeros(nv), zeros(nv), zeros(nv), zeros(nv), zeros(1)
         )
-        self._check = IdentityCache(self._compile_check)
+        self._checks = IdentityCache(self._compile_checks)
         self._window: Callable[[], float] | None = None
         self._no_forces = np.zeros(0)
         self._no_support = Support((), robot, self._weight)
@@ -131,6 +135,10 @@ class Actuation:
             or planned.distances
             or any(each.static_effort for each in planned.sets if each is not None)
         )
+
+    def is_direct(self, support: Support) -> bool:
+        """Return whether M a + N is the effort wherever `violated` finds nothing."""
+        return self._only_box_limits and not support.size
 
     def update_limits(self, t: float) -> None:
         """Compute the limits in force at time t [s], if they change."""
@@ -219,6 +227,7 @@ class Actuation:
         self,
         state: RobotState,
         a: Array,
+        violated: int,
         resolution: Resolution,
         support: Support,
         offset: Array | None = None,
@@ -228,14 +237,14 @@ class Actuation:
         Args:
             state: The robot's state.
             a: The law's acceleration, shape (nv,).
+            violated: The limits that it violates, see `violated`.
             resolution: The resolved law, with its levels in order of priority.
             support: The forces of the active contacts; updated here.
             offset: Effort besides M a + N, for friction for example, shape (nv,)
                 [N·m or N]; None: none. The limits hold for the sum.
         """
-        violated = self._check.get(state, a, self.limits is None)(state.t)
         wanted = state.effort  # M a + N
-        unsupported = self._only_box_limits and not support.size
+        unsupported = self.is_direct(support)
         if offset is None and unsupported:
             if not violated:
                 return wanted, a, self._no_forces, EXACT, 0.0
@@ -260,18 +269,22 @@ class Actuation:
             return tau, a, forces, EXACT, 0.0
         return self._limit(state, wanted, a, motion_ok, resolution, support, barriers)
 
-    def _compile_check(
-        self, state: RobotState, a: Array, unlimited: bool
-    ) -> Callable[[float], float]:
-        """Return the call of the time that writes M a + N and the bounds on a.
+    def checks(
+        self, state: RobotState, a: Array, code: Indices
+    ) -> list[Callable[[float], Any]]:
+        """Return the calls of the time that write M a + N, and compare with the bounds.
 
-        It returns 0, `MOTION` if a violates its bounds, `EFFORT` if the effort without
-        contacts does, or the sum of both.
+        The last one returns the law's code times `CODES`, plus `MOTION` if a violates
+        its bounds, plus `EFFORT` if the effort without contacts does.
+
+        Args:
+            state: The robot's state; the calls read it each time.
+            a: The acceleration, shape (nv,); this array, too.
+            code: The law's code, see `Resolution.code`; this array, too.
         """
-        dynamics = state.bind_inverse_dynamics(a)
         check = (
-            bind(_nothing, timed=True)
-            if unlimited
+            bind(_unlimited, code, timed=True)
+            if self.limits is None
             else bind(
                 _check,
                 state.q,
@@ -282,10 +295,26 @@ class Actuation:
                 self._motion,
                 self._held.memory_of_kernels,
                 self._bounds,
+                code,
                 timed=True,
             )
         )
-        return one_call(dynamics, check)
+        return [*in_order([state.bind_inverse_dynamics(a)]), check]
+
+    def violated(self, state: RobotState, a: Array, code: Indices) -> int:
+        """Write M a + N and the bounds on a; return which of them are violated.
+
+        See `checks` for the arguments; the sum is without the law's code.
+        """
+        value = 0.0
+        for call in self._checks.get(state, a, code, self.limits is None):
+            value = call(state.t)
+        return int(value) % CODES
+
+    def _compile_checks(
+        self, state: RobotState, a: Array, code: Indices, _: bool
+    ) -> list[Callable[[float], Any]]:
+        return self.checks(state, a, code)
 
     def _barriers(self, state: RobotState, support: Support) -> Barriers:
         """Return the rows A a ≥ lower for distances and static efforts, by kind."""
@@ -382,9 +411,9 @@ class Actuation:
 
 
 @kernel
-def _nothing(t: float) -> int:
-    """Return that nothing is violated."""
-    return 0
+def _unlimited(code: Indices, t: float) -> int:
+    """Return that nothing is violated, with the law's code."""
+    return int(CODES * code[0])
 
 
 @kernel
@@ -397,12 +426,16 @@ def _check(
     limits: MotionLimits,
     held: Held,
     bounds: Bounds,
+    code: Indices,
     t: float,
 ) -> int:
     """Observe the last period's effort, and return which limits the next violates.
 
-    See `observe` and `violated_limits`.
+    And the law's code, see `Actuation.checks`; `observe` and `violated_limits`.
     """
     observe(v, held, t)
     error, disturbance = held.error, held.disturbance
-    return violated_limits(q, v, a, tau, where, limits, error, disturbance, bounds)
+    return int(
+        CODES * code[0]
+        + violated_limits(q, v, a, tau, where, limits, error, disturbance, bounds)
+    )

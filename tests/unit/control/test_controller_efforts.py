@@ -10,6 +10,7 @@ from controller_cases import (
     EXACT,
     METRICS,
     assert_same,
+    circle,
     contents,
     hold_orientation,
     metrics,
@@ -18,8 +19,9 @@ from controller_cases import (
     track,
 )
 
-from hsp_control import Controller, Rest, TargetPosture
+from hsp_control import Controller, FramePosition, Limits, Rest, TargetPosture
 from hsp_control.common.exceptions import ControllerError
+from hsp_control.control.actuation import Status
 from hsp_control.null_space.fields import Uncontrolled
 from hsp_control.null_space.metrics import (
     IdentityMetric,
@@ -197,6 +199,32 @@ def test_a_state_may_be_given_in_any_form() -> None:
     assert controller.state is own
     with pytest.raises(ControllerError, match="needs t, q and v, or a RobotState"):
         controller.compute(t)  # type: ignore[call-overload]
+
+
+def test_a_step_in_one_call_is_the_step_in_many() -> None:
+    """To the last bit: with (t, q, v) all is one native call, with a state several."""
+    level = FramePosition("panda_link4", circle(), priority=2)
+    found = set[tuple[Status, bool]]()
+    for tasks, limits in (
+        ([track(), hold_orientation()], Limits()),
+        ([track(), level], Limits(effort=30.0, velocity=1.0)),
+        ([track(), hold_orientation(), level], None),
+        ([track()], None),
+    ):
+        controller = Controller(panda(), tasks, TargetPosture(), limits=limits)
+        rest = panda().home(), np.zeros(7)
+        controller.compute(0.0, *rest)
+        slow = [(t, *rest) for t in (0.0, 0.1)]
+        upright = (0.0, np.zeros(7), np.zeros(7))
+        for t, q, v in [*slow, upright, *states(20, seed=4)]:
+            one = controller.compute(t, q, v)
+            many = controller.compute(panda().state(t, q, v))
+            assert_same(contents(one), contents(many))
+            assert (one.status, one.relaxation) == (many.status, many.relaxation)
+            found.add((one.status, bool(one.damped)))
+    kinds = {Status.EXACT, Status.LIMITED, Status.RELAXED}
+    assert found >= {(Status.EXACT, False), (Status.EXACT, True)}
+    assert {status for status, _ in found} == kinds
 
 
 def test_an_output_belongs_to_the_caller() -> None:
