@@ -104,6 +104,30 @@ def bind(
     return partial(function, *arguments)
 
 
+def once(calls: Sequence[Callable[[], object]], stamp: Indices) -> Callable[[], object]:
+    """Return one call that makes several, unless it made them at this stamp, (1,)."""
+    native = [call for call in calls if isinstance(call, NativeCall)]
+    made = np.full(1, -1)
+    if len(native) < len(calls):
+        return partial(_make_once, calls, stamp, made)
+    from hsp_control.common import adapters
+
+    rows = np.concatenate([call.args[0] for call in native])
+    call = NativeCall.of(adapters.run_once, (rows, stamp, made), timed=False)
+    call.recipe, call.kept = (once, (calls, stamp)), (rows, made)
+    return call
+
+
+def _make_once(
+    calls: Sequence[Callable[[], object]], stamp: Indices, made: Indices
+) -> None:
+    """Do the same, where calls are made one by one."""
+    if made[0] != stamp[0]:
+        made[0] = stamp[0]
+        for call in calls:
+            call()
+
+
 def sequence(calls: Sequence[Timed], *free: float) -> NativeCall:
     """Return one call of the time that makes several; it returns the last result.
 

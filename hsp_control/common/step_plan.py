@@ -9,6 +9,10 @@ import numpy as np
 from hsp_control.common.native import FOREVER, NativeCall, Timed, sequence
 
 
+def stay(t: float) -> None:
+    """Do nothing: the follower of a constant sample that is already written."""
+
+
 class StepPlan(NamedTuple):
     """The calls that evaluate one part of a controller, at whatever the state is.
 
@@ -104,6 +108,8 @@ def _parts(
     if isinstance(call, CallSequence):
         for each in call.calls:
             yield from _parts(each, start, end)
+    elif call is stay:
+        return
     elif isinstance(call, TimeWindow):
         yield from _parts(call.call, max(start, call.start), min(end, call.end))
     else:

@@ -24,7 +24,7 @@ from hsp_control.common.identity_cache import IdentityCache
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
 from hsp_control.common.rotations import cross, rotate, rotate_back
-from hsp_control.common.step_plan import StepPlan
+from hsp_control.common.step_plan import StepPlan, stay
 from hsp_control.geometry.links import LinkShape
 from hsp_control.geometry.scene import Obstacle
 from hsp_control.geometry.shapes import Box, Capsule, Cylinder, HalfSpace, Shape, Sphere
@@ -40,7 +40,6 @@ from hsp_control.geometry.signed_distance import (
 )
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.kinematics import WorldKinematics, joint_support
-from hsp_control.trajectories.following import stay
 
 MOTION_SIZE = 18
 """Size of an obstacle's motion, R, c, c' and ω: see `Obstacle.follow`."""

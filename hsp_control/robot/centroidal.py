@@ -1,20 +1,22 @@
 """The centre of mass and the angular momentum about it, with exact Jacobians."""
 
-from functools import partial
+from collections.abc import Callable
 
 import numpy as np
 import pinocchio as pin
 
-from hsp_control.common.arrays import Array
+from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
-from hsp_control.common.native import bind
+from hsp_control.common.native import bind, once
 from hsp_control.robot.matrix_view import matrix_view
+from hsp_control.robot.pinocchio_calls import bind_pinocchio
 
 
 class CentroidalMotion:
     """Centre of mass and centroidal angular momentum of a robot, in world axes.
 
     Attributes:
+        compute: Updates the attributes below to the state, if they are not up to date.
         mass: Total mass [kg].
         position: The centre of mass c [m], shape (3,).
         velocity: c' = J v [m/s], shape (3,).
@@ -25,14 +27,17 @@ class CentroidalMotion:
         momentum_matrix_dot: A' = dA/dt along v, exact, shape (3, nv).
     """
 
-    def __init__(self, model: pin.Model, data: pin.Data, q: Array, v: Array) -> None:
-        """Allocate the arrays; `update` computes them at the values of q and v then.
+    def __init__(
+        self, model: pin.Model, data: pin.Data, q: Array, v: Array, stamp: Indices
+    ) -> None:
+        """Allocate the arrays; `compute` computes them at the values of q and v then.
 
         Args:
             model: The model.
             data: Its data.
             q: Configuration, shape (nq,); the array is kept.
             v: Velocity, shape (nv,); the array is kept.
+            stamp: Changes with q and v, shape (1,); the array is kept.
         """
         # Pinocchio allocates these results at the first call; take views after it.
         pin.computeCentroidalMapTimeVariation(model, data, q, v)
@@ -43,10 +48,8 @@ class CentroidalMotion:
         self.jacobian_dot: Array = np.zeros((3, model.nv))
         self.momentum_matrix: Array = np.zeros((3, model.nv))
         self.momentum_matrix_dot: Array = np.zeros((3, model.nv))
-        self._compute_momentum = partial(
-            pin.computeCentroidalMapTimeVariation, model, data, q, v
-        )
-        self._extract = bind(
+        momentum = bind_pinocchio("centroidal", model, data, q, v)
+        extract = bind(
             _extract,
             matrix_view(data.Ag),
             matrix_view(data.dAg),
@@ -58,11 +61,7 @@ class CentroidalMotion:
             self.momentum_matrix,
             self.momentum_matrix_dot,
         )
-
-    def update(self) -> None:
-        """Compute all attributes at the present q and v."""
-        self._compute_momentum()
-        self._extract()
+        self.compute: Callable[[], object] = once([momentum, extract], stamp)
 
 
 @kernel

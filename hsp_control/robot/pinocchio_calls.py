@@ -38,6 +38,16 @@ _NAMES = {
         "SA_EERKNS_7DataTplIT_XT0_ET1_E8Matrix6xERKNS_8ModelTplISC_XT0_ESD_EERSE_"
         "RKNS3_10MatrixBaseIT2_EERKNSN_IT3_EE"
     ),
+    "centroidal": (
+        f"_ZN9pinocchio4impl33computeCentroidalMapTimeVariation{_TEMPLATE}{_IN_IMPL}"
+        "SA_EERKNS_7DataTplIT_XT0_ET1_E8Matrix6xERKNS_8ModelTplISC_XT0_ESD_EERSE_"
+        "RKNS3_10MatrixBaseIT2_EERKNSN_IT3_EE"
+    ),
+    "coriolis": (
+        f"_ZN9pinocchio4impl21computeCoriolisMatrix{_TEMPLATE}{_IN_IMPL}"
+        "SA_EERKNS_7DataTplIT_XT0_ET1_E8MatrixXsERKNS_8ModelTplISC_XT0_ESD_EERSE_"
+        "RKNS3_10MatrixBaseIT2_EERKNSN_IT3_EE"
+    ),
     "rnea": (
         f"_ZN9pinocchio4impl4rnea{_TEMPLATE}{_IN_IMPL}"
         "SA_SA_EERKNS_7DataTplIT_XT0_ET1_E17TangentVectorTypeERKNS_8ModelTplISC_XT0_"
@@ -58,10 +68,15 @@ _NAMES = {
 
 _BINDINGS: dict[str, Callable[..., object]] = {
     "jacobians": pin.computeJointJacobiansTimeVariation,
+    "centroidal": pin.computeCentroidalMapTimeVariation,
+    "coriolis": pin.computeCoriolisMatrix,
     "rnea": pin.rnea,
     "crba": pin.crba,
     "aba": pin.aba,
 }
+
+_WITHOUT_MIMICS = "centroidal", "coriolis", "aba"
+"""What Pinocchio does not support for models with mimic joints: the bindings know."""
 
 _QUERY = "_ZN5boost6python9converter8registry5queryENS0_9type_infoE"
 _EXTRACT = (
@@ -136,15 +151,17 @@ def bind_pinocchio(
     """Return a call that computes from what these arrays then hold, into the data.
 
     Args:
-        what: ``jacobians`` (q, v), into J and dJ; ``rnea`` (q, v, a), into tau;
-            ``crba`` (q), into M, both triangles; ``aba`` (q, v, tau), into ddq.
+        what: ``jacobians`` (q, v), into J and dJ; ``centroidal`` (q, v), into Ag and
+            dAg; ``coriolis`` (q, v), into C; ``rnea`` (q, v, a), into tau; ``crba``
+            (q), into M, both triangles; ``aba`` (q, v, tau), into ddq.
         model: The model.
         data: Its data.
         vectors: The arrays; they are kept. What is no packed vector of doubles of the
             model's size is left to the bindings.
     """
     sizes = model.nq, model.nv, model.nv
-    if not unknown() and all(map(_fits, vectors, sizes)):
+    refused = what in _WITHOUT_MIMICS and len(model.mimicking_joints) > 0
+    if not refused and not unknown() and all(map(_fits, vectors, sizes)):
         addresses = _object_address(model, _MODEL), _object_address(data, _DATA)
         if all(addresses):
             return _native(what, addresses, (model, data, *vectors))

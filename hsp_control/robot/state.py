@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import NonFiniteError
-from hsp_control.common.native import NativeCall
+from hsp_control.common.native import NativeCall, once
 from hsp_control.robot.centroidal import CentroidalMotion
 from hsp_control.robot.configuration_space import as_numbers
 from hsp_control.robot.kinematics import (
@@ -56,6 +56,8 @@ class RobotState:
         q: Configuration, shape (nq,).
         v: Velocity, shape (nv,).
         stamp_array: `stamp` as an array of shape (1,), for kernels.
+        compute_mass_matrix: Updates `mass_matrix`, if it is not up to date.
+        compute_coriolis_matrix: Updates `coriolis_matrix`, if it is not up to date.
         effort: What `inverse_dynamics` wrote last, shape (nv,) [N·m or N].
         data: Pinocchio's data at (q, v), for terms that this class does not offer.
     """
@@ -73,16 +75,17 @@ class RobotState:
         )
         self._acceleration: Array = np.zeros(robot.nv)
         self._inverse_dynamics = self.bind_inverse_dynamics(self._acceleration)
-        self._compute_mass_matrix = bind_pinocchio(
-            "crba", robot.model, self.data, self.q
-        )
-        self._mass_matrix = matrix_view(self.data.M)
         self._world: WorldKinematics | None = None
         self._unit_blocks = np.array(robot.unit_blocks, dtype=np.int64).reshape(-1, 2)
         self._frames: dict[str, FrameKinematics] = {}
         self.stamp_array: Indices = np.zeros(1, dtype=np.int64)
-        self._mass_matrix_stamp = self._mass_matrix_rate_stamp = -1
-        self._coriolis_stamp = self._effects_stamp = self._centroidal_stamp = -1
+        model, stamp = robot.model, self.stamp_array
+        mass_matrix = bind_pinocchio("crba", model, self.data, self.q)
+        coriolis = bind_pinocchio("coriolis", model, self.data, self.q, self.v)
+        self.compute_mass_matrix = once([mass_matrix], stamp)
+        self.compute_coriolis_matrix = once([coriolis], stamp)
+        self._mass_matrix = matrix_view(self.data.M)
+        self._mass_matrix_rate_stamp = self._effects_stamp = -1
         self._centroidal: CentroidalMotion | None = None
         self._mass_matrix_rate: Array = np.zeros((robot.nv, robot.nv))
         self._displaced: RobotState | None = None
@@ -173,28 +176,21 @@ class RobotState:
         """The centre of mass, the angular momentum about it, and their Jacobians."""
         if self._centroidal is None:
             self._centroidal = CentroidalMotion(
-                self.robot.model, self.data, self.q, self.v
+                self.robot.model, self.data, self.q, self.v, self.stamp_array
             )
-        if self._centroidal_stamp != self.stamp:
-            self._centroidal.update()
-            self._centroidal_stamp = self.stamp
+        self._centroidal.compute()
         return self._centroidal
 
     @property
     def mass_matrix(self) -> Array:
         """M(q), shape (nv, nv) (CRBA)."""
-        stamp = self.stamp
-        if self._mass_matrix_stamp != stamp:
-            self._compute_mass_matrix()
-            self._mass_matrix_stamp = stamp
+        self.compute_mass_matrix()
         return self._mass_matrix
 
     @property
     def coriolis_matrix(self) -> Array:
         """C(q, v), where C v are Coriolis and centrifugal efforts, shape (nv, nv)."""
-        if self._coriolis_stamp != self.stamp:
-            pin.computeCoriolisMatrix(self.robot.model, self.data, self.q, self.v)
-            self._coriolis_stamp = self.stamp
+        self.compute_coriolis_matrix()
         return matrix_view(self.data.C)
 
     @property

@@ -1,7 +1,6 @@
 """The task of the centre of mass."""
 
 from dataclasses import KW_ONLY, replace
-from functools import partial
 from typing import Self
 
 from hsp_control.common.arrays import Array
@@ -66,8 +65,7 @@ class CenterOfMass(TrackingTask, type="center_of_mass"):
             feedback,
             out,
         )
-        centroidal = partial(getattr, state, "centroidal")
-        return StepPlan((self.trajectory.follow(desired),), (centroidal, write))
+        return StepPlan((self.trajectory.follow(desired),), (mass.compute, write))
 
     def reference_rate(self, state: RobotState) -> Array:
         """Return c_d', shape (m,) [m/s]."""

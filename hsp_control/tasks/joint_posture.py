@@ -10,7 +10,7 @@ from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import TaskError
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
-from hsp_control.common.step_plan import StepPlan
+from hsp_control.common.step_plan import StepPlan, stay
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Names
 from hsp_control.geometry.start import Start
@@ -26,7 +26,6 @@ from hsp_control.tasks.task import (
 )
 from hsp_control.trajectories import Hold, Stream, Trajectory, TrajectorySample
 from hsp_control.trajectories.crossfade import AnyReference
-from hsp_control.trajectories.following import stay
 
 
 class JointPosture(CompliantTask, type="joint_posture"):

@@ -9,17 +9,13 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
-from hsp_control.common.step_plan import CallSequence, TimeWindow
+from hsp_control.common.step_plan import CallSequence, TimeWindow, stay
 
 Follower = Callable[[float], object]
 """A function of time [s] that writes the sample at that time into fixed memory."""
 
 Kernel = tuple[Callable[..., None], tuple[Any, ...]]
 """``(function, parameters)``, called as ``function(*parameters, *sample, t)``."""
-
-
-def stay(t: float) -> None:
-    """Do nothing: the follower of a constant sample that is already written."""
 
 
 def follow_all(*followers: Follower) -> Follower:

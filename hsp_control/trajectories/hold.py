@@ -4,8 +4,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from hsp_control.common.step_plan import stay
 from hsp_control.declaration.quantities import Vector
-from hsp_control.trajectories.following import Follower, stay
+from hsp_control.trajectories.following import Follower
 from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
 
 

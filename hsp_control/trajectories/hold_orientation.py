@@ -3,8 +3,9 @@
 from functools import cached_property
 
 from hsp_control.common.arrays import Array
+from hsp_control.common.step_plan import stay
 from hsp_control.declaration.rotation import Rotation, matrix_of
-from hsp_control.trajectories.following import Follower, stay
+from hsp_control.trajectories.following import Follower
 from hsp_control.trajectories.orientation import (
     OrientationSample,
     OrientationTrajectory,

@@ -1,5 +1,6 @@
 """A ball that rolls without slipping: three rows, and one force below its centre."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY
 from functools import cached_property
 from typing import ClassVar
@@ -8,7 +9,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.constraints.contacts.contact import Contact
-from hsp_control.constraints.contacts.point_contact import point_velocity_rows
+from hsp_control.constraints.contacts.point_contact import point_rows
 from hsp_control.declaration.quantities import Positive, read_only
 from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.tasks import TaskSample
@@ -33,21 +34,13 @@ class BallContact(Contact, type="ball"):
         """The ball's centre in the frame, zeros of shape (1, 3) [m]."""
         return read_only(np.zeros((1, 3)))
 
-    def constrain(self, frame: FrameKinematics, out: TaskSample) -> None:
-        """Write the velocity rows of the material point in contact, at -r n."""
-        point_velocity_rows(
-            frame.jacobian,
-            frame.jacobian_dot,
-            self._arm(),
-            np.zeros(3),
-            out.jacobian,
-            out.jacobian_dot,
-        )
-
-    def arms(self, frame: FrameKinematics) -> Array:
-        """Return the position of the contact point from the ball's centre, (1, 3)."""
-        return self._arm()[None]
-
-    def _arm(self) -> Array:
-        """Return -r n, world axes, shape (3,) [m]."""
+    @property
+    def shift(self) -> Array:
+        """From the ball's centre to the point in contact: -r n, shape (3,) [m]."""
         return -self.radius * self.axes[:, 2]
+
+    def constrain(
+        self, frame: FrameKinematics, out: TaskSample
+    ) -> Sequence[Callable[[], object]]:
+        """Return the call for the velocity rows of the material point in contact."""
+        return [point_rows(self, frame, out.jacobian, out.jacobian_dot)]

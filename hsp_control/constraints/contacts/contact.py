@@ -1,8 +1,9 @@
 """The base class of contacts: constraint rows, and points where forces may act."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
@@ -12,6 +13,7 @@ from pydantic import AfterValidator
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ContactError
 from hsp_control.common.kernels import kernel
+from hsp_control.common.native import bind
 from hsp_control.common.step_plan import StepPlan
 from hsp_control.constraints.contacts.commanded_force import (
     WRENCH,
@@ -51,7 +53,8 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
     it pushes and never pulls.
 
     A subclass declares its parameters as fields (see `Part`), sets `rows`, and
-    implements `points`, `constrain` and `arms`.
+    implements `points` and `constrain`, and `shift` if its points are not where
+    forces act.
 
     Attributes:
         rows: Number of constraint rows.
@@ -166,23 +169,34 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
 
     def compile(self, state: RobotState, out: TaskSample) -> StepPlan:
         """Return the step plan that evaluates this state into this sample."""
-        return StepPlan(write=(partial(self.evaluate, state, out),))
+        frame = state.frame(self.frame)
+        J, _, _, e_dot, a = out
+        damp = bind(damp_velocity, J, state.v, self.damping, e_dot, a)
+        return StepPlan(write=(frame.compute, *self.constrain(frame, out), damp))
 
     def evaluate(self, state: RobotState, out: TaskSample) -> TaskSample:
         """Write the rows: J, J', and the acceleration that damps the motion."""
-        self.constrain(state.frame(self.frame), out)
-        damp_velocity(
-            out.jacobian, state.v, self.damping, out.error_rate, out.acceleration
-        )
+        for write in self.compile(state, out).write:
+            write()
         return out
 
     @abstractmethod
-    def constrain(self, frame: FrameKinematics, out: TaskSample) -> None:
-        """Write J and J' of the constraint, shape (rows, nv) each."""
+    def constrain(
+        self, frame: FrameKinematics, out: TaskSample
+    ) -> Sequence[Callable[[], object]]:
+        """Return the calls that write J and J' of the constraint, (rows, nv) each.
 
-    @abstractmethod
+        Each call reads the frame's motion as it is then.
+        """
+
+    @property
+    def shift(self) -> Array:
+        """From `points` to where forces act, in world axes, shape (3,) [m]."""
+        return np.zeros(3)
+
     def arms(self, frame: FrameKinematics) -> Array:
         """Return where forces act, from the frame's origin, world axes, (k, 3) [m]."""
+        return np.asarray(self.points @ frame.rotation.T + self.shift)
 
 
 @kernel

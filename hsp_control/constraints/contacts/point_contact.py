@@ -1,5 +1,6 @@
 """A point contact: three rows, and one force."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY
 from functools import cached_property
 from typing import ClassVar
@@ -8,9 +9,10 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.kernels import kernel
+from hsp_control.common.native import bind
 from hsp_control.constraints.contacts.contact import Contact
 from hsp_control.declaration.quantities import Vector3
-from hsp_control.robot.kinematics import FrameKinematics
+from hsp_control.robot.kinematics import FrameKinematics, FrameMotion
 from hsp_control.tasks import TaskSample
 
 
@@ -28,42 +30,53 @@ class PointContact(Contact, type="point"):
         """The point in the frame, shape (1, 3) [m]."""
         return np.asarray(self.point)[None]
 
-    def constrain(self, frame: FrameKinematics, out: TaskSample) -> None:
-        """Write the velocity rows of the point."""
-        arm = frame.rotation @ self.points[0]
-        point_velocity_rows(
-            frame.jacobian,
-            frame.jacobian_dot,
-            arm,
-            np.cross(frame.velocity[3:], arm),
-            out.jacobian,
-            out.jacobian_dot,
-        )
+    def constrain(
+        self, frame: FrameKinematics, out: TaskSample
+    ) -> Sequence[Callable[[], object]]:
+        """Return the call for the velocity rows of the point."""
+        return [point_rows(self, frame, out.jacobian, out.jacobian_dot)]
 
-    def arms(self, frame: FrameKinematics) -> Array:
-        """Return the point, from the frame's origin, in world axes, shape (1, 3)."""
-        return self.points @ frame.rotation.T
+
+def point_rows(
+    contact: Contact, frame: FrameKinematics, out: Array, out_dot: Array
+) -> Callable[[], object]:
+    """Return the call that writes the velocity rows of a contact's first point.
+
+    Args:
+        contact: The contact.
+        frame: The motion of its frame.
+        out: Written: J of the point, shape (3, nv).
+        out_dot: Written: J', shape (3, nv).
+    """
+    point, shift = np.array(contact.points[0]), np.array(contact.shift)
+    return bind(_point_velocity_rows, frame.motion, point, shift, out, out_dot)
 
 
 @kernel
-def point_velocity_rows(
-    J: Array, J_dot: Array, arm: Array, arm_dot: Array, out: Array, out_dot: Array
+def _point_velocity_rows(
+    frame: FrameMotion, point: Array, shift: Array, out: Array, out_dot: Array
 ) -> None:
     """Write the velocity rows of a point, and their rate, from those of a frame.
 
-    With l and w the frame's linear and angular rows and r the arm: l + w × r, and its
-    rate l' + w' × r + w × r'.
+    With l and w the frame's linear and angular rows and the arm r = R p + s, whose
+    shift s does not turn: l + w × r, and its rate l' + w' × r + w × r', where
+    r' = ω × R p.
 
     Args:
-        J: Frame Jacobian, world axes, linear rows first, shape (6, nv).
-        J_dot: Its rate, shape (6, nv).
-        arm: r, from the frame's origin to the point, world axes, shape (3,) [m].
-        arm_dot: r', shape (3,) [m/s].
+        frame: The frame's motion, in world axes.
+        point: p, in the frame, shape (3,) [m].
+        shift: s, in world axes, shape (3,) [m].
         out: The point's rows, shape (3, nv).
         out_dot: Their rate, shape (3, nv).
     """
-    x, y, z = arm[0], arm[1], arm[2]
-    u, v, w = arm_dot[0], arm_dot[1], arm_dot[2]
+    J, J_dot, R, _, velocity = frame
+    x = R[0, 0] * point[0] + R[0, 1] * point[1] + R[0, 2] * point[2]
+    y = R[1, 0] * point[0] + R[1, 1] * point[1] + R[1, 2] * point[2]
+    z = R[2, 0] * point[0] + R[2, 1] * point[1] + R[2, 2] * point[2]
+    u = velocity[4] * z - velocity[5] * y
+    v = velocity[5] * x - velocity[3] * z
+    w = velocity[3] * y - velocity[4] * x
+    x, y, z = x + shift[0], y + shift[1], z + shift[2]
     for j in range(J.shape[1]):
         a, b, c = J[3, j], J[4, j], J[5, j]
         d, e, f = J_dot[3, j], J_dot[4, j], J_dot[5, j]

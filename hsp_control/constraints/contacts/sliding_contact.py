@@ -1,5 +1,6 @@
 """A point that moves along a plane while it presses: one row, and one force."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY
 from functools import cached_property
 from typing import ClassVar
@@ -8,9 +9,11 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ContactError
+from hsp_control.common.linalg import multiply_transposed
+from hsp_control.common.native import bind
 from hsp_control.constraints.contacts.commanded_force import NORMAL, WRENCH
 from hsp_control.constraints.contacts.contact import Contact
-from hsp_control.constraints.contacts.point_contact import point_velocity_rows
+from hsp_control.constraints.contacts.point_contact import point_rows
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Positive, Vector3
 from hsp_control.robot.kinematics import FrameKinematics
@@ -74,23 +77,19 @@ class SlidingContact(Contact, type="sliding"):
         """The point in the frame, shape (1, 3) [m]."""
         return np.asarray(self.point)[None]
 
-    def constrain(self, frame: FrameKinematics, out: TaskSample) -> None:
-        """Write the row of the normal: nᵀ times the velocity rows of the point."""
-        J, J_dot = np.empty((2, 3, frame.jacobian.shape[1]))
-        arm = frame.rotation @ self.points[0]
-        point_velocity_rows(
-            frame.jacobian,
-            frame.jacobian_dot,
-            arm + np.asarray(self.offset),
-            np.cross(frame.velocity[3:], arm),
-            J,
-            J_dot,
-        )
-        normal = self.axes[:, 2]
-        out.jacobian[0] = normal @ J
-        out.jacobian_dot[0] = normal @ J_dot
+    @property
+    def shift(self) -> Array:
+        """From the point to where the plane is touched, shape (3,) [m]."""
+        return np.asarray(self.offset, dtype=float)
 
-    def arms(self, frame: FrameKinematics) -> Array:
-        """Return where the plane is touched, from the frame's origin, shape (1, 3)."""
-        arms: Array = self.points @ frame.rotation.T + np.asarray(self.offset)
-        return arms
+    def constrain(
+        self, frame: FrameKinematics, out: TaskSample
+    ) -> Sequence[Callable[[], object]]:
+        """Return the calls for the normal's row: nᵀ times the point's velocity rows."""
+        J, J_dot = np.zeros((2, *frame.jacobian[:3].shape))
+        n = np.ascontiguousarray(self.axes[:, 2])
+        return [
+            point_rows(self, frame, J, J_dot),
+            bind(multiply_transposed, J, n, out.jacobian[0]),
+            bind(multiply_transposed, J_dot, n, out.jacobian_dot[0]),
+        ]

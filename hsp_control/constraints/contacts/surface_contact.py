@@ -1,5 +1,6 @@
 """A flat sole: six rows, and a force at every corner."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY
 from functools import cached_property
 from typing import Annotated, ClassVar
@@ -9,10 +10,12 @@ from pydantic import AfterValidator
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ContactError
+from hsp_control.common.native import bind
 from hsp_control.constraints.contacts.contact import Contact
 from hsp_control.declaration.quantities import Points, Positive, Vector3, read_only
 from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.tasks import TaskSample
+from hsp_control.tasks.task import copy_rows
 
 
 def _surface(corners: Array) -> Array:
@@ -78,11 +81,9 @@ class SurfaceContact(Contact, type="surface"):
         center = np.zeros(3) if self.center is None else np.asarray(self.center)
         return read_only(square + center)
 
-    def constrain(self, frame: FrameKinematics, out: TaskSample) -> None:
-        """Write the six rows of the frame: it neither moves nor turns."""
-        out.jacobian[:] = frame.jacobian
-        out.jacobian_dot[:] = frame.jacobian_dot
-
-    def arms(self, frame: FrameKinematics) -> Array:
-        """Return the corners, from the frame's origin, in world axes, shape (k, 3)."""
-        return self.points @ frame.rotation.T
+    def constrain(
+        self, frame: FrameKinematics, out: TaskSample
+    ) -> Sequence[Callable[[], object]]:
+        """Return the call for the six rows of the frame: it neither moves nor turns."""
+        J, J_dot = out.jacobian, out.jacobian_dot
+        return [bind(copy_rows, frame.jacobian, frame.jacobian_dot, 0, J, J_dot)]

@@ -108,6 +108,7 @@ class Actuation:
             zeros(nv), zeros(nv), zeros(nv), zeros(nv), zeros(1)
         )
         self._checks = IdentityCache(self._compile_checks)
+        self._permits = IdentityCache(self._bind_permits)
         self._window: Callable[[], float] | None = None
         self._no_forces = np.zeros(0)
         self._no_support = Support((), robot, self._weight)
@@ -263,8 +264,8 @@ class Actuation:
         for A, least in barriers.values():
             motion_ok = motion_ok and bool((A @ a >= least).all())
         forces_ok = not support.size or support.permits(forces)
-        if motion_ok and forces_ok and within(tau, self._tau_lower, self._tau_upper):
-            if self._floating:
+        if motion_ok and forces_ok and self._permits.get(tau)():
+            if self._floating and not support.size:
                 tau[self.base] = 0.0
             return tau, a, forces, EXACT, 0.0
         return self._limit(state, wanted, a, motion_ok, resolution, support, barriers)
@@ -310,6 +311,10 @@ class Actuation:
         for call in self._checks.get(state, a, code, self.limits is None):
             value = call(state.t)
         return int(value) % CODES
+
+    def _bind_permits(self, tau: Array) -> Callable[[], float]:
+        """Return a call that says whether this effort, (nv,), is within its bounds."""
+        return bind(within, tau, self._tau_lower, self._tau_upper)
 
     def _compile_checks(
         self, state: RobotState, a: Array, code: Indices, _: bool

@@ -4,32 +4,54 @@ import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
-from hsp_control.common.linalg import multiply, multiply_transposed, orthogonalise_rows
+from hsp_control.common.linalg import (
+    cholesky,
+    multiply,
+    multiply_transposed,
+    orthogonalise_rows,
+    solve_lower,
+    solve_lower_transposed,
+)
+from hsp_control.robot.kinematics import FrameMotion
 
 _NEGLIGIBLE = 1e-10
 """Eigenvalue, relative to the largest, below which a direction has no support."""
+_TRUSTED = 1e-6
+"""Pivot, relative to the largest, above which no direction is without support."""
 
 
 @kernel
 def force_map(
-    J: Array, position: Array, arms: Array, axes: Array, positions: Array, out: Array
+    frame: FrameMotion,
+    points: Array,
+    shift: Array,
+    axes: Array,
+    first: int,
+    positions: Array,
+    out: Array,
 ) -> None:
     """Write the positions of the points, and the generalised forces of unit forces.
 
     A force s at an arm r has the wrench (s, r × s): column Jᵀ(s, r × s).
 
     Args:
-        J: Jacobian of the contact's frame, world axes, shape (6, nv).
-        position: Position of the frame's origin, shape (3,) [m].
-        arms: From the origin to the points, world axes, shape (k, 3) [m].
+        frame: Motion of the contact's frame, in world axes.
+        points: The points in the frame, shape (k, 3) [m].
+        shift: From them to where forces act, in world axes, shape (3,) [m].
         axes: Tangents and normal as columns, world axes, shape (3, 3).
-        positions: Written: the points in the world, shape (k, 3) [m].
-        out: Written: one column per axis, point after point, shape (nv, 3 k).
+        first: Index of the first of these points among all.
+        positions: Written: the points in the world, shape (all, 3) [m].
+        out: Written: one column per axis, point after point, shape (nv, 3 all).
     """
-    for p in range(arms.shape[0]):
-        x, y, z = arms[p, 0], arms[p, 1], arms[p, 2]
-        for i in range(3):
-            positions[p, i] = position[i] + arms[p, i]
+    J, _, R, origin, _ = frame
+    for k in range(points.shape[0]):
+        p, px, py, pz = first + k, points[k, 0], points[k, 1], points[k, 2]
+        x = R[0, 0] * px + R[0, 1] * py + R[0, 2] * pz + shift[0]
+        y = R[1, 0] * px + R[1, 1] * py + R[1, 2] * pz + shift[1]
+        z = R[2, 0] * px + R[2, 1] * py + R[2, 2] * pz + shift[2]
+        positions[p, 0] = origin[0] + x
+        positions[p, 1] = origin[1] + y
+        positions[p, 2] = origin[2] + z
         for axis in range(3):
             a, b, c = axes[0, axis], axes[1, axis], axes[2, axis]
             d, e, f = y * c - z * b, z * a - x * c, x * b - y * a
@@ -58,7 +80,8 @@ def minimum_norm_forces(
 
     f = r + E Aᵀ(A E Aᵀ)⁺(w - A r) with A the base's rows of F, E = diag(e), w the
     base's rows of the wanted effort, and r what is commanded. w lies in the range of A:
-    directions without support are left out.
+    directions without support are left out. The effort of the base, which has no
+    motor, is zero.
 
     Args:
         F: Generalised forces of unit forces, shape (nv, size).
@@ -86,8 +109,41 @@ def minimum_norm_forces(
             for k in range(size):
                 total += A[i, k] * inverse_cost[k] * A[j, k]
             G[i, j] = G[j, i] = total
-    # G is symmetric and positive semidefinite: the lengths of the orthogonalised rows
-    # are its eigenvalues.
+    if _well_conditioned(G, U):
+        for i in range(n):
+            scaled[i] = w[i]
+        solve_lower(U, scaled)
+        solve_lower_transposed(U, scaled)
+    else:
+        _least_squares(G, U, w, scaled)
+    multiply_transposed(A, scaled, forces)
+    for k in range(size):
+        forces[k] = reference[k] + inverse_cost[k] * forces[k]
+    multiply(F, forces, tau)
+    for i in range(tau.shape[0]):
+        tau[i] = wanted[i] - tau[i]
+    for i in range(n):
+        tau[base[i]] = 0.0
+
+
+@kernel
+def _well_conditioned(G: Array, L: Array) -> bool:
+    """Write the Cholesky factor of G, and return whether it can be trusted."""
+    if not cholesky(G, L):
+        return False
+    least, most = np.inf, 0.0
+    for i in range(G.shape[0]):
+        least, most = min(least, L[i, i]), max(most, L[i, i])
+    return bool(least * least > _TRUSTED * most * most)
+
+
+@kernel
+def _least_squares(G: Array, U: Array, w: Array, out: Array) -> None:
+    """Write G⁺ w, and overwrite G, U and w; G is positive semidefinite, shape (n, n).
+
+    The lengths of the orthogonalised rows of G are its eigenvalues.
+    """
+    n = G.shape[0]
     orthogonalise_rows(G, U)
     largest = 0.0
     for r in range(n):
@@ -96,16 +152,10 @@ def minimum_norm_forces(
             square += G[r, i] * G[r, i]
         G[r, 0] = np.sqrt(square)
         largest = max(largest, G[r, 0])
-    multiply(U, w, scaled)
+    multiply(U, w, out)
     for r in range(n):
-        scaled[r] = scaled[r] / G[r, 0] if G[r, 0] > _NEGLIGIBLE * largest else 0.0
-    multiply_transposed(U, scaled, w)
-    multiply_transposed(A, w, forces)
-    for k in range(size):
-        forces[k] = reference[k] + inverse_cost[k] * forces[k]
-    multiply(F, forces, tau)
-    for i in range(tau.shape[0]):
-        tau[i] = wanted[i] - tau[i]
+        w[r] = out[r] / G[r, 0] if G[r, 0] > _NEGLIGIBLE * largest else 0.0
+    multiply_transposed(U, w, out)
 
 
 @kernel

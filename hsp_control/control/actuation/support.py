@@ -1,12 +1,15 @@
 """Contact forces of the active contacts: their map, cones, bounds and points."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.identity_cache import IdentityCache
+from hsp_control.common.native import bind
+from hsp_control.common.step_plan import in_order
 from hsp_control.constraints.contacts import Contact
 from hsp_control.control.actuation.commanded_forces import (
     COMMANDED_INVERSE_COST,
@@ -80,7 +83,7 @@ class Support:
                     self.cone[4 * k + row, 3 * k + 2] = contact.side
 
         self.reference = np.zeros(self.size)
-        self._parts: list[tuple[PlannedContact, Array, Array, slice, Array]] = []
+        self._scheduled: list[tuple[PlannedContact, slice, Array]] = []
         self._commanded: list[tuple[PlannedContact, CommandedForces, Array]] = []
         for planned, where in zip(contacts, self.points, strict=True):
             columns = slice(3 * where.start, 3 * where.stop)
@@ -91,10 +94,15 @@ class Support:
                 full[command.mask] *= COMMANDED_INVERSE_COST
                 self._commanded.append((planned, command, self.reference[columns]))
             self.inverse_cost[columns] = full
-            positions, part = self.positions[where], self.map[:, columns]
-            self._parts.append((planned, positions, part, columns, full))
-        self._tau, self.forces = np.zeros(nv), np.zeros(self.size)
-        self._scratch = IdentityCache(self._allocate)
+            if not planned.always:
+                self._scheduled.append((planned, columns, full))
+        self._wanted, self._tau = np.zeros(nv), np.zeros(nv)
+        self.forces, self._asked = np.zeros(self.size), np.zeros(self.size)
+        self._maps = IdentityCache(self._bind_maps)
+        self._solve = IdentityCache(self._bind_solve)
+        self._permits = bind(
+            within_cones, self.cone, self._asked, self.lower, self.upper
+        )
 
     def update(self, state: RobotState, resolution: Resolution) -> None:
         """Compute the map, the positions, the bounds of schedules, and the commands.
@@ -103,17 +111,25 @@ class Support:
             state: The robot's state.
             resolution: The law, resolved there.
         """
-        for planned, positions, part, columns, full in self._parts:
-            contact = planned.contact
-            frame = state.frame(contact.frame)
-            arms, axes = contact.arms(frame), contact.axes
-            force_map(frame.jacobian, frame.position, arms, axes, positions, part)
-            if not planned.always:
-                on = max(planned.weight(state.t), 1e-6)
-                self.upper[columns][2::3] = on * _MAX_FORCE * self._weight
-                self.inverse_cost[columns] = on * full
+        for write in self._maps.get(state):
+            write(state.t)
+        for planned, columns, full in self._scheduled:
+            on = max(planned.weight(state.t), 1e-6)
+            self.upper[columns][2::3] = on * _MAX_FORCE * self._weight
+            self.inverse_cost[columns] = on * full
         for planned, command, own in self._commanded:
             command.write(state, planned.weight(state.t), resolution, own)
+
+    def _bind_maps(self, state: RobotState) -> list[Callable[[float], Any]]:
+        """Return the calls that write the map and the positions at this state."""
+        calls: list[Callable[[], object]] = []
+        for contact, where in zip(self.contacts, self.points, strict=True):
+            frame = state.frame(contact.frame)
+            points, shift = np.array(contact.points), np.array(contact.shift)
+            own = points, shift, np.array(contact.axes), where.start
+            write = bind(force_map, frame.motion, *own, self.positions, self.map)
+            calls += [frame.compute, write]
+        return in_order(calls)
 
     def minimum_norm_forces(self, base: Indices, wanted: Array) -> tuple[Array, Array]:
         """Return the forces of minimum Σ (f - f_ref)²/e, and the remaining effort.
@@ -126,25 +142,23 @@ class Support:
             The forces, shape (size,) [N], and the effort that remains for the motors,
             shape (nv,) [N·m or N]; both are overwritten by the next call.
         """
-        minimum_norm_forces(
-            self.map,
-            base,
-            self.inverse_cost,
-            self.reference,
-            wanted,
-            *self._scratch.get(base),
-            self.forces,
-            self._tau,
-        )
+        self._wanted[:] = wanted
+        self._solve.get(base)()
         return self.forces, self._tau
 
-    def _allocate(self, base: Indices) -> tuple[Array, Array, Array, Array]:
+    def _bind_solve(self, base: Indices) -> Callable[[], object]:
         n, zeros = len(base), np.zeros
-        return zeros((n, self.size)), zeros((n, n)), zeros((n, n)), zeros((2, n))
+        return bind(
+            minimum_norm_forces,
+            *(self.map, base, self.inverse_cost, self.reference, self._wanted),
+            *(zeros((n, self.size)), zeros((n, n)), zeros((n, n)), zeros((2, n))),
+            *(self.forces, self._tau),
+        )
 
     def permits(self, forces: Array) -> bool:
         """Return whether forces, shape (size,), are within cones and bounds."""
-        return within_cones(self.cone, forces, self.lower, self.upper)
+        self._asked[:] = forces
+        return bool(self._permits())
 
     def in_world(self, forces: Array) -> Array:
         """Return the forces in world axes, shape (size/3, 3) [N]."""

@@ -1,6 +1,5 @@
 """The kinetic-energy metric, of Khatib's dynamically consistent inverse."""
 
-from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -34,9 +33,7 @@ class MassMatrixMetric(Metric, type="mass_matrix"):
         if state.robot.mimics:
             return super().compile(state, out)
         matrices = state.mass_matrix, state.coriolis_matrix
-        update = [
-            partial(getattr, state, name) for name in ("mass_matrix", "coriolis_matrix")
-        ]
+        update = state.compute_mass_matrix, state.compute_coriolis_matrix
         return StepPlan((), (*update, bind(_write, *matrices, *out)))
 
     def evaluate(self, state: RobotState, out: MetricSample) -> MetricSample:

@@ -4,7 +4,8 @@ import copy
 import gc
 import pickle
 import weakref
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -14,8 +15,8 @@ from hypothesis import strategies as st
 import hsp_control as hsp
 from hsp_control.common import adapters
 from hsp_control.common.arrays import Array
-from hsp_control.common.kernels import kernel
-from hsp_control.common.native import NativeCall, Timed, bind, sequence
+from hsp_control.common.kernels import PLAIN, kernel
+from hsp_control.common.native import NativeCall, Timed, bind, once, sequence
 from hsp_control.common.step_plan import CallSequence, StepPlan, TimeWindow, steps
 
 compiled = pytest.mark.skipif(
@@ -185,6 +186,30 @@ def test_native_calls_that_follow_one_another_are_one() -> None:
     assert len(found) == 1
     assert isinstance(found[0], NativeCall)
     assert found[0](0.0) == 4.0
+
+
+@pytest.mark.parametrize("plain", [False, True])
+def test_calls_are_made_once_at_a_stamp(plain: bool) -> None:
+    """Also by a copy, which counts the stamps of its own array."""
+    log, stamp = np.zeros(20), np.zeros(1, dtype=np.int64)
+    calls: list[Any] = [bind(_note, log, 1.0), bind(_note, log, 2.0)]
+    if plain:
+        calls[1] = partial(_note, log, 2.0)
+    call = once(calls, stamp)
+    if not plain and not PLAIN:
+        assert isinstance(call, NativeCall)
+    gc.collect()  # nothing that the call points to may be gone
+    for value in (3, 3, 0, 4):
+        stamp[0] = value
+        call()
+        call()
+    assert called(log) == [1.0, 2.0] * 3
+    copied, own, own_stamp = copy.deepcopy((call, log, stamp))
+    own_stamp[0] = 5
+    copied()
+    copied()
+    assert called(own) == [1.0, 2.0]
+    assert called(log) == []
 
 
 def test_several_calls_as_one_return_what_one_of_them_says() -> None:

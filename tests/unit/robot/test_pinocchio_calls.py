@@ -43,6 +43,8 @@ def test_native_calls_equal_the_bindings(case: str) -> None:
         "crba": ((q,), ("M",)),
     }
     if not robot.mimics:
+        calls["coriolis"] = (q, v), ("C",)
+        calls["centroidal"] = (q, v), ("Ag", "dAg")
         calls["aba"] = ((q, v, a), ("ddq",))
     for what, (vectors, results) in calls.items():
         native, bound, call = both(what, model, *vectors)
@@ -99,6 +101,16 @@ def test_what_is_not_packed_is_left_to_the_bindings() -> None:
     call = bind_pinocchio("crba", robot.model, native, q[:-1])
     with pytest.raises(ValueError, match="size"):
         call()
+
+
+def test_what_refuses_mimic_joints_is_left_to_the_bindings() -> None:
+    robot, q, v, _ = draw("tiago_pro", seed=25)
+    for what, arguments in (("coriolis", 2), ("centroidal", 2), ("aba", 3)):
+        vectors = (q, v, v)[:arguments]
+        call = bind_pinocchio(what, robot.model, robot.model.createData(), *vectors)
+        assert not isinstance(call, NativeCall)
+    with pytest.raises(RuntimeError, match="Mimic"):
+        bind_pinocchio("centroidal", robot.model, robot.model.createData(), q, v)()
 
 
 @pytest.fixture
