@@ -72,6 +72,7 @@ class ControlChain(Generic[Source_co]):
 
     Attributes:
         command: What computes the efforts.
+        needs_sensors: Whether more is needed of a measurement than q and v.
         plan: What runs of the plan; None without one, or before `begin`.
     """
 
@@ -91,14 +92,11 @@ class ControlChain(Generic[Source_co]):
         """
         self.command = command
         self._plan, self._estimators = plan, tuple(estimators)
+        self._feels = bool(getattr(command, "feels_contacts", False))
+        self.needs_sensors = plan is not None or bool(estimators) or self._feels
         self._estimating: list[RunningEstimator] = []
         self.plan: RunningPlan | None = None
         self._status = 0.0
-
-    @property
-    def needs_sensors(self) -> bool:
-        """Whether more is needed of a measurement than q and v."""
-        return bool(self._plan is not None or self._estimators or self._feels)
 
     def begin(self, inertial: Inertial | None, state: RobotState | None = None) -> None:
         """Begin a run: nothing is remembered of an earlier one.
@@ -165,7 +163,3 @@ class ControlChain(Generic[Source_co]):
             )
             channels = {**channels, "estimate.status": status}
         return channels
-
-    @property
-    def _feels(self) -> bool:
-        return bool(getattr(self.command, "feels_contacts", False))

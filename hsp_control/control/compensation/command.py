@@ -49,6 +49,8 @@ class Command:
         compensation: The compensators.
         state: The last state at which the law was evaluated.
         output: The controller's output there.
+        feels_contacts: Whether `effort` needs the wrenches that sensors in contacts
+            measure.
     """
 
     state: RobotState
@@ -70,6 +72,8 @@ class Command:
         self.state = controller.state
         self._measured = self.state if own.predictor is None else RobotState(robot)
         self._tau, self._zero = np.zeros(robot.nv), np.zeros(robot.nv)
+        feedback = own.force_feedback
+        self.feels_contacts = feedback is not None and feedback.force == "measured"
         self._changes_state = (own.velocity_filter or own.predictor) is not None
         self._changes_effort = any(
             part is not None
@@ -109,12 +113,6 @@ class Command:
         # The efforts on the model, less friction: one for each period from the last
         # measurement to the period that begins now.
         self._under_way: deque[Array] = deque()
-
-    @property
-    def feels_contacts(self) -> bool:
-        """Whether `effort` needs the wrenches that sensors in contacts measure."""
-        own = self.compensation.force_feedback
-        return own is not None and own.force == "measured"
 
     def effort(
         self,
