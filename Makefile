@@ -24,9 +24,9 @@ help: ## list the targets
 	@awk 'BEGIN { FS = ":.*## " } /^##@ / { printf "\n%s\n", substr($$0, 5) } \
 	  /^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
 
-# The bytecode of what the demo imports is written, whatever the shell says: without it
-# each later start would take seconds more.
-demo: export PYTHONDONTWRITEBYTECODE :=
+# The bytecode of what these import is written, whatever the shell says: without it each
+# later start takes longer, and tests start hundreds of processes.
+demo test thorough docs wheel-test: export PYTHONDONTWRITEBYTECODE :=
 demo: $(USE) ## the paper's run, and a Panda under a ball, with and without its field
 	@echo "Running paper/4_moving_obstacle; the first run compiles its kernels, once ..."
 	@$(BIN)/hsp run paper/4_moving_obstacle --out out/demo --no-view
@@ -83,10 +83,12 @@ fuzz: $(STAMP) ## random states, mutated files, faults, soak: hours; writes docs
 mutants: $(STAMP) ## break the code on purpose, report what no test notices
 	@PYTHONPATH=tests/support $(BIN)/python tests/mutants.py $(ARGS)
 
+# What is in the wheel goes: a checkout compiles for its own processor.
 wheel: $(STAMP) ## build the wheel into dist/, with machine code for every configuration
-	@echo "Compiling what the bundled configurations use (some minutes) ..."
+	@echo "Compiling what the bundled configurations use (a minute) ..."
 	@$(BIN)/python tools/machine_code.py $(CONFIGS)
 	@rm -rf dist; $(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist .
+	@rm -rf machine_code
 	@ls dist
 
 sims: $(STAMP) ## robosuite's own arms and our law in them, in .venv-sims

@@ -21,18 +21,24 @@ import sys
 
 import hsp_control as hsp
 
-log, name = sys.argv[1:]
-experiment = hsp.load_experiment(name, "simulation.duration=0.02")
-controller = experiment.controller
-controller.compute(0.0, experiment.q0, experiment.v0)
-controller.diagnose()
-experiment.run().save(log)
+log, *names = sys.argv[1:]
+for k, name in enumerate(names):
+    print(f"[{k + 1}/{len(names)}] {name}", flush=True)
+    experiment = hsp.load_experiment(name, "simulation.duration=0.02")
+    controller = experiment.controller
+    controller.compute(0.0, experiment.q0, experiment.v0)
+    controller.diagnose()
+    experiment.run().save(log)
 """
 """Whatever a run of a configuration calls."""
 
 
 def main() -> None:
-    """Run each configuration in a process of its own, and gather what was compiled."""
+    """Run the configurations, and gather what was compiled.
+
+    In one process: most have their kernels from those before, and starting takes longer
+    than running. It is a process of its own because Numba reads the variables once.
+    """
     names = sys.argv[1:] or sorted(bundled_configs())
     with tempfile.TemporaryDirectory() as folder:
         environment = {
@@ -41,11 +47,8 @@ def main() -> None:
             "NUMBA_CPU_NAME": shipped_processor()[0],
             "NUMBA_CPU_FEATURES": "",
         }
-        for k, name in enumerate(names):
-            print(f"[{k + 1}/{len(names)}] {name}", flush=True)
-            log = f"{folder}/log.npz"
-            python = [sys.executable, "-c", USE, log, name]
-            subprocess.run(python, check=True, env=environment)
+        python = [sys.executable, "-c", USE, f"{folder}/log.npz", *names]
+        subprocess.run(python, check=True, env=environment)
         shutil.rmtree(FOLDER, ignore_errors=True)
         FOLDER.mkdir()
         for file in Path(folder).rglob("*.nb?"):

@@ -3,6 +3,7 @@
 import os
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -41,6 +42,17 @@ def opened(browser: Any, url: str, **options: Any) -> tuple[Any, list[str]]:
         ),
     )
     page.goto(url)
+    return page, wrong
+
+
+def exported(
+    browser: Any, file: Path, t: float, size: tuple[int, int]
+) -> tuple[Any, list[str]]:
+    """An exported page that stands at a time [s]: to play takes longer than to open."""
+    address = f"{file.resolve().as_uri()}#t={t}"
+    width, height = size
+    page, wrong = opened(browser, address, viewport={"width": width, "height": height})
+    page.wait_for_selector("body[data-ready]", state="attached")
     return page, wrong
 
 

@@ -237,6 +237,13 @@ MUTANTS = (
         OF_STREAMS + "silence",
     ),
     Mutant(
+        "streams: the first message compiles",
+        STREAMS + "running.py",
+        "self._compile(start)",
+        "start",
+        UNIT + "live/test_live_streams.py",
+    ),
+    Mutant(
         "impedance: no rate of the inertia",
         TASKS + "impedance_gains.py",
         "Kv[i, j] -= 0.5 * root[i, j]",

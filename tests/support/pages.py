@@ -36,6 +36,7 @@ class Page(threading.Thread):
 
     async def look(self) -> None:
         page = await websocket_connect(scene_request(self.url))
+        protocol = page.protocol  # `leave` takes it from the page
         self.loop, self.socket = asyncio.get_running_loop(), page
         try:
             while (message := await page.read_message()) is not None:
@@ -48,7 +49,6 @@ class Page(threading.Thread):
         except WebSocketClosedError:
             pass
         finally:
-            protocol = page.protocol
             page.close()
             # The event loop ends here, before the other side could confirm.
             if protocol is not None and protocol.stream is not None:

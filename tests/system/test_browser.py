@@ -26,9 +26,6 @@ from hsp_control.common.resources import bundled_configs
 from hsp_control.visualization.viewer import LiveView, Viewer
 from hsp_control.visualization.viewer.commands import PLOTS, set_property
 from hsp_control.visualization.viewer.export import FilmStyle, export_film, export_html
-from hsp_control.visualization.viewer.export.chromium import (
-    open_page,
-)
 from hsp_control.visualization.viewer.export.clip_reduction import (
     ANGLE_BOUND,
     POSITION_BOUND,
@@ -739,10 +736,8 @@ def test_a_configuration_has_its_picture(
     overrides = SHOWN.get(name.partition("/")[0], QUICK)
     rollout = load_experiment(name, *overrides).run()
     file = export_html(rollout, tmp_path / "page.html")
-    page = open_page(browser, file, (1280, 800))
-    wrong: list[str] = []
-    page.on("pageerror", lambda error: wrong.append(str(error)))
-    page.evaluate("(t) => { player.pause(); player.seek(t); }", 0.6 * rollout.t[-1])
+    moment = 0.6 * rollout.t[-1]
+    page, wrong = browsers.exported(browser, file, moment, (1280, 800))
     page.evaluate(SETTLE)
     picture = SCREENSHOTS / f"{name.replace('/', '_')}.png"
     picture.parent.mkdir(parents=True, exist_ok=True)

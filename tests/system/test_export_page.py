@@ -10,9 +10,6 @@ import pytest
 
 from hsp_control import load_experiment
 from hsp_control.visualization.viewer import ComparedRun, export_html
-from hsp_control.visualization.viewer.export.chromium import (
-    open_page,
-)
 
 pytestmark = pytest.mark.browser
 
@@ -45,10 +42,7 @@ def page_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def page(browser: Any, page_file: Path) -> Iterator[Any]:
-    opened = open_page(browser, page_file, (1280, 800))
-    wrong: list[str] = []
-    opened.on("pageerror", lambda error: wrong.append(str(error)))
-    opened.evaluate("player.pause(); player.seek(1)")
+    opened, wrong = browsers.exported(browser, page_file, 1.0, (1280, 800))
     yield opened
     opened.close()
     assert wrong == []

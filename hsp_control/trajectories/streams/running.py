@@ -112,9 +112,10 @@ class RunningStream:
     def _compile(self, start: State) -> None:
         """Compile what a message needs now, and not in a period of a live loop."""
         chart, zeros = self.chart, np.zeros_like(start.x)
-        value = np.zeros(chart.linear + 4 * chart.rotational)
-        value[-1] = 1.0
-        chart.local(value[None], start.base)
+        values = np.zeros((2, chart.linear + 4 * chart.rotational))
+        values[:, -1] = 1.0
+        chart.local(values, start.base)
+        chart.local(values[:1], start.base)  # to Numba a single row has another layout
         chart.local_rate(start.x, zeros, start.base)
         chart.rebased(start)
         Quintic(0.0, 1.0, start.base, np.zeros((6, chart.size))).state(0.5)
