@@ -46,7 +46,10 @@ def kernel(function: Function) -> Function:
 
     compiled = cast("Any", numba.jit(**_OPTIONS)(function))
     compiled._cache = Kept(function)
+    own = compiled._compiler
+    own._compile_core = partial(_watched, own._compile_core)
     inner = linked(function, _OPTIONS)
+    inner._compiler._compile_core = partial(_watched, inner._compiler._compile_core)
     compiled.get_call_template = inner.get_call_template
     compiled.get_overload = inner.get_overload
     return cast("Function", compiled)
@@ -83,7 +86,10 @@ _watchers: list[Callable[[], AbstractContextManager[None]]] = []
 
 @contextmanager
 def watched(watcher: Callable[[], AbstractContextManager[None]]) -> Iterator[None]:
-    """Enter the watcher's context around each compilation not found on disk."""
+    """Enter the watcher's context around each compilation not found on disk.
+
+    Those of the kernels that a kernel calls lie within its own.
+    """
     _watchers.append(watcher)
     try:
         yield
@@ -91,8 +97,8 @@ def watched(watcher: Callable[[], AbstractContextManager[None]]) -> Iterator[Non
         _watchers.remove(watcher)
 
 
-def _watched(compile_it: Callable[[], Any]) -> Any:
+def _watched(compile_it: Callable[..., Any], *arguments: Any) -> Any:
     with ExitStack() as stack:
         for watcher in _watchers:
             stack.enter_context(watcher())
-        return compile_it()
+        return compile_it(*arguments)

@@ -122,7 +122,11 @@ class Viewer:
         return is_dark(self.view.background)
 
     def draw_scene(
-        self, scene: Rollout | Scene, *, controller: Controller | None = None
+        self,
+        scene: Rollout | Scene,
+        *,
+        controller: Controller | None = None,
+        title: str | None = None,
     ) -> None:
         """Show a run, paused at its start, or a scene's obstacles.
 
@@ -131,6 +135,7 @@ class Viewer:
         Args:
             scene: The run or the scene.
             controller: The run's controller: see `play`.
+            title: The title above a scene; None: the robot's name.
 
         Raises:
             ViewerError: If the run is empty or not of this robot, or if the server has
@@ -139,7 +144,7 @@ class Viewer:
         if isinstance(scene, Rollout):
             self._draw_run(scene, controller, **self._playing(None, None))
         else:
-            self._draw_obstacles(scene)
+            self._draw_obstacles(scene, title)
 
     def show(self, state: RobotState | Any) -> None:
         """Show the robot in a state, or at a configuration of shape (nq,).
@@ -372,10 +377,10 @@ class Viewer:
         self.transport.send([*stage, *set_clip(run.clip(), **playing)])
         self._plot([ComparedRun("", self.robot, rollout, controller)])
 
-    def _draw_obstacles(self, scene: Scene) -> None:
+    def _draw_obstacles(self, scene: Scene, title: str | None) -> None:
         placements = self._placements(self.robot.home())
         obstacles = ObstacleDrawing(scene)
-        stage = self._stage(obstacles, None, self.drawing.points(placements))
+        stage = self._stage(obstacles, title, self.drawing.points(placements))
         self._obstacles = obstacles
         still = [*obstacles.move(0.0), *self.drawing.move(placements)]
         self.transport.send([*stage, *remove_clip(), *still])
