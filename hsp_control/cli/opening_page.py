@@ -23,22 +23,24 @@ class OpeningPage:
 
     def __init__(
         self,
-        transport: Transport,
+        url: str | None,
         options: argparse.Namespace,
         announce: Callable[[str], object],
+        say: Callable[[str], object],
     ) -> None:
         """Keep what it takes.
 
         Args:
-            transport: The way to the page.
+            url: The page's address.
             options: The command's, of which ``browser`` says whether to open one.
-            announce: Prints the page's address.
+            announce: Prints the address.
+            say: Sets the page's status line; "" hides it.
         """
-        assert transport.url is not None
+        assert url is not None
         self.opened = False
-        self._transport, self._url = transport, transport.url
-        self._browser, self._announce = options.browser, announce
-        self._done = self._told = False
+        self._url, self._browser = url, options.browser
+        self._announce, self._say = announce, say
+        self._done = self._told = self._ready = False
 
     def open(self) -> None:
         """Print the address, and open the page in a browser."""
@@ -50,23 +52,31 @@ class OpeningPage:
             self.opened = browser.open_browser(self._url)
 
     def ready(self) -> None:
-        """Open the page, if it is not open, and hide what it says of kernels."""
+        """Open the page, if it is not open; from now on it says nothing of kernels."""
         self.open()
+        self._ready = True
         if self._told:
-            self._transport.send([set_status("")])
+            self._say("")
 
     @contextmanager
     def compiling(self) -> Iterator[None]:
         """Say on the page how many kernels are compiled; the first one opens it."""
 
         def tell(text: str) -> None:
+            if self._ready:
+                return
             self._told = True
             with suppress(ViewerError):  # who uses the page is told in any case
-                self._transport.send([set_status(text)])
+                self._say(text)
             self.open()
 
         with compiling_told(tell):
             yield
+
+
+def status_line(transport: Transport) -> Callable[[str], object]:
+    """Return what sets the status line of the pages of a transport."""
+    return lambda text: transport.send([set_status(text)])
 
 
 def draw_before(viewer: Viewer, setup: Setup) -> None:

@@ -8,7 +8,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from types import FrameType
 
 from hsp_control.cli.consoles import out
-from hsp_control.cli.opening_page import OpeningPage, draw_before
+from hsp_control.cli.opening_page import OpeningPage, draw_before, status_line
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.config.experiment import build, set_up
 from hsp_control.play import Picture, Session
@@ -25,7 +25,10 @@ def play(options: argparse.Namespace) -> int:
         server = Server(options.port, host=options.host, steerable=True)
         stack.callback(server.close)
         page = OpeningPage(
-            server, options, lambda url: out.print(f"Play: {url}", soft_wrap=True)
+            server.url,
+            options,
+            lambda url: out.print(f"Play: {url}", soft_wrap=True),
+            status_line(server),
         )
         with page.compiling():
             document = playable_document(

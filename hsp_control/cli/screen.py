@@ -7,7 +7,7 @@ from contextlib import ExitStack, closing, contextmanager, suppress
 from typing import Self
 
 from hsp_control.cli.consoles import out
-from hsp_control.cli.opening_page import OpeningPage, draw_before
+from hsp_control.cli.opening_page import OpeningPage, draw_before, status_line
 from hsp_control.common.exceptions import ViewerError
 from hsp_control.config import Experiment
 from hsp_control.config.experiment import Setup
@@ -57,7 +57,8 @@ class Screen:
                 _say_without(error)
                 yield None
                 return
-            page = OpeningPage(viewer.transport, options, announce)
+            say = status_line(viewer.transport)
+            page = OpeningPage(viewer.url, options, announce, say)
             stack.enter_context(page.compiling())
             yield cls(viewer, page)
 
@@ -102,7 +103,12 @@ def show_logs(options: argparse.Namespace) -> None:
         server = stack.enter_context(closing(Server(options.port)))
         names = ", ".join(log.stem for log in options.logs)
         server.send([set_caption(names, [])])
-        page = OpeningPage(server, options, lambda url: out.print(f"View: {url}"))
+        page = OpeningPage(
+            server.url,
+            options,
+            lambda url: out.print(f"View: {url}"),
+            status_line(server),
+        )
         with page.compiling():
             viewer = view_logs(
                 options.logs,
