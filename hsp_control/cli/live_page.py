@@ -18,7 +18,7 @@ from time import monotonic, sleep
 from typing import Any
 
 from hsp_control.cli.compiling import compiling_told
-from hsp_control.cli.opening_page import draw_before, status_line
+from hsp_control.cli.opening_page import draw_before, draw_empty, status_line
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.config import load_experiment
 from hsp_control.config.document import Document
@@ -54,6 +54,7 @@ def _run(settings: dict[str, Any]) -> None:
     server = Server(settings["port"], host=settings["host"], steerable=True)
     try:
         print(server.url, flush=True)
+        draw_empty(server, "")
         say = status_line(server)
         say("preparing the loop …")
         viewer: Viewer | None = None

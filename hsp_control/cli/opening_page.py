@@ -7,8 +7,10 @@ from contextlib import contextmanager, suppress
 from hsp_control.cli.compiling import compiling_told
 from hsp_control.common.exceptions import HspControlError, ViewerError
 from hsp_control.config.experiment import Setup
+from hsp_control.config.view_settings import ViewSettings
 from hsp_control.visualization.viewer import Viewer, browser
-from hsp_control.visualization.viewer.commands import set_status
+from hsp_control.visualization.viewer.commands import set_caption, set_status
+from hsp_control.visualization.viewer.stage import draw_background
 from hsp_control.visualization.viewer.transport import Transport
 
 
@@ -77,6 +79,15 @@ class OpeningPage:
 def status_line(transport: Transport) -> Callable[[str], object]:
     """Return what sets the status line of the pages of a transport."""
     return lambda text: transport.send([set_status(text)])
+
+
+def draw_empty(transport: Transport, title: str) -> None:
+    """Show a title on an empty stage, before the robot is loaded.
+
+    Raises:
+        ViewerError: If the server has ended.
+    """
+    transport.send([*draw_background(ViewSettings()), set_caption(title, [])])
 
 
 def draw_before(viewer: Viewer, setup: Setup) -> None:

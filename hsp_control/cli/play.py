@@ -8,7 +8,12 @@ from contextlib import ExitStack, contextmanager, suppress
 from types import FrameType
 
 from hsp_control.cli.consoles import out
-from hsp_control.cli.opening_page import OpeningPage, draw_before, status_line
+from hsp_control.cli.opening_page import (
+    OpeningPage,
+    draw_before,
+    draw_empty,
+    status_line,
+)
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.config.experiment import build, set_up
 from hsp_control.play import Picture, Session
@@ -24,6 +29,7 @@ def play(options: argparse.Namespace) -> int:
     with ExitStack() as stack:
         server = Server(options.port, host=options.host, steerable=True)
         stack.callback(server.close)
+        draw_empty(server, str(options.config))
         page = OpeningPage(
             server.url,
             options,

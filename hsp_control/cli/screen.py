@@ -7,14 +7,18 @@ from contextlib import ExitStack, closing, contextmanager, suppress
 from typing import Self
 
 from hsp_control.cli.consoles import out
-from hsp_control.cli.opening_page import OpeningPage, draw_before, status_line
+from hsp_control.cli.opening_page import (
+    OpeningPage,
+    draw_before,
+    draw_empty,
+    status_line,
+)
 from hsp_control.common.exceptions import ViewerError
 from hsp_control.config import Experiment
 from hsp_control.config.experiment import Setup
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.recorder import Recorder
 from hsp_control.visualization.viewer import LiveView, Viewer, view_logs
-from hsp_control.visualization.viewer.commands import set_caption
 from hsp_control.visualization.viewer.server import Server
 
 PAGE_TIMEOUT = 15.0
@@ -101,8 +105,7 @@ def show_logs(options: argparse.Namespace) -> None:
     """
     with ExitStack() as stack:
         server = stack.enter_context(closing(Server(options.port)))
-        names = ", ".join(log.stem for log in options.logs)
-        server.send([set_caption(names, [])])
+        draw_empty(server, ", ".join(log.stem for log in options.logs))
         page = OpeningPage(
             server.url,
             options,
