@@ -19,7 +19,7 @@ def compiling_told(tell: Callable[[str], object]) -> Iterator[None]:
     done = 0
 
     def tell_it() -> None:
-        tell(f"Compiling kernels (once, about 10 s) ... {done} done")
+        tell(f"Compiling kernels (once, 10 to 20 s) ... {done} done")
 
     @contextmanager
     def told() -> Iterator[None]:
