@@ -87,9 +87,11 @@ def test_the_page_of_a_run_opens_before_its_kernels_are_compiled(
     pages: list[Page] = []
 
     def build(document: Document, setup: Setup) -> Experiment:
-        kernels._watched(lambda: wait_until(lambda: pages))  # the browser has opened
-        said = "Compiling kernels (once, 10 to 20 s) ... 0 done"
-        wait_until(lambda: said in [c.get("text") for c in pages[0].commands])
+        def compile_one() -> None:
+            line = "Compiling kernels (once, 10 to 20 s) ... 0 done"
+            wait_until(lambda: line in [c.get("text") for c in pages[0].commands])
+
+        kernels._watched(compile_one)
         assert pages[0].last("caption", "/caption")["title"] == setup.scenario.title
         assert pages[0].last("set_object", "/robot/joint3/link3")
         return experiment.build(document, setup)

@@ -4,7 +4,6 @@ from argparse import Namespace
 
 import pytest
 
-from hsp_control.cli import opening_page
 from hsp_control.cli.opening_page import OpeningPage, draw_before
 from hsp_control.common import adapters, kernels
 from hsp_control.common.exceptions import ViewerError
@@ -38,6 +37,11 @@ def said(monkeypatch: pytest.MonkeyPatch) -> Said:
 
 def compiled() -> None:
     kernels._watched(lambda: None)
+
+
+def transforms(recorder: Recorder) -> dict[str, bytes]:
+    return {path: packed for path, kind, packed in recorder.scene.items()
+            if kind == "transform"}  # fmt: skip
 
 
 def test_it_opens_at_the_first_kernel_and_says_how_many(said: Said) -> None:
@@ -93,15 +97,12 @@ def test_the_robot_is_drawn_at_its_start_before_any_kernel_is_compiled(
     recorder = Recorder()
     viewer = Viewer(setup.robot, transport=recorder)
     draw_before(viewer, setup)
-    drawn = {path: unpack(packed) for path, kind, packed in recorder.scene.items()
-             if kind == "transform"}  # fmt: skip
     captions = [unpack(packed)["title"] for _, kind, packed in recorder.scene.items()
                 if kind == "caption"]  # fmt: skip
     assert captions == [setup.scenario.title]
+    drawn = transforms(recorder)
     viewer.show(setup.robot.home())
-    at_home = {path: unpack(packed) for path, kind, packed in recorder.scene.items()
-               if kind == "transform"}  # fmt: skip
-    moved = {path for path in drawn if drawn[path] != at_home[path]}
+    home = transforms(recorder)
+    moved = {path for path in drawn if drawn[path] != home[path]}
     assert "/robot/panda_joint5" in moved
     assert "/robot/panda_joint3" not in moved
-    assert opening_page.browser is browser
