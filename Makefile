@@ -174,7 +174,7 @@ $(USE): pyproject.toml constraints.txt
 	@touch $@
 
 $(STAMP): pyproject.toml constraints.txt
-	@echo "Installing hsp_control, test and development tools into .venv (2.0 GB, once) ..."
+	@echo "Installing hsp_control, test and development tools into .venv (2.6 GB, once) ..."
 	@$(find-python); "$$python" tools/install.py .venv --editable '.[test,dev]'
 	@touch $(USE) $@
 

@@ -2,6 +2,8 @@
 
     .venv/bin/python benchmarks/start_up.py [CONFIG ...] [--rounds N]
 
+A CONFIG may be followed by changes, as in "panda_obstacle limits=none".
+
 Each start is a new interpreter that imports the package, builds a configuration and
 computes its first effort. Cold: the cache of compiled code is an empty folder. Cached:
 it is the folder that the cold start has filled. The two alternate. Times are processor
@@ -15,13 +17,18 @@ import subprocess
 import sys
 import tempfile
 
-CONFIGS = ("paper/4_moving_obstacle", "panda_obstacle", "limits/panda_half_strength")
+CONFIGS = (
+    "paper/4_moving_obstacle",
+    "panda_obstacle",
+    "panda_obstacle limits=none",
+    "limits/panda_half_strength",
+)
 
 START = """
 import sys
 from time import process_time
 import hsp_control as hsp
-experiment = hsp.load_experiment(sys.argv[1])
+experiment = hsp.load_experiment(*sys.argv[1:])
 experiment.controller.compute(0.0, experiment.q0, experiment.v0)
 print(process_time())
 """
@@ -30,7 +37,7 @@ print(process_time())
 def start(config: str, cache: str) -> float:
     """Return the time of a start, to the first effort [s]."""
     done = subprocess.run(
-        [sys.executable, "-c", START, config],
+        [sys.executable, "-c", START, *config.split()],
         env={**os.environ, "NUMBA_CACHE_DIR": cache},
         capture_output=True,
         text=True,

@@ -5,7 +5,6 @@ import json
 import sys
 import tempfile
 from collections.abc import Callable
-from contextlib import closing
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -27,11 +26,13 @@ from hsp_control.cli.consoles import message_of, renamed_keys_printed, working
 from hsp_control.cli.consoles import out as _out
 from hsp_control.cli.interrupts import DeferredInterrupt
 from hsp_control.cli.limit_rows import limit_rows
-from hsp_control.cli.loading import load
+from hsp_control.cli.loading import read
 from hsp_control.cli.startup import INTERRUPTED
 from hsp_control.cli.stopwatch import Stopwatch
 from hsp_control.common.exceptions import LogError, SimulationError
 from hsp_control.config import Experiment, json_schema
+from hsp_control.config.document import Document
+from hsp_control.config.experiment import Setup, build, set_up
 from hsp_control.robot import Robot
 from hsp_control.robot.description.sources import example_robots
 from hsp_control.simulation import Rollout
@@ -44,21 +45,27 @@ if TYPE_CHECKING:
 @renamed_keys_printed()
 def run(options: argparse.Namespace) -> int:
     """Simulate, save the log and print a summary; rows computed so far are kept."""
-    experiment = load(options)
-    checks.warn_of_rates(experiment)
-    log = options.out / f"{experiment.name}.npz"
+    document = read(options)
+    setup = set_up(document)
+    log = options.out / f"{Path(document.name).stem}.npz"
     log.parent.mkdir(parents=True, exist_ok=True)  # fails before the work, not after
     tell = _tell_json if options.json else _tell
     if not options.view:
-        return _run_and_save(experiment, log, tell, None)
+        return _run_and_save(_built(document, setup), log, tell, None)
     from hsp_control.cli.screen import Screen
 
     said = _errors if options.json else _out
-    screen = Screen.open(experiment, options, said.print)
-    if screen is None:
+    with Screen.open(setup, options, lambda url: said.print(f"View: {url}")) as screen:
+        experiment = _built(document, setup)
+        if screen is not None and screen.begin(experiment):
+            return _run_and_save(experiment, log, tell, screen)
         return max(_run_and_save(experiment, log, tell, None), 2)
-    with closing(screen):
-        return _run_and_save(experiment, log, tell, screen)
+
+
+def _built(document: Document, setup: Setup) -> Experiment:
+    experiment = build(document, setup)
+    checks.warn_of_rates(experiment)
+    return experiment
 
 
 def _run_and_save(
@@ -151,20 +158,9 @@ def salvage(options: argparse.Namespace) -> int:
 @renamed_keys_printed()
 def view(options: argparse.Namespace) -> int:
     """Show logs in the browser."""
-    from hsp_control.cli.screen import attend
-    from hsp_control.visualization.viewer import view_logs
+    from hsp_control.cli.screen import show_logs
 
-    with view_logs(
-        options.logs,
-        beside=options.beside,
-        speed=options.speed,
-        loop=options.loop,
-        port=options.port,
-        strict=options.strict or bool(options.allow),
-        allow=options.allow,
-    ) as viewer:
-        _out.print(f"View: {viewer.url}")
-        attend(viewer, opened=options.browser and viewer.open_browser())
+    show_logs(options)
     return 0
 
 

@@ -1,12 +1,38 @@
 """Says that kernels are being compiled, which takes a while once."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
 from rich.console import Console
 from rich.errors import LiveError
 
 from hsp_control.common import kernels
+
+
+@contextmanager
+def compiling_told(tell: Callable[[str], object]) -> Iterator[None]:
+    """Tell how many kernels are compiled, at the beginning and the end of each.
+
+    Args:
+        tell: Is given the line.
+    """
+    done = 0
+
+    def tell_it() -> None:
+        tell(f"Compiling kernels (once, 10 to 20 s) ... {done} done")
+
+    @contextmanager
+    def told() -> Iterator[None]:
+        nonlocal done
+        tell_it()
+        try:
+            yield
+        finally:
+            done += 1
+            tell_it()
+
+    with kernels.watched(told):
+        yield
 
 
 @contextmanager
@@ -17,19 +43,21 @@ def compiling_shown(console: Console) -> Iterator[None]:
         console: Where to show it; only a terminal shows it.
     """
     status = console.status("")
-    done = 0
+    depth = 0
 
     @contextmanager
-    def shown() -> Iterator[None]:
-        nonlocal done
-        status.update(f"Compiling kernels (once, 10 to 20 s) ... {done} done")
-        with suppress(LiveError):  # a progress bar is already there
-            status.start()
+    def shown() -> Iterator[None]:  # a kernel is compiled within its caller
+        nonlocal depth
+        if not depth:
+            with suppress(LiveError):  # a progress bar is already there
+                status.start()
+        depth += 1
         try:
             yield
         finally:
-            status.stop()
-            done += 1
+            depth -= 1
+            if not depth:
+                status.stop()
 
-    with kernels.watched(shown):
+    with compiling_told(status.update), kernels.watched(shown):
         yield

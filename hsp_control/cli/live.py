@@ -19,12 +19,13 @@ from hsp_control.cli.live_experiment import (
     live_period,
     simulated_robot,
 )
-from hsp_control.cli.loading import load
+from hsp_control.cli.loading import read
 from hsp_control.cli.robot_process import RobotProcess
 from hsp_control.cli.robot_start import begun_where_it_is
 from hsp_control.cli.steering import let_steer, steering_page
 from hsp_control.common.exceptions import LiveError, LogError
 from hsp_control.config import Experiment
+from hsp_control.config.experiment import build, set_up
 from hsp_control.control.compensation import Command
 from hsp_control.live import (
     Faults,
@@ -50,9 +51,9 @@ _DRY_RUN_OF_A_PLAN = 3.0
 def live(options: argparse.Namespace) -> int:
     """Run a loop in real time, print its response times and why it ended."""
     faults, kill = Faults.parse(options.faults), _parse_kill(options.kill)
-    experiment = load(options)
-    check_live(experiment)
-    simulation = experiment.scenario.simulation
+    document = read(options)
+    setup = set_up(document)
+    simulation = setup.scenario.simulation
     duration = simulation.duration if options.duration is None else options.duration
     if not duration > 0.0:
         raise LiveError(f"--duration {duration:g}; must be positive")
@@ -68,35 +69,39 @@ def live(options: argparse.Namespace) -> int:
         )
     if options.steer is None and (options.port, options.host) != (None, "127.0.0.1"):
         raise LiveError("--port and --host are those of a page: they need --steer")
-    loop_log = options.out / f"{experiment.name}-live.journal"
-    robot_log = options.out / f"{experiment.name}-robot.journal"
+    name = Path(document.name).stem
+    loop_log = options.out / f"{name}-live.journal"
+    robot_log = options.out / f"{name}-robot.journal"
     requests = OperatorRequests()
-    plan = experiment.scenario.plan
-    options_of_loop: dict[str, Any] = {
-        "plan": plan,
-        "estimators": experiment.scenario.estimators,
-        "settings": experiment.scenario.live,
-        "requests": requests,
-        "scene": experiment.scene,
-        "log_period": simulation.log_period,
-    }
-    command = Command(experiment.controller, experiment.compensation)
     on_period: list[Callable[[float], object]] = []
+    with ExitStack() as stack:
+        page = stack.enter_context(steering_page(options, setup))
+        experiment = build(document, setup)
+        check_live(experiment)
+        stack.enter_context(stop_signals(requests, takes_over=True))
+        command = Command(experiment.controller, experiment.compensation)
+        plan = experiment.scenario.plan
+        options_of_loop: dict[str, Any] = {
+            "plan": plan,
+            "estimators": experiment.scenario.estimators,
+            "settings": experiment.scenario.live,
+            "requests": requests,
+            "scene": experiment.scene,
+            "log_period": simulation.log_period,
+        }
 
-    def run(hardware: Hardware) -> LoopReport:
-        return run_loop(
-            command,
-            hardware,
-            duration=None if duration == inf else duration,
-            log=loop_log,
-            meta=_meta(experiment),
-            priority=options.priority,
-            on_period=_in_turn(on_period),
-            **options_of_loop,
-        )
+        def run(hardware: Hardware) -> LoopReport:
+            return run_loop(
+                command,
+                hardware,
+                duration=None if duration == inf else duration,
+                log=loop_log,
+                meta=_meta(experiment),
+                priority=options.priority,
+                on_period=_in_turn(on_period),
+                **options_of_loop,
+            )
 
-    with stop_signals(requests, takes_over=True), ExitStack() as stack:
-        page = stack.enter_context(steering_page(options, experiment, loop_log))
         dry_run_robot = InProcessRobot(simulated_robot(experiment))
         run_loop(
             command,
@@ -120,7 +125,7 @@ def live(options: argparse.Namespace) -> int:
         if options.publish is not None:
             on_period.append(publish(options.publish, command))
         if page is not None:
-            on_period.append(let_steer(page, experiment, requests))
+            on_period.append(let_steer(page, experiment, requests, loop_log))
         if hardware is not None:
             report = run(hardware)
             out.print(_times(report, experiment))

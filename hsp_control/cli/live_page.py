@@ -1,9 +1,10 @@
 """The process of a live loop's page: ``python -m hsp_control.cli.live_page``.
 
 It draws what the loop writes into its journal, and passes on what the page says. It
-reads its settings from its standard input, one line of JSON, and writes the page's
-address. It begins to draw after a second line, ``begin``: until then the loop's process
-compiles what both need. When its input is closed, the loop has ended, and so does it.
+reads lines of JSON from its standard input. The first has its settings; then it writes
+the page's address. ``prepare`` lets it draw the robot and the scene, ``status`` sets
+the status line, ``begin`` lets it draw the loop: until then the loop's process compiles
+what both need. When its input is closed, the loop has ended, and so does it.
 """
 
 import json
@@ -16,13 +17,16 @@ from pathlib import Path
 from time import monotonic, sleep
 from typing import Any
 
+from hsp_control.cli.compiling import compiling_told
+from hsp_control.cli.opening_page import draw_before, draw_empty, status_line
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.config import load_experiment
+from hsp_control.config.document import Document
+from hsp_control.config.experiment import Setup, set_up
 from hsp_control.play.channel import Channel
 from hsp_control.play.mirror import Mirror
 from hsp_control.play.picture import FRAME, Picture
 from hsp_control.visualization.viewer import Viewer
-from hsp_control.visualization.viewer.commands import set_caption, set_status
 from hsp_control.visualization.viewer.server import Server
 
 _POLL = 0.005
@@ -50,25 +54,36 @@ def _run(settings: dict[str, Any]) -> None:
     server = Server(settings["port"], host=settings["host"], steerable=True)
     try:
         print(server.url, flush=True)
-        config = settings["config"]
-        status = set_status("preparing the loop …")
-        server.send([set_caption(str(config.get("title") or ""), []), status])
-        if sys.stdin.readline().strip() != "begin":
-            return
-        experiment = load_experiment(config)
-        view = experiment.scenario.view.all_fields()
-        viewer = Viewer(experiment.robot, transport=server, **view)
-        channel = Channel(socket.socket(fileno=settings["channel"]))
-        mirror = Mirror(
-            experiment,
-            settings["period"],
-            Path(settings["journal"]),
-            channel,
-            held=settings["held"],
-        )
-        _show(mirror, Picture(mirror, viewer), server)
+        draw_empty(server, "")
+        say = status_line(server)
+        say("preparing the loop …")
+        viewer: Viewer | None = None
+        for line in iter(sys.stdin.readline, ""):
+            match json.loads(line):
+                case {"status": str(text)}:
+                    say(text)
+                case {"prepare": dict(config)}:
+                    viewer = _drawn(
+                        set_up(Document(config, {}, "configuration")), server
+                    )
+                case {"begin": dict(config), "journal": str(file), "period": period}:
+                    assert viewer is not None
+                    with compiling_told(say):
+                        experiment = load_experiment(config)
+                        channel = Channel(socket.socket(fileno=settings["channel"]))
+                        journal, held = Path(file), settings["held"]
+                        mirror = Mirror(experiment, period, journal, channel, held=held)
+                        picture = Picture(mirror, viewer)
+                    _show(mirror, picture, server)
+                    return
     finally:
         server.close()
+
+
+def _drawn(setup: Setup, server: Server) -> Viewer:
+    viewer = Viewer(setup.robot, transport=server, **setup.scenario.view.all_fields())
+    draw_before(viewer, setup)
+    return viewer
 
 
 def _show(mirror: Mirror, picture: Picture, server: Server) -> None:

@@ -3,7 +3,9 @@
 import argparse
 from pathlib import Path
 
-from hsp_control.config import Experiment, load_experiment
+from hsp_control.config import Experiment
+from hsp_control.config.document import Document
+from hsp_control.config.experiment import build, read_document
 from hsp_control.robot.description.access import ANYWHERE, Access, only_within
 from hsp_control.robot.description.sources import is_path
 
@@ -15,13 +17,19 @@ def load(options: argparse.Namespace, *overrides: str) -> Experiment:
         options: Of the command line.
         overrides: Values to change after those of ``--set``.
     """
-    return load_experiment(
+    return build(read(options, *overrides))
+
+
+def read(options: argparse.Namespace, *overrides: str) -> Document:
+    """Return a command's configuration; for the arguments see `load`."""
+    document = read_document(
         options.config,
-        *options.overrides,
-        *overrides,
         strict=options.strict or bool(options.allow),
         allow=options.allow,
     )
+    for assignment in (*options.overrides, *overrides):
+        document.override(assignment)
+    return document
 
 
 def robot_access(name: str, options: argparse.Namespace) -> Access:

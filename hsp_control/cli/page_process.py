@@ -7,12 +7,14 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 from hsp_control.cli.live_experiment import live_period
 from hsp_control.common.exceptions import ViewerError
 from hsp_control.config import Experiment
+from hsp_control.config.scenario import Scenario
 from hsp_control.config.streams import without_sources
+from hsp_control.declaration.plain_data import plain_data
 from hsp_control.play.channel import channel_pair
 
 START = 60.0
@@ -28,20 +30,10 @@ class PageProcess:
         held: Whether somebody must hold a key.
     """
 
-    def __init__(
-        self,
-        experiment: Experiment,
-        journal: Path,
-        *,
-        port: int | None,
-        host: str,
-        held: bool,
-    ) -> None:
+    def __init__(self, *, port: int | None, host: str, held: bool) -> None:
         """Prepare the process; entering the context starts it.
 
         Args:
-            experiment: What the loop controls.
-            journal: The loop's journal; an old one is removed.
             port: The page's port; None: a free one.
             host: The page's address.
             held: Whether somebody must hold a key.
@@ -49,11 +41,7 @@ class PageProcess:
         self.held = held
         self.channel, self._there = channel_pair()
         self.url = ""
-        journal.unlink(missing_ok=True)  # of another run
         self._settings = {
-            "config": without_sources(experiment.config),
-            "journal": str(journal.absolute()),
-            "period": live_period(experiment),
             "channel": self._there.fileno(),
             "port": port,
             "host": host,
@@ -75,7 +63,7 @@ class PageProcess:
         )
         self._there.close()
         assert self._process.stdout is not None
-        self._say(json.dumps(self._settings))
+        self._say(self._settings)
         ready, _, _ = select.select([self._process.stdout], [], [], START)
         if not ready:
             self._process.kill()
@@ -95,9 +83,34 @@ class PageProcess:
     ) -> None:
         self.close()
 
-    def begin(self) -> None:
-        """Let it draw: what it needs is compiled."""
-        self._say("begin")
+    def prepare(self, scenario: Scenario) -> None:
+        """Let it draw the robot and the scene of a configuration.
+
+        Args:
+            scenario: The configuration.
+        """
+        config = plain_data(scenario, defaults=True)
+        self._say({"prepare": without_sources(config)})
+
+    def say(self, text: str) -> None:
+        """Set its status line."""
+        self._say({"status": text})
+
+    def begin(self, experiment: Experiment, journal: Path) -> None:
+        """Let it draw the loop: what it needs is compiled.
+
+        Args:
+            experiment: What the loop controls.
+            journal: The loop's journal; an old one is removed.
+        """
+        journal.unlink(missing_ok=True)  # of another run
+        self._say(
+            {
+                "begin": without_sources(experiment.config),
+                "journal": str(journal.absolute()),
+                "period": live_period(experiment),
+            }
+        )
 
     def close(self) -> None:
         """End the process; a second call does nothing."""
@@ -112,8 +125,8 @@ class PageProcess:
             self._process.kill()
             self._process.wait()
 
-    def _say(self, line: str) -> None:
+    def _say(self, message: dict[str, Any]) -> None:
         assert self._process.stdin is not None
         with suppress(OSError):  # it has ended, and said why
-            self._process.stdin.write(line.encode() + b"\n")
+            self._process.stdin.write(json.dumps(message).encode() + b"\n")
             self._process.stdin.flush()

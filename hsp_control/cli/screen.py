@@ -2,55 +2,84 @@
 
 import argparse
 import sys
-from collections.abc import Callable
-from contextlib import ExitStack, suppress
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing, contextmanager, suppress
 from typing import Self
 
+from hsp_control.cli.consoles import out
+from hsp_control.cli.opening_page import (
+    OpeningPage,
+    draw_before,
+    draw_empty,
+    status_line,
+)
 from hsp_control.common.exceptions import ViewerError
 from hsp_control.config import Experiment
+from hsp_control.config.experiment import Setup
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.recorder import Recorder
-from hsp_control.visualization.viewer import LiveView, Viewer
+from hsp_control.visualization.viewer import LiveView, Viewer, view_logs
+from hsp_control.visualization.viewer.server import Server
 
 PAGE_TIMEOUT = 15.0
 """Time in which a started browser must show the page [s]."""
 
 
 class Screen:
-    """Shows a run while it is computed, and after."""
+    """Shows a run: before it, while kernels are compiled, while it runs, and after."""
 
-    def __init__(self, viewer: Viewer, experiment: Experiment, *, opened: bool) -> None:
-        """Show the robot and the scene before the run."""
-        self._viewer = viewer
-        self._opened = opened
-        self._live = LiveView(viewer, experiment)
+    def __init__(self, viewer: Viewer, page: OpeningPage) -> None:
+        """Keep a viewer that shows the robot, and its page."""
+        self._viewer, self._page = viewer, page
+        self._live: LiveView | None = None
 
     @classmethod
+    @contextmanager
     def open(
         cls,
-        experiment: Experiment,
+        setup: Setup,
         options: argparse.Namespace,
         announce: Callable[[str], None],
-    ) -> Self | None:
-        """Open the view; if that fails, print why and return None."""
-        view = experiment.scenario.view.all_fields()
+    ) -> Iterator[Self | None]:
+        """Yield a screen that shows the robot and the scene.
+
+        The page opens when a kernel has to be compiled, or when `begin` is called. If
+        that fails, print why and yield None.
+
+        Args:
+            setup: What the configuration is about.
+            options: The command's.
+            announce: Prints the page's address.
+        """
+        view = setup.scenario.view.all_fields()
         with ExitStack() as stack:
             try:
-                viewer = Viewer(experiment.robot, port=options.port, **view)
+                viewer = Viewer(setup.robot, port=options.port, **view)
                 stack.enter_context(viewer)
-                announce(f"View: {viewer.url}")
-                opened = options.browser and viewer.open_browser()
-                screen = cls(viewer, experiment, opened=opened)
+                draw_before(viewer, setup)
             except ViewerError as error:
-                message = f"hsp: {error}; the run continues without a view"
-                print(message, file=sys.stderr)
-                return None
-            stack.pop_all()  # the viewer stays open
-        return screen
+                _say_without(error)
+                yield None
+                return
+            say = status_line(viewer.transport)
+            page = OpeningPage(viewer.url, options, announce, say)
+            stack.enter_context(page.compiling())
+            yield cls(viewer, page)
+
+    def begin(self, experiment: Experiment) -> bool:
+        """Show what will run, and open the page; return False if that fails."""
+        try:
+            self._live = LiveView(self._viewer, experiment)
+        except ViewerError as error:
+            _say_without(error)
+            return False
+        self._page.open()
+        return True
 
     def on_row(self, recorder: Recorder) -> None:
         """Show the rows computed so far."""
-        self._live.on_row(recorder)
+        if self._live is not None:
+            self._live.on_row(recorder)
 
     def finish(self, rollout: Rollout) -> None:
         """Show the whole run until the user closes the view.
@@ -58,12 +87,43 @@ class Screen:
         Raises:
             ViewerError: If the server has ended.
         """
-        self._live.finish(rollout)
-        attend(self._viewer, opened=self._opened)
+        if self._live is not None:
+            self._live.finish(rollout)
+            attend(self._viewer, opened=self._page.opened)
 
-    def close(self) -> None:
-        """Close the view; a second call does nothing."""
-        self._viewer.close()
+
+def _say_without(error: ViewerError) -> None:
+    print(f"hsp: {error}; the run continues without a view", file=sys.stderr)
+
+
+def show_logs(options: argparse.Namespace) -> None:
+    """Play logs until the user closes the view.
+
+    Raises:
+        LogError: If a log cannot be read.
+        ViewerError: See `view_logs`.
+    """
+    with ExitStack() as stack:
+        server = stack.enter_context(closing(Server(options.port)))
+        draw_empty(server, ", ".join(log.stem for log in options.logs))
+        page = OpeningPage(
+            server.url,
+            options,
+            lambda url: out.print(f"View: {url}"),
+            status_line(server),
+        )
+        with page.compiling():
+            viewer = view_logs(
+                options.logs,
+                beside=options.beside,
+                speed=options.speed,
+                loop=options.loop,
+                transport=server,
+                strict=options.strict or bool(options.allow),
+                allow=options.allow,
+            )
+        page.ready()
+        attend(viewer, opened=page.opened)
 
 
 def attend(viewer: Viewer, *, opened: bool) -> None:

@@ -6,35 +6,49 @@ from contextlib import contextmanager
 from copy import deepcopy
 from pathlib import Path
 from time import sleep
-from typing import Any
+from typing import Any, NamedTuple
 
 from hsp_control.cli.consoles import out
 from hsp_control.cli.live_experiment import live_period
+from hsp_control.cli.opening_page import OpeningPage
 from hsp_control.cli.page_process import PageProcess
 from hsp_control.common.exceptions import ViewerError
 from hsp_control.config import Experiment
+from hsp_control.config.experiment import Setup
 from hsp_control.control.controller import Controller
 from hsp_control.live import OperatorRequests
 from hsp_control.play.dead_mans_key import DeadMansKey
 from hsp_control.play.handles import Handles
 from hsp_control.play.steered_loop import SteeredLoop
-from hsp_control.visualization.viewer import browser
 
 _REHEARSAL = 0.5
 """Time of a rehearsal [s]: beyond the ramps of changes."""
 _POLL = 0.02
 
 
+class SteeringPage(NamedTuple):
+    """A page that shows a live loop.
+
+    Attributes:
+        process: Its process.
+        opening: What opens it.
+    """
+
+    process: PageProcess
+    opening: OpeningPage
+
+
 @contextmanager
 def steering_page(
-    options: argparse.Namespace, experiment: Experiment, journal: Path
-) -> Iterator[PageProcess | None]:
-    """Yield the process of the page, if there is to be one, with its address printed.
+    options: argparse.Namespace, setup: Setup
+) -> Iterator[SteeringPage | None]:
+    """Yield the page, if there is to be one; it shows the robot and the scene.
+
+    It opens when a kernel has to be compiled, or when `let_steer` is called.
 
     Args:
         options: The command's.
-        experiment: What the loop controls.
-        journal: The loop's journal.
+        setup: What the configuration is about.
 
     Raises:
         ViewerError: If it does not start.
@@ -42,26 +56,35 @@ def steering_page(
     if options.steer is None:
         yield None
         return
-    with PageProcess(
-        experiment,
-        journal,
-        port=options.port,
-        host=options.host,
-        held=options.steer == "hardware",
-    ) as page:
-        out.print(f"Steer: {page.url}", soft_wrap=True)
-        if options.browser:
-            browser.open_browser(page.url)
-        yield page
+    held = options.steer == "hardware"
+    with PageProcess(port=options.port, host=options.host, held=held) as process:
+        process.prepare(setup.scenario)
+        opening = OpeningPage(
+            process.url,
+            options,
+            lambda url: out.print(f"Steer: {url}", soft_wrap=True),
+            process.say,
+        )
+        with opening.compiling():
+            yield SteeringPage(process, opening)
 
 
 def let_steer(
-    page: PageProcess, experiment: Experiment, requests: OperatorRequests
+    steering: SteeringPage,
+    experiment: Experiment,
+    requests: OperatorRequests,
+    journal: Path,
 ) -> Callable[[float], object]:
     """Return what the loop does in the rest of each period, so that the page steers.
 
     With a dead-man's key it returns when the key is held for the first time, or when
     the operator stops.
+
+    Args:
+        steering: The page.
+        experiment: What the loop controls.
+        requests: Where the page's stop goes.
+        journal: The loop's journal.
 
     Raises:
         ViewerError: If the page's process ends before its key was ever held.
@@ -69,7 +92,9 @@ def let_steer(
     controller, period = experiment.controller, live_period(experiment)
     controller.compute(0.0, experiment.q0, experiment.v0)
     _rehearse(controller, period, experiment)
-    page.begin()
+    steering.opening.ready()
+    page = steering.process
+    page.begin(experiment, journal)
     key = DeadMansKey() if page.held else None
     loop = SteeredLoop(controller, period, page.channel, requests, key=key)
     if key is not None:

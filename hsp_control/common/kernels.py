@@ -6,6 +6,7 @@ calls only other kernels. There is one implementation of each: with
 debugging and coverage, and Numba is not even imported.
 """
 
+import gc
 import os
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
@@ -42,11 +43,15 @@ def kernel(function: Function) -> Function:
     import numba
 
     from hsp_control.common.kernel_cache import Kept
-    from hsp_control.common.linked_kernels import linked
+    from hsp_control.common.linked_kernels import KernelCompiler, linked
 
-    compiled = cast("Any", numba.jit(**_OPTIONS)(function))
+    jit = numba.jit(**_OPTIONS, pipeline_class=KernelCompiler)
+    compiled = cast("Any", jit(function))
     compiled._cache = Kept(function)
+    own = compiled._compiler
+    own._compile_core = partial(_watched, own._compile_core)
     inner = linked(function, _OPTIONS)
+    inner._compiler._compile_core = partial(_watched, inner._compiler._compile_core)
     compiled.get_call_template = inner.get_call_template
     compiled.get_overload = inner.get_overload
     return cast("Function", compiled)
@@ -83,7 +88,10 @@ _watchers: list[Callable[[], AbstractContextManager[None]]] = []
 
 @contextmanager
 def watched(watcher: Callable[[], AbstractContextManager[None]]) -> Iterator[None]:
-    """Enter the watcher's context around each compilation not found on disk."""
+    """Enter the watcher's context around each compilation not found on disk.
+
+    Those of the kernels that a kernel calls lie within its own.
+    """
     _watchers.append(watcher)
     try:
         yield
@@ -91,8 +99,21 @@ def watched(watcher: Callable[[], AbstractContextManager[None]]) -> Iterator[Non
         _watchers.remove(watcher)
 
 
-def _watched(compile_it: Callable[[], Any]) -> Any:
+def _watched(compile_it: Callable[..., Any], *arguments: Any) -> Any:
     with ExitStack() as stack:
+        stack.enter_context(_no_collection())
         for watcher in _watchers:
             stack.enter_context(watcher())
-        return compile_it()
+        return compile_it(*arguments)
+
+
+@contextmanager
+def _no_collection() -> Iterator[None]:
+    """Keep Python's garbage collector off: it takes a tenth of a cold start."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Any, cast
 
 import numba
-from numba.core import codegen, compiler, registry, types
+from numba.core import codegen, compiler, compiler_machinery, registry, types
 
 _target = cast("Any", registry).cpu_target
 _Library = cast("Any", codegen).JITCodeLibrary
@@ -59,6 +59,31 @@ class _CallableLibrary(_Library):  # type: ignore[misc,valid-type]
         """Optimise once; Numba does so twice, to remove counts that kernels lack."""
         passes, options = self._codegen._module_pass_manager()
         passes.run(self._final_module, options)
+
+
+class KernelCompiler(cast("Any", compiler).CompilerBase):  # type: ignore[misc]
+    """Numba's compiler without the passes that find nothing in kernels.
+
+    These look for array expressions, which would allocate, for closures, and for what
+    is inlined before it is typed: a twentieth of a cold start.
+    """
+
+    def define_pipelines(self) -> list[Any]:
+        """Return the passes."""
+        whole = cast("Any", compiler).DefaultPassBuilder.define_nopython_pipeline
+        manager = cast("Any", compiler_machinery).PassManager("kernel")
+        for each, description in whole(self.state).passes:
+            if each.__name__ not in _NEEDLESS:
+                manager.add_pass(each, description)
+        manager.finalize()
+        return [manager]
+
+
+_NEEDLESS = (
+    "WithLifting", "InlineClosureLikes", "MakeFunctionToJitFunction",
+    "InlineInlinables", "LiteralUnroll", "InlineOverloads", "NopythonRewrites",
+    "AnnotateTypes", "DumpParforDiagnostics",
+)  # fmt: skip
 
 
 class _Flags(cast("Any", compiler).Flags):  # type: ignore[misc]
@@ -117,6 +142,7 @@ def compile_callable(own: Any, function: Callable[..., Any], args: Any, to: Any)
         flags=own._customize_flags(flags),
         locals={},
         library=library,
+        pipeline_class=KernelCompiler,
     )
 
 
@@ -144,6 +170,7 @@ def linked(function: Callable[..., Any], options: dict[str, Any]) -> Any:
             flags=flags,
             locals={},
             library=_LinkedLibrary(target.codegen(), function.__qualname__),
+            pipeline_class=KernelCompiler,
         )
         # What calls it looks it up by this object.
         result = result._replace(entry_point=_Entry())

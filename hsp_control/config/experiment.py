@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
-from typing import Any, Literal, NoReturn
+from typing import Any, Literal, NamedTuple, NoReturn
 
 import numpy as np
 import yaml
@@ -373,8 +373,33 @@ def _check_heard(path: Path, run: Rollout) -> None:
                 )
 
 
-def build(document: Document) -> Experiment:
-    """Build the experiment of a configuration.
+class Setup(NamedTuple):
+    """What a configuration is about, before anything is compiled for it.
+
+    Attributes:
+        scenario: The checked configuration.
+        robot: The robot.
+        scene: Its obstacles.
+    """
+
+    scenario: Scenario
+    robot: Robot
+    scene: Scene
+
+    def start(self) -> Array:
+        """Return the start configuration, shape (nq,); home where it has to be found.
+
+        Raises:
+            HspControlError: If it is wrong; `build` says where.
+        """
+        start, contacts = self.scenario.start, self.scenario.contacts.values()
+        if start.is_found:
+            return self.robot.home()
+        return start.configuration_of(self.robot, contacts)
+
+
+def set_up(document: Document) -> Setup:
+    """Check a configuration, and load its robot and its scene: it compiles no kernel.
 
     Raises:
         HspControlError: If the configuration is wrong; see `load_experiment`.
@@ -387,13 +412,27 @@ def build(document: Document) -> Experiment:
     with document.at():
         scenario = with_messages(scenario, folder, document.access)
     robot = load_robot(document, scenario)
-    contacts = tuple(scenario.contacts.values())
-    for contact in contacts:
+    for contact in scenario.contacts.values():
         with document.at("contacts", contact.name, "frame"):
             robot.frame_id(contact.frame)
     with document.at():
         scene = located_scene(scenario.scene, folder, document.access)
-        scenario = replace(scenario, scene=scene)
+    return Setup(replace(scenario, scene=scene), robot, scene)
+
+
+def build(document: Document, setup: Setup | None = None) -> Experiment:
+    """Build the experiment of a configuration.
+
+    Args:
+        document: The configuration.
+        setup: What `set_up` made of it, if it is there.
+
+    Raises:
+        HspControlError: If the configuration is wrong; see `load_experiment`.
+    """
+    scenario, robot, scene = setup or set_up(document)
+    folder = Path(document.name).resolve().parent
+    contacts = tuple(scenario.contacts.values())
     null_space, tasks = scenario.null_space, tuple(scenario.tasks.values())
     with document.at("start"):
         q0 = scenario.start.configuration_of(

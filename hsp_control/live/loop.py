@@ -21,6 +21,7 @@ from hsp_control.live.latency import no_garbage_collection, real_time_priority
 from hsp_control.live.live_log import LoopLog
 from hsp_control.live.one_run import OneRun
 from hsp_control.live.operator_requests import OperatorRequests
+from hsp_control.live.rehearsal import rehearse
 from hsp_control.live.report import LoopReport
 from hsp_control.live.safe_stop import SafeStop
 from hsp_control.live.settings import LiveSettings, check_held
@@ -118,6 +119,8 @@ def run_loop(
                 chain.effort(first._replace(t=start_time, applied=None), period)
                 safe_stop.effort(reader.state)
                 limiter.reset(first.q)
+            end = np.inf if duration is None else start_time + duration - 0.5 * period
+            rehearse(controller, start_time, end, first.q, first.v)
             shown = scene or controller.scene
             loop_log = LoopLog(log, log_period, chain, shown, dict(meta or {}))
             loop_log.warm_up(reader, limiter)
@@ -126,7 +129,6 @@ def run_loop(
             loop_log.begin()
             safe_stop.begin()
             balance = balance_of(robot, controller.contacts, reader.state)
-            end = np.inf if duration is None else start_time + duration - 0.5 * period
             loop = OneRun(
                 chain,
                 hardware,

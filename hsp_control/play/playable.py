@@ -21,9 +21,22 @@ _PERIOD = 0.001
 
 
 def playable(
-    source: str | PathLike[str], *overrides: str, strict: bool = False, **reading: Any
+    source: str | PathLike[str], *overrides: str, **reading: Any
 ) -> Experiment:
     """Return the experiment of a configuration, or one for a robot.
+
+    See `playable_document` for the arguments.
+
+    Raises:
+        HspControlError: See `playable_document` and `load_experiment`.
+    """
+    return build(playable_document(source, *overrides, **reading))
+
+
+def playable_document(
+    source: str | PathLike[str], *overrides: str, strict: bool = False, **reading: Any
+) -> Document:
+    """Return a configuration that can be played with, or one for a robot.
 
     It gets a control period of a millisecond, if it has none, and rows of about 10 ms.
 
@@ -54,7 +67,7 @@ def playable(
         row = max(round(ROW / period), 1) * period
         document.override(f"simulation.log_period={row!r}")
         document.override(f"simulation.duration={row!r}")
-    return build(document)
+    return document
 
 
 def _for_robot(name: str) -> dict[str, Any]:

@@ -8,9 +8,14 @@ from pathlib import Path
 
 import pytest
 from pages import Page
+from played import wait_until
 
-from hsp_control import Rollout
-from hsp_control.cli import main
+from hsp_control import Experiment, Rollout
+from hsp_control.cli import commands, main
+from hsp_control.common import kernels
+from hsp_control.config import experiment
+from hsp_control.config.document import Document
+from hsp_control.config.experiment import Setup
 from hsp_control.visualization.viewer import browser, server
 
 pytestmark = pytest.mark.process
@@ -73,6 +78,30 @@ def test_run_shows_what_it_computes_and_keeps_its_log(
     assert main(["run", MOVING, "--view", "--out", str(tmp_path), *SHORT]) == 0
     assert refused(address(capsys.readouterr().out))
     assert len(Rollout.load(tmp_path / "4_moving_obstacle.npz")) == 21
+
+
+def test_the_page_of_a_run_opens_before_its_kernels_are_compiled(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It shows the robot and its title, and says what is being done."""
+    pages: list[Page] = []
+
+    def build(document: Document, setup: Setup) -> Experiment:
+        def compile_one() -> None:
+            line = "Compiling kernels (once, 10 to 20 s) ... 0 done"
+            wait_until(lambda: line in [c.get("text") for c in pages[0].commands])
+
+        kernels._watched(compile_one)
+        assert pages[0].last("caption", "/caption")["title"] == setup.scenario.title
+        assert pages[0].last("set_object", "/robot/joint3/link3")
+        return experiment.build(document, setup)
+
+    monkeypatch.setattr(commands, "build", build)
+    monkeypatch.setattr(
+        browser, "open_browser", lambda url: pages.append(Page(url)) or False
+    )
+    assert main(["run", MOVING, "--view", "--out", str(tmp_path), *SHORT]) == 0
+    assert any(c["type"] == "clip" for c in pages[0].commands)
 
 
 def test_a_port_in_use_is_said_and_the_run_goes_on(

@@ -58,9 +58,6 @@ class LiveView:
         self._viewer = viewer
         self._experiment = experiment
         viewer.show(experiment.q0)
-        viewer.transport.send(
-            [set_status("preparing; takes some seconds at the first time")]
-        )
         preview = _preview(experiment)
         self._meta = preview.meta
         robot, controller = experiment.robot, experiment.controller

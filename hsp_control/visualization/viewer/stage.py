@@ -32,15 +32,24 @@ def draw_stage(points: Array, floor: float, view: ViewSettings) -> Iterator[Comm
         floor: The floor's height [m].
         view: The settings: background colour, light, grid.
     """
-    sky = view.background
-    horizon = palette.blend(sky, palette.MUTED, HAZE)
-    yield set_property("/Background", "top_color", _channels(sky))
-    yield set_property("/Background", "bottom_color", _channels(horizon))
+    yield from draw_background(view)
     center = 0.5 * (points.min(axis=0) + points.max(axis=0))
     size = scene_size(points)
     yield from _lights(center, size, view.light)
     yield from _floor(center, size, floor)
     yield set_property("/floor/grid", "visible", view.show.grid)
+
+
+def draw_background(view: ViewSettings) -> Iterator[Command]:
+    """Yield the background alone.
+
+    Args:
+        view: The settings: its colour.
+    """
+    sky = view.background
+    horizon = palette.blend(sky, palette.MUTED, HAZE)
+    yield set_property("/Background", "top_color", _channels(sky))
+    yield set_property("/Background", "bottom_color", _channels(horizon))
 
 
 def stage_legend(view: ViewSettings) -> list[LegendEntry]:

@@ -103,8 +103,9 @@ class Viewer:
             transport = MeshcatTransport(meshcat)
         self.transport = Server(port) if transport is None else transport
         try:
-            self.transport.send(self.drawing.draw())
-            self.draw_scene(Scene())
+            # Its meshes last: they appear where they belong, in their light.
+            still = self._with_obstacles(Scene(), None)
+            self.transport.send([*still, *self.drawing.draw()])
         except BaseException:
             self.close()
             raise
@@ -122,7 +123,11 @@ class Viewer:
         return is_dark(self.view.background)
 
     def draw_scene(
-        self, scene: Rollout | Scene, *, controller: Controller | None = None
+        self,
+        scene: Rollout | Scene,
+        *,
+        controller: Controller | None = None,
+        title: str | None = None,
     ) -> None:
         """Show a run, paused at its start, or a scene's obstacles.
 
@@ -131,6 +136,7 @@ class Viewer:
         Args:
             scene: The run or the scene.
             controller: The run's controller: see `play`.
+            title: The title above a scene; None: the robot's name.
 
         Raises:
             ViewerError: If the run is empty or not of this robot, or if the server has
@@ -139,7 +145,7 @@ class Viewer:
         if isinstance(scene, Rollout):
             self._draw_run(scene, controller, **self._playing(None, None))
         else:
-            self._draw_obstacles(scene)
+            self.transport.send(self._with_obstacles(scene, title))
 
     def show(self, state: RobotState | Any) -> None:
         """Show the robot in a state, or at a configuration of shape (nq,).
@@ -372,13 +378,14 @@ class Viewer:
         self.transport.send([*stage, *set_clip(run.clip(), **playing)])
         self._plot([ComparedRun("", self.robot, rollout, controller)])
 
-    def _draw_obstacles(self, scene: Scene) -> None:
+    def _with_obstacles(self, scene: Scene, title: str | None) -> list[Command]:
+        """Return the commands that show the robot at home with a scene's obstacles."""
         placements = self._placements(self.robot.home())
         obstacles = ObstacleDrawing(scene)
-        stage = self._stage(obstacles, None, self.drawing.points(placements))
+        stage = self._stage(obstacles, title, self.drawing.points(placements))
         self._obstacles = obstacles
         still = [*obstacles.move(0.0), *self.drawing.move(placements)]
-        self.transport.send([*stage, *remove_clip(), *still])
+        return [*stage, *remove_clip(), *still]
 
     def _stage(
         self,

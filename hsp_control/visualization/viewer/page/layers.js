@@ -20,6 +20,7 @@ class Layers {
     this.rows = [];
     this.toggle = document.createElement("button");
     this.toggle.className = "layers-toggle";
+    this.toggle.hidden = true;  // before there are layers
     this.toggle.type = "button";
     this.toggle.title = "Show or hide the legend, whose rows are switches";
     this.toggle.setAttribute("aria-controls", "layers");
@@ -70,6 +71,7 @@ class Layers {
     if (told !== this.told) {
       this.told = told;
       this.rows = entries.map((entry) => this.row(entry));
+      this.toggle.hidden = !entries.length;
       this.list.replaceChildren(...this.rows.map(({item}) => item));
     }
     this.apply();

@@ -1,0 +1,104 @@
+"""A page that opens at once: it says that kernels are compiled, and how many."""
+
+import argparse
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+
+from hsp_control.cli.compiling import compiling_told
+from hsp_control.common.exceptions import HspControlError, ViewerError
+from hsp_control.config.experiment import Setup
+from hsp_control.config.view_settings import ViewSettings
+from hsp_control.visualization.viewer import Viewer, browser
+from hsp_control.visualization.viewer.commands import set_caption, set_status
+from hsp_control.visualization.viewer.stage import draw_background
+from hsp_control.visualization.viewer.transport import Transport
+
+
+class OpeningPage:
+    """Opens a page once: at the first kernel that has to be compiled, or when told to.
+
+    A mistake in a configuration is then said before, unless the cache is empty.
+
+    Attributes:
+        opened: Whether it was opened in a browser.
+    """
+
+    def __init__(
+        self,
+        url: str | None,
+        options: argparse.Namespace,
+        announce: Callable[[str], object],
+        say: Callable[[str], object],
+    ) -> None:
+        """Keep what it takes.
+
+        Args:
+            url: The page's address.
+            options: The command's, of which ``browser`` says whether to open one.
+            announce: Prints the address.
+            say: Sets the page's status line; "" hides it.
+        """
+        assert url is not None
+        self.opened = False
+        self._url, self._browser = url, options.browser
+        self._announce, self._say = announce, say
+        self._done = self._told = self._ready = False
+
+    def open(self) -> None:
+        """Print the address, and open the page in a browser."""
+        if self._done:
+            return
+        self._done = True
+        self._announce(self._url)
+        if self._browser:
+            self.opened = browser.open_browser(self._url)
+
+    def ready(self) -> None:
+        """Open the page, if it is not open; from now on it says nothing of kernels."""
+        self.open()
+        self._ready = True
+        if self._told:
+            self._say("")
+
+    @contextmanager
+    def compiling(self) -> Iterator[None]:
+        """Say on the page how many kernels are compiled; the first one opens it."""
+
+        def tell(text: str) -> None:
+            if self._ready:
+                return
+            self._told = True
+            with suppress(ViewerError):  # who uses the page is told in any case
+                self._say(text)
+            self.open()
+
+        with compiling_told(tell):
+            yield
+
+
+def status_line(transport: Transport) -> Callable[[str], object]:
+    """Return what sets the status line of the pages of a transport."""
+    return lambda text: transport.send([set_status(text)])
+
+
+def draw_empty(transport: Transport, title: str) -> None:
+    """Show a title on an empty stage, before the robot is loaded.
+
+    Raises:
+        ViewerError: If the server has ended.
+    """
+    transport.send([*draw_background(ViewSettings()), set_caption(title, [])])
+
+
+def draw_before(viewer: Viewer, setup: Setup) -> None:
+    """Show the robot at its start, and the scene, before a controller is composed.
+
+    Raises:
+        ViewerError: If the server has ended.
+    """
+    viewer.draw_scene(setup.scene, title=setup.scenario.title or None)
+    try:
+        start = setup.start()
+    except HspControlError:  # `build` says where the mistake is
+        start = setup.robot.home()
+    viewer.show(start)

@@ -1,0 +1,108 @@
+"""When a page opens, and what it says before all is ready."""
+
+from argparse import Namespace
+
+import pytest
+
+from hsp_control.cli.opening_page import OpeningPage, draw_before
+from hsp_control.common import adapters, kernels
+from hsp_control.common.exceptions import ViewerError
+from hsp_control.config.experiment import read_document, set_up
+from hsp_control.visualization.viewer import Recorder, Viewer, browser
+from hsp_control.visualization.viewer.commands import unpack
+
+
+class Said:
+    """A page that keeps what happened."""
+
+    def __init__(self) -> None:
+        self.events: list[str] = []
+        options = Namespace(browser=True)
+        self.page = OpeningPage(
+            "http://x/", options, self.events.append, self.events.append
+        )
+
+
+@pytest.fixture
+def said(monkeypatch: pytest.MonkeyPatch) -> Said:
+    said = Said()
+
+    def open_browser(url: str) -> bool:
+        said.events.append("browser")
+        return True
+
+    monkeypatch.setattr(browser, "open_browser", open_browser)
+    return said
+
+
+def compiled() -> None:
+    kernels._watched(lambda: None)
+
+
+def transforms(recorder: Recorder) -> dict[str, bytes]:
+    return {path: packed for path, kind, packed in recorder.scene.items()
+            if kind == "transform"}  # fmt: skip
+
+
+def test_it_opens_at_the_first_kernel_and_says_how_many(said: Said) -> None:
+    with said.page.compiling():
+        assert not said.page.opened
+        compiled()
+        compiled()
+    said.page.ready()
+    line = "Compiling kernels (once, 10 to 20 s) ... {} done"
+    assert said.events == [
+        line.format(0), "http://x/", "browser", *map(line.format, (1, 1, 2)), "",
+    ]  # fmt: skip
+    assert said.page.opened
+
+
+def test_with_nothing_to_compile_it_opens_when_all_is_ready(said: Said) -> None:
+    with said.page.compiling():
+        pass
+    assert said.events == []  # a mistake is then said without a page
+    said.page.ready()
+    said.page.ready()
+    assert said.events == ["http://x/", "browser"]
+
+
+def test_a_page_that_is_ready_is_told_no_more(said: Said) -> None:
+    with said.page.compiling():
+        said.page.ready()
+        compiled()
+    assert said.events == ["http://x/", "browser"]
+
+
+def test_a_server_that_has_ended_stops_no_compilation(said: Said) -> None:
+    def ended(_: str) -> None:
+        raise ViewerError("the viewer is closed")
+
+    page = OpeningPage("http://x/", Namespace(browser=False), said.events.append, ended)
+    with page.compiling():
+        compiled()
+    assert said.events == ["http://x/"]
+    assert not page.opened
+
+
+def test_the_robot_is_drawn_at_its_start_before_any_kernel_is_compiled(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def compile_none(*_: object) -> int:
+        raise AssertionError("a kernel was asked for")
+
+    monkeypatch.setattr(adapters, "adapter", compile_none)
+    document = read_document("panda_obstacle")
+    document.override("start={joints: {panda_joint4: -1.0}}")
+    setup = set_up(document)
+    recorder = Recorder()
+    viewer = Viewer(setup.robot, transport=recorder)
+    draw_before(viewer, setup)
+    captions = [unpack(packed)["title"] for _, kind, packed in recorder.scene.items()
+                if kind == "caption"]  # fmt: skip
+    assert captions == [setup.scenario.title]
+    drawn = transforms(recorder)
+    viewer.show(setup.robot.home())
+    home = transforms(recorder)
+    moved = {path for path in drawn if drawn[path] != home[path]}
+    assert "/robot/panda_joint5" in moved
+    assert "/robot/panda_joint3" not in moved
