@@ -10,6 +10,13 @@ from hsp_control.common.kernels import kernel
 
 
 @kernel
+def copy(x: Array, out: Array) -> None:
+    """Write x; shapes (n,)."""
+    for i in range(out.shape[0]):
+        out[i] = x[i]
+
+
+@kernel
 def multiply(A: Array, x: Array, out: Array) -> None:
     """Write A x; shapes (m, n), (n,) and (m,)."""
     for i in range(A.shape[0]):

@@ -112,19 +112,18 @@ class LimitedStep:
             begin[r] = force_begin[r] = n + 3 * point
             end[r] = force_end[r] = n + 3 * point + 3
         end[self._null_space] = n
-        alike = _REGULARISATION**-0.5 * np.eye(width)
+        alike = np.full(width, _REGULARISATION**-0.5)
         self._soft, none = zeros(k + width), zeros(0)
-        self._rows = _problem(
-            zeros((width, width)), A, begin, end, lower, upper, none, len(base)
-        )
+        shared = lower, upper, none, len(base)
+        self._rows = Problem(zeros((n, n)), zeros(p), A, begin, end, *shared)
+        fixed = zeros((0, n))
+        softened = lower, upper, self._soft, len(base)
         programmes = Programmes(
-            forces=_problem(
-                zeros((width, width)),
-                *(A, force_begin, force_end, lower, upper, none, len(base)),
-            ),
+            forces=Problem(fixed, zeros(p), A, force_begin, force_end, *shared),
             nearest=self._rows,
-            soft=_problem(alike, A, begin, end, lower, upper, self._soft, len(base)),
+            soft=Problem(zeros((0, 0)), alike, A, begin, end, *softened),
             x=zeros(width),
+            first=zeros(width),
             force_memory=Workspace.of(width, k),
             memory=Workspace.of(width, k),
             second_memory=Workspace.of(width, k),
@@ -262,19 +261,3 @@ class LimitedStep:
         upper[where] = np.maximum(high, reached + slack)
         beyond = np.maximum(low - reached, reached - high)
         return float(np.maximum(beyond, 0.0).max(initial=0.0))
-
-
-def _problem(
-    JT: Array,
-    A: Array,
-    begin: Indices,
-    end: Indices,
-    lower: Array,
-    upper: Array,
-    softness: Array,
-    equalities: int,
-) -> Problem:
-    """Return a QP; the non-zero entries of Jᵀ are on its diagonal, until others say."""
-    size = len(JT)
-    first, last = np.arange(size), np.arange(1, size + 1)
-    return Problem(JT, first, last, A, begin, end, lower, upper, softness, equalities)
