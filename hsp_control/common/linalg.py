@@ -37,6 +37,26 @@ def multiply_transposed(A: Array, x: Array, out: Array) -> None:
 
 
 @kernel
+def add_rows(weights: Array, rows: Array, out: Array) -> None:
+    """Add Σ weight row to out, shape (n,), for as many rows as weights.
+
+    Four rows at a time: out is read and written a quarter as often.
+    """
+    count, n = weights.shape[0], out.shape[0]
+    for group in range(count // 4):
+        r = 4 * group
+        four, by = rows[r : r + 4], weights[r : r + 4]
+        a, b, c, d = by[0], by[1], by[2], by[3]
+        for j in range(n):
+            out[j] += a * four[0, j] + b * four[1, j] + c * four[2, j] + d * four[3, j]
+    for rest in range(count % 4):
+        r = count - 1 - rest
+        row, weight = rows[r], weights[r]
+        for j in range(n):
+            out[j] += weight * row[j]
+
+
+@kernel
 def norm(W: Array, x: Array) -> float:
     """Return ‖x‖_W = √(xᵀ W x); shapes (n, n) and (n,)."""
     square = 0.0

@@ -228,6 +228,13 @@ class RobotState:
             "rnea", self.robot.model, self.data, self.q, self.v, acceleration
         )
 
+    def bind_mass_matrix(self) -> Callable[[], object]:
+        """Return a call that writes M(q) where `mass_matrix` has it.
+
+        Unlike that, it does so each time.
+        """
+        return self._compute_mass_matrix
+
     @property
     def stamp(self) -> int:
         """A number that changes with every `update`: use it to invalidate caches."""

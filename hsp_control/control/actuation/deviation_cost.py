@@ -7,7 +7,9 @@ import numpy as np
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
 from hsp_control.common.linalg import (
+    add_rows,
     copy,
+    multiply,
     orthogonalise_rows,
     orthonormalise_rows,
     solve_lower_transposed,
@@ -49,6 +51,7 @@ class Directions(NamedTuple):
         wide: Scratch, shape (2, m, nv).
         square: Scratch, shape (m, m).
         remainders: Scratch, shape (nv,).
+        shares: Scratch, shape (nv,).
         factors: The law's pseudo-inverse of the stack.
         code: The law's outcome, see `Resolution.code`.
         N: The directions n_k as rows, shape (nv, nv).
@@ -66,6 +69,7 @@ class Directions(NamedTuple):
     wide: Array
     square: Array
     remainders: Array
+    shares: Array
     factors: Factors
     code: Indices
     N: Array
@@ -102,6 +106,7 @@ class Directions(NamedTuple):
             np.empty((2, m, n)),
             np.empty((m, m)),
             np.empty(n),
+            np.empty(n),
             resolution.factors,
             resolution.code,
             np.empty((n, n)),
@@ -130,7 +135,7 @@ def write_directions(directions: Directions) -> None:
             level[r], share[r] = k, 0.0
     else:
         count = _write_levels(directions)
-    _complete(N, count, directions.remainders)
+    _complete(N, count, directions.remainders, directions.shares)
     for r in range(n - count):
         level[n - 1 - r], share[n - 1 - r] = levels, 1.0
 
@@ -195,7 +200,7 @@ def _write_levels(directions: Directions) -> int:
 
 
 @kernel
-def _complete(N: Array, count: int, remainders: Array) -> None:
+def _complete(N: Array, count: int, remainders: Array, shares: Array) -> None:
     """Complete the first rows of N to an orthonormal basis.
 
     Each new row is what the others leave of the unit vector of which they leave most.
@@ -214,17 +219,19 @@ def _complete(N: Array, count: int, remainders: Array) -> None:
         for i in range(n):
             if remainders[i] > remainders[best]:
                 best = i
-        row = N[new]
+        row, share = N[new], shares[:new]
+        for k in range(new):
+            share[k] = -N[k, best]
         for i in range(n):
             row[i] = 0.0
         row[best] = 1.0
-        for k in range(new):
-            share = N[k, best]
-            for i in range(n):
-                row[i] -= share * N[k, i]
+        add_rows(share, N, row)
         square = squared_norm(row)
         if square < 0.5:
-            _project_out(N[:new], row)
+            multiply(N[:new], row, share)
+            for k in range(new):
+                share[k] = -share[k]
+            add_rows(share, N, row)
             square = squared_norm(row)
         size = np.sqrt(square)
         for i in range(n):

@@ -33,6 +33,7 @@ import numpy as np
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
 from hsp_control.common.linalg import (
+    add_rows,
     copy,
     multiply,
     solve_lower,
@@ -258,28 +259,26 @@ def _negligible(i: int, problem: Problem, work: Workspace) -> float:
 def _settle(problem: Problem, x: Array, work: Workspace) -> None:
     """Make y and x the optimum of the active constraints, without rounding of steps.
 
-    Twice, since the second time corrects the first: y = Bᵀ multipliers; L w = b - A x
-    is what the active constraints lack; y grows by Qᵀ w and the multipliers by L⁻ᵀ w.
-    Constraints with a multiplier of the wrong sign are then released, the worst first:
-    from what remains the method may begin.
+    L w = b - A x is what the active constraints lack; the multipliers grow by L⁻ᵀ w.
+    Twice, at x0 and at y = Bᵀ multipliers, since the second time corrects the first;
+    then y grows by Qᵀ w. Constraints with a multiplier of the wrong sign are released,
+    the worst first: from what remains the method may begin.
     """
     y = work.vectors[0]
     while True:
         count = work.counts[0]
         L, w, shares = work.L, work.steps[0, :count], work.multipliers[:count]
-        for _ in range(2):
-            y[:] = 0.0
-            _add_rows(shares, work.B, y)
-            _move(problem, x, work)
-            for c in range(count):
-                i = work.active[c]
-                bound = problem.lower if work.held[i] > 0 else problem.upper
-                w[c] = bound[i] - _value(i, problem, x, y)
-            solve_lower(L, w)
-            _add_rows(w, work.Q, y)
-            solve_lower_transposed(L, w)
-            for c in range(count):
-                shares[c] += w[c]
+        y[:] = 0.0
+        _lack(problem, work.origin, w, work)
+        solve_lower_transposed(L, w)
+        copy(w, shares)
+        add_rows(shares, work.B, y)
+        _move(problem, x, work)
+        _lack(problem, x, w, work)
+        add_rows(w, work.Q, y)
+        solve_lower_transposed(L, w)
+        for c in range(count):
+            shares[c] += w[c]
         wrong, least = count, 0.0
         for c in range(count):
             i = work.active[c]
@@ -292,23 +291,13 @@ def _settle(problem: Problem, x: Array, work: Workspace) -> None:
 
 
 @kernel
-def _add_rows(weights: Array, rows: Array, out: Array) -> None:
-    """Add Σ weight row to out, shape (n,), for as many rows as weights.
-
-    Four rows at a time: out is read and written a quarter as often.
-    """
-    count, n = weights.shape[0], out.shape[0]
-    for group in range(count // 4):
-        r = 4 * group
-        four, by = rows[r : r + 4], weights[r : r + 4]
-        a, b, c, d = by[0], by[1], by[2], by[3]
-        for j in range(n):
-            out[j] += a * four[0, j] + b * four[1, j] + c * four[2, j] + d * four[3, j]
-    for rest in range(count % 4):
-        r = count - 1 - rest
-        row, weight = rows[r], weights[r]
-        for j in range(n):
-            out[j] += weight * row[j]
+def _lack(problem: Problem, x: Array, w: Array, work: Workspace) -> None:
+    """Write w = L⁻¹ (b - A x) of the active constraints."""
+    for c in range(w.shape[0]):
+        i = work.active[c]
+        bound = problem.lower if work.held[i] > 0 else problem.upper
+        w[c] = bound[i] - _value(i, problem, x, work.vectors[0])
+    solve_lower(work.L, w)
 
 
 @kernel
@@ -317,7 +306,7 @@ def _move(problem: Problem, x: Array, work: Workspace) -> None:
     JT, own, y = problem.JT, problem.own, work.vectors[0]
     nz, n = JT.shape
     copy(work.origin, x)
-    _add_rows(y[:nz], JT, x[:n])
+    add_rows(y[:nz], JT, x[:n])
     own_x, own_y = x[n:], y[nz : nz + own.shape[0]]
     for j in range(own.shape[0]):
         own_x[j] += own[j] * own_y[j]
@@ -436,10 +425,12 @@ def _remainder(i: int, problem: Problem, work: Workspace) -> float:
     _write_row(i, problem, work.B[count])
     copy(work.B[count], remainder)
     before = squared_norm(remainder)
+    if count == 0:
+        return before
     multiply(work.Q[:count], remainder, components)
     for c in range(count):
         again[c] = -components[c]
-    _add_rows(again, work.Q, remainder)
+    add_rows(again, work.Q, remainder)
     after = squared_norm(remainder)
     if after > 0.01 * before:
         return after
@@ -447,7 +438,7 @@ def _remainder(i: int, problem: Problem, work: Workspace) -> float:
     for c in range(count):
         components[c] += again[c]
         again[c] = -again[c]
-    _add_rows(again, work.Q, remainder)
+    add_rows(again, work.Q, remainder)
     return squared_norm(remainder)
 
 
