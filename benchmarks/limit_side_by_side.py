@@ -2,19 +2,30 @@
 
     .venv-peers/bin/python benchmarks/limit_side_by_side.py
 
-The configurations of configs/limits on rigid bodies at 1 kHz. Without TSID its rows are
-omitted. Writes a table into docs/limits.md and draws docs/figures/limits.png;
-``--draw`` only draws, which needs no TSID.
+The configurations of configs/limits on rigid bodies at 1 kHz. The cost of a step is
+also measured for two arms and for Talos on two feet, with a part of their efforts.
+Without TSID its rows are omitted. Writes tables into docs/limits.md and draws
+docs/figures/limits.png; ``--draw`` only draws, which needs no TSID.
 """
+
+# ruff: noqa: E402
+import os
+
+# TSID's solver is built with OpenMP: see `whole_body_side_by_side`.
+for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ[variable] = "1"
 
 import argparse
 from collections.abc import Callable
 from typing import NamedTuple
 
 import beside_tsid
+import many_tasks
 import numpy as np
+import whole_body_side_by_side as whole_body
 from marked_sections import DOCS, replace_section
 from matplotlib.figure import Figure
+from standing import TALOS, Standing
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
@@ -27,6 +38,8 @@ from hsp_control.visualization.palette import INK, SERIES
 from hsp_control.visualization.plots import new_figure, styled
 
 PERIOD = 1e-3  # [s]
+ARMS_STRENGTH = 0.2  # of two Pandas' efforts; at 0.25 one joint of each is at its limit
+STANDING_STRENGTHS = (0.35, 0.25)  # of Talos' efforts
 NAMES = ("panda_half_strength", "panda_towards_limit")
 SHOWN = ("this law, limits", "this law, no limits")
 Compute = Callable[[float, Array, Array], Array]
@@ -258,6 +271,59 @@ def cost(name: str, run: Run, limits: RobotLimits) -> str:
     )
 
 
+def cost_of_two_arms() -> str:
+    """Return the row of two Pandas on circles, with a part of their efforts.
+
+    They could not even hold their posture: the states are those of a run with all of
+    their efforts, and each step is limited.
+    """
+    poses = many_tasks.two_arms()
+    _, states = poses.run(poses.law(), 1.0)
+    weaken(poses.robot, ARMS_STRENGTH)
+    return beside_tsid.row(
+        f"two Pandas, {100 * ARMS_STRENGTH:.0f} % of their efforts (status 2)",
+        poses.law(),
+        poses.tsid(),
+        states,
+        np.full(len(states), True),
+    )
+
+
+def cost_of_standing(strength: float, status: Status, what: str) -> str:
+    """Return the row of Talos on two feet, with a part of its efforts.
+
+    Along its own run: on MuJoCo with all of its efforts, else on ideal contacts, until
+    it falls.
+    """
+    from controllers.standing_tsid import make
+
+    case = Standing(TALOS)
+    weaken(case.robot, strength)
+    engine = case.mujoco() if strength == 1.0 else case.ideal()
+    law, statuses = whole_body.this_law(case)
+    run = whole_body.close_loop(case, engine, (law, statuses), 3.0)
+    chosen = np.array([each[0] == str(int(status)) for each in statuses])
+    peer, _ = make(case, posture_weight=1e-3)
+    return beside_tsid.row(what, law, peer, run.states, chosen)
+
+
+def weaken(robot: hsp.Robot, strength: float) -> None:
+    """Scale the limits of a robot's efforts, for all controllers."""
+    model = robot.model
+    model.upperEffortLimit = strength * np.array(model.upperEffortLimit)
+    model.lowerEffortLimit = strength * np.array(model.lowerEffortLimit)
+
+
+def costs_of_others() -> str:
+    """Return the rows of the larger robots."""
+    rows = cost_of_two_arms()
+    for strength in STANDING_STRENGTHS:
+        what = f"Talos on two feet, {100 * strength:.0f} % of its efforts (status 2)"
+        rows += cost_of_standing(strength, Status.LIMITED, what)
+    what = "Talos on two feet, forces redistributed (status 1)"
+    return rows + cost_of_standing(1.0, Status.REDISTRIBUTED, what)
+
+
 def figure(found: dict[str, tuple[dict[str, Run], RobotLimits]]) -> Figure:
     """Draw limited quantities, tracking error and null-space error."""
     drawn = new_figure(8.4, 6.4)
@@ -308,6 +374,7 @@ def main() -> None:
             cost(name, runs["this law, limits"], limits)
             for name, (runs, limits) in found.items()
         )
+        costs += costs_of_others()
         table += f"\n{costs}\n{beside_tsid.CPP}"
         replace_section(DOCS / "step_cost.md", "make bench, limits", costs)
     print(table)

@@ -10,6 +10,13 @@ from hsp_control.common.kernels import kernel
 
 
 @kernel
+def copy(x: Array, out: Array) -> None:
+    """Write x; shapes (n,)."""
+    for i in range(out.shape[0]):
+        out[i] = x[i]
+
+
+@kernel
 def multiply(A: Array, x: Array, out: Array) -> None:
     """Write A x; shapes (m, n), (n,) and (m,)."""
     for i in range(A.shape[0]):
@@ -27,6 +34,26 @@ def multiply_transposed(A: Array, x: Array, out: Array) -> None:
     for i in range(A.shape[0]):
         for j in range(A.shape[1]):
             out[j] += A[i, j] * x[i]
+
+
+@kernel
+def add_rows(weights: Array, rows: Array, out: Array) -> None:
+    """Add Σ weight row to out, shape (n,), for as many rows as weights.
+
+    Four rows at a time: out is read and written a quarter as often.
+    """
+    count, n = weights.shape[0], out.shape[0]
+    for group in range(count // 4):
+        r = 4 * group
+        four, by = rows[r : r + 4], weights[r : r + 4]
+        a, b, c, d = by[0], by[1], by[2], by[3]
+        for j in range(n):
+            out[j] += a * four[0, j] + b * four[1, j] + c * four[2, j] + d * four[3, j]
+    for rest in range(count % 4):
+        r = count - 1 - rest
+        row, weight = rows[r], weights[r]
+        for j in range(n):
+            out[j] += weight * row[j]
 
 
 @kernel

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Any, cast
 
 import numba
+from llvmlite.binding import Linkage
 from numba.core import codegen, compiler, compiler_machinery, registry, types
 
 _target = cast("Any", registry).cpu_target
@@ -56,7 +57,15 @@ class _CallableLibrary(_Library):  # type: ignore[misc,valid-type]
     """Code that others call by its address."""
 
     def _optimize_final_module(self) -> None:
-        """Optimise once; Numba does so twice, to remove counts that kernels lack."""
+        """Optimise once; Numba does so twice, to remove counts that kernels lack.
+
+        Nothing else calls what is linked into it. LLVM is told so: it then removes
+        arguments that are not read, and what it has inlined everywhere. Of an array's
+        seven or more words, a call between kernels would else hand over all.
+        """
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.linkage == Linkage.linkonce_odr:
+                function.linkage = Linkage.internal
         passes, options = self._codegen._module_pass_manager()
         passes.run(self._final_module, options)
 

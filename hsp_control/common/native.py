@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from hsp_control.common.arrays import Indices
+from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import is_compiled
 
 FOREVER = -np.inf, np.inf
@@ -26,14 +26,12 @@ class NativeCall(partial[float]):
     It is a `partial` because Python calls nothing faster.
 
     Attributes:
-        row: The addresses of the adapter and of the words, as `run` reads them.
         words: The packed arguments.
         kept: What the arguments point to besides, if anything.
         recipe: A function and its arguments that make this call. It keeps the arrays
             alive, and copies and pickles use it to bind the copied arrays.
     """
 
-    row: tuple[int, int]
     words: Indices
     recipe: tuple[Callable[..., Any], tuple[Any, ...]]
     kept: object
@@ -50,7 +48,7 @@ class NativeCall(partial[float]):
         row = address, table.ctypes.data
         free = () if timed else (0.0,)
         call = cls(adapters.entry(), np.array([row]), np.array([FOREVER]), *free)
-        call.row, call.words = row, table
+        call.words = table
         call.recipe = cls.of, (kernel, arguments, timed)
         return call
 
@@ -64,7 +62,7 @@ class NativeCall(partial[float]):
         table = np.array([address, *words], dtype=np.int64)
         row = adapters.foreign_adapter(len(words)), table.ctypes.data
         call = cls(adapters.entry(), np.array([row]), np.array([FOREVER]), 0.0)
-        call.row, call.words, call.recipe = row, table, recipe
+        call.words, call.recipe = table, recipe
         return call
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -135,9 +133,16 @@ def sequence(calls: Sequence[Timed], *free: float) -> NativeCall:
     """
     from hsp_control.common import adapters
 
-    when = np.array([[each.start, each.end] for each in calls])
-    call = NativeCall(
-        adapters.entry(), np.array([each.call.row for each in calls]), when, *free
-    )
+    rows = np.concatenate([each.call.args[0] for each in calls])
+    when = np.concatenate([_within(*each) for each in calls])
+    call = NativeCall(adapters.entry(), rows, when, *free)
     call.recipe = sequence, (calls, *free)
     return call
+
+
+def _within(call: NativeCall, start: float, end: float) -> Array:
+    """Return the windows of a call's parts within another window, shape (parts, 2)."""
+    windows: Array = call.args[1]
+    return np.column_stack(
+        [np.maximum(windows[:, 0], start), np.minimum(windows[:, 1], end)]
+    )

@@ -38,17 +38,31 @@ class Resolved(NamedTuple):
     outcome: Outcome
 
 
+class Factors(NamedTuple):
+    """The two factors of the stack's pseudo-inverse, see `weighted_pseudo_inverse`.
+
+    Attributes:
+        Q: Shape (m, nv).
+        X: Shape (m, m).
+    """
+
+    Q: Array
+    X: Array
+
+
 class Scratch(NamedTuple):
     """Memory of the law between its steps.
 
     Attributes:
-        wide: Shape (2, m, nv).
+        factors: The stack's pseudo-inverse.
+        wide: Shape (m, nv).
         square: Shape (3, m, m).
         rows: Shape (7, max(m, nv)).
         tall: Shape (nv, m); for levels in conflict.
         inner: Shape (nv, nv); for levels in conflict.
     """
 
+    factors: Factors
     wide: Array
     square: Array
     rows: Array
@@ -69,6 +83,7 @@ class Resolution:
         acceleration: a of the last `resolve`, shape (nv,).
         null_space_error: e_N of the last `resolve`, shape (nv,).
         code: What the last `resolve` returned, see `outcome_of`, shape (1,).
+        factors: The stack's pseudo-inverse at the last `resolve`.
     """
 
     def __init__(
@@ -89,8 +104,10 @@ class Resolution:
         self.ends: Indices = np.cumsum([*levels] or [0], dtype=np.int64)
         self.form = form
         self.threshold = threshold
+        self.factors = Factors(np.zeros((m, nv)), np.zeros((m, m)))
         self._scratch = Scratch(
-            np.zeros((2, m, nv)),
+            self.factors,
+            np.zeros((m, nv)),
             np.zeros((3, m, m)),
             np.zeros((7, max(m, nv))),
             np.zeros((nv, m)),
@@ -142,7 +159,8 @@ class Resolution:
         if values is None:
             J, L = self.problem.task.jacobian[first:], self.problem.metric.L
             out = np.zeros(min(J.shape))
-            wide, small = self._scratch.wide, self._scratch.square
+            m, n = self.problem.task.jacobian.shape
+            wide, small = np.zeros((2, m, n)), np.zeros((3, m, m))
             call = bind(_singular_values, J, L, self.form, wide, small, out)
             self._spectra[first] = values = call, out
         manipulability = values[0]()
@@ -174,11 +192,11 @@ def _resolve_at_once(
     other: this is the same then.
     """
     n = task.jacobian.shape[1]
-    Q, X, rows = scratch.wide[1], scratch.square[1], scratch.rows
+    (Q, X), rows = scratch.factors, scratch.rows
     u = rows[6, :n]
     damped = int(
         weighted_pseudo_inverse(
-            task.jacobian, metric.L, form, threshold, scratch.wide[0], Q, X
+            task.jacobian, metric.L, form, threshold, scratch.wide, Q, X
         )
     )
     null_space_command(task, field, metric, form, Q, X, v, K_N, rows, e_N, u)

@@ -129,6 +129,20 @@ def with_zeros(rng: Generator) -> Case:
     return around(rng, JT, A)
 
 
+def uncoupled(rng: Generator) -> Case:
+    """Unknowns of which the last have costs of their own, as forces have."""
+    n, p, k = int(rng.integers(0, 7)), int(rng.integers(1, 7)), int(rng.integers(1, 13))
+    nz = int(rng.integers(0, n + 1))
+    JT = np.zeros((nz + p, n + p))
+    JT[:nz, :n] = factor(rng, nz, n)
+    JT[nz:, n:] = np.diag(10.0 ** rng.uniform(-1.0, 1.0, p))
+    A = rng.standard_normal((k, n + p))
+    for row in A:
+        begin, end = np.sort(rng.integers(0, n + p + 1, 2))
+        row[:begin] = row[end:] = 0.0
+    return around(rng, JT, A)
+
+
 def redundant(rng: Generator) -> Case:
     """Equalities that follow from others."""
     case = equalities(rng)
@@ -176,6 +190,7 @@ KINDS: dict[str, Callable[[Generator], Case]] = {
         bounds_only,
         unspanned,
         with_zeros,
+        uncoupled,
         redundant,
         infeasible,
     )
@@ -217,11 +232,22 @@ def spans(A: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 
 
 def packed(case: Case, softness: Array | None = None) -> Problem:
-    """Return the kernel's argument."""
+    """Return the kernel's argument; J's last columns with one entry are apart."""
     soft = np.zeros(0) if softness is None else softness
-    JT, A = np.ascontiguousarray(case.JT), np.ascontiguousarray(case.A)
+    A, (nz, n) = np.ascontiguousarray(case.A), case.JT.shape
+    own = 0
+    while own < nz and _is_alone(case.JT, nz - own - 1, n - own - 1):
+        own += 1
+    JT = np.ascontiguousarray(case.JT[: nz - own, : n - own])
+    rest = np.diag(case.JT[nz - own :, n - own :]).copy()
     ends = case.lower, case.upper, soft, case.equalities
-    return Problem(JT, *spans(JT), A, *spans(A), *ends)
+    return Problem(JT, rest, A, *spans(A), *ends)
+
+
+def _is_alone(JT: Array, row: int, column: int) -> bool:
+    """Return whether an entry is the only one of its row and of its column."""
+    others = np.count_nonzero(JT[row]) + np.count_nonzero(JT[:, column])
+    return bool(JT[row, column] != 0.0 and others == 2)
 
 
 def answer(

@@ -41,7 +41,6 @@ from hsp_control.control.actuation.held_effort import (
 )
 from hsp_control.control.actuation.limited_step import Barriers, LimitedStep
 from hsp_control.control.actuation.status import EXACT, Status
-from hsp_control.control.actuation.step_qp import Wanted
 from hsp_control.control.actuation.support import Support
 from hsp_control.control.planned_contact import PlannedContact
 from hsp_control.control.planned_limits import PlannedLimits
@@ -93,7 +92,7 @@ class Actuation:
         self._bounds = Bounds(
             self._a_lower, self._a_upper, self._tau_lower, self._tau_upper
         )
-        self._wanted, self._effort = np.zeros(nv), np.zeros(nv)
+        self._effort = np.zeros(nv)
         self._steps: WeakKeyDictionary[Resolution, LimitedStep] = WeakKeyDictionary()
         self._resolution: Resolution | None = None
         self._step: LimitedStep | None = None
@@ -179,7 +178,8 @@ class Actuation:
         """Compile what a limited step calls, now instead of where a limit binds."""
         limited = self.limits is not None or support.size
         if limited and resolution not in self._steps:
-            self._limited_step(state, resolution, support, 0)
+            step = self._limited_step(state, resolution, support, 0)
+            step.prepare(resolution.acceleration, state.effort)
         if self.limits is not None:
             self._held.prepare(state.v, resolution.acceleration)
 
@@ -367,20 +367,22 @@ class Actuation:
         if step is None or resolution is not self._resolution:
             found = self._steps.get(resolution)
             step = found or self._limited_step(state, resolution, support, 0)
+            self._step, self._resolution = step, resolution
         if barriers:
             count = sum(len(least) for _, least in barriers.values())
             if count > step.capacity:
                 step = self._limited_step(state, resolution, support, count)
-        self._step, self._resolution = step, resolution
-        state.mass_matrix  # noqa: B018 (writes what the step reads)
-        self._wanted[:], self._effort[:] = a, wanted
-        if self._speed.size:
-            assert self.limits is not None
-            assert self.limits.null_space_speed is not None
+                self._step = step
+        effort = wanted
+        if wanted is not state.effort:  # a sum, made anew in each step
+            effort = self._effort
+            effort[:] = wanted
+        limits = self.limits
+        if limits is not None and limits.null_space_speed is not None:
             problem = resolution.problem
             rate = decay_rate(problem.gain, problem.metric.L)
-            np.multiply(rate, self.limits.null_space_speed, out=self._speed)
-        status, relaxation = step.solve(redistribute, barriers)
+            np.multiply(rate, limits.null_space_speed, out=self._speed)
+        status, relaxation = step.solve(a, effort, redistribute, barriers)
         if status is None:  # the solver failed: the efforts stay within their limits
             tau = np.clip(
                 wanted - support.map @ support.forces, self._tau_lower, self._tau_upper
@@ -388,7 +390,7 @@ class Actuation:
             tau[self.base] = 0.0
             return tau, a, support.forces, Status.RELAXED, np.inf
         tau, acceleration, forces = step.result
-        if status == Status.REDISTRIBUTED:
+        if redistribute and status is Status.REDISTRIBUTED:
             acceleration = a
         return tau, acceleration, forces, status, relaxation
 
@@ -401,7 +403,7 @@ class Actuation:
         some |= not self._planned.numbers.constant  # a limit that comes is still inf
         weight = None if self.limits is None else self.limits.null_space_weight
         self._steps[resolution] = LimitedStep(
-            Wanted(state.mass_matrix, self._wanted, self._effort),
+            state,
             resolution,
             support,
             self._bounds,

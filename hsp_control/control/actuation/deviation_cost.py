@@ -7,6 +7,9 @@ import numpy as np
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
 from hsp_control.common.linalg import (
+    add_rows,
+    copy,
+    multiply,
     orthogonalise_rows,
     orthonormalise_rows,
     solve_lower_transposed,
@@ -15,6 +18,7 @@ from hsp_control.common.linalg import (
 )
 from hsp_control.law import Resolution
 from hsp_control.law.pseudo_inverse import whiten
+from hsp_control.law.resolution import Factors
 from hsp_control.null_space.metrics.metric import IDENTITY
 
 _ONE_LEVEL, _SEVERAL_LEVELS = 1e-6, 1e-8
@@ -47,6 +51,9 @@ class Directions(NamedTuple):
         wide: Scratch, shape (2, m, nv).
         square: Scratch, shape (m, m).
         remainders: Scratch, shape (nv,).
+        shares: Scratch, shape (nv,).
+        factors: The law's pseudo-inverse of the stack.
+        code: The law's outcome, see `Resolution.code`.
         N: The directions n_k as rows, shape (nv, nv).
         level: The level of each, the number of levels for the null space, shape (nv,).
         share: How much of each the null space has: 0 for a level's own, 1 for its own,
@@ -62,6 +69,9 @@ class Directions(NamedTuple):
     wide: Array
     square: Array
     remainders: Array
+    shares: Array
+    factors: Factors
+    code: Indices
     N: Array
     level: Indices
     share: Array
@@ -96,6 +106,9 @@ class Directions(NamedTuple):
             np.empty((2, m, n)),
             np.empty((m, m)),
             np.empty(n),
+            np.empty(n),
+            resolution.factors,
+            resolution.code,
             np.empty((n, n)),
             np.empty(n, dtype=np.int64),
             np.empty(n),
@@ -107,15 +120,57 @@ class Directions(NamedTuple):
 def write_directions(directions: Directions) -> None:
     """Write the directions of all levels, and then those of the null space.
 
+    Where no singular value is small, the law has made the rows of all levels
+    orthonormal, one after the other; else they are found here.
+    """
+    Q, N, ends = directions.factors.Q, directions.N, directions.ends
+    level, share = directions.level, directions.share
+    n, levels = N.shape[0], ends.shape[0]
+    if directions.code[0] == 0 and _orthonormalised(directions.factors):
+        count, k = Q.shape[0], 0
+        for r in range(count):
+            copy(Q[r], N[r])
+            while r >= ends[k]:
+                k += 1
+            level[r], share[r] = k, 0.0
+    else:
+        count = _write_levels(directions)
+    _complete(N, count, directions.remainders, directions.shares)
+    for r in range(n - count):
+        level[n - 1 - r], share[n - 1 - r] = levels, 1.0
+
+
+@kernel
+def _orthonormalised(factors: Factors) -> bool:
+    """Return whether Q = X B has orthonormal rows, and X is lower triangular.
+
+    Both hold unless the law needed the spectrum: then the rows of Q are orthogonal, but
+    not of length 1, or X combines each row with those after it.
+    """
+    Q, X = factors
+    found = True
+    for r in range(Q.shape[0]):
+        found = found and abs(squared_norm(Q[r]) - 1.0) < 1e-12
+        for k in range(Q.shape[0] - 1 - r):
+            found = found and X[r, Q.shape[0] - 1 - k] == 0.0
+    return bool(found)
+
+
+@kernel
+def _write_levels(directions: Directions) -> int:
+    """Write the directions of all levels, and return their number.
+
     Below the threshold the law's inverse is bounded: of a direction with the singular
     value s, the projector on the null space has the share (1 - s²/threshold²)². A
     direction of the last level belongs to the null space in that share, so that no
     effort jumps where s passes the threshold. One of a level above others belongs to it
     or not: what it lacks, the levels below may use.
     """
-    J, L, form, ends, threshold, wide, square, remainders, N, level, share, _ = (
-        directions
-    )
+    J, L, form, ends = (
+        directions.jacobian, directions.L, directions.form, directions.ends
+    )  # fmt: skip
+    threshold, wide, square = directions.threshold, directions.wide, directions.square
+    N, level, share = directions.N, directions.level, directions.share
     n = N.shape[0]
     count = start = 0
     whiten(J, L, form, wide[0])
@@ -141,35 +196,47 @@ def write_directions(directions: Directions) -> None:
             level[count] = k
             count += 1
         start = end
-    _complete(N, count, remainders)
-    for k in range(count, n):
-        level[k], share[k] = ends.shape[0], 1.0
+    return int(count)
 
 
 @kernel
-def _complete(N: Array, count: int, remainders: Array) -> None:
+def _complete(N: Array, count: int, remainders: Array, shares: Array) -> None:
     """Complete the first rows of N to an orthonormal basis.
 
     Each new row is what the others leave of the unit vector of which they leave most.
+    The components of a unit vector are entries of N. Where less than half of it
+    remains, what rounding left is subtracted ("twice is enough", Giraud et al. 2005).
     """
     n = N.shape[0]
     for i in range(n):
         remainders[i] = 1.0
-        for k in range(count):
+    for k in range(count):
+        for i in range(n):
             remainders[i] -= N[k, i] * N[k, i]
-    for new in range(count, n):
+    for missing in range(n - count):
+        new = count + missing
         best = 0
         for i in range(n):
-            N[new, i] = 0.0
             if remainders[i] > remainders[best]:
                 best = i
-        N[new, best] = 1.0
-        for _ in range(2):  # "twice is enough" (Giraud et al. 2005)
-            _project_out(N[:new], N[new])
-        size = np.sqrt(squared_norm(N[new]))
+        row, share = N[new], shares[:new]
+        for k in range(new):
+            share[k] = -N[k, best]
         for i in range(n):
-            N[new, i] /= size
-            remainders[i] -= N[new, i] * N[new, i]
+            row[i] = 0.0
+        row[best] = 1.0
+        add_rows(share, N, row)
+        square = squared_norm(row)
+        if square < 0.5:
+            multiply(N[:new], row, share)
+            for k in range(new):
+                share[k] = -share[k]
+            add_rows(share, N, row)
+            square = squared_norm(row)
+        size = np.sqrt(square)
+        for i in range(n):
+            row[i] /= size
+            remainders[i] -= row[i] * row[i]
 
 
 @kernel
@@ -195,16 +262,15 @@ def write_inverse_root(directions: Directions, first: int, JT: Array) -> int:
     Returns:
         The number of its rows.
     """
-    _, L, form, _, _, _, _, _, N, level, _, _ = directions
-    n = N.shape[0]
-    rows = 0
+    N, level, L = directions.N, directions.level, directions.L
+    n, rows = N.shape[0], 0
     for k in range(n):
         if level[k] < first:
             continue
         root = _root(directions, k)
         for i in range(n):
             JT[rows, i] = root * N[k, i]
-        if form != IDENTITY:
+        if directions.form != IDENTITY:
             solve_lower_transposed(L, JT[rows, :n])
         rows += 1
     return rows
@@ -236,7 +302,7 @@ def freedom(directions: Directions, k: int) -> float:
 
 
 @kernel
-def null_space_scale(directions: Directions, deviation: Array) -> float:
+def null_space_scale(directions: Directions, y: Array) -> float:
     """Return by how much 1/√ρ of the null space shrinks after a first optimum.
 
     Where limits let no motion keep the tasks, an optimum with a tiny ρ moves the null
@@ -252,23 +318,16 @@ def null_space_scale(directions: Directions, deviation: Array) -> float:
 
     Args:
         directions: The directions.
-        deviation: The first optimum, shape (at least nv,).
+        y: The first optimum δ = J y in terms of `write_inverse_root`, shape (count,).
     """
-    _, L, form, ends, _, _, _, _, N, _, _, roots = directions
-    n = N.shape[0]
-    missed = moved = 0.0
-    for k in range(n):
-        along = 0.0
-        for j in range(n):
-            if form == IDENTITY:
-                along += N[k, j] * deviation[j]
-            else:
-                for i in range(j, n):
-                    along += N[k, j] * L[i, j] * deviation[i]
-        free = freedom(directions, k)
-        missed += (1.0 - free) * (along / _root(directions, k)) ** 2
-        moved += free * along * along
-    weight = roots[ends.shape[0]] ** -2.0
+    roots, missed, moved = directions.roots, 0.0, 0.0
+    without = directions.share.shape[0] - y.shape[0]  # those that may not move
+    for r in range(y.shape[0]):
+        k = without + r
+        free, root = freedom(directions, k), _root(directions, k)
+        missed += (1.0 - free) * y[r] * y[r]
+        moved += free * root * root * y[r] * y[r]
+    weight = roots[roots.shape[0] - 1] ** -2.0
     if _SHARE * missed <= weight * moved or moved == 0.0:
         return 1.0
     return float(np.sqrt(weight / min(_SHARE * missed / moved, 1.0)))
@@ -283,7 +342,8 @@ def write_null_space_rows(directions: Directions, A: Array) -> None:
     δ = 0 always satisfies them. With m the columns of L⁻ᵀ N, P = Σ s_k m_k (L n_k)ᵀ
     with the shares s_k of the null space: the law's own projector.
     """
-    _, L, form, _, _, _, _, raised, N, _, share, _ = directions
+    L, form, raised = directions.L, directions.form, directions.remainders
+    N, share = directions.N, directions.share
     n = N.shape[0]
     for i in range(n):
         for j in range(n):

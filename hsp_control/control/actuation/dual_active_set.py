@@ -9,8 +9,11 @@ The method is that of Goldfarb and Idnani (1983). It starts at the unconstrained
 and adds the most violated constraint, until none is violated. The constraints that it
 holds active are kept as B = L Q: row i of B is Jᵀ a_i, Q has orthonormal rows and L is
 lower triangular (Gill, Gould, Murray, Saunders and Wright 1984, "A weighted
-Gram-Schmidt method for convex quadratic programming"). So J is never changed, and the
-zeros of its columns and of A's rows save work in every iteration.
+Gram-Schmidt method for convex quadratic programming"). So J is never changed, and its
+zeros and those of A's rows save work in every iteration.
+
+The loops begin at zero, over slices where need be: an index that may be negative in
+Numba's eyes would keep them from being vectorised, which makes them seven times slower.
 
 Each constraint that enters raises the dual cost strictly, so no set of active
 constraints returns and the method cannot cycle; against rounding there is a limit on
@@ -30,8 +33,12 @@ import numpy as np
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
 from hsp_control.common.linalg import (
+    add_rows,
+    copy,
+    multiply,
     solve_lower,
     solve_lower_transposed,
+    squared_norm,
 )
 
 SOLVED = 0
@@ -59,11 +66,13 @@ benchmarks/qp.py; Talos with all efforts at their limits 5."""
 class Problem(NamedTuple):
     """A QP with k rows lower ≤ A x ≤ upper; bounds on x count as k, k + 1, ...
 
+    The cost couples the first n₁ unknowns; of the others, each has a cost of its own:
+    J is block-diagonal.
+
     Attributes:
-        JT: Jᵀ with J Jᵀ = H⁻¹, shape (nz, n), nz ≤ n. What its rows do not span does
-            not move.
-        first: First non-zero entry of each row of Jᵀ, shape (nz,).
-        last: After the last non-zero entry of each row of Jᵀ, shape (nz,).
+        JT: Jᵀ of the first unknowns, J Jᵀ = H⁻¹, shape (nz, n₁), nz ≤ n₁. What its rows
+            do not span does not move.
+        own: J of the others, 1/√cost of each, shape (n - n₁,).
         A: Shape (k, n).
         begin: First non-zero entry of each row of A, shape (k,).
         end: After the last non-zero entry of each row of A, shape (k,).
@@ -75,8 +84,7 @@ class Problem(NamedTuple):
     """
 
     JT: Array
-    first: Indices
-    last: Indices
+    own: Array
     A: Array
     begin: Indices
     end: Indices
@@ -97,12 +105,14 @@ class Workspace(NamedTuple):
         multipliers: Theirs, in that order, shape (m,): H (x - x0) = Σ multiplier a;
             positive at lower bounds.
         origin: x0, shape (n,).
-        norms: ‖a‖ of each constraint, shape (k + n,).
-        negligible: The square of a remainder of Jᵀ a that is rounding, shape (k + n,).
+        rounding: The square of a remainder of Jᵀ a that is rounding, for a of length 1,
+            shape (1,).
+        B: Its active rows, and then that of an entering constraint, shape
+            (m + 1, width).
         L: Shape (m, m).
         Q: Shape (m, width).
         vectors: y, and the remainder of a row of B, shape (2, width).
-        steps: Two vectors of the active constraints, shape (2, m).
+        steps: Three vectors of the active constraints, shape (3, m).
     """
 
     held: Indices
@@ -110,8 +120,8 @@ class Workspace(NamedTuple):
     active: Indices
     multipliers: Array
     origin: Array
-    norms: Array
-    negligible: Array
+    rounding: Array
+    B: Array
     L: Array
     Q: Array
     vectors: Array
@@ -129,12 +139,12 @@ class Workspace(NamedTuple):
             np.zeros(m, dtype=np.int64),
             np.zeros(m),
             np.zeros(n),
-            np.zeros(k + n),
-            np.zeros(k + n),
+            np.zeros(1),
+            np.zeros((m + 1, width)),
             np.zeros((m, m)),
             np.zeros((m, width)),
             np.zeros((2, width)),
-            np.zeros((2, m)),
+            np.zeros((3, m)),
         )
 
 
@@ -150,7 +160,7 @@ def minimise(problem: Problem, warm: bool, x: Array, work: Workspace) -> int:
         problem: The QP.
         warm: Whether to begin with the active constraints of the last call.
         x: x0, shape (n,); overwritten.
-        work: Memory; its active constraints, multipliers and counts are results.
+        work: Memory; its active constraints, multipliers, counts and y are results.
     """
     if not _prepare(problem, warm, x, work):
         return INFEASIBLE
@@ -187,7 +197,7 @@ def _begin(problem: Problem, x: Array, work: Workspace) -> bool:
         if work.held[i] != 0:
             count += 1
             square = _remainder(i, problem, work)
-            if square > work.negligible[i]:
+            if square > _negligible(i, problem, work):
                 work.multipliers[work.counts[0]] = 0.0
                 _extend(i, square, work)
             else:
@@ -201,66 +211,74 @@ def _begin(problem: Problem, x: Array, work: Workspace) -> bool:
 def _prepare(problem: Problem, warm: bool, x: Array, work: Workspace) -> bool:
     """Begin at x0, mark what to hold; return whether each constraint can be kept alone.
 
-    NaN makes each comparison false, and so the result.
+    NaN makes each comparison false, and so the result. NaN in A is found by
+    `_most_violated`.
     """
-    JT, A, lower, upper = problem.JT, problem.A, problem.lower, problem.upper
-    k, n = A.shape
-    held, norms = work.held, work.norms
+    lower, upper, held = problem.lower, problem.upper, work.held
     work.counts[:] = 0
     work.vectors[0] = 0.0
-    size, rounding = 1.0, 0.0
-    for j in range(n):
-        work.origin[j] = x[j]
+    size = 1.0
+    copy(x, work.origin)
+    for j in range(x.shape[0]):
         size += abs(x[j])
-        norms[k + j] = 1.0
-        for r in range(JT.shape[0]):
-            rounding += JT[r, j] * JT[r, j]
-    rounding *= _DEPENDENT * _DEPENDENT
-    for i in range(k):
-        square = 0.0
-        for j in range(problem.begin[i], problem.end[i]):
-            square += A[i, j] * A[i, j]
-        norms[i] = np.sqrt(square) if square != 0.0 else 1.0
+    rounding = squared_norm(problem.own)
+    for r in range(problem.JT.shape[0]):
+        rounding += squared_norm(problem.JT[r])
+    work.rounding[0] = _DEPENDENT * _DEPENDENT * rounding
     possible = size + rounding < np.inf
-    for i in range(k + n):
-        work.negligible[i] = rounding * norms[i] * norms[i]
+    for i in range(held.shape[0]):
         gap = lower[i] - upper[i]
-        possible = possible and gap <= _TOLERANCE * norms[i] * size
-        bound = lower[i] if held[i] > 0 else upper[i]
+        if not gap <= 0.0:
+            possible = possible and gap <= _TOLERANCE * _norm(i, problem) * size
         if i < problem.equalities:
             held[i] = 1
-        elif not (warm and np.isfinite(bound)):
-            held[i] = 0
-    return possible
+        elif held[i] != 0:
+            bound = lower[i] if held[i] > 0 else upper[i]
+            if not (warm and np.isfinite(bound)):
+                held[i] = 0
+    return bool(possible)
+
+
+@kernel
+def _norm(i: int, problem: Problem) -> float:
+    """Return ‖a‖ of constraint i, and 1 for a row of zeros."""
+    if i >= problem.A.shape[0]:
+        return 1.0
+    square = squared_norm(problem.A[i, problem.begin[i] : problem.end[i]])
+    return float(np.sqrt(square)) if square != 0.0 else 1.0
+
+
+@kernel
+def _negligible(i: int, problem: Problem, work: Workspace) -> float:
+    """Return the square of a remainder of Jᵀ a that is rounding."""
+    norm = _norm(i, problem)
+    return float(work.rounding[0] * norm * norm)
 
 
 @kernel
 def _settle(problem: Problem, x: Array, work: Workspace) -> None:
     """Make y and x the optimum of the active constraints, without rounding of steps.
 
-    Twice, since the second time corrects the first: y = Bᵀ multipliers; L w = b - A x
-    is what the active constraints lack; y grows by Qᵀ w and the multipliers by L⁻ᵀ w.
-    Constraints with a multiplier of the wrong sign are then released, the worst first:
-    from what remains the method may begin.
+    L w = b - A x is what the active constraints lack; the multipliers grow by L⁻ᵀ w.
+    Twice, at x0 and at y = Bᵀ multipliers, since the second time corrects the first;
+    then y grows by Qᵀ w. Constraints with a multiplier of the wrong sign are released,
+    the worst first: from what remains the method may begin.
     """
-    y, shares = work.vectors[0], work.multipliers
+    y = work.vectors[0]
     while True:
         count = work.counts[0]
-        L, w = work.L, work.steps[0, :count]
-        for _ in range(2):
-            _gather(problem, x, work)
-            _move(problem, x, work)
-            for c in range(count):
-                i = work.active[c]
-                bound = problem.lower if work.held[i] > 0 else problem.upper
-                w[c] = bound[i] - _value(i, problem, x, y)
-            solve_lower(L, w)
-            for c in range(count):
-                for j in range(y.shape[0]):
-                    y[j] += w[c] * work.Q[c, j]
-            solve_lower_transposed(L, w)
-            for c in range(count):
-                shares[c] += w[c]
+        L, w, shares = work.L, work.steps[0, :count], work.multipliers[:count]
+        y[:] = 0.0
+        _lack(problem, work.origin, w, work)
+        solve_lower_transposed(L, w)
+        copy(w, shares)
+        add_rows(shares, work.B, y)
+        _move(problem, x, work)
+        _lack(problem, x, w, work)
+        add_rows(w, work.Q, y)
+        solve_lower_transposed(L, w)
+        for c in range(count):
+            shares[c] += w[c]
         wrong, least = count, 0.0
         for c in range(count):
             i = work.active[c]
@@ -273,35 +291,25 @@ def _settle(problem: Problem, x: Array, work: Workspace) -> None:
 
 
 @kernel
-def _gather(problem: Problem, gradient: Array, work: Workspace) -> None:
-    """Write y = Bᵀ multipliers = Jᵀ H (x - x0), and H (x - x0) in between."""
-    JT, A, y = problem.JT, problem.A, work.vectors[0]
-    nz, k = JT.shape[0], A.shape[0]
-    y[:] = 0.0
-    gradient[:] = 0.0
-    for c in range(work.counts[0]):
-        i, share = work.active[c], work.multipliers[c]
-        if i >= k:
-            gradient[i - k] += share
-        else:
-            for j in range(problem.begin[i], problem.end[i]):
-                gradient[j] += share * A[i, j]
-        if problem.softness.shape[0] > 0:
-            y[nz + i] = share * problem.softness[i]
-    for r in range(nz):
-        for j in range(problem.first[r], problem.last[r]):
-            y[r] += JT[r, j] * gradient[j]
+def _lack(problem: Problem, x: Array, w: Array, work: Workspace) -> None:
+    """Write w = L⁻¹ (b - A x) of the active constraints."""
+    for c in range(w.shape[0]):
+        i = work.active[c]
+        bound = problem.lower if work.held[i] > 0 else problem.upper
+        w[c] = bound[i] - _value(i, problem, x, work.vectors[0])
+    solve_lower(work.L, w)
 
 
 @kernel
 def _move(problem: Problem, x: Array, work: Workspace) -> None:
     """Write x = x0 + J y."""
-    JT, y = problem.JT, work.vectors[0]
-    for j in range(x.shape[0]):
-        x[j] = work.origin[j]
-    for r in range(JT.shape[0]):
-        for j in range(problem.first[r], problem.last[r]):
-            x[j] += y[r] * JT[r, j]
+    JT, own, y = problem.JT, problem.own, work.vectors[0]
+    nz, n = JT.shape
+    copy(work.origin, x)
+    add_rows(y[:nz], JT, x[:n])
+    own_x, own_y = x[n:], y[nz : nz + own.shape[0]]
+    for j in range(own.shape[0]):
+        own_x[j] += own[j] * own_y[j]
 
 
 @kernel
@@ -312,10 +320,13 @@ def _value(i: int, problem: Problem, x: Array, y: Array) -> float:
     if i >= k:
         total = x[i - k]
     else:
-        for j in range(problem.begin[i], problem.end[i]):
-            total += A[i, j] * x[j]
+        begin, end = problem.begin[i], problem.end[i]
+        row, part = A[i, begin:end], x[begin:end]
+        for j in range(row.shape[0]):
+            total += row[j] * part[j]
     if softness.shape[0] > 0:
-        total += softness[i] * y[problem.JT.shape[0] + i]
+        slack = y[problem.JT.shape[0] + problem.own.shape[0] :]
+        total += softness[i] * slack[i]
     return total
 
 
@@ -329,7 +340,7 @@ def _most_violated(
     """Return the constraint that x is farthest from, marked as held, and its violation.
 
     It is -1 if x satisfies all. The distance is the violation divided by the length of
-    the row.
+    the row. A row that contains NaN counts as violated.
     """
     lower, upper = problem.lower, problem.upper
     largest = 0.0
@@ -342,9 +353,11 @@ def _most_violated(
             continue
         value = _value(i, problem, x, work.vectors[0])
         below, above = lower[i] - value, value - upper[i]
-        beyond = max(below, above)
-        if beyond > farthest * work.norms[i]:
-            farthest = beyond / work.norms[i]
+        if below <= 0.0 and above <= 0.0:
+            continue
+        beyond, norm = max(below, above), _norm(i, problem)
+        if not beyond <= farthest * norm:
+            farthest = beyond / norm
             entering, side, violation = i, 1 if below > above else -1, beyond
     if entering >= 0:
         work.held[entering] = side
@@ -362,10 +375,11 @@ def _enter(entering: int, violation: float, problem: Problem, work: Workspace) -
     y, remainder = work.vectors[0], work.vectors[1]
     side, multiplier = work.held[entering], 0.0
     square = _remainder(entering, problem, work)
+    negligible = _negligible(entering, problem, work)
     while True:
         work.counts[1] += 1
         count = work.counts[0]
-        independent = square > work.negligible[entering]
+        independent = square > negligible
         rate = work.steps[1, :count]  # of the multipliers, Lᵀ rate = Q b
         for c in range(count):
             rate[c] = work.steps[0, c]
@@ -392,62 +406,88 @@ def _enter(entering: int, violation: float, problem: Problem, work: Workspace) -
             work.multipliers[count] = multiplier
             return True
         _release(leaving, work)
-        count, square = work.counts[0], 0.0  # the remainder gains what is freed
+        count = work.counts[0]  # the remainder gains what is freed
+        freed, share = work.Q[count], work.steps[0, count]
         for j in range(y.shape[0]):
-            remainder[j] += work.steps[0, count] * work.Q[count, j]
-            square += remainder[j] * remainder[j]
+            remainder[j] += share * freed[j]
+        square = squared_norm(remainder)
 
 
 @kernel
 def _remainder(i: int, problem: Problem, work: Workspace) -> float:
     """Write b = Jᵀ a of constraint i, Q b, and what remains of b; return its square.
 
-    If nine tenths of the length cancel, the components are subtracted a second time
-    ("twice is enough", Giraud et al. 2005).
+    b goes to the row of B after the active ones. If nine tenths of the length cancel,
+    the components are subtracted a second time ("twice is enough", Giraud et al. 2005).
     """
-    JT, A, nz = problem.JT, problem.A, problem.JT.shape[0]
-    remainder, components, count = work.vectors[1], work.steps[0], work.counts[0]
-    remainder[:] = 0.0
-    components[:count] = 0.0
-    for r in range(nz):
-        if i < A.shape[0]:
-            begin = max(problem.begin[i], problem.first[r])
-            end = min(problem.end[i], problem.last[r])
-            for j in range(begin, end):
-                remainder[r] += JT[r, j] * A[i, j]
+    count, remainder = work.counts[0], work.vectors[1]
+    components, again = work.steps[0, :count], work.steps[2, :count]
+    _write_row(i, problem, work.B[count])
+    copy(work.B[count], remainder)
+    before = squared_norm(remainder)
+    if count == 0:
+        return before
+    multiply(work.Q[:count], remainder, components)
+    for c in range(count):
+        again[c] = -components[c]
+    add_rows(again, work.Q, remainder)
+    after = squared_norm(remainder)
+    if after > 0.01 * before:
+        return after
+    multiply(work.Q[:count], remainder, again)
+    for c in range(count):
+        components[c] += again[c]
+        again[c] = -again[c]
+    add_rows(again, work.Q, remainder)
+    return squared_norm(remainder)
+
+
+@kernel
+def _write_row(i: int, problem: Problem, b: Array) -> None:
+    """Write b = Jᵀ a of constraint i, and its softness."""
+    JT, own, A = problem.JT, problem.own, problem.A
+    nz, n = JT.shape
+    b[:] = 0.0
+    own_b = b[nz:]
+    if i >= A.shape[0]:
+        j = i - A.shape[0]
+        if j < n:
+            for r in range(nz):
+                b[r] = JT[r, j]
         else:
-            remainder[r] = JT[r, i - A.shape[0]]
+            own_b[j - n] = own[j - n]
+    else:
+        begin, end = problem.begin[i], problem.end[i]
+        if begin < n:
+            row = A[i, : min(n, end)]
+            for r in range(nz):
+                total = 0.0
+                for j in range(row.shape[0]):
+                    total += JT[r, j] * row[j]
+                b[r] = total
+        first = max(begin - n, 0)
+        rest, by, out = A[i, n + first : end], own[first:], own_b[first:]
+        for j in range(rest.shape[0]):
+            out[j] = by[j] * rest[j]
     if problem.softness.shape[0] > 0:
-        remainder[nz + i] = problem.softness[i]
-    before = after = 0.0
-    for j in range(remainder.shape[0]):
-        before += remainder[j] * remainder[j]
-    for _ in range(2):
-        for c in range(count):
-            q, component = work.Q[c], 0.0
-            for j in range(remainder.shape[0]):
-                component += q[j] * remainder[j]
-            for j in range(remainder.shape[0]):
-                remainder[j] -= component * q[j]
-            components[c] += component
-        after = 0.0
-        for j in range(remainder.shape[0]):
-            after += remainder[j] * remainder[j]
-        if after > 0.01 * before:
-            break
-    return after
+        slack = own_b[own.shape[0] :]
+        slack[i] = problem.softness[i]
 
 
 @kernel
 def _extend(i: int, square: float, work: Workspace) -> None:
-    """Add constraint i to the active ones: one more row of L and of Q."""
+    """Add constraint i to the active ones: one more row of L and of Q.
+
+    Its row of B is there already.
+    """
     count = work.counts[0]
     size = np.sqrt(square)
+    row, q = work.L[count], work.Q[count]
     for c in range(count):
-        work.L[count, c] = work.steps[0, c]
-    work.L[count, count] = size
-    for j in range(work.Q.shape[1]):
-        work.Q[count, j] = work.vectors[1, j] / size
+        row[c] = work.steps[0, c]
+    row[count] = size
+    for j in range(q.shape[0]):
+        q[j] = work.vectors[1, j] / size
     work.active[count] = i
     work.multipliers[count] = 0.0
     work.counts[0] = count + 1
@@ -460,9 +500,12 @@ def _release(leaving: int, work: Workspace) -> None:
     They leave the direction that is freed in the row of Q after the last, and rotate
     the components Q b too.
     """
-    L, Q, components, count = work.L, work.Q, work.steps[0], work.counts[0] - 1
+    B, L, Q, components = work.B, work.L, work.Q, work.steps[0]
+    count = work.counts[0] - 1
     work.held[work.active[leaving]] = 0
     work.counts[0] = count
+    for r in range(leaving, count + 1):  # the last is that of an entering constraint
+        copy(B[r + 1], B[r])
     for r in range(leaving, count):
         work.active[r] = work.active[r + 1]
         work.multipliers[r] = work.multipliers[r + 1]

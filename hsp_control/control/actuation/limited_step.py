@@ -1,11 +1,16 @@
 """Steps within limits: the nearest to what the law wants, or the least violation."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.native import bind
+from hsp_control.common.identity_cache import IdentityCache
+from hsp_control.common.kernels import kernel
+from hsp_control.common.linalg import copy
+from hsp_control.common.native import FOREVER, NativeCall, Timed, bind, sequence
+from hsp_control.common.step_plan import CallSequence
 from hsp_control.constraints.limits.acceleration_bounds import Bounds
 from hsp_control.control.actuation.deviation_cost import Directions
 from hsp_control.control.actuation.dual_active_set import Problem, Workspace
@@ -25,6 +30,7 @@ from hsp_control.control.actuation.step_qp import (
 )
 from hsp_control.control.actuation.support import Support
 from hsp_control.law import Resolution
+from hsp_control.robot import RobotState
 
 _RELAXATION_COST = {
     "contacts": 1e3,
@@ -57,7 +63,7 @@ class LimitedStep:
 
     def __init__(
         self,
-        wanted: Wanted,
+        state: RobotState,
         resolution: Resolution,
         support: Support,
         bounds: Bounds,
@@ -71,7 +77,7 @@ class LimitedStep:
         """Allocate.
 
         Args:
-            wanted: What the law wants; each step reads these arrays.
+            state: The robot's state; each step reads its mass matrix.
             resolution: The law, with its levels in order of priority.
             support: The forces of the active contacts.
             bounds: The bounds on acceleration and effort; each step reads these arrays.
@@ -83,7 +89,7 @@ class LimitedStep:
                 there is no such bound.
             capacity: How many rows of barriers there is room for.
         """
-        n, p = len(wanted.acceleration), support.size
+        n, p = state.robot.nv, support.size
         held = sum(contact.rows for contact in support.contacts)
         self.capacity = capacity
         counts = [len(base) + len(limited), len(support.cone), len(speed), capacity]
@@ -94,7 +100,6 @@ class LimitedStep:
         self._motion = np.arange(k, k + n)
         self._contacts = np.arange(contacts, k)
         self._J = resolution.problem.task.jacobian[:held]
-        self._accelerations = wanted.acceleration
         width = n + p
 
         A, zeros = np.zeros((k, width)), np.zeros
@@ -112,19 +117,18 @@ class LimitedStep:
             begin[r] = force_begin[r] = n + 3 * point
             end[r] = force_end[r] = n + 3 * point + 3
         end[self._null_space] = n
-        alike = _REGULARISATION**-0.5 * np.eye(width)
+        alike = np.full(width, _REGULARISATION**-0.5)
         self._soft, none = zeros(k + width), zeros(0)
-        self._rows = _problem(
-            zeros((width, width)), A, begin, end, lower, upper, none, len(base)
-        )
+        shared = lower, upper, none, len(base)
+        self._rows = Problem(zeros((n, n)), zeros(p), A, begin, end, *shared)
+        fixed = zeros((0, n))
+        softened = lower, upper, self._soft, len(base)
         programmes = Programmes(
-            forces=_problem(
-                zeros((width, width)),
-                *(A, force_begin, force_end, lower, upper, none, len(base)),
-            ),
+            forces=Problem(fixed, zeros(p), A, force_begin, force_end, *shared),
             nearest=self._rows,
-            soft=_problem(alike, A, begin, end, lower, upper, self._soft, len(base)),
+            soft=Problem(zeros((0, 0)), alike, A, begin, end, *softened),
             x=zeros(width),
+            first=zeros(width),
             force_memory=Workspace.of(width, k),
             memory=Workspace.of(width, k),
             second_memory=Workspace.of(width, k),
@@ -132,8 +136,9 @@ class LimitedStep:
         )
         self._x = programmes.x
         self.result = Result(zeros(n), zeros(n), zeros(p))
+        self._wanted = Wanted(state.mass_matrix, zeros(n), zeros(n))
         arguments = (
-            wanted,
+            self._wanted,
             Forces(
                 support.map,
                 support.forces,
@@ -153,17 +158,41 @@ class LimitedStep:
             programmes,
             self.result,
         )
-        self._nearest_by_forces = bind(solve_step, FORCES, *arguments)
+        self._forces = bind(solve_step, FORCES, *arguments)
         self._nearest = bind(solve_step, NEAREST, *arguments)
         self._again = bind(solve_step, NEAREST_AGAIN, *arguments)
         self._least_violation = bind(solve_step, LEAST_VIOLATION, *arguments)
+        self._write_mass_matrix = state.compute_mass_matrix
+        self._calls = IdentityCache(self._after_input)
+
+    def prepare(self, acceleration: Array, effort: Array) -> None:
+        """Compile what `solve` calls, for these arrays."""
+        self._calls.get(acceleration, effort)
+
+    def _after_input(
+        self, acceleration: Array, effort: Array
+    ) -> tuple[Callable[[], float], Callable[[], float]]:
+        """Return the calls for forces and for the nearest, with all that they read.
+
+        To bind the copies of two arrays takes a fiftieth of the time of binding all.
+        """
+        _, own, own_effort = self._wanted
+        copies = bind(_copy_both, acceleration, own, effort, own_effort)
+        first = self._write_mass_matrix, copies
+        return _one_call(*first, self._forces), _one_call(*first, self._nearest)
 
     def solve(
-        self, redistribute: bool, barriers: Barriers
+        self,
+        acceleration: Array,
+        effort: Array,
+        redistribute: bool,
+        barriers: Barriers,
     ) -> tuple[Status | None, float]:
         """Write the nearest to what the law wants to `result`.
 
         Args:
+            acceleration: The law's acceleration, shape (nv,).
+            effort: The effort for it without contact forces, shape (nv,) [N·m or N].
             redistribute: Whether forces alone can be enough.
             barriers: The rows of the barriers.
 
@@ -171,21 +200,26 @@ class LimitedStep:
             The status, None if the solver found nothing; and the largest violation of a
             relaxed limit [rad/s² or m/s²].
         """
-        rows = self._write_barriers(barriers) if barriers or self._used else {}
-        code = self._nearest_by_forces() if redistribute else self._nearest()
+        by_forces, nearest = self._calls.get(acceleration, effort)
+        where = {}
+        if barriers or self._used:
+            where = self._write_barriers(barriers, acceleration)
+        code = by_forces() if redistribute else nearest()
         if code != UNSOLVED:
             return _STATUS[int(code)], 0.0
-        return self._relax(rows)
+        return self._relax(where)
 
-    def _write_barriers(self, barriers: Barriers) -> dict[str, Indices]:
+    def _write_barriers(
+        self, barriers: Barriers, acceleration: Array
+    ) -> dict[str, Indices]:
         """Write the rows of the barriers; return where they are, by kind."""
         A, end, lower = self._rows.A, self._rows.end, self._rows.lower
-        n, r, where = len(self._accelerations), self._barriers, {}
+        n, r, where = len(acceleration), self._barriers, {}
         for kind, (rows, least) in barriers.items():
             place = np.arange(r, r + len(least))
             A[place, :n] = rows
             end[place] = n
-            lower[place] = least - rows @ self._accelerations
+            lower[place] = least - rows @ acceleration
             where[kind] = place
             r += len(least)
         unused = slice(r, self._barriers + self._used)
@@ -264,17 +298,16 @@ class LimitedStep:
         return float(np.maximum(beyond, 0.0).max(initial=0.0))
 
 
-def _problem(
-    JT: Array,
-    A: Array,
-    begin: Indices,
-    end: Indices,
-    lower: Array,
-    upper: Array,
-    softness: Array,
-    equalities: int,
-) -> Problem:
-    """Return a QP; the non-zero entries of Jᵀ are on its diagonal, until others say."""
-    size = len(JT)
-    first, last = np.arange(size), np.arange(1, size + 1)
-    return Problem(JT, first, last, A, begin, end, lower, upper, softness, equalities)
+def _one_call(*calls: Callable[[], Any]) -> Callable[[], float]:
+    """Return one call for several, with the result of the last one."""
+    native = [call for call in calls if isinstance(call, NativeCall)]
+    if len(native) == len(calls):
+        return sequence([Timed(call, *FOREVER) for call in native], 0.0)
+    return CallSequence(*calls)
+
+
+@kernel
+def _copy_both(a: Array, own_a: Array, b: Array, own_b: Array) -> None:
+    """Copy two vectors, shape (nv,) each."""
+    copy(a, own_a)
+    copy(b, own_b)

@@ -21,6 +21,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
+from hsp_control.common.linalg import copy
 from hsp_control.constraints.limits.acceleration_bounds import Bounds
 from hsp_control.control.actuation.deviation_cost import (
     Directions,
@@ -108,6 +109,7 @@ class Programmes(NamedTuple):
         nearest: Of deviation and forces, at the law's cost.
         soft: Of deviation and forces, all at the same cost, with soft rows.
         x: The unknowns, shape (nv + p,).
+        first: The first optimum, where it is computed again, shape (nv + p,).
         force_memory: Of the first.
         memory: Of the second.
         second_memory: Of the second, where its optimum is computed again.
@@ -118,6 +120,7 @@ class Programmes(NamedTuple):
     nearest: Problem
     soft: Problem
     x: Array
+    first: Array
     force_memory: Workspace
     memory: Workspace
     second_memory: Workspace
@@ -170,8 +173,8 @@ def solve_step(
         _write_rows(wanted, forces, bounds, places, qp.nearest)
         if what == FORCES:
             _start(forces, x)
-            count = _write_force_factor(forces, 0, 1.0, qp.forces)
-            code = minimise(_moving(qp.forces, count), True, x, qp.force_memory)
+            _write_force_factor(forces, 1.0, qp.forces)
+            code = minimise(qp.forces, True, x, qp.force_memory)
             if code == SOLVED and _write_result(
                 wanted, forces, bounds, places, x, result
             ):
@@ -180,24 +183,21 @@ def solve_step(
         _write_null_space_bound(directions, speed, places, qp.nearest)
     _start(forces, x)
     contacts_held = what != NEAREST_AGAIN and forces.first.shape[0] > 0
-    count = _write_law_factor(directions, contacts_held, qp.nearest)
-    count = _write_force_factor(forces, count, _FORCE_COST, qp.nearest)
+    count = write_inverse_root(directions, 1 if contacts_held else 0, qp.nearest.JT)
+    _write_force_factor(forces, _FORCE_COST, qp.nearest)
     problem, warm = _moving(qp.nearest, count), what != NEAREST_AGAIN
-    code = minimise(problem, warm, x, qp.memory)
-    if not (
-        code == SOLVED and _write_result(wanted, forces, bounds, places, x, result)
-    ):
+    if minimise(problem, warm, x, qp.memory) != SOLVED:
         return UNSOLVED
-    scale = null_space_scale(directions, x)
+    scale = null_space_scale(directions, qp.memory.vectors[0, :count])
     if scale < 1.0:  # the tasks miss: once more, with a dearer null space
-        _scale_null_space(directions, scale, count - forces.first.shape[0], problem)
+        copy(x, qp.first)
+        _scale_null_space(directions, scale, problem.JT)
         _start(forces, x)
-        code = minimise(problem, warm, x, qp.second_memory)
-        if code == SOLVED and not _write_result(
-            wanted, forces, bounds, places, x, result
-        ):
-            return UNSOLVED
-    return Status.LIMITED
+        if minimise(problem, warm, x, qp.second_memory) != SOLVED:
+            copy(qp.first, x)
+    if _write_result(wanted, forces, bounds, places, x, result):
+        return Status.LIMITED
+    return UNSOLVED
 
 
 @kernel
@@ -211,66 +211,31 @@ def _start(forces: Forces, x: Array) -> None:
 
 
 @kernel
-def _write_law_factor(
-    directions: Directions, contacts_held: bool, problem: Problem
-) -> int:
-    """Write the rows of Jᵀ of the directions that may move; return their number."""
-    JT, n = problem.JT, directions.N.shape[0]
-    count = write_inverse_root(directions, 1 if contacts_held else 0, JT)
-    for k in range(count):
-        problem.first[k], problem.last[k] = 0, n
-        for j in range(n, JT.shape[1]):
-            JT[k, j] = 0.0
-    return count
-
-
-@kernel
-def _scale_null_space(
-    directions: Directions, scale: float, count: int, problem: Problem
-) -> None:
-    """Scale the rows of Jᵀ as far as they are free; ``count`` are the law's."""
-    n = directions.share.shape[0]
-    for row in range(count):  # the directions of contacts have no rows
-        free = freedom(directions, n - count + row)
+def _scale_null_space(directions: Directions, scale: float, JT: Array) -> None:
+    """Scale the rows of Jᵀ as far as they are free."""
+    count = JT.shape[0]
+    without = directions.share.shape[0] - count  # those of contacts
+    for row in range(count):
+        free = freedom(directions, without + row)
         if free > 0.0:
             factor = scale**free
-            for j in range(problem.JT.shape[1]):
-                problem.JT[row, j] *= factor
+            for j in range(JT.shape[1]):
+                JT[row, j] *= factor
 
 
 @kernel
-def _write_force_factor(
-    forces: Forces, count: int, cost: float, problem: Problem
-) -> int:
-    """Write the rows of Jᵀ of the forces after others; return the number of all."""
-    JT, size = problem.JT, forces.first.shape[0]
-    n = JT.shape[1] - size
-    for j in range(size):
-        row, column = count + j, n + j
-        for i in range(JT.shape[1]):
-            JT[row, i] = 0.0
+def _write_force_factor(forces: Forces, cost: float, problem: Problem) -> None:
+    """Write the forces' part of J."""
+    for j in range(problem.own.shape[0]):
         inverse_cost = max(forces.inverse_cost[j], _LEAST_INVERSE_COST)
-        JT[row, column] = np.sqrt(inverse_cost / cost)
-        problem.first[row], problem.last[row] = column, column + 1
-    return int(count + size)
+        problem.own[j] = np.sqrt(inverse_cost / cost)
 
 
 @kernel
 def _moving(problem: Problem, count: int) -> Problem:
     """Return a QP in which only the first rows of Jᵀ move."""
-    JT, first, last, A, begin, end, lower, upper, softness, equalities = problem
-    return Problem(
-        JT[:count],
-        first[:count],
-        last[:count],
-        A,
-        begin,
-        end,
-        lower,
-        upper,
-        softness,
-        equalities,
-    )
+    JT, own, A, begin, end, lower, upper, softness, equalities = problem
+    return Problem(JT[:count], own, A, begin, end, lower, upper, softness, equalities)
 
 
 @kernel

@@ -28,6 +28,7 @@ from hsp_control import (
 )
 from hsp_control.common import linalg
 from hsp_control.common.linalg import (
+    add_rows,
     cholesky,
     multiply,
     multiply_transposed,
@@ -98,6 +99,16 @@ def test_products(seed: int, n: int, m: int, scale: float) -> None:
     assert (np.abs(out - A @ x) <= 2 * m * EPS * np.abs(A) @ np.abs(x)).all()
     bound = 2 * n * EPS * np.abs(A).T @ np.abs(y)
     assert (np.abs(transposed - A.T @ y) <= bound).all()
+
+
+@given(seeds, sizes, sizes)
+def test_add_rows(seed: int, n: int, m: int) -> None:
+    """Rows beyond the weights do not count, nor entries beyond out."""
+    rows, weights, out = normal(seed, m + 2, n + 1), normal(seed + 1, m), np.ones(n)
+    rows[m:], rows[:, n] = np.nan, np.nan
+    add_rows(weights, rows, out)
+    bound = 2 * (m + 1) * EPS * (1.0 + np.abs(rows[:m, :n]).T @ np.abs(weights))
+    assert (np.abs(out - 1.0 - rows[:m, :n].T @ weights) <= bound).all()
 
 
 def test_products_of_views() -> None:
@@ -340,6 +351,8 @@ def arguments(name: str) -> tuple[Any, ...]:
     index = np.arange(n)
     shared = np.array([0, 1, 2, 3, 4, 5, 5])  # the last joint mimics its neighbour
     return {
+        "add_rows": (normal(24, 6), normal(25, 6, n), normal(26, n)),
+        "copy": (sample[0], np.zeros(n)),
         "multiply": (J, sample[0], np.zeros(m)),
         "multiply_transposed": (J, sample[0][:m], np.zeros(n)),
         "cholesky": (spd, np.zeros((6, 6))),

@@ -144,6 +144,12 @@ def test_calls_are_made_in_turn_and_when_it_is_time() -> None:
     assert called(log) == [11.5, 2.0]
     call(2.0)  # the end is not within
     assert called(log) == [12.0]
+    # Within another sequence, a call is made when it is time for both.
+    call = sequence([Timed(first, 0.0, 9.0), Timed(sequence(calls), 1.5, 9.0)])
+    call(1.0)
+    assert called(log) == [1.0]
+    call(1.5)
+    assert called(log) == [1.0, 11.5, 2.0]
 
 
 def test_steps_are_references_then_what_reads_them_then_the_law() -> None:
