@@ -188,9 +188,16 @@ def parts_table(case: Standing, states: list[State]) -> str:
         )
         timed("cones", lambda: support.permits(forces))  # noqa: B023
         # Pinocchio's pass is kept until the state changes: the second call is cheap.
+        violated = actuation.violated(state, a, active.resolution.code)
         delivered = timed(
             "deliver, total",
-            lambda: actuation.deliver(state, a, active.resolution, support),  # noqa: B023
+            lambda: actuation.deliver(
+                state,
+                a,  # noqa: B023
+                violated,  # noqa: B023
+                active.resolution,
+                support,
+            ),
         )
         key = f"deliver, status {delivered[3]}"
         times.setdefault(key, []).append(times["deliver, total"][-1])
