@@ -7,6 +7,7 @@ with δ' = v for single-dof joints and δ' = J_r(δ)⁻¹ v for a root.
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import partial
+from math import ceil
 from typing import Any
 
 import numpy as np
@@ -422,4 +423,4 @@ class _Trial:
 
 def number_of_steps(duration: float, step: float) -> int:
     """Return the smallest number of equal steps that are not longer than ``step``."""
-    return max(1, int(np.ceil(duration / step - 1e-9)))
+    return max(1, ceil(duration / step - 1e-9))

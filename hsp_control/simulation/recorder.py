@@ -119,7 +119,7 @@ class Recorder:
                 f"{prefix}.friction_used", (), "-", "largest ‖f_t‖/(μ f_n) of a point"
             )
         self._excess = LimitExcess(robot)
-        self._points, self._parents = _skeleton(robot, controller)
+        self._carriers, self._frames, self._parents = _skeleton(robot, controller)
         column("skeleton", (len(self._parents), 3), "m", "joints and task frames")
         self._add_term_columns()
         for obstacle in scene.values():
@@ -243,10 +243,10 @@ class Recorder:
             for prefix, stream in self._streams[name]:
                 for what, value in stream.counts().items():
                     columns[f"{prefix}.{what}"][i] = value
-        for k, (frame, joint) in enumerate(self._points):
-            columns["skeleton"][i, k] = (
-                state.position(frame) if frame else state.data.oMi[joint].translation
-            )
+        skeleton = columns["skeleton"][i]
+        skeleton[:] = state.world.placements[self._carriers, 9:]
+        for k, frame in self._frames:
+            skeleton[k] = state.position(frame)
         moved = self._controller.scene
         for known in self._scene.values():
             # No `get`: a scene raises its own error, not KeyError.
@@ -501,23 +501,26 @@ def _probe(controller: Controller) -> RobotState:
 
 def _skeleton(
     robot: Robot, controller: Controller
-) -> tuple[list[tuple[str, int]], list[int]]:
-    """Return the points to draw as (frame, joint), and each one's parent, -1 for none.
+) -> tuple[list[int], list[tuple[int, str]], list[int]]:
+    """Return the joints of the points to draw, which of them are frames, and parents.
 
-    There is one point per joint, and one per frame that a task controls.
+    There is one point per joint, and one per frame that a task controls: of these also
+    index and name. A parent is the index of another point, -1 for none.
     """
-    points: list[tuple[str, int]] = []
+    joints: list[int] = []
+    named: list[tuple[int, str]] = []
     parents: list[int] = []
     index = {0: -1}
     for joint in range(1, robot.model.njoints):
-        index[joint] = len(points)
-        points.append(("", joint))
+        index[joint] = len(joints)
+        joints.append(joint)
         parents.append(index[robot.model.parents[joint]])
     frames = dict.fromkeys(
         frame for task in controller.tasks if (frame := getattr(task, "frame", None))
     )
     for frame in frames:
         joint = robot.model.frames[robot.frame_id(frame)].parentJoint
-        points.append((frame, joint))
+        named.append((len(joints), frame))
+        joints.append(joint)
         parents.append(index[joint])
-    return points, parents
+    return joints, named, parents

@@ -114,9 +114,20 @@ class FramePose(FrameTask, TrackingTask, CompliantTask, type="frame_pose"):
         motion = state.frame(self.frame_name).motion
         return Rotating(3, motion.rotation, motion.velocity[3:])
 
+    def _reference(self, state: RobotState) -> PoseSample:
+        """Return the reference at the state's time; the state keeps the memory."""
+
+        def make() -> tuple[PoseSample, Follower]:
+            sample = PoseSample.allocate()
+            return sample, self.pose.follow(sample)
+
+        sample, follow = state.made(self, "reference", make)
+        follow(state.t)
+        return sample
+
     def reference_rate(self, state: RobotState) -> Array:
         """Return x_d' and w_d in world axes, shape (6,) [m/s, rad/s]."""
-        sample = self.pose.sample(state.t)
+        sample = self._reference(state)
         velocity, turning = (
             sample.position.velocity,
             sample.orientation.angular_velocity,
@@ -126,7 +137,7 @@ class FramePose(FrameTask, TrackingTask, CompliantTask, type="frame_pose"):
     def measure(self, state: RobotState) -> tuple[Array, Array]:
         """Return desired and actual pose: x, y, z [m], quaternion (x, y, z, w)."""
         frame = state.frame(self.frame_name)
-        sample = self.pose.sample(state.t)
+        sample = self._reference(state)
         desired, actual = np.zeros(7), np.zeros(7)
         desired[:3], actual[:3] = sample.position.position, frame.position
         quaternion_from_rotation(sample.orientation.rotation, desired[3:])
