@@ -62,10 +62,14 @@ class _CallableLibrary(_Library):  # type: ignore[misc,valid-type]
         Nothing else calls what is linked into it. LLVM is told so: it then removes
         arguments that are not read, and what it has inlined everywhere. Of an array's
         seven or more words, a call between kernels would else hand over all.
+
+        Such a function gets a name of its own: when other code is loaded, its copy of
+        the function, with all arguments, would else be taken for the same.
         """
         for function in self._final_module.functions:
             if not function.is_declaration and function.linkage == Linkage.linkonce_odr:
                 function.linkage = Linkage.internal
+                function.name += ".internal"
         passes, options = self._codegen._module_pass_manager()
         passes.run(self._final_module, options)
 
