@@ -32,7 +32,7 @@ from hsp_control.constraints.limits.acceleration_bounds import (
     violated_limits,
     within,
 )
-from hsp_control.control.actuation.deviation_cost import decay_rate
+from hsp_control.control.actuation.deviation_cost import DecayRate
 from hsp_control.control.actuation.held_effort import (
     Held,
     HeldEffort,
@@ -93,6 +93,7 @@ class Actuation:
             self._a_lower, self._a_upper, self._tau_lower, self._tau_upper
         )
         self._effort = np.zeros(nv)
+        self._decay_rate = DecayRate()
         self._steps: WeakKeyDictionary[Resolution, LimitedStep] = WeakKeyDictionary()
         self._resolution: Resolution | None = None
         self._step: LimitedStep | None = None
@@ -380,7 +381,7 @@ class Actuation:
         limits = self.limits
         if limits is not None and limits.null_space_speed is not None:
             problem = resolution.problem
-            rate = decay_rate(problem.gain, problem.metric.L)
+            rate = self._decay_rate.of(problem.gain, problem.metric.L)
             np.multiply(rate, limits.null_space_speed, out=self._speed)
         status, relaxation = step.solve(a, effort, redistribute, barriers)
         if status is None:  # the solver failed: the efforts stay within their limits

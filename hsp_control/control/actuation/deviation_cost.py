@@ -365,16 +365,35 @@ def write_null_space_rows(directions: Directions, A: Array) -> None:
                 A[i, j] += raised[i] * lowered
 
 
-def decay_rate(gain: Array, L: Array) -> float:
-    """Return λ, the slowest rate at which ‖e_N‖_W decays [1/s], W = L Lᵀ.
+class DecayRate:
+    """λ, the slowest rate at which ‖e_N‖_W decays [1/s], W = L Lᵀ.
 
-    Args:
-        gain: K_N, shape (nv, nv) [1/s].
-        L: Cholesky factor of the metric, shape (nv, nv).
+    With one number for all degrees of freedom it is that number, whatever the metric:
+    then it is found once for a gain, and not in each step.
     """
-    first = float(gain[0, 0])
-    if (gain == first * np.eye(len(gain))).all():
-        return first
+
+    def __init__(self) -> None:
+        """Begin without a gain."""
+        self._known = b""
+        self._number: float | None = None
+
+    def of(self, gain: Array, L: Array) -> float:
+        """Return λ.
+
+        Args:
+            gain: K_N, shape (nv, nv) [1/s].
+            L: Cholesky factor of the metric, shape (nv, nv).
+        """
+        written = gain.tobytes()
+        if written != self._known:
+            first = float(gain[0, 0])
+            alike = (gain == first * np.eye(len(gain))).all()
+            self._known, self._number = written, first if alike else None
+        return _least_rate(gain, L) if self._number is None else self._number
+
+
+def _least_rate(gain: Array, L: Array) -> float:
+    """Return the largest λ with xᵀW K_N x ≥ λ xᵀW x."""
     lowered = L @ (L.T @ gain)
     both = 0.5 * (lowered + lowered.T)
     for _ in range(2):  # L⁻¹ from the left, then from the right

@@ -27,8 +27,8 @@ from hsp_control import (
 from hsp_control.constraints.limits import Scaled, StaticEffort
 from hsp_control.control.actuation import Status
 from hsp_control.control.actuation.deviation_cost import (
+    DecayRate,
     Directions,
-    decay_rate,
     write_directions,
     write_inverse_root,
     write_null_space_rows,
@@ -152,15 +152,21 @@ def test_the_root_of_the_inverse_cost_is_that(metric: str, seed: int) -> None:
 @given(seeds)
 @settings(max_examples=30)
 def test_decay_rate_is_the_least(seed: int) -> None:
-    """xᵀW K_N x ≥ λ xᵀW x, met with equality by one x; a scalar gain is its own."""
+    """xᵀW K_N x ≥ λ xᵀW x, met with equality by one x; a scalar gain is its own.
+
+    Also after another gain, and for another metric.
+    """
     rng = np.random.default_rng(seed)
     root = rng.standard_normal((5, 5))
     W = root @ root.T + np.eye(5)
     L = np.linalg.cholesky(W)
-    assert decay_rate(3.0 * np.eye(5), L) == 3.0
+    decay_rate = DecayRate()
+    assert decay_rate.of(3.0 * np.eye(5), L) == 3.0
     half = rng.standard_normal((5, 5))
     gain = np.linalg.solve(W, half @ half.T + 0.1 * np.eye(5))
-    rate = decay_rate(gain, L)
+    decay_rate.of(gain, np.eye(5))
+    rate = decay_rate.of(gain, L)
+    assert decay_rate.of(3.0 * np.eye(5), L) == 3.0
     x = rng.standard_normal((5, 200))
     parts = np.einsum("ik,ik->k", x, W @ gain @ x) / np.einsum("ik,ik->k", x, W @ x)
     assert parts.min() >= rate * (1.0 - 1e-9)
