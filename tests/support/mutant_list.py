@@ -842,8 +842,8 @@ MUTANTS = (
     Mutant(
         "command line: --set ignored",
         CLI + "loading.py",
-        "        *options.overrides,\n",
-        "",
+        "(*options.overrides, *overrides)",
+        "overrides",
         UNIT + "cli/test_cli.py -k a_log_that_numpy_alone",
     ),
     Mutant(
