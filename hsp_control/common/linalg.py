@@ -256,41 +256,55 @@ def smallest_singular_value_bound(X: Array) -> float:
 def orthogonalise_rows(Y: Array, U: Array) -> None:
     """Overwrite Y with U Y, whose rows are orthogonal; U is orthogonal.
 
-    One-sided Jacobi. The norms of the new rows are the singular values of Y; small ones
-    have high relative accuracy (Demmel and Veselić 1992). Y may be rank-deficient.
+    One-sided Jacobi, in rounds of pairs that share no row, on several of which a
+    processor works at a time. The norms of the new rows are the singular values of Y;
+    small ones have high relative accuracy (Demmel and Veselić 1992). Y may be
+    rank-deficient.
 
     Args:
         Y: Shape (m, n).
         U: Shape (m, m); shape (0, m) if only the singular values are needed.
     """
-    m, n = Y.shape
+    m = Y.shape[0]
     for i in range(m):
         for j in range(U.shape[0]):
             U[i, j] = 1.0 if i == j else 0.0
+    turning = m - 1 + m % 2  # with an even m the last row is in one pair of each round
     for _ in range(30):  # sweeps; about six are needed
         rotated = False
-        for p in range(m - 1):
-            for q in range(p + 1, m):
-                alpha = beta = gamma = 0.0
-                for i in range(n):
-                    alpha += Y[p, i] * Y[p, i]
-                    beta += Y[q, i] * Y[q, i]
-                    gamma += Y[p, i] * Y[q, i]
-                if abs(gamma) <= 1e-15 * np.sqrt(alpha * beta) or gamma == 0.0:
-                    continue
-                rotated = True
-                zeta = (beta - alpha) / (2.0 * gamma)
-                sign = 1.0 if zeta >= 0.0 else -1.0
-                t = sign / (abs(zeta) + np.sqrt(1.0 + zeta * zeta))
-                c = 1.0 / np.sqrt(1.0 + t * t)
-                s = c * t
-                for i in range(n):
-                    y = Y[p, i]
-                    Y[p, i] = c * y - s * Y[q, i]
-                    Y[q, i] = s * y + c * Y[q, i]
-                for i in range(U.shape[0]):
-                    y = U[p, i]
-                    U[p, i] = c * y - s * U[q, i]
-                    U[q, i] = s * y + c * U[q, i]
+        for r in range(turning):
+            if turning < m:
+                rotated = _rotate_rows(Y, U, r, turning) or rotated
+            for k in range(1, (turning + 1) // 2):
+                p = r - k if r >= k else r - k + turning
+                q = r + k if r + k < turning else r + k - turning
+                rotated = _rotate_rows(Y, U, min(p, q), max(p, q)) or rotated
         if not rotated:
             return
+
+
+@kernel
+def _rotate_rows(Y: Array, U: Array, p: int, q: int) -> bool:
+    """Rotate two rows so that they are orthogonal; return whether they were not."""
+    n = Y.shape[1]
+    alpha = beta = gamma = 0.0
+    for i in range(n):
+        alpha += Y[p, i] * Y[p, i]
+        beta += Y[q, i] * Y[q, i]
+        gamma += Y[p, i] * Y[q, i]
+    if abs(gamma) <= 1e-15 * np.sqrt(alpha * beta) or gamma == 0.0:
+        return False
+    zeta = (beta - alpha) / (2.0 * gamma)
+    sign = 1.0 if zeta >= 0.0 else -1.0
+    t = sign / (abs(zeta) + np.sqrt(1.0 + zeta * zeta))
+    c = 1.0 / np.sqrt(1.0 + t * t)
+    s = c * t
+    for i in range(n):
+        y = Y[p, i]
+        Y[p, i] = c * y - s * Y[q, i]
+        Y[q, i] = s * y + c * Y[q, i]
+    for i in range(U.shape[0]):
+        y = U[p, i]
+        U[p, i] = c * y - s * U[q, i]
+        U[q, i] = s * y + c * U[q, i]
+    return True

@@ -367,6 +367,7 @@ def arguments(name: str) -> tuple[Any, ...]:
         "_project_out_row": (independent.copy(), triangular(5), 2),
         "squared_norm": (sample[0],),
         "smallest_singular_value_bound": (triangular(6),),
+        "_rotate_rows": (independent.copy(), np.eye(5), 1, 3),
         "orthogonalise_rows": (deficient.copy(), np.zeros((5, 5))),
         "acceleration": (
             *(rows_of(J, J_dot, sample[1][:m]), triangular(7), CONSTANT),
