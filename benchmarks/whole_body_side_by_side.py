@@ -252,7 +252,7 @@ def compare(
             replace_section(ROOT / "docs" / "step_cost.md", "make bench, Talos", costs)
     parts = parts_table(case, path[::5])
     say(
-        "Times of the parts of this law's step (*deliver* contains inverse dynamics, "
+        "Times of the parts of this law's step (*deliver* contains "
         f"map, minimum-norm forces and cones):\n\n{parts}\n"
     )
 
