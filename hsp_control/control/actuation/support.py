@@ -1,6 +1,7 @@
 """Contact forces of the active contacts: their map, cones, bounds and points."""
 
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -100,9 +101,6 @@ class Support:
         self.forces, self._asked = np.zeros(self.size), np.zeros(self.size)
         self._maps = IdentityCache(self._bind_maps)
         self._solve = IdentityCache(self._bind_solve)
-        self._permits = bind(
-            within_cones, self.cone, self._asked, self.lower, self.upper
-        )
 
     def update(self, state: RobotState, resolution: Resolution) -> None:
         """Compute the map, the positions, the bounds of schedules, and the commands.
@@ -159,6 +157,10 @@ class Support:
         """Return whether forces, shape (size,), are within cones and bounds."""
         self._asked[:] = forces
         return bool(self._permits())
+
+    @cached_property
+    def _permits(self) -> Callable[[], float]:
+        return bind(within_cones, self.cone, self._asked, self.lower, self.upper)
 
     def in_world(self, forces: Array) -> Array:
         """Return the forces in world axes, shape (size/3, 3) [N]."""
