@@ -51,8 +51,6 @@ AccelerationModifier = Callable[
 stack, a). It returns the acceleration to deliver, shape (nv,), and an additional effort
 besides M a + N, shape (nv,), or None."""
 
-_NO_FORCES: Array = np.zeros(0)
-
 _MEMORY = 1.0
 """Changes that were complete this long ago are forgotten [s]; an integrator may ask for
 earlier times than the last one."""
@@ -303,7 +301,7 @@ class Controller:
                         self._raise_not_finite()
                     damped = active.damped
             if direct and violated == 0:
-                tau, forces = state.effort, _NO_FORCES
+                tau, forces = state.effort, active.support.forces
                 status, relaxation = EXACT, 0.0
             else:
                 tau, a, forces, status, relaxation = self._actuation.deliver(
