@@ -96,7 +96,7 @@ class ActiveStack:
             followed: object = task.followed
             if isinstance(followed, Streamed):
                 self.streamed.append((followed, partial(task.measure, state)))
-        self.has_forces = support.size > 0
+        self.forces, self.has_forces = support.forces, support.size > 0
         self.memory = self.resolution.problem.record.memory
         self.acceleration = self.resolution.acceleration
         self.contact_rows = _places(self.contacts, 0)

@@ -280,9 +280,10 @@ class Controller:
             ConfigurationError: If a quaternion or a (cos, sin) pair is not of norm 1.
             ControllerError: If the state belongs to another robot.
         """
-        with self._lock:
+        lock = self._lock
+        lock.acquire()  # as a context manager it takes 0.1 µs more
+        try:
             state, whole, offset = self._state, self._whole, None
-            direct, damped, violated = False, "", 0
             if whole is None or modifier is not None or q is None or v is None:
                 self._observe(t, q, v)
                 a, damped = self._resolve()
@@ -291,31 +292,34 @@ class Controller:
                     self._modified[:], offset = modifier(state, active, a)
                     a = self._modified
                 violated = self._actuation.violated(state, a, active.resolution.code)
+                direct = False
             else:
                 active, move, direct = whole
-                a = active.acceleration
+                a, damped, violated = active.acceleration, "", 0
                 value = state.advance(move, t, q, v)  # type: ignore[arg-type]
                 if value != 0.0:
                     code, violated = divmod(int(value), CODES)
                     if code == BEYOND_ANY_LEVEL:
                         self._raise_not_finite()
-                    damped = active.damped
-            if direct and violated == 0:
-                tau, forces = state.effort, active.support.forces
+                    damped, direct = active.damped, direct and not violated
+            if direct:
+                tau, forces = state.effort, active.forces
                 status, relaxation = EXACT, 0.0
             else:
                 tau, a, forces, status, relaxation = self._actuation.deliver(
                     state, a, violated, active.resolution, active.support, offset
                 )
+                # The kernel of limited steps has looked at all efforts already.
+                if (status is RELAXED or offset is not None) and not isfinite(
+                    tau @ tau
+                ):
+                    self._raise_not_finite()
             # Not on the controller itself: its own attributes cost 0.4 µs to set.
             self._actuation.delivered = a
-            # The kernel of limited steps has looked at all efforts already.
-            if (status is RELAXED or offset is not None) and not isfinite(tau @ tau):
-                self._raise_not_finite()
             # By name, and without a call of nine arguments, which costs 1 µs.
             if out is None:
                 out = ControlOutput()
-                out.tau, out._memory = tau.copy(), active.memory.copy()
+                out.tau, out._memory = tau.copy(), active.memory.tobytes()
                 out._views = None
             else:
                 out.tau[:] = tau
@@ -325,6 +329,8 @@ class Controller:
             out.forces = forces.copy() if active.has_forces else forces
             out.damped, out.status, out.relaxation = damped, status, relaxation
             return out
+        finally:
+            lock.release()
 
     def _observe(
         self,

@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+import numpy as np
+
 from hsp_control.common.arrays import Array
 from hsp_control.control.actuation.status import Status
 from hsp_control.law.problem import Record
@@ -47,7 +49,7 @@ class ControlOutput:
     status: Status
     relaxation: float
     _acceleration: Array | None  # None: the law's own
-    _memory: Array
+    _memory: Array | bytes  # bytes are made faster, and most are never looked at
     _rows: int
     _views: Record | None  # of the memory, once they were asked for
 
@@ -74,18 +76,18 @@ class ControlOutput:
 
     def _keep(self, memory: Array) -> None:
         """Copy the record of a step, into the memory of the last one if it fits."""
-        if self._memory.shape == memory.shape:
-            self._memory[:] = memory
+        own = self._memory
+        if isinstance(own, bytes) or own.shape != memory.shape:
+            self._memory, self._views = memory.copy(), None
         else:
-            self._memory = memory.copy()
+            own[:] = memory
 
     @property
     def _record(self) -> Record:
-        views = self._views
-        if views is None or views.memory is not self._memory:
-            views = Record.over(self._memory, self._rows, len(self.tau))
-            self._views = views
-        return views
+        if self._views is None:
+            memory = np.frombuffer(self._memory)
+            self._views = Record.over(memory, self._rows, len(self.tau))
+        return self._views
 
 
 class Diagnostics(NamedTuple):
