@@ -32,7 +32,8 @@ from hsp_control.cli.stopwatch import Stopwatch
 from hsp_control.common.exceptions import LogError, SimulationError
 from hsp_control.config import Experiment, json_schema
 from hsp_control.config.document import Document
-from hsp_control.config.experiment import Setup, build, set_up
+from hsp_control.config.experiment import build
+from hsp_control.config.setup import Setup, set_up
 from hsp_control.robot import Robot
 from hsp_control.robot.description.sources import example_robots
 from hsp_control.simulation import Rollout

@@ -25,7 +25,8 @@ from hsp_control.cli.robot_start import begun_where_it_is
 from hsp_control.cli.steering import let_steer, steering_page
 from hsp_control.common.exceptions import LiveError, LogError
 from hsp_control.config import Experiment
-from hsp_control.config.experiment import build, set_up
+from hsp_control.config.experiment import build
+from hsp_control.config.setup import set_up
 from hsp_control.control.compensation import Command
 from hsp_control.live import (
     Faults,

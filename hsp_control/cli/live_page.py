@@ -22,7 +22,7 @@ from hsp_control.cli.opening_page import draw_before, draw_empty, status_line
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.config import load_experiment
 from hsp_control.config.document import Document
-from hsp_control.config.experiment import Setup, set_up
+from hsp_control.config.setup import Setup, set_up
 from hsp_control.play.channel import Channel
 from hsp_control.play.mirror import Mirror
 from hsp_control.play.picture import FRAME, Picture

@@ -5,7 +5,8 @@ from pathlib import Path
 
 from hsp_control.config import Experiment
 from hsp_control.config.document import Document
-from hsp_control.config.experiment import build, read_document
+from hsp_control.config.experiment import build
+from hsp_control.config.source import read_document
 from hsp_control.robot.description.access import ANYWHERE, Access, only_within
 from hsp_control.robot.description.sources import is_path
 

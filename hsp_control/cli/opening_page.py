@@ -6,7 +6,7 @@ from contextlib import contextmanager, suppress
 
 from hsp_control.cli.compiling import compiling_told
 from hsp_control.common.exceptions import HspControlError, ViewerError
-from hsp_control.config.experiment import Setup
+from hsp_control.config.setup import Setup
 from hsp_control.config.view_settings import ViewSettings
 from hsp_control.visualization.viewer import Viewer, browser
 from hsp_control.visualization.viewer.commands import set_caption, set_status

@@ -15,7 +15,8 @@ from hsp_control.cli.opening_page import (
     status_line,
 )
 from hsp_control.common.exceptions import HspControlError
-from hsp_control.config.experiment import build, set_up
+from hsp_control.config.experiment import build
+from hsp_control.config.setup import set_up
 from hsp_control.play import Picture, Session
 from hsp_control.play import play as play_in_real_time
 from hsp_control.play.playable import playable_document

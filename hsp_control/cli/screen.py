@@ -15,7 +15,7 @@ from hsp_control.cli.opening_page import (
 )
 from hsp_control.common.exceptions import ViewerError
 from hsp_control.config import Experiment
-from hsp_control.config.experiment import Setup
+from hsp_control.config.setup import Setup
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.recorder import Recorder
 from hsp_control.visualization.viewer import LiveView, Viewer, view_logs

@@ -14,7 +14,7 @@ from hsp_control.cli.opening_page import OpeningPage
 from hsp_control.cli.page_process import PageProcess
 from hsp_control.common.exceptions import ViewerError
 from hsp_control.config import Experiment
-from hsp_control.config.experiment import Setup
+from hsp_control.config.setup import Setup
 from hsp_control.control.controller import Controller
 from hsp_control.live import OperatorRequests
 from hsp_control.play.dead_mans_key import DeadMansKey

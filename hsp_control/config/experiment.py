@@ -1,27 +1,20 @@
 """An experiment: the objects of a configuration, ready to run."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
 from os import PathLike
-from pathlib import Path
-from typing import Any, Literal, NamedTuple, NoReturn
+from typing import Any, Literal, NoReturn
 
-import numpy as np
 import yaml
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ConfigError, ImmutableError, ModelError
-from hsp_control.common.files import is_file
-from hsp_control.common.resources import bundled_configs
-from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.config.composing import compose
 from hsp_control.config.document import Document
-from hsp_control.config.located_scene import located_scene
-from hsp_control.config.loop_check import check_compensation, check_rates
 from hsp_control.config.named_obstacles import named_obstacles
 from hsp_control.config.scenario import Scenario
-from hsp_control.config.streams import with_messages, with_recordings
-from hsp_control.config.validation import validate
+from hsp_control.config.setup import Setup, set_up
+from hsp_control.config.source import read_document
 from hsp_control.config.view_settings import ViewSettings
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits
@@ -32,7 +25,7 @@ from hsp_control.control.controller import Controller
 from hsp_control.declaration.named import keyed
 from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.plain_data import plain_data
-from hsp_control.estimation import Estimator, begun
+from hsp_control.estimation import Estimator
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.live.settings import LiveSettings
 from hsp_control.null_space.fields import NullSpaceField
@@ -40,17 +33,14 @@ from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.metrics import IdentityMetric, Metric
 from hsp_control.plans import Plan
 from hsp_control.robot import Robot
-from hsp_control.robot.description.access import only_within
 from hsp_control.robot.description.robot_description import RobotDescription
-from hsp_control.robot.description.sources import packaged_folders
 from hsp_control.robot.integrators import Integrator
 from hsp_control.simulation import Rollout, simulate
 from hsp_control.simulation.initial_state import InitialState
-from hsp_control.simulation.plants import Plant, PlantPart, SampledPlant
+from hsp_control.simulation.plants import Plant, PlantPart
 from hsp_control.simulation.real_time import in_real_time
 from hsp_control.simulation.recorder import Recorder
 from hsp_control.simulation.settings import SimulationSettings
-from hsp_control.simulation.simulate import check_steps
 from hsp_control.tasks import Task
 from hsp_control.trajectories.streams.stream import Streamed
 
@@ -175,7 +165,8 @@ class Experiment:
             "plant": plant,
             **{key: part for key, part in given.items() if part is not None},
         }
-        vars(self).update(vars(build(Document(data, {}, name))))
+        document = Document(data, {}, name)
+        vars(self).update(compose(document, set_up(document))._asdict())
 
     def __setattr__(self, attribute: str, value: object) -> NoReturn:
         """Raise: an experiment does not change.
@@ -294,132 +285,6 @@ def load_experiment(
     return build(document)
 
 
-def read_document(
-    source: str | PathLike[str] | dict[str, Any],
-    *,
-    strict: bool = False,
-    allow: Sequence[str | PathLike[str]] = (),
-) -> Document:
-    """Return the configuration's data with the location of each key.
-
-    See `load_experiment` for the arguments.
-
-    Raises:
-        ConfigError: If there is no such configuration or it is not plain YAML.
-        LogError: If it is a log that cannot be read.
-    """
-    document = _read(source)
-    if strict:
-        own = [] if isinstance(source, dict) else [Path(document.name).parent]
-        document.access = only_within([*own, *packaged_folders(), *allow])
-        document.packages = frozenset(map(str, allow))
-    return document
-
-
-def _read(source: str | PathLike[str] | dict[str, Any]) -> Document:
-    if isinstance(source, dict):
-        return Document(source, {}, "configuration")
-    path = Path(source)
-    if path.suffix in {".npz", ".journal"}:
-        run = Rollout.load(path)
-        if run.config is None:
-            raise ConfigError(
-                f"{path}: this log was made from Python and contains no configuration"
-            )
-        if lost := run.meta.get("changes_lost"):
-            raise ConfigError(
-                f"{path}: the run cannot be repeated, because changes were made while "
-                f"it ran that are not data: {lost}"
-            )
-        if lost := run.meta.get("streams_lost"):
-            raise ConfigError(
-                f"{path}: the run cannot be repeated, because {lost} messages of its "
-                "streams were too many to be recorded"
-            )
-        _check_heard(path, run)
-        made = run.meta.get("changes") or []
-        config = with_recordings(
-            run.config,
-            run.meta.get("streams") or {},
-            run.meta.get("plan_streams") or [],
-        )
-        return Document(config | {"changes": made}, {}, str(path))
-    known = bundled_configs()
-    if path.suffix in {".yaml", ".yml"} or is_file(path):
-        return Document.read(path)
-    if str(source) in known:
-        return Document.read(known[str(source)])
-    raise ConfigError(
-        f"no configuration {str(source)!r}{did_you_mean(str(source), known)} "
-        f"(give the path of a .yaml file, or one of: {listing(known)})"
-    )
-
-
-def _check_heard(path: Path, run: Rollout) -> None:
-    """Check that a log holds all that its streams have taken.
-
-    Raises:
-        ConfigError: If it does not: it is the journal of a process that was killed.
-    """
-    for name, recordings in (run.meta.get("streams") or {}).items():
-        for k, messages in enumerate(recordings):
-            column = f"stream.{name}{f'_{k + 1}' if k else ''}.taken"
-            taken = np.nanmax(run[column]) if column in run.columns else 0
-            if taken > len(messages):
-                raise ConfigError(
-                    f"{path}: the run cannot be repeated: a stream of task {name!r} "
-                    f"took {taken:.0f} messages, and the log holds {len(messages)} of "
-                    "them, because it has no end"
-                )
-
-
-class Setup(NamedTuple):
-    """What a configuration is about, before anything is compiled for it.
-
-    Attributes:
-        scenario: The checked configuration.
-        robot: The robot.
-        scene: Its obstacles.
-    """
-
-    scenario: Scenario
-    robot: Robot
-    scene: Scene
-
-    def start(self) -> Array:
-        """Return the start configuration, shape (nq,); home where it has to be found.
-
-        Raises:
-            HspControlError: If it is wrong; `build` says where.
-        """
-        start, contacts = self.scenario.start, self.scenario.contacts.values()
-        if start.is_found:
-            return self.robot.home()
-        return start.configuration_of(self.robot, contacts)
-
-
-def set_up(document: Document) -> Setup:
-    """Check a configuration, and load its robot and its scene: it compiles no kernel.
-
-    Raises:
-        HspControlError: If the configuration is wrong; see `load_experiment`.
-    """
-    scenario = validate(document, Scenario)
-    if not scenario.tasks and scenario.plan is None:
-        raise document.error(("tasks",), "needs at least one task, or a plan")
-    folder = Path(document.name).resolve().parent
-    scenario = replace(scenario, robot=scenario.robot.located(folder))
-    with document.at():
-        scenario = with_messages(scenario, folder, document.access)
-    robot = load_robot(document, scenario)
-    for contact in scenario.contacts.values():
-        with document.at("contacts", contact.name, "frame"):
-            robot.frame_id(contact.frame)
-    with document.at():
-        scene = located_scene(scenario.scene, folder, document.access)
-    return Setup(replace(scenario, scene=scene), robot, scene)
-
-
 def build(document: Document, setup: Setup | None = None) -> Experiment:
     """Build the experiment of a configuration.
 
@@ -430,88 +295,10 @@ def build(document: Document, setup: Setup | None = None) -> Experiment:
     Raises:
         HspControlError: If the configuration is wrong; see `load_experiment`.
     """
-    scenario, robot, scene = setup or set_up(document)
-    folder = Path(document.name).resolve().parent
-    contacts = tuple(scenario.contacts.values())
-    null_space, tasks = scenario.null_space, tuple(scenario.tasks.values())
-    with document.at("start"):
-        q0 = scenario.start.configuration_of(
-            robot, contacts, tasks, scene, null_space.singularity_threshold
-        )
-        if scenario.start.is_found:  # the log repeats the run where another is found
-            found = InitialState(configuration=q0, velocity=scenario.start.velocity)
-            scenario = replace(scenario, start=found)
-    with document.at():
-        limits = scenario.limits
-        if scenario.plan is not None:
-            tasks, contacts = scenario.plan.parts(robot, tasks, contacts)
-            limits = scenario.plan.limits(limits)
-        controller = Controller(
-            robot,
-            tasks,
-            null_space.field,
-            null_space_gain=null_space.gain,
-            metric=null_space.metric,
-            singularity_threshold=null_space.singularity_threshold,
-            limits=limits,
-            contacts=contacts,
-            base=scenario.base,
-            scene=scene,
-            start=q0,
-            changes=scenario.changes,
-        )
-    with document.at("start"):
-        v0 = scenario.start.velocity_of(controller, q0)
-        if controller.limits is not None:
-            controller.limits.check_start(q0, v0)
-    if scenario.plan is not None:
-        with document.at("plan"):
-            scenario.plan.begin(controller).start(robot.state(0.0, q0, v0))
-    scenario = replace(scenario, plant=scenario.plant.located(folder))
-    plant = _plant(document, scenario, robot)
-    with document.at():
-        begun(scenario.estimators, controller, plant.inertial())
-    check_compensation(document, scenario, controller)
-    rates = check_rates(document, scenario, controller, q0, plant.robot)
-    return _experiment(
-        name=Path(document.name).stem,
-        scenario=scenario,
-        robot=robot,
-        controller=controller,
-        scene=scene,
-        q0=q0,
-        v0=v0,
-        plant=plant,
-        rate_findings=rates,
-    )
-
-
-def load_robot(document: Document, scenario: Scenario) -> Robot:
-    """Return the robot of a configuration.
-
-    Raises:
-        HspControlError: If it cannot be loaded; with a location.
-    """
-    keys = [key for key in ("name", "description") if getattr(scenario.robot, key)]
-    with document.at("robot", *keys):
-        return Robot.load(scenario.robot, access=document.access)
-
-
-def _plant(document: Document, scenario: Scenario, robot: Robot) -> Plant:
-    """Return the plant, which has the control period and the steps that it needs."""
-    settings = scenario.simulation
-    if (step := scenario.plant.longest_step) is not None:
-        with document.at("simulation"):
-            check_steps(settings.duration, step, "plant.timestep")
-    with document.at("plant"):
-        plant = scenario.plant.build(robot, settings.integrator, access=document.access)
-    if isinstance(plant, SampledPlant) and settings.control_period is None:
-        raise document.error(
-            ("plant",),
-            "this plant needs efforts that are held for a period: set "
-            "simulation.control_period [s], for example to 0.001",
-        )
-    return plant
+    experiment = object.__new__(Experiment)
+    composed = compose(document, setup or set_up(document))
+    vars(experiment).update(composed._asdict())
+    return experiment
 
 
 def _description(robot: str | Robot | RobotDescription) -> RobotDescription:
@@ -530,9 +317,3 @@ def _description(robot: str | Robot | RobotDescription) -> RobotDescription:
             "name it; give a name, a path or a RobotDescription"
         )
     return robot.description
-
-
-def _experiment(**attributes: object) -> Experiment:
-    experiment = object.__new__(Experiment)
-    vars(experiment).update(attributes)
-    return experiment

@@ -15,7 +15,7 @@ from hsp_control.cli import commands, main
 from hsp_control.common import kernels
 from hsp_control.config import experiment
 from hsp_control.config.document import Document
-from hsp_control.config.experiment import Setup
+from hsp_control.config.setup import Setup
 from hsp_control.visualization.viewer import browser, server
 
 pytestmark = pytest.mark.process

@@ -7,7 +7,8 @@ import pytest
 from hsp_control.cli.opening_page import OpeningPage, draw_before
 from hsp_control.common import adapters, kernels
 from hsp_control.common.exceptions import ViewerError
-from hsp_control.config.experiment import read_document, set_up
+from hsp_control.config.setup import set_up
+from hsp_control.config.source import read_document
 from hsp_control.visualization.viewer import Recorder, Viewer, browser
 from hsp_control.visualization.viewer.commands import unpack
 

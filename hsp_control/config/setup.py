@@ -1,0 +1,72 @@
+"""A configuration's robot and scene: what can be shown before anything is compiled."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+from hsp_control.common.arrays import Array
+from hsp_control.config.document import Document
+from hsp_control.config.located_scene import located_scene
+from hsp_control.config.scenario import Scenario
+from hsp_control.config.streams import with_messages
+from hsp_control.config.validation import validate
+from hsp_control.geometry.scene import Scene
+from hsp_control.robot import Robot
+
+
+class Setup(NamedTuple):
+    """What a configuration is about, before anything is compiled for it.
+
+    Attributes:
+        scenario: The checked configuration.
+        robot: The robot.
+        scene: Its obstacles.
+    """
+
+    scenario: Scenario
+    robot: Robot
+    scene: Scene
+
+    def start(self) -> Array:
+        """Return the start configuration, shape (nq,); home where it has to be found.
+
+        Raises:
+            HspControlError: If it is wrong; `build` says where.
+        """
+        start, contacts = self.scenario.start, self.scenario.contacts.values()
+        if start.is_found:
+            return self.robot.home()
+        return start.configuration_of(self.robot, contacts)
+
+
+def set_up(document: Document) -> Setup:
+    """Check a configuration, and load its robot and its scene: it compiles no kernel.
+
+    Raises:
+        HspControlError: If the configuration is wrong; see `load_experiment`.
+    """
+    scenario = validate(document, Scenario)
+    if not scenario.tasks and scenario.plan is None:
+        raise document.error(("tasks",), "needs at least one task, or a plan")
+    folder = Path(document.name).resolve().parent
+    scenario = replace(scenario, robot=scenario.robot.located(folder))
+    with document.at():
+        scenario = with_messages(scenario, folder, document.access)
+    robot = load_robot(document, scenario)
+    for contact in scenario.contacts.values():
+        with document.at("contacts", contact.name, "frame"):
+            robot.frame_id(contact.frame)
+    with document.at():
+        scene = located_scene(scenario.scene, folder, document.access)
+    return Setup(replace(scenario, scene=scene), robot, scene)
+
+
+def load_robot(document: Document, scenario: Scenario) -> Robot:
+    """Return the robot of a configuration.
+
+    Raises:
+        HspControlError: If it cannot be loaded; with a location.
+    """
+    keys = [key for key in ("name", "description") if getattr(scenario.robot, key)]
+    with document.at("robot", *keys):
+        return Robot.load(scenario.robot, access=document.access)
