@@ -180,6 +180,11 @@ class ActiveStack:
         law = self.resolution.compile(state.v, controls=field.controls)
         return steps(plans, law)
 
+    @cached_property
+    def field_value(self) -> Callable[[], float]:
+        """The call that returns the field's value at the state; see `bind_value`."""
+        return self._field.bind_value(self._state)
+
     def not_finite(self) -> str | None:
         """Return the first task or contact whose sample contains NaN or inf, if any."""
         for part, sample in self._parts:

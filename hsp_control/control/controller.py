@@ -661,14 +661,8 @@ class Controller:
     def diagnose(self) -> Diagnostics:
         """Return quantities to plot, after `compute`, at the same state."""
         active = self.active_stack
-        resolution = active.resolution
-        singular_values, manipulability = resolution.spectrum(active.first_task_row)
-        return Diagnostics(
-            self.field.value(self._state),
-            resolution.null_space_norm(),
-            singular_values,
-            manipulability,
-        )
+        values, product, norm = active.resolution.diagnose(active.first_task_row)
+        return Diagnostics(active.field_value(), norm, values, product)
 
     def flow(self, t: float, q: ArrayLike) -> Array:
         """Return v = J# x_d' + P g, shape (nv,): the robot once both errors have died.

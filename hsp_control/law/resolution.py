@@ -116,7 +116,6 @@ class Resolution:
         self.acceleration = self.problem.record.acceleration
         self.null_space_error = self.problem.record.null_space_error
         self.code: Indices = np.zeros(1, dtype=np.int64)
-        self._norm = bind(norm, self.problem.metric.W, self.null_space_error)
         self._spectra: dict[int, tuple[Callable[[], float], Array]] = {}
 
     def resolve(self, v: Array, *, controls_null_space: bool = True) -> Resolved:
@@ -149,26 +148,29 @@ class Resolution:
             *(self._scratch, self.null_space_error, self.acceleration, self.code),
         )
 
-    def spectrum(self, first: int = 0) -> tuple[Array, float]:
-        """Return singular values and their squared product, the paper's manipulability.
+    def diagnose(self, first: int = 0) -> tuple[Array, float, float]:
+        """Return what tells how near the last `resolve` was to singular and to rest.
 
-        The values are those of J L⁻ᵀ without the rows before ``first``, the largest
-        first. Their squared product is det(J W⁻¹ Jᵀ).
+        Args:
+            first: The first row of the tasks: those before it belong to contacts.
+
+        Returns:
+            The singular values of J L⁻ᵀ without the rows before ``first``, the largest
+            first; their squared product det(J W⁻¹ Jᵀ), the paper's manipulability; and
+            ‖e_N‖_W, the square root of 2 V.
         """
-        values = self._spectra.get(first)
-        if values is None:
-            J, L = self.problem.task.jacobian[first:], self.problem.metric.L
-            out = np.zeros(min(J.shape))
+        found = self._spectra.get(first)
+        if found is None:
+            J, metric = self.problem.task.jacobian[first:], self.problem.metric
+            out = np.zeros(min(J.shape) + 1)
             m, n = self.problem.task.jacobian.shape
             wide, small = np.zeros((2, m, n)), np.zeros((3, m, m))
-            call = bind(_singular_values, J, L, self.form, wide, small, out)
-            self._spectra[first] = values = call, out
-        manipulability = values[0]()
-        return values[1].copy(), manipulability
-
-    def null_space_norm(self) -> float:
-        """Return ‖e_N‖_W, the square root of 2 V, at the last `resolve`."""
-        return float(self._norm())
+            e_N, form = self.null_space_error, self.form
+            call = bind(_diagnose, J, *metric[:2], form, e_N, wide, small, out)
+            self._spectra[first] = found = call, out
+        manipulability = found[0]()
+        numbers = found[1].copy()
+        return numbers[:-1], manipulability, float(numbers[-1])
 
 
 @kernel
@@ -263,6 +265,22 @@ def _all_finite(a: Array) -> bool:
     for i in range(a.shape[0]):
         total += a[i]
     return bool(np.isfinite(total))
+
+
+@kernel
+def _diagnose(
+    J: Array,
+    W: Array,
+    L: Array,
+    form: int,
+    e_N: Array,
+    wide: Array,
+    small: Array,
+    out: Array,
+) -> float:
+    """Write the singular values of J L⁻ᵀ and then ‖e_N‖_W; return det(J W⁻¹ Jᵀ)."""
+    out[-1] = norm(W, e_N)
+    return float(_singular_values(J, L, form, wide, small, out[:-1]))
 
 
 @kernel

@@ -52,6 +52,10 @@ class CompiledCost(Cost):
         """Return f."""
         return float(self._own(state).derivatives())
 
+    def bind_value(self, state: RobotState) -> Derivatives:
+        """Return the call of `value`."""
+        return self._own(state).derivatives
+
     def gradient(self, state: RobotState) -> Array:
         """Return ∇f, exact, shape (nv,)."""
         own = self._own(state)

@@ -56,9 +56,10 @@ class NullSpaceField(Part, ABC, family="fields", error=FieldError):
     * `value` returns one number to plot.
 
     It may override `compile` to make a step faster (by default the step plan calls
-    `evaluate` at every step), `placed` if it refers to the start, to obstacles or to
-    frames, and `minimum_distance` if it measures distances. A field has no memory: what
-    a computation needs is kept by the state (see `RobotState.made`).
+    `evaluate` at every step) and `bind_value` to make `Controller.diagnose` faster,
+    `placed` if it refers to the start, to obstacles or to frames, and
+    `minimum_distance` if it measures distances. A field has no memory: what a
+    computation needs is kept by the state (see `RobotState.made`).
 
     All methods are about the field without its weight. The sum applies the weight.
 
@@ -108,14 +109,17 @@ class NullSpaceField(Part, ABC, family="fields", error=FieldError):
         )
 
     def __init_subclass__(cls, **arguments: Any) -> None:
-        """Reset `compile` if a subclass overrides `evaluate` only.
+        """Reset `compile` and `bind_value` if a subclass overrides what they do.
 
         Otherwise a subclass of a concrete field would inherit a step plan that ignores
-        its `evaluate`.
+        its `evaluate`, or a call that ignores its `value`.
         """
         super().__init_subclass__(**arguments)
-        if "evaluate" in vars(cls) and "compile" not in vars(cls):
+        own = vars(cls)
+        if "evaluate" in own and "compile" not in own:
             cls.compile = NullSpaceField.compile  # type: ignore[method-assign]
+        if "value" in own and "bind_value" not in own:
+            cls.bind_value = NullSpaceField.bind_value  # type: ignore[method-assign]
 
     def compile(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
@@ -146,6 +150,14 @@ class NullSpaceField(Part, ABC, family="fields", error=FieldError):
     @abstractmethod
     def value(self, state: RobotState) -> float:
         """Return one number to plot: f(q, t) of a cost, or the norm of a field."""
+
+    def bind_value(self, state: RobotState) -> Callable[[], float]:
+        """Return a call that does what `value` does; may be overridden.
+
+        Args:
+            state: The state that every call reads. Its values change between calls.
+        """
+        return partial(self.value, state)
 
     def minimum_distance(self, state: RobotState) -> float | None:
         """Return the minimum distance that the field measures [m], or None."""

@@ -21,7 +21,15 @@ from field_oracles import (
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hsp_control import FunctionCost, JointCentering, Rest, RobotState, TargetPosture
+from hsp_control import (
+    Controller,
+    FramePosition,
+    FunctionCost,
+    JointCentering,
+    Rest,
+    RobotState,
+    TargetPosture,
+)
 from hsp_control.common.exceptions import FieldError
 from hsp_control.null_space.fields import (
     FieldSum,
@@ -316,6 +324,23 @@ def test_frames_obstacles_and_terms_are_placed() -> None:
     assert found.terms == tuple(placed(term, state, scene) for term in total.terms)
     named = FieldSum([Rest(), Rest()], name="two rests")
     assert placed(named, state) == named
+
+
+def test_a_field_with_a_value_of_its_own_is_diagnosed_by_it() -> None:
+    """A subclass that overrides `value` only does not inherit the call of another."""
+
+    class Halved(JointCentering):
+        def value(self, state: RobotState) -> float:
+            return 0.5 * super().value(state)
+
+    robot = load("panda")
+    q, v = draw("panda", 3)
+    found = []
+    for field in (Halved(), JointCentering()):
+        controller = Controller(robot, [FramePosition("panda_tcp", Hold())], field)
+        controller.compute(TIME, q, v)
+        found.append(controller.diagnose().field_value)
+    assert found[0] == 0.5 * found[1] > 0.0
 
 
 # --- fading --------------------------------------------------------------------------

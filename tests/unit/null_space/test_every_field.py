@@ -31,8 +31,9 @@ def test_value(name: str, which: str) -> None:
     """The value is the cost, the sum of costs, or the vector field's norm."""
     member = MEMBERS[which]
     q, v = draw(name, 1)
-    field = member.build(name)
-    value = field.value(load(name).state(TIME, q, v))
+    field, state = member.build(name), load(name).state(TIME, q, v)
+    value = field.value(state)
+    assert field.bind_value(state)() == value
     expected = 0.0
     for weight, oracle, is_cost in member.parts(name):
         part = oracle(TIME, q)
