@@ -280,9 +280,7 @@ class Controller:
             ConfigurationError: If a quaternion or a (cos, sin) pair is not of norm 1.
             ControllerError: If the state belongs to another robot.
         """
-        lock = self._lock
-        lock.acquire()  # as a context manager it takes 0.1 µs more
-        try:
+        with self._lock:
             state, whole, offset = self._state, self._whole, None
             if whole is None or modifier is not None or q is None or v is None:
                 self._observe(t, q, v)
@@ -329,8 +327,6 @@ class Controller:
             out.forces = forces.copy() if active.has_forces else forces
             out.damped, out.status, out.relaxation = damped, status, relaxation
             return out
-        finally:
-            lock.release()
 
     def _observe(
         self,
