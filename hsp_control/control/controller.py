@@ -5,7 +5,7 @@ from copy import deepcopy
 from dataclasses import replace
 from math import isfinite
 from threading import Lock
-from typing import Any, NoReturn, overload
+from typing import TYPE_CHECKING, Any, NoReturn, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -43,6 +43,9 @@ from hsp_control.tasks import Task, TaskSample
 from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.impedance import parts_of
 from hsp_control.tasks.task import Feedback, InForce
+
+if TYPE_CHECKING:
+    from hsp_control.control.free_step import FreeStep
 
 AccelerationModifier = Callable[
     [RobotState, ActiveStack, Array], tuple[Array, Array | None]
@@ -144,6 +147,7 @@ class Controller:
         # While nothing changes: the stack, all calls of a step as one, and whether the
         # effort is M a + N wherever no limit is violated.
         self._whole: tuple[ActiveStack, Move, bool] | None = None
+        self._free: tuple[object, FreeStep | None] = None, None  # what it gives a loop
         q = robot.home() if given is None else given
         state = robot.state(0.0, q, np.zeros(robot.nv))
         start = Start(state, self._declared.scene, known=given is not None)
@@ -386,6 +390,42 @@ class Controller:
             stream.see(self._state.t, measure)
         if self._gains.stiffening:
             self._gains.wait(self.active_stack, self._state.t, period)
+
+    def while_free(self, advance: Callable[["FreeStep"], int]) -> int:
+        """Let a compiled loop make steps, without Python in between.
+
+        Each of them is a `compute` that finds no limit violated, and an `applied` for
+        the period of the last one. The law is the same, to the last bit.
+
+        Args:
+            advance: Makes steps up to one that is not free (`is_free`), which is left
+                to `compute`; it returns how many it made.
+
+        Returns:
+            What it returned; 0 where there are no such steps: something changes, is
+            streamed, is no native call, or the last effort was not the law's own.
+        """
+        with self._lock:
+            step = None if self._gains.stiffening else self._free_step()
+            return 0 if step is None else advance(step)
+
+    def _free_step(self) -> "FreeStep | None":
+        whole = self._whole
+        if whole is None or self._actuation.delivered is not whole[0].acceleration:
+            return None
+        if self._free[0] is not whole:
+            self._free = whole, self._bind_free_step(*whole)
+        return self._free[1]
+
+    def _bind_free_step(
+        self, active: ActiveStack, move: Move, direct: bool
+    ) -> "FreeStep | None":
+        from hsp_control.control.free_step import free_step  # here: it imports Numba
+
+        if active.streamed or not direct:
+            return None
+        sending = self._actuation.sending(self._state, active.acceleration)
+        return free_step(move, self._state.effort, sending)
 
     def disturbed(self, acceleration: ArrayLike) -> None:
         """Store an acceleration that something else than the efforts causes.

@@ -7,7 +7,6 @@ with δ' = v for single-dof joints and δ' = J_r(δ)⁻¹ v for a root.
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import partial
-from math import ceil
 from typing import Any
 
 import numpy as np
@@ -16,12 +15,13 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HspControlError, SimulationError
 from hsp_control.common.kernels import kernel
-from hsp_control.common.native import bind
+from hsp_control.common.native import NativeCall, bind
 from hsp_control.common.step_plan import in_order
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Positive
 from hsp_control.robot.acceleration import Acceleration
 from hsp_control.robot.robot import Robot
+from hsp_control.robot.step_count import number_of_steps
 
 Dynamics = Callable[[float, Array, Array], Array]
 """(t, q, v) ↦ v'."""
@@ -154,49 +154,75 @@ class FixedStep(Integrator):
 class Rk4(FixedStep, type="rk4"):
     """The classical fourth-order Runge-Kutta step, with a new chart in each step."""
 
-    def begin(self, robot: Robot, bind_dynamics: Bind) -> Advance:
+    def begin(self, robot: Robot, bind_dynamics: Bind) -> "Steps":
         """Return what integrates; see `Integrator.begin`."""
-        return _Rk4(robot, bind_dynamics, self.step).advance
+        return _Rk4(robot, bind_dynamics, self.step)
 
 
 class SemiImplicitEuler(FixedStep, type="semi_implicit_euler"):
     """The semi-implicit Euler step, of first order: v ← v + h v', q ← q ⊕ h v."""
 
-    def begin(self, robot: Robot, bind_dynamics: Bind) -> Advance:
+    def begin(self, robot: Robot, bind_dynamics: Bind) -> "Steps":
         """Return what integrates; see `Integrator.begin`."""
-        return _SemiImplicitEuler(robot, bind_dynamics, self.step).advance
+        return _SemiImplicitEuler(robot, bind_dynamics, self.step)
 
 
-class _Steps:
-    """Takes steps of equal length: the memory of a `FixedStep`.
+class Steps(ABC):
+    """Takes steps of equal length: the memory of a `FixedStep`, called as `Advance`.
 
     Attributes:
         q: Configuration where v' is computed, shape (nq,).
         v: Velocity there, shape (nv,).
         acceleration: v' there.
+        interval: Beginning and end of what is integrated [s], shape (2,).
         h: The step [s], shape (1,).
-        calls: The calls of a step, each of its first instant [s].
+        native: Integrates q and v over the interval; None where a part of a step, for
+            example v', is not native.
     """
 
-    calls: list[Callable[[float], Any]]
-
     def __init__(self, robot: Robot, bind_dynamics: Bind, longest: float) -> None:
+        """Allocate, and bind the calls of a step.
+
+        Args:
+            robot: The robot.
+            bind_dynamics: Makes v' of the arrays q and v.
+            longest: The longest step [s].
+        """
         self.robot, self._longest = robot, longest
         self.q, self.v = robot.neutral(), np.zeros(robot.nv)
         self.acceleration = bind_dynamics(self.q, self.v)
-        self.h = np.zeros(1)
+        self.interval, self.h = np.zeros(2), np.zeros(1)
         self._t = 0.0
+        self._calls = in_order(self._bind())
+        self.native: NativeCall | None = None
+        if all(isinstance(call, NativeCall) for call in self._calls):
+            from hsp_control.robot.native_steps import bind_steps
 
-    def advance(self, t: float, end: float, q: Array, v: Array) -> tuple[Array, Array]:
+            native: Any = self._calls
+            self.native = bind_steps(native, self.interval, longest, self.h)
+
+    @abstractmethod
+    def _bind(self) -> list[Callable[[], object]]:
+        """Return the calls of a step."""
+
+    def __call__(self, t: float, end: float, q: Array, v: Array) -> tuple[Array, Array]:
         """Return (q, v) at ``end``; see `Integrator.advance`."""
+        self.q[:], self.v[:] = q, v
+        if self.native is not None:
+            self.interval[0], self.interval[1] = t, end
+            self.native()
+        else:
+            self._step_by_step(t, end)
+        return self.q.copy(), self.v.copy()
+
+    def _step_by_step(self, t: float, end: float) -> None:
+        """Do what `native` does, where the calls are made one by one."""
         steps = number_of_steps(end - t, self._longest)
         h = self.h[0] = (end - t) / steps
-        self.q[:], self.v[:] = q, v
         for k in range(steps):
             self._t = t + k * h
-            for call in self.calls:
+            for call in self._calls:
                 call(self._t)
-        return self.q.copy(), self.v.copy()
 
     def compute_at(self, fraction: float) -> Callable[[], object]:
         """Return the call that writes v' at this fraction of the step."""
@@ -204,28 +230,28 @@ class _Steps:
         return native or (lambda: compute(self._t + fraction * self.h[0]))
 
 
-class _SemiImplicitEuler(_Steps):
-    def __init__(self, robot: Robot, bind_dynamics: Bind, longest: float) -> None:
-        super().__init__(robot, bind_dynamics, longest)
+class _SemiImplicitEuler(Steps):
+    def _bind(self) -> list[Callable[[], object]]:
+        robot = self.robot
         self._moved = np.zeros(robot.nv)
         q, a = self.q if robot.linear else np.zeros(0), self.acceleration.value
         parts = [self.compute_at(0.0), bind(_euler, self.h, a, q, self.v, self._moved)]
         if not robot.linear:
             parts.append(self._place)
-        self.calls = in_order(parts)
+        return parts
 
     def _place(self) -> None:
         self.q[:] = self.robot.integrate(self.q, self._moved)
 
 
-class _Rk4(_Steps):
+class _Rk4(Steps):
     """The four stages of a step, in the chart q = base ⊕ δ.
 
     The slopes are those of (δ, v): the rows of D and A.
     """
 
-    def __init__(self, robot: Robot, bind_dynamics: Bind, longest: float) -> None:
-        super().__init__(robot, bind_dynamics, longest)
+    def _bind(self) -> list[Callable[[], object]]:
+        robot = self.robot
         self._D, A = np.zeros((2, 4, robot.nv))
         self._delta, v0 = np.zeros((2, robot.nv))
         self._chart = Chart(robot, self.q)
@@ -245,7 +271,7 @@ class _Rk4(_Steps):
         parts.append(bind(_weighted_step, *slopes, *point))
         if not robot.linear:
             parts.append(partial(self._place, None))
-        self.calls = in_order(parts)
+        return parts
 
     def _place(self, stage: int | None) -> None:
         """Compute what the chart of a robot that is not linear needs."""
@@ -419,8 +445,3 @@ class _Trial:
             except (HspControlError, ArithmeticError, np.linalg.LinAlgError) as failure:
                 self.failure = failure
         return np.full(y.shape, np.nan)
-
-
-def number_of_steps(duration: float, step: float) -> int:
-    """Return the smallest number of equal steps that are not longer than ``step``."""
-    return max(1, ceil(duration / step - 1e-9))

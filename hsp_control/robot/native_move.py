@@ -50,7 +50,7 @@ class NativeMove(partial[float]):
 
 
 @kernel
-def _move(
+def move_to(
     calls: Indices,
     when: Array,
     q: Array,
@@ -73,6 +73,6 @@ def _entry() -> Callable[..., float]:
     given = types.float64[:]  # with any strides
     rest = own, own, table, types.int64[::1], types.float64, given, given
     entry: Callable[..., float] = entry_point(
-        _move, (table, types.float64[:, ::1], *rest)
+        move_to, (table, types.float64[:, ::1], *rest)
     )
     return entry

@@ -98,6 +98,11 @@ class ControlChain(Generic[Source_co]):
         self.plan: RunningPlan | None = None
         self._status = 0.0
 
+    @property
+    def is_bare(self) -> bool:
+        """Whether the command gets measurements as they are, with no plan before it."""
+        return not (self.needs_sensors or self._estimators)
+
     def begin(self, inertial: Inertial | None, state: RobotState | None = None) -> None:
         """Begin a run: nothing is remembered of an earlier one.
 

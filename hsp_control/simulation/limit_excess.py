@@ -1,9 +1,12 @@
 """How far a robot is beyond its limits, whatever the law says of them."""
 
+from typing import Any
+
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
+from hsp_control.common.native import bind
 from hsp_control.constraints.limits import RobotLimits
 from hsp_control.control.log_channel import LogChannel
 from hsp_control.robot import Robot
@@ -41,17 +44,18 @@ class LimitExcess:
             v: Velocity, shape (nv,).
         """
         if limits is not None:
-            _see(
-                self._coordinates,
-                self._dofs,
-                q,
-                v,
-                limits.lower,
-                limits.upper,
-                limits.velocity,
-                self.position,
-                self.velocity,
-            )
+            _see(*self._arguments(limits, q, v))
+
+    def seeing(self, limits: RobotLimits | None, q: Array, v: Array) -> list[Any]:
+        """Return `see` of what these arrays then hold, as calls."""
+        if limits is None:
+            return []
+        return [bind(_see, *self._arguments(limits, q, v))]
+
+    def _arguments(self, limits: RobotLimits, q: Array, v: Array) -> tuple[Any, ...]:
+        bounds = limits.lower, limits.upper, limits.velocity
+        most = self.position, self.velocity
+        return self._coordinates, self._dofs, q, v, *bounds, *most
 
     def take(self, limits: RobotLimits | None) -> dict[str, LogChannel]:
         """Return what to log, and begin anew; nothing without limits."""

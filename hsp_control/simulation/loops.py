@@ -1,7 +1,7 @@
 """The closed loop, row by row: the law in the integrator's stages, or sampled."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -17,7 +17,14 @@ from hsp_control.robot import RobotState
 from hsp_control.robot.integrators import Integrator, bound
 from hsp_control.simulation.control_chain import ControlChain
 from hsp_control.simulation.limit_excess import LimitExcess
-from hsp_control.simulation.plants import ContinuousPlant, SampledPlant
+from hsp_control.simulation.plants import (
+    ContinuousPlant,
+    IntegratedPlant,
+    SampledPlant,
+)
+
+if TYPE_CHECKING:
+    from hsp_control.simulation.stretch import Stretch
 
 RUNAWAY_SPEED = 1e4
 """Joint speed [rad/s or m/s] above which a simulation has diverged."""
@@ -103,14 +110,15 @@ def sampled_loop(
     command, excess = chain.command, LimitExcess(plant.robot)
     controller = command.controller
     period = (times[1] - times[0]) / periods
+    stretch = _stretch(chain, plant, excess)
     tau, count = np.zeros(plant.robot.nv), 0
     for start, end in zip(times, (*times[1:], times[-1]), strict=True):
         if end > start:
             period = (end - start) / periods
-        for k in range(periods):
+        k = 0
+        while k < periods:
             t = start + k * (end - start) / periods
             measured = Measurement(count, t, *plant.measure(t, q, v))
-            count += 1
             excess.see(controller.limits, q, v)
             if chain.needs_sensors:
                 measured = measured._replace(
@@ -130,9 +138,31 @@ def sampled_loop(
                 yield Instant(state, output, tau, channels)
             if end == start:  # the last row
                 return
-            stop = start + (k + 1) * (end - start) / periods
-            q, v = plant.advance(t, stop, tau)
+            made = stretch and stretch.advance(start, end, periods, k, tau)
+            if made:
+                q, v, after = made
+            else:
+                after = k + 1
+                stop = start + after * (end - start) / periods
+                q, v = plant.advance(t, stop, tau)
+            k, count = after, count + after - k
         _check_divergence(end, q, v)
+
+
+def _stretch(
+    chain: ControlChain[Command], plant: SampledPlant, excess: LimitExcess
+) -> "Stretch | None":
+    """Return what moves on many periods at once; None where each must be made alone."""
+    command = chain.command
+    bare = chain.is_bare and type(command) is Command and not command.compensation.names
+    if not bare or type(plant) is not IntegratedPlant:  # not a subclass of either
+        return None
+    steps = plant.native_steps()
+    if steps is None:
+        return None
+    from hsp_control.simulation.stretch import Stretch  # here: it imports Numba
+
+    return Stretch(command.controller, plant, steps, excess)
 
 
 def _check_divergence(t: float, q: Array, v: Array) -> None:

@@ -201,6 +201,23 @@ class Actuation:
             assert self._window is not None
             self._window()
 
+    def sending(self, state: RobotState, a: Array) -> list[Callable[[float], Any]]:
+        """Return calls of the time that do what `applied` does of the effort M a + N.
+
+        The period is that of the last `applied`.
+
+        Args:
+            state: The robot's state, with its effort; the calls read it each time.
+            a: The acceleration, shape (nv,); this array, too.
+        """
+        if self.limits is None:
+            return []
+        calls = [self._held.expect(state.v, a)]
+        if self._rate_limited:
+            assert self._window is not None
+            calls += in_order([bind(_keep, state.effort, self._sent), self._window])
+        return calls
+
     def disturbed(self, acceleration: Array) -> None:
         """Expect an acceleration that something else than the efforts causes, (nv,)."""
         self._held.disturbance[:] = acceleration
@@ -447,3 +464,10 @@ def _check(
         CODES * code[0]
         + violated_limits(q, v, a, tau, where, limits, error, disturbance, bounds)
     )
+
+
+@kernel
+def _keep(effort: Array, sent: Array) -> None:
+    """Keep an effort, (nv,), as the last one that was sent, see `effort_window`."""
+    for i in range(effort.shape[0]):
+        sent[i] = effort[i]

@@ -57,7 +57,7 @@ class HeldEffort:
         self.disturbance: Array = np.zeros(nv)
         self._expected, self._stray = np.zeros(nv), np.zeros(nv)
         self._timing = np.full(2, np.nan)
-        self._expect = IdentityCache(self._compile_expect)
+        self._expect = IdentityCache(self.expect)
 
     def sent(self, t: float, v: Array, a: Array, period: float) -> None:
         """Record that the effort of an acceleration is held from now on.
@@ -68,15 +68,20 @@ class HeldEffort:
             a: The acceleration, shape (nv,).
             period: How long the effort is held [s].
         """
-        self._timing[0], self._timing[1] = t + period, period
-        self._expect.get(v, a)()
+        self._timing[1] = period
+        self._expect.get(v, a)(t)
 
     def observe(self, t: float, v: Array) -> None:
         """Look at the velocity (nv,) at time t [s]; it counts at a period's end."""
         observe(v, self.memory_of_kernels, t)
 
-    def _compile_expect(self, v: Array, a: Array) -> Callable[[], float]:
-        return bind(_expect, v, a, self.disturbance, self._timing, self._expected)
+    def expect(self, v: Array, a: Array) -> Callable[[float], float]:
+        """Return `sent` of what these arrays then hold, as a call of the time.
+
+        The period is that of the last `sent`.
+        """
+        arrays = v, a, self.disturbance, self._timing, self._expected
+        return bind(_expect, *arrays, timed=True)
 
     @property
     def memory_of_kernels(self) -> "Held":
@@ -114,9 +119,10 @@ class HeldEffort:
 
 @kernel
 def _expect(
-    v: Array, a: Array, disturbance: Array, timing: Array, expected: Array
+    v: Array, a: Array, disturbance: Array, timing: Array, expected: Array, t: float
 ) -> None:
-    """Write the velocity at the end of a period."""
+    """Write the end of a period that begins now, and the velocity there."""
+    timing[0] = t + timing[1]
     for i in range(v.shape[0]):
         expected[i] = v[i] + timing[1] * (a[i] + disturbance[i])
 

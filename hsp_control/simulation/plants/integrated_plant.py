@@ -7,7 +7,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.log_channel import LogChannel
-from hsp_control.robot.integrators import Advance, Integrator
+from hsp_control.robot.integrators import Advance, Integrator, Steps
 from hsp_control.simulation.plants.plant import ContinuousPlant, SampledPlant
 
 
@@ -17,6 +17,7 @@ class IntegratedPlant(SampledPlant):
     Attributes:
         plant: The continuous plant.
         integrator: The integrator.
+        effort: The effort that is held, shape (nv,).
     """
 
     def __init__(self, plant: ContinuousPlant, integrator: Integrator) -> None:
@@ -25,7 +26,7 @@ class IntegratedPlant(SampledPlant):
         self.plant = plant
         self.integrator = integrator
         self._q, self._v = plant.robot.neutral(), np.zeros(plant.robot.nv)
-        self._tau = np.zeros(plant.robot.nv)
+        self.effort = np.zeros(plant.robot.nv)
         self._advance: Advance | None = None  # begun where it is needed
 
     def __getstate__(self) -> dict[str, Any]:
@@ -38,12 +39,33 @@ class IntegratedPlant(SampledPlant):
 
     def advance(self, t: float, end: float, tau: Array) -> tuple[Array, Array]:
         """Integrate from t to ``end``; see `SampledPlant.advance`."""
-        if self._advance is None:
-            self._advance = self.integrator.begin(
-                self.robot, lambda q, v: self.plant.bind(q, v, self._tau)
-            )
-        self._tau[:] = tau
-        self._q, self._v = self._advance(t, end, self._q, self._v)
+        advance = self._advance or self._begin()
+        self.effort[:] = tau
+        self._q, self._v = advance(t, end, self._q, self._v)
+        return self._q, self._v
+
+    def _begin(self) -> Advance:
+        """Begin the integrator."""
+        self._advance = self.integrator.begin(
+            self.robot, lambda q, v: self.plant.bind(q, v, self.effort)
+        )
+        return self._advance
+
+    def native_steps(self) -> Steps | None:
+        """Return the steps that `advance` takes, if they are native.
+
+        Whoever calls them begins with `hold`, and ends with `moved`.
+        """
+        steps = self._advance or self._begin()
+        return steps if isinstance(steps, Steps) and steps.native is not None else None
+
+    def hold(self, steps: Steps, tau: Array) -> None:
+        """Write the present state and an effort, (nv,), where native steps read it."""
+        steps.q[:], steps.v[:], self.effort[:] = self._q, self._v, tau
+
+    def moved(self, steps: Steps) -> tuple[Array, Array]:
+        """Go on where native steps have ended; return (q, v) there, as `advance`."""
+        self._q, self._v = steps.q.copy(), steps.v.copy()
         return self._q, self._v
 
     def log_channels(

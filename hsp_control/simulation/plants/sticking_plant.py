@@ -11,7 +11,7 @@ from hsp_control.common.exceptions import SimulationError
 from hsp_control.common.kernels import kernel
 from hsp_control.robot import Robot
 from hsp_control.robot.friction import JointFriction
-from hsp_control.robot.integrators import number_of_steps
+from hsp_control.robot.step_count import number_of_steps
 from hsp_control.simulation.plants.json_data import to_json_data
 from hsp_control.simulation.plants.plant import SampledPlant
 from hsp_control.simulation.plants.push import Push, Pushes

@@ -25,6 +25,7 @@ from hsp_control.common.exceptions import (
 )
 from hsp_control.robot import integrators
 from hsp_control.robot.integrators import Dop853, Rk4, SemiImplicitEuler
+from hsp_control.robot.step_count import number_of_steps
 
 pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]
@@ -196,8 +197,8 @@ def test_steps_are_equal_and_none_is_longer() -> None:
         starts = [1.0, 1.0025, 1.005, 1.0075]
         np.testing.assert_allclose(times[::stages], starts, rtol=0, atol=1e-14)
         assert len(times) == 4 * stages
-    assert integrators.number_of_steps(0.3, 0.1) == 3  # 0.3/0.1 is 2.9999999999999996
-    assert integrators.number_of_steps(0.1, 0.3) == 1
+    assert number_of_steps(0.3, 0.1) == 3  # 0.3/0.1 is 2.9999999999999996
+    assert number_of_steps(0.1, 0.3) == 1
 
 
 def test_trials_that_stray_are_shortened() -> None:

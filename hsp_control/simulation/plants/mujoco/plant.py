@@ -13,8 +13,8 @@ from hsp_control.control.log_channel import LogChannel
 from hsp_control.declaration import within
 from hsp_control.robot import Robot
 from hsp_control.robot.friction import JointFriction
-from hsp_control.robot.integrators import number_of_steps
 from hsp_control.robot.mujoco_coordinates import MujocoCoordinates, joints_of
+from hsp_control.robot.step_count import number_of_steps
 from hsp_control.simulation.plants.contact_channels import contact_channels
 from hsp_control.simulation.plants.floating_roots import FloatingRoots
 from hsp_control.simulation.plants.json_data import to_json_data

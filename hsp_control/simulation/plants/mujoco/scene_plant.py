@@ -15,7 +15,7 @@ from hsp_control.declaration import within
 from hsp_control.robot import MujocoCoordinates, Robot
 from hsp_control.robot.description.mujoco.motors import Motor, joint_actuators, motor
 from hsp_control.robot.description.mujoco.names import Names
-from hsp_control.robot.integrators import number_of_steps
+from hsp_control.robot.step_count import number_of_steps
 from hsp_control.simulation.plants.contact_channels import contact_channels
 from hsp_control.simulation.plants.floating_roots import FloatingRoots
 from hsp_control.simulation.plants.json_data import to_json_data

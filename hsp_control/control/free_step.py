@@ -1,0 +1,48 @@
+"""A step in which no limit is violated, as native calls that a compiled loop makes."""
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.kernels import kernel
+from hsp_control.common.native import NativeCall
+from hsp_control.control.actuation.actuation import CODES
+from hsp_control.law.outcome import BEYOND_ANY_LEVEL
+from hsp_control.robot.native_move import NativeMove
+from hsp_control.robot.state import Move
+
+
+class FreeStep(NamedTuple):
+    """What `Controller.compute` and `Controller.applied` do where no limit is violated.
+
+    Attributes:
+        move: (t, q, v) ↦ a number that `is_free` understands; the effort and the
+            acceleration are written.
+        effort: M a + N, shape (nv,) [N·m or N].
+        sending: Calls of the time that record that this effort is held from now on, for
+            the period of the last `Controller.applied`.
+    """
+
+    move: NativeMove
+    effort: Array
+    sending: Sequence[NativeCall]
+
+
+def free_step(
+    move: Move, effort: Array, sending: Sequence[Callable[[float], Any]]
+) -> FreeStep | None:
+    """Return a free step of these parts; None where one of them is not native."""
+    native = [call for call in sending if isinstance(call, NativeCall)]
+    if not isinstance(move, NativeMove) or len(native) < len(sending):
+        return None
+    return FreeStep(move, effort, native)
+
+
+@kernel
+def is_free(value: float) -> bool:
+    """Return whether a state is valid, the law finite, and no limit violated.
+
+    Args:
+        value: What the move returned, see `Actuation.checks`; negative: refused.
+    """
+    return 0.0 <= value < CODES * BEYOND_ANY_LEVEL and value % CODES == 0.0

@@ -1,0 +1,194 @@
+"""Many control periods of a simulation as one native call.
+
+Between two rows of a log nothing of a period is looked at, and in Python a period costs
+more than its law and its dynamics. So they are left to a compiled loop, as long as no
+limit is violated and nothing comes from outside. It makes the calls that a single
+period makes, by their addresses: the motion is the same, to the last bit.
+"""
+
+from collections.abc import Callable, Sequence
+from functools import cache, partial
+
+import numpy as np
+from numba import types
+
+from hsp_control.common.adapters import entry_point, run
+from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.kernels import kernel
+from hsp_control.common.native import NativeCall
+from hsp_control.control.controller import Controller
+from hsp_control.control.free_step import FreeStep, is_free
+from hsp_control.robot.integrators import Steps
+from hsp_control.robot.native_move import move_to
+from hsp_control.simulation.limit_excess import LimitExcess
+from hsp_control.simulation.plants import IntegratedPlant
+
+MOST = 100
+"""Most periods of one call: then Ctrl-C is noticed, and other threads go on."""
+
+
+class Stretch:
+    """Moves a plant on while its controller's steps are free, see `FreeStep`."""
+
+    def __init__(
+        self,
+        controller: Controller,
+        plant: IntegratedPlant,
+        steps: Steps,
+        excess: LimitExcess,
+    ) -> None:
+        """Load or compile the loop.
+
+        Args:
+            controller: The controller, without compensation.
+            plant: The plant.
+            steps: Its native steps.
+            excess: What sees every state.
+        """
+        self._controller, self._excess = controller, excess
+        self._plant, self._steps = plant, steps
+        self._loop = _entry()
+        self._step: FreeStep | None = None
+        self._calls: tuple[Array | Indices, ...] = ()
+        self._seeing: list[NativeCall] = []
+
+    def advance(
+        self, start: float, end: float, periods: int, k: int, tau: Array
+    ) -> tuple[Array, Array, int] | None:
+        """Move on from the beginning of a period to that of a later one.
+
+        Args:
+            start: Time of the row before [s].
+            end: Time of the row after [s].
+            periods: How many periods are between them.
+            k: The present period.
+            tau: Its effort, shape (nv,), computed and recorded.
+
+        Returns:
+            (q, v) there, in new arrays, and which period begins; None where the
+            controller has no free steps.
+        """
+        if periods - k < 2:
+            return None
+        go = partial(self._go, start, end - start, periods, k, tau)
+        made = self._controller.while_free(go)
+        return (*self._plant.moved(self._steps), k + made) if made else None
+
+    def _go(
+        self,
+        start: float,
+        span: float,
+        periods: int,
+        k: int,
+        tau: Array,
+        step: FreeStep,
+    ) -> int:
+        """Make periods from the k-th on; return how many."""
+        if step is not self._step:
+            self._bind(step)
+        self._plant.hold(self._steps, tau)
+        last = min(periods, k + MOST)
+        made = self._loop(*self._calls, start, span, periods, k, last) - k
+        if made > 1:  # calls in Python read it
+            state = self._controller.state
+            state.t = start + (k + made - 1) * span / periods
+        return made
+
+    def _bind(self, step: FreeStep) -> None:
+        """Gather what the loop calls."""
+        steps = self._steps
+        assert steps.native is not None
+        # Rows are addresses: what they lead to is kept, here and in the steps.
+        self._step = step
+        self._seeing = self._excess.seeing(self._controller.limits, steps.q, steps.v)
+        moving = _table([steps.native, *self._seeing])
+        own = steps.q, steps.v, self._plant.effort, step.effort, steps.interval
+        self._calls = (*moving, *step.move.args, *_table(step.sending), *own)
+
+
+def _table(calls: Sequence[NativeCall]) -> tuple[Indices, Array]:
+    """Return the rows of calls, and their windows, for `run`."""
+    rows = [np.zeros((0, 2), dtype=np.int64), *(call.args[0] for call in calls)]
+    when = [np.zeros((0, 2)), *(call.args[1] for call in calls)]
+    return np.concatenate(rows), np.concatenate(when)
+
+
+@kernel
+def _stretch(
+    moving: Indices,
+    moving_when: Array,
+    law: Indices,
+    law_when: Array,
+    q_law: Array,
+    v_law: Array,
+    unit_blocks: Indices,
+    stamp: Indices,
+    sending: Indices,
+    sending_when: Array,
+    q: Array,
+    v: Array,
+    held: Array,
+    effort: Array,
+    interval: Array,
+    start: float,
+    span: float,
+    periods: int,
+    first: int,
+    last: int,
+) -> int:
+    """Move on from period ``first`` to ``last``, or to one that is not free.
+
+    Args:
+        moving: Calls that move q and v over the interval, and see them there.
+        moving_when: Their windows.
+        law: `NativeMove`'s arguments, up to its stamp.
+        law_when: One of them.
+        q_law: One of them.
+        v_law: One of them.
+        unit_blocks: One of them.
+        stamp: One of them.
+        sending: Calls that record that the effort is held.
+        sending_when: Their windows.
+        q: The plant's configuration, shape (nq,).
+        v: Its velocity, shape (nv,).
+        held: The effort that it is under, shape (nv,).
+        effort: What the law writes, shape (nv,).
+        interval: Written: when a period begins and ends [s], shape (2,).
+        start: When period 0 begins [s].
+        span: The length of all periods [s].
+        periods: Their number.
+        first: The present period, whose effort is held.
+        last: The period to move on to.
+
+    Returns:
+        The period that begins where it ended.
+    """
+    t = start + first * span / periods
+    for k in range(first + 1, last + 1):
+        interval[0] = t
+        interval[1] = t = start + k * span / periods
+        run(moving, moving_when, t)
+        if k == last:
+            break
+        code = move_to(law, law_when, q_law, v_law, unit_blocks, stamp, t, q, v)
+        if not is_free(code):
+            return k
+        square = 0.0
+        for i in range(effort.shape[0]):
+            held[i] = effort[i]
+            square += effort[i] * effort[i]
+        if not np.isfinite(square):
+            return k
+        run(sending, sending_when, t)
+    return last
+
+
+@cache
+def _entry() -> Callable[..., int]:
+    table, windows = types.int64[:, ::1], types.float64[:, ::1]
+    vector, number, count = types.float64[::1], types.float64, types.int64
+    move = table, windows, vector, vector, table, types.int64[::1]
+    own = (vector,) * 5
+    kinds = table, windows, *move, table, windows, *own, number, number, *(count,) * 3
+    entry: Callable[..., int] = entry_point(_stretch, kinds)
+    return entry

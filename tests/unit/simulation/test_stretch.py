@@ -1,0 +1,197 @@
+"""Check that many periods in one native call move the robot as one by one."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from closed_loops import load, panda_controller
+
+from hsp_control import Rollout, TargetPosture, load_experiment, simulate
+from hsp_control.common.exceptions import SimulationError
+from hsp_control.common.kernels import PLAIN
+from hsp_control.config import Experiment
+from hsp_control.control.controller import Controller
+from hsp_control.robot.integrators import SemiImplicitEuler
+from hsp_control.simulation import loops
+
+if not PLAIN:
+    from hsp_control.simulation.stretch import MOST
+
+pytestmark = [
+    pytest.mark.filterwarnings("error"),
+    pytest.mark.skipif(PLAIN, reason="plain Python has no native calls"),
+]
+
+EULER = "simulation.integrator={type: semi_implicit_euler}"
+RK4 = "simulation.integrator={type: rk4}"
+
+
+def short(name: str, *overrides: str, duration: float = 0.3) -> Experiment:
+    return load_experiment(name, f"simulation.duration={duration}", *overrides)
+
+
+class Counted:
+    """Counts the periods that were made natively.
+
+    Attributes:
+        many: How many periods each call made.
+    """
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.many: list[int] = []
+        self._patch = monkeypatch
+        while_free = Controller.while_free
+
+        def counted(controller: Controller, advance: Any) -> int:
+            made = while_free(controller, advance)
+            self.many.append(made)
+            return made
+
+        monkeypatch.setattr(Controller, "while_free", counted)
+
+    def alone(self, run: Callable[[], Rollout]) -> Rollout:
+        """Run with each period made alone."""
+        before = sum(self.many)
+        with self._patch.context() as patch:
+            patch.setattr(loops, "_stretch", lambda *_: None)
+            found = run()
+        assert sum(self.many) == before
+        return found
+
+
+@pytest.fixture
+def counted(monkeypatch: pytest.MonkeyPatch) -> Counted:
+    return Counted(monkeypatch)
+
+
+def assert_same(ours: Rollout, theirs: Rollout) -> None:
+    """Compare every number of two logs, to the last bit."""
+    assert ours.columns.keys() == theirs.columns.keys()
+    for name, column in ours.columns.items():
+        assert column.tobytes() == theirs.columns[name].tobytes(), name
+    assert ours.meta == theirs.meta
+
+
+CASES = {
+    "a ball sweeps past, RK4": ("panda_obstacle",),
+    "a ball sweeps past, Euler": ("panda_obstacle", EULER),
+    "manipulability": ("panda_manipulability",),
+    "no limits": ("panda_obstacle", "limits=null"),
+    "efforts limited in rate": (
+        "panda_obstacle", "limits.effort_rate=2000",
+    ),
+    "a singular arm": ("iiwa_singular",),
+    "a position task": ("ur5_position",),
+    "two arms, steps of 2 ms": ("dual_panda",),
+    "steps shorter than a period": (
+        "panda_limits", "simulation.integrator={type: rk4, step: 0.0005}",
+    ),
+    "more periods than a call makes": (
+        "panda_limits", "simulation.log_period=0.3", EULER,
+    ),
+    "periods that are no binary fractions": (
+        "panda_limits", "simulation.log_period=0.03",
+        "simulation.control_period=0.0006", "simulation.integrator.step=0.0003",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", CASES.values(), ids=CASES.keys())
+def test_the_same_to_the_last_bit(case: tuple[str, ...], counted: Counted) -> None:
+    theirs = counted.alone(short(*case).run)
+    ours = short(*case).run()
+    assert_same(ours, theirs)
+    periods = 0.9 * 0.3 / 0.001
+    assert sum(counted.many) > 0.5 * periods
+    assert max(counted.many) <= MOST
+
+
+def test_periods_in_which_a_limit_binds_are_made_alone(counted: Counted) -> None:
+    """The rest is not: after a limit, free steps go on in the loop."""
+    slow = "limits.velocity=0.35", RK4, "simulation.log_period=0.005"
+    theirs = counted.alone(short("panda_obstacle", *slow, duration=2.0).run)
+    ours = short("panda_obstacle", *slow, duration=2.0).run()
+    assert_same(ours, theirs)
+    limited = np.count_nonzero(ours["status"] == 2)
+    assert 5 < limited < 0.9 * len(ours)
+    assert sum(counted.many) > 200
+
+
+def test_a_change_is_made_where_it_begins(counted: Counted) -> None:
+    """What changes is made in Python; a second after its end the loop goes on."""
+
+    def run() -> Rollout:
+        experiment = short("panda_obstacle", EULER)
+        controller = experiment.controller
+
+        def change(recorder: Any) -> None:
+            if recorder.count == 11:  # at 0.1 s
+                at = controller.at(0.1234)
+                at.ramp(0.05).null_space_gain(20.0)
+
+        return simulate(
+            controller,
+            experiment.q0,
+            duration=1.4,
+            control_period=0.001,
+            integrator=SemiImplicitEuler(),
+            on_row=change,
+        )
+
+    theirs = counted.alone(run)
+    ours = run()
+    assert_same(ours, theirs)
+    made = np.array(counted.many)
+    (native,) = np.nonzero(made)
+    assert len(native) > 20
+    assert (np.diff(native) > 100).any()  # calls that were refused, while it changed
+
+
+def test_a_motion_that_diverges_stops_the_same_way(counted: Counted) -> None:
+    """K_N times the period is 20: joints run away natively, and their speed is told.
+
+    With a period of 10 ms they are faster than floats can tell within a row of 1 s.
+    """
+    robot = load("panda")
+    task, q0 = panda_controller().tasks[0], robot.home()
+    fields = TargetPosture(q0)
+    controller = Controller(robot, [task], fields, null_space_gain=2000.0, limits=None)
+    for options in ({"duration": 0.2, "log_period": 0.05}, {"log_period": 1.0}):
+        told = []
+
+        def failure(options: dict[str, float] = options) -> Rollout:
+            refused = pytest.raises(SimulationError, match=r"^the simulation stopped")
+            with np.errstate(over="ignore"), refused as caught:
+                simulate(
+                    controller,
+                    q0,
+                    np.ones(7),
+                    control_period=0.01,
+                    integrator=SemiImplicitEuler(0.01),
+                    **{"duration": 1.0, **options},
+                )
+            told.append(str(caught.value))  # noqa: B023
+            assert caught.value.rollout is not None
+            return caught.value.rollout
+
+        before = len(counted.many)
+        theirs = counted.alone(failure)
+        assert_same(failure(), theirs)
+        assert told[0] == told[1]
+        assert max(counted.many[before:]) > 1
+
+
+@pytest.mark.parametrize(
+    "override",
+    [
+        "compensation.effort_rate=2000",
+        "plant={type: rigid_body, sensors: {velocity_noise: 0.01}}",
+        "plant={type: rigid_body, pushes: [{frame: panda_link4, force: [1, 0, 0], "
+        "start: 0, duration: 1}]}",
+        "simulation.integrator={type: dop853}",
+    ],
+)
+def test_what_is_not_native_is_made_alone(override: str, counted: Counted) -> None:
+    short("panda_obstacle", override, duration=0.05).run()
+    assert sum(counted.many) == 0
