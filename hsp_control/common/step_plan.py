@@ -90,6 +90,14 @@ def steps(
     return found
 
 
+def merged(call: Callable[[float], Any]) -> Callable[[float], Any]:
+    """Return a call of the time as one native call, if all its parts are native."""
+    parts = list(_parts(call))
+    if len(parts) < 2 or not all(isinstance(each.call, NativeCall) for each in parts):
+        return call
+    return sequence([Timed(*each) for each in parts])
+
+
 def in_order(calls: Sequence[Callable[[], object]]) -> list[Callable[[float], Any]]:
     """Return calls without arguments as calls of the time, native ones as one."""
     return steps([StepPlan(write=tuple(calls[:-1]))], calls[-1])

@@ -580,6 +580,14 @@ class Controller:
         """All changes that were made, in order of their times."""
         return tuple(sorted(self._time_line.made, key=lambda each: each.at))
 
+    @read_only()
+    def settled(self) -> object:
+        """An object that stays the same while nothing changes; None while it does.
+
+        As long as it is the same, so are the tasks, the field and the limits.
+        """
+        return self._whole
+
     @read_only("call compute")
     def state(self) -> RobotState:
         """The state that the last effort was computed for; the next one overwrites it.

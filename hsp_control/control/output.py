@@ -74,6 +74,20 @@ class ControlOutput:
         """e_N = (I - J#J)(g - v), shape (nv,)."""
         return self._record.null_space_error
 
+    def explanation(self, own: Record | None) -> Record:
+        """Return a copy of tasks, field, null-space error and `acceleration`.
+
+        Args:
+            own: A record to overwrite, if it is of the same size; None: a new one.
+        """
+        rows = self._rows
+        if own is None or len(own.task.error) != rows:
+            own = Record.allocate(rows, len(self.tau))
+        own.memory[:] = self._memory
+        if self._acceleration is not None:
+            own.acceleration[:] = self._acceleration
+        return own
+
     def _keep(self, memory: Array) -> None:
         """Copy the record of a step, into the memory of the last one if it fits."""
         own = self._memory

@@ -153,6 +153,8 @@ class ConfigurationSpace:
 
         Continuous joints have angles in (-π, π].
         """
+        if self.linear:  # then neutral is 0
+            return q.copy()
         return self.difference(self.neutral(), q)
 
     def position_limits(self) -> tuple[Array, Array]:

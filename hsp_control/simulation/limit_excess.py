@@ -12,6 +12,8 @@ from hsp_control.control.log_channel import LogChannel
 from hsp_control.robot import Robot
 
 POSITION, VELOCITY = "position_excess", "velocity_excess"
+BEYOND_POSITION = "beyond the position limit, most since the row before"
+BEYOND_SPEED = "beyond the speed limit, most since the row before"
 
 
 class LimitExcess:
@@ -32,7 +34,8 @@ class LimitExcess:
         # Only such a joint has a range; see `Robot.position_limits`.
         self._coordinates = np.array([j.idx_q for j in joints], dtype=np.int64)
         self._dofs = np.array([j.idx_v for j in joints], dtype=np.int64)
-        self._unit = " or ".join(dict.fromkeys(robot.units))
+        unit = " or ".join(dict.fromkeys(robot.units))
+        self._units = unit, f"{unit}/s"
         self.position, self.velocity = np.zeros(robot.nv), np.zeros(robot.nv)
 
     def see(self, limits: RobotLimits | None, q: Array, v: Array) -> None:
@@ -61,16 +64,12 @@ class LimitExcess:
         """Return what to log, and begin anew; nothing without limits."""
         if limits is None:
             return {}
-        most, unit = "most since the row before", self._unit
         found = {
-            POSITION: LogChannel(
-                self.position.copy(), unit, f"beyond the position limit, {most}"
-            ),
-            VELOCITY: LogChannel(
-                self.velocity.copy(), f"{unit}/s", f"beyond the speed limit, {most}"
-            ),
+            POSITION: LogChannel(self.position.copy(), self._units[0], BEYOND_POSITION),
+            VELOCITY: LogChannel(self.velocity.copy(), self._units[1], BEYOND_SPEED),
         }
-        self.position[:] = self.velocity[:] = 0.0
+        self.position.fill(0.0)
+        self.velocity.fill(0.0)
         return found
 
 

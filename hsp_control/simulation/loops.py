@@ -129,7 +129,7 @@ def sampled_loop(
             tau = chain.effort(measured, period).copy()
             if k == 0:
                 output, state = command.output, command.state
-                if not (t == state.t and _equal(state.q, q) and _equal(state.v, v)):
+                if not (t == state.t and _same(state.q, state.v, q, v)):
                     output = command.evaluate(t, q, v)
                 channels = {
                     **chain.log_channels(q, v),
@@ -166,7 +166,7 @@ def _stretch(
 
 
 def _check_divergence(t: float, q: Array, v: Array) -> None:
-    if not (_within(q, np.inf) and _within(v, RUNAWAY_SPEED)):
+    if not _bounded(q, v, RUNAWAY_SPEED):
         speed = float(np.abs(v).max())
         raise SimulationError(
             f"the motion diverged before t = {t:.6g} s: a joint moves at {speed:.3g} "
@@ -176,18 +176,22 @@ def _check_divergence(t: float, q: Array, v: Array) -> None:
 
 
 @kernel
-def _within(x: Array, bound: float) -> bool:
-    """Return whether every component's magnitude is below a bound; NaN is not."""
+def _bounded(q: Array, v: Array, speed: float) -> bool:
+    """Return whether q is finite, and v below a speed; NaN is neither."""
     inside = True
-    for i in range(x.shape[0]):
-        inside = inside and bool(-bound < x[i] < bound)
+    for i in range(q.shape[0]):
+        inside = inside and bool(-np.inf < q[i] < np.inf)
+    for i in range(v.shape[0]):
+        inside = inside and bool(-speed < v[i] < speed)
     return inside
 
 
 @kernel
-def _equal(x: Array, y: Array) -> bool:
-    """Return whether two vectors are equal."""
-    same = bool(x.shape[0] == y.shape[0])
-    for i in range(x.shape[0]):
-        same = same and bool(x[i] == y[i])
+def _same(q: Array, v: Array, q_other: Array, v_other: Array) -> bool:
+    """Return whether two states are equal."""
+    same = bool(q.shape[0] == q_other.shape[0] and v.shape[0] == v_other.shape[0])
+    for i in range(q.shape[0]):
+        same = same and bool(q[i] == q_other[i])
+    for i in range(v.shape[0]):
+        same = same and bool(v[i] == v_other[i])
     return same

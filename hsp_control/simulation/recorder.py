@@ -12,7 +12,9 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ConfigError, SimulationError
+from hsp_control.common.identity_cache import IdentityCache
 from hsp_control.common.version import __version__
+from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.controller import Controller
 from hsp_control.control.log_channel import LogChannel
 from hsp_control.control.output import ControlOutput
@@ -20,14 +22,16 @@ from hsp_control.declaration.nested import parts_within, with_parts_replaced
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.shapes import shape_to_log
+from hsp_control.law.problem import Record
 from hsp_control.null_space.fields import NullSpaceField, PointDistance
 from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.metrics import FixedMetric, Metric
 from hsp_control.plans import RunningPlan
 from hsp_control.robot import Robot, RobotState
-from hsp_control.simulation.limit_excess import LimitExcess
+from hsp_control.simulation.limit_excess import VELOCITY, LimitExcess
 from hsp_control.simulation.log_file import MAX_SIZE
 from hsp_control.simulation.rollout import FORMAT, Rollout, complete_columns
+from hsp_control.simulation.row_copies import RowCopies
 from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.trajectories.streams.stream import Streamed
@@ -78,6 +82,9 @@ class Recorder:
         self._logged: dict[str, Task] = {}
         self._levels: dict[str, int] = {}
         self._streams: dict[str, tuple[tuple[str, Streamed], ...]] = {}
+        self._settled: object = None
+        self._law: Record | None = None  # of the present row
+        self._yielding: set[str] = set()  # tasks with an impedance
         robot = controller.robot
         nv, units = robot.nv, dict.fromkeys(robot.units)
         self._joint_unit = joint_unit = " or ".join(units)
@@ -119,7 +126,7 @@ class Recorder:
                 f"{prefix}.friction_used", (), "-", "largest ‖f_t‖/(μ f_n) of a point"
             )
         self._excess = LimitExcess(robot)
-        self._carriers, self._frames, self._parents = _skeleton(robot, controller)
+        self._frames, self._parents = _skeleton(robot, controller)
         column("skeleton", (len(self._parents), 3), "m", "joints and task frames")
         self._add_term_columns()
         for obstacle in scene.values():
@@ -145,6 +152,8 @@ class Recorder:
         # By identity: equal tasks of two runs may have streams in different states.
         self._known = list(map(id, self._controller.tasks))
         self._log_names: dict[str, str] = {}
+        self._copies = IdentityCache(self._bind_copies)
+        self._yielding.clear()
         probe = _probe(self._controller)
         levels = [
             (level, task)
@@ -170,6 +179,7 @@ class Recorder:
                     unit_of = "s" if what == "age" else "-"
                     column(f"{stream}.{what}", (), unit_of, meaning)
             if impedance_of(task) is not None:
+                self._yielding.add(task.name)
                 column(f"{prefix}.stiffness", (m,), "N/m or N·m/rad", "diagonal of K")
             column(f"{prefix}.reference", (width,), unit, "desired value")
             column(f"{prefix}.actual", (width,), unit, "actual value")
@@ -190,6 +200,7 @@ class Recorder:
     def _add_term_columns(self) -> None:
         """Add the columns of the field's terms; the field may change during the run."""
         controller, probe = self._controller, _probe(self._controller)
+        self._copies = IdentityCache(self._bind_copies)
         self._field, self._terms = controller.field, logged_terms(controller)
         shape, unit = (controller.robot.nv,), f"{self._joint_unit}/s"
         for name, field in self._terms.items():
@@ -227,10 +238,13 @@ class Recorder:
         """
         i, columns = self._rows, self._columns
         robot = self._controller.robot
-        if list(map(id, self._controller.tasks)) != self._known:
-            self._add_task_columns()
-        if self._controller.field is not self._field:
-            self._add_term_columns()
+        settled = self._controller.settled
+        if settled is None or settled is not self._settled:
+            self._settled = settled
+            if list(map(id, self._controller.tasks)) != self._known:
+                self._add_task_columns()
+            if self._controller.field is not self._field:
+                self._add_term_columns()
         columns["t"][i] = state.t
         columns["q"][i] = state.q
         columns["v"][i] = state.v
@@ -244,7 +258,8 @@ class Recorder:
                 for what, value in stream.counts().items():
                     columns[f"{prefix}.{what}"][i] = value
         skeleton = columns["skeleton"][i]
-        skeleton[:] = state.world.placements[self._carriers, 9:]
+        joints = len(skeleton) - len(self._frames)
+        skeleton[:joints] = state.world.placements[1:, 9:]
         for k, frame in self._frames:
             skeleton[k] = state.position(frame)
         moved = self._controller.scene
@@ -255,32 +270,28 @@ class Recorder:
             columns[f"obstacle.{obstacle.name}"][i] = placement[:3]
             columns[f"obstacle.{obstacle.name}.quaternion"][i] = placement[3:]
         limits = self._controller.limits
-        self._excess.see(limits, state.q, state.v)
-        log_channels = {**self._excess.take(limits), **log_channels}
+        if VELOCITY not in log_channels:  # the state was seen in this row alone
+            self._excess.see(limits, state.q, state.v)
+            log_channels = {**self._excess.take(limits), **log_channels}
         if output is not None:
             self._record_law(state, output)
         for name, channel in log_channels.items():
-            self._add_column(
-                name, np.shape(channel.value), channel.unit, channel.meaning
-            )
+            if name not in columns:
+                shape = np.shape(channel.value)
+                self._add_column(name, shape, channel.unit, channel.meaning)
             columns[name][i] = channel.value
         self._rows += 1
 
     def _record_law(self, state: RobotState, output: ControlOutput) -> None:
         i, columns, controller = self._rows, self._columns, self._controller
-        columns["acceleration"][i] = output.acceleration
-        errors = output.task
-        for task, rows in controller.task_rows.items():  # of the active tasks
-            prefix = f"task.{self._log_names[task]}"
-            columns[f"{prefix}.error"][i] = errors.error[rows]
-            columns[f"{prefix}.error_rate"][i] = errors.error_rate[rows]
-            if f"{prefix}.stiffness" in columns:
-                stiffness = np.diag(controller.stiffness(task))
-                columns[f"{prefix}.stiffness"][i] = stiffness
+        self._law = law = output.explanation(self._law)
+        active = controller.active_stack
+        self._copies.get(active, law).write(i)
+        for task in self._yielding & active.task_rows.keys():
+            stiffness = np.diag(controller.stiffness(task))
+            columns[f"task.{self._log_names[task]}.stiffness"][i] = stiffness
         diagnostics = controller.diagnose()
-        columns["field.g"][i] = output.field.g
         columns["field.value"][i] = diagnostics.field_value
-        columns["null_space_error"][i] = output.null_space_error
         columns["null_space_norm"][i] = diagnostics.null_space_norm
         columns["manipulability"][i] = diagnostics.manipulability
         values = diagnostics.singular_values
@@ -290,19 +301,35 @@ class Recorder:
                 old, ((0, 0), (0, added)), constant_values=np.nan
             )
         columns["singular_values"][i, : len(values)] = values
-        level = controller.active_stack.damped_level if output.damped else 0
+        level = active.damped_level if output.damped else 0
         columns["damped"][i] = level
         columns["status"][i] = output.status
         columns["relaxation"][i] = output.relaxation
         self._record_contacts(output)
-        samples = controller.active_stack.term_samples
-        for (name, field), sample in zip(self._terms.items(), samples, strict=True):
-            columns[f"field.{name}.g"][i] = sample.g
+        for name, field in self._terms.items():
             columns[f"field.{name}.value"][i] = field.value(state)
             if f"distance.{name}" in columns:
                 columns[f"distance.{name}"][i] = field.minimum_distance(state)
 
+    def _bind_copies(self, active: ActiveStack, law: Record) -> RowCopies:
+        """Return what copies the law's arrays, those of the active tasks and terms."""
+        columns = self._columns
+        pairs = [
+            (law.acceleration, columns["acceleration"]),
+            (law.field.g, columns["field.g"]),
+            (law.null_space_error, columns["null_space_error"]),
+        ]
+        for task, rows in active.task_rows.items():
+            prefix = f"task.{self._log_names[task]}"
+            pairs.append((law.task.error[rows], columns[f"{prefix}.error"]))
+            pairs.append((law.task.error_rate[rows], columns[f"{prefix}.error_rate"]))
+        for name, sample in zip(self._terms, active.term_samples, strict=True):
+            pairs.append((sample.g, columns[f"field.{name}.g"]))
+        return RowCopies(pairs)
+
     def _record_contacts(self, output: ControlOutput) -> None:
+        if not self._controller.contacts:
+            return
         columns, support = self._columns, self._controller.active_stack.support
         world = support.in_world(output.forces)
         commanded = support.in_world(support.reference)
@@ -501,26 +528,24 @@ def _probe(controller: Controller) -> RobotState:
 
 def _skeleton(
     robot: Robot, controller: Controller
-) -> tuple[list[int], list[tuple[int, str]], list[int]]:
-    """Return the joints of the points to draw, which of them are frames, and parents.
+) -> tuple[list[tuple[int, str]], list[int]]:
+    """Return which of the points to draw are frames, and the parent of each point.
 
-    There is one point per joint, and one per frame that a task controls: of these also
-    index and name. A parent is the index of another point, -1 for none.
+    There is one point per joint, in their order, and then one per frame that a task
+    controls: of these index and name. A parent is the index of another point, -1 for
+    none.
     """
-    joints: list[int] = []
     named: list[tuple[int, str]] = []
     parents: list[int] = []
     index = {0: -1}
     for joint in range(1, robot.model.njoints):
-        index[joint] = len(joints)
-        joints.append(joint)
+        index[joint] = len(parents)
         parents.append(index[robot.model.parents[joint]])
     frames = dict.fromkeys(
         frame for task in controller.tasks if (frame := getattr(task, "frame", None))
     )
     for frame in frames:
         joint = robot.model.frames[robot.frame_id(frame)].parentJoint
-        named.append((len(joints), frame))
-        joints.append(joint)
+        named.append((len(parents), frame))
         parents.append(index[joint])
-    return joints, named, parents
+    return named, parents

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 import pinocchio as pin
@@ -11,6 +11,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
 from hsp_control.common.rotations import quaternion_from_rotation
+from hsp_control.common.step_plan import merged
 from hsp_control.declaration import AnyOf
 from hsp_control.geometry.start import Start
 from hsp_control.robot import RobotState
@@ -114,20 +115,23 @@ class FramePose(FrameTask, TrackingTask, CompliantTask, type="frame_pose"):
         motion = state.frame(self.frame_name).motion
         return Rotating(3, motion.rotation, motion.velocity[3:])
 
-    def _reference(self, state: RobotState) -> PoseSample:
+    def _reference(self, state: RobotState) -> "_Reference":
         """Return the reference at the state's time; the state keeps the memory."""
 
-        def make() -> tuple[PoseSample, Follower]:
-            sample = PoseSample.allocate()
-            return sample, self.pose.follow(sample)
+        def make() -> _Reference:
+            desired, values = np.zeros((8, 3)), np.zeros((2, 7))
+            sample, frame = PoseSample.over(desired), state.frame(self.frame_name)
+            place = frame.position, frame.rotation
+            measure = bind(_measured_pose, desired, *place, values)
+            return _Reference(sample, merged(self.pose.follow(sample)), measure, values)
 
-        sample, follow = state.made(self, "reference", make)
-        follow(state.t)
-        return sample
+        reference = state.made(self, "reference", make)
+        reference.follow(state.t)
+        return reference
 
     def reference_rate(self, state: RobotState) -> Array:
         """Return x_d' and w_d in world axes, shape (6,) [m/s, rad/s]."""
-        sample = self._reference(state)
+        sample = self._reference(state).sample
         velocity, turning = (
             sample.position.velocity,
             sample.orientation.angular_velocity,
@@ -136,15 +140,50 @@ class FramePose(FrameTask, TrackingTask, CompliantTask, type="frame_pose"):
 
     def measure(self, state: RobotState) -> tuple[Array, Array]:
         """Return desired and actual pose: x, y, z [m], quaternion (x, y, z, w)."""
-        frame = state.frame(self.frame_name)
-        sample = self._reference(state)
-        desired, actual = np.zeros(7), np.zeros(7)
-        desired[:3], actual[:3] = sample.position.position, frame.position
-        quaternion_from_rotation(sample.orientation.rotation, desired[3:])
-        quaternion_from_rotation(frame.rotation, actual[3:])
-        if desired[3:] @ actual[3:] < 0.0:
-            actual[3:] *= -1.0
+        state.frame(self.frame_name)
+        reference = self._reference(state)
+        reference.measure()
+        desired, actual = reference.values.copy()
         return desired, actual
+
+
+class _Reference(NamedTuple):
+    """The reference of a pose at a state's time.
+
+    Attributes:
+        sample: The reference.
+        follow: Writes it for a time [s].
+        measure: Writes `values` for the reference and the frame.
+        values: What `FramePose.measure` returns, shape (2, 7).
+    """
+
+    sample: PoseSample
+    follow: Callable[[float], object]
+    measure: Callable[[], object]
+    values: Array
+
+
+@kernel
+def _measured_pose(desired: Array, position: Array, R: Array, values: Array) -> None:
+    """Write the desired and the actual pose; see `FramePose.measure`.
+
+    Args:
+        desired: See `pose_error_equation`.
+        position: The actual position, shape (3,).
+        R: The actual rotation, shape (3, 3).
+        values: Written, shape (2, 7); of the two quaternions that mean the actual
+            rotation, it has the one nearer to the desired one.
+    """
+    for i in range(3):
+        values[0, i], values[1, i] = desired[0, i], position[i]
+    quaternion_from_rotation(desired[3:6], values[0, 3:])
+    quaternion_from_rotation(R, values[1, 3:])
+    alike = 0.0
+    for i in range(3, 7):
+        alike += values[0, i] * values[1, i]
+    if alike < 0.0:
+        for i in range(3, 7):
+            values[1, i] *= -1.0
 
 
 @kernel
