@@ -1,18 +1,22 @@
 """Measure the real-time factor of rollouts on one core.
 
-    .venv/bin/python benchmarks/rollouts.py [--rounds N]
+    .venv/bin/python benchmarks/rollouts.py [--rounds N] [--steps]
 
-First 10 s of a Panda at 1 kHz (6-D pose and joint centering) with a fixed-step plant
-and with RK4, logged every 10 ms and at every step, in turns; then every bundled
-configuration as it is. Times include logging, but not compilation. They are processor
-times, so that other processes on the machine matter little. Memory is the size of the
-log's columns.
+First what a step costs, rows of the log included, in parts of what it cannot do
+without: one `compute`, and one articulated-body algorithm (ABA) for each stage of the
+integrator. Then 10 s of a Panda at 1 kHz (6-D pose and joint centering) with a
+fixed-step plant and with RK4, logged every 10 ms and at every step, in turns; then
+every bundled configuration as it is. Times include logging, but not compilation. They
+are processor times, so that other processes on the machine matter little. Memory is the
+size of the log's columns.
 """
 
 import argparse
 import statistics
-from time import process_time
+from time import perf_counter, process_time
 from typing import Any
+
+import numpy as np
 
 from hsp_control import Rollout, load_experiment
 from hsp_control.common.resources import bundled_configs
@@ -58,11 +62,58 @@ def row(name: str, factors: list[float], rollout: Rollout) -> str:
     )
 
 
+def step_costs(rounds: int) -> None:
+    """Print what a step costs, in parts of `compute` and of the dynamics."""
+    stages = {"semi_implicit_euler": 1, "rk4": 4}
+    periods = {"every 10 ms": 0.01, "every step": 0.001}
+    cases = {
+        (kind, name): load_experiment(
+            PANDA, f"simulation.integrator={{type: {kind}}}",
+            f"simulation.log_period={period}", "simulation.duration=3",
+        )
+        for kind in stages for name, period in periods.items()
+    }  # fmt: skip
+    experiment = cases["rk4", "every 10 ms"]
+    robot, controller = experiment.robot, experiment.controller
+    q, v, n = experiment.q0, experiment.v0, np.arange(robot.nv)
+    states = [(1e-3 * k, q + 1e-3 * np.sin(k + n), 1e-2 * np.cos(k + n))
+              for k in range(1000)]  # fmt: skip
+    dynamics = robot.bind_forward_dynamics(q, v, np.zeros(robot.nv))
+    found: dict[tuple[str, str], list[float]] = {case: [] for case in cases}
+    for round_ in range(rounds + 1):
+        for case, each in cases.items():
+            begin = perf_counter()
+            for state in states:
+                controller.compute(*state)
+            law = (perf_counter() - begin) / len(states)
+            begin = perf_counter()
+            for _ in states:
+                dynamics.compute(0.0)
+            forward = (perf_counter() - begin) / len(states)
+            rows: list[float] = []
+            each.run(lambda _, rows=rows: rows.append(perf_counter()))  # type: ignore
+            row = statistics.median(np.diff(rows)[len(rows) // 3 :])
+            step = row * 0.001 / periods[case[1]]
+            if round_ > 0:  # the first compiles
+                found[case].append(step / (law + stages[case[0]] * forward))
+    print("| integrator | a row | a step, in parts of compute + ABA | range |")
+    print("|---|---|--:|---|")
+    for (kind, name), parts in found.items():
+        print(f"| {kind}, {stages[kind]} ABA | {name} | {statistics.median(parts):.2f} "
+              f"| {min(parts):.2f} to {max(parts):.2f} |")  # fmt: skip
+    print()
+
+
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=5)
-    rounds = parser.parse_args().rounds
+    parser.add_argument("--steps", action="store_true", help="the first table alone")
+    arguments = parser.parse_args()
+    rounds = arguments.rounds
+    step_costs(rounds)
+    if arguments.steps:
+        return
     head = "| {} | real-time factor | range | rows | row size | largest error |"
     cases = {
         f"{name}, a row {logged}": (f"simulation.integrator={{type: {kind}}}", period)

@@ -376,7 +376,7 @@ class Controller:
             type(tau) is not np.ndarray
             or tau.shape != own.shape
             or tau.dtype != own.dtype
-            or not isfinite(tau @ tau)
+            or not isfinite(tau.dot(tau))  # half the time of tau @ tau
         ):
             tau = self._declared.robot.check_tangent(tau, "effort tau")
         if not isfinite(period):

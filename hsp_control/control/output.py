@@ -83,7 +83,7 @@ class ControlOutput:
         rows = self._rows
         if own is None or len(own.task.error) != rows:
             own = Record.allocate(rows, len(self.tau))
-        own.memory[:] = self._memory
+        own.memory[:] = np.frombuffer(self._memory)
         if self._acceleration is not None:
             own.acceleration[:] = self._acceleration
         return own

@@ -2,7 +2,7 @@
 
 import math
 import platform
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from importlib.metadata import version
 from typing import Any
@@ -201,15 +201,17 @@ class Recorder:
         """Add the columns of the field's terms; the field may change during the run."""
         controller, probe = self._controller, _probe(self._controller)
         self._copies = IdentityCache(self._bind_copies)
+        self._values = IdentityCache(self._bind_values)
+        self._distances: dict[str, NullSpaceField] = {}  # terms that measure one
         self._field, self._terms = controller.field, logged_terms(controller)
         shape, unit = (controller.robot.nv,), f"{self._joint_unit}/s"
         for name, field in self._terms.items():
             self._add_column(f"field.{name}.g", shape, unit, "weighted share of g")
             self._add_column(f"field.{name}.value", (), "-", "unweighted cost or norm")
             if field.minimum_distance(probe) is not None:
-                self._add_column(
-                    f"distance.{name}", (), "m", "minimum distance", **_center_of(field)
-                )
+                column, center = f"distance.{name}", _center_of(field)
+                self._distances[column] = field
+                self._add_column(column, (), "m", "minimum distance", **center)
 
     def _reserve(self, rows: int, shape: tuple[int, ...]) -> None:
         """Check that the log can be loaded again, before memory is allocated."""
@@ -306,10 +308,19 @@ class Recorder:
         columns["status"][i] = output.status
         columns["relaxation"][i] = output.relaxation
         self._record_contacts(output)
-        for name, field in self._terms.items():
-            columns[f"field.{name}.value"][i] = field.value(state)
-            if f"distance.{name}" in columns:
-                columns[f"distance.{name}"][i] = field.minimum_distance(state)
+        for value, column in self._values.get(state):
+            column[i] = value()
+        for name, field in self._distances.items():
+            columns[name][i] = field.minimum_distance(state)
+
+    def _bind_values(
+        self, state: RobotState
+    ) -> list[tuple[Callable[[], float], Array]]:
+        """Return what computes the value of each term at a state, and its column."""
+        return [
+            (field.bind_value(state), self._columns[f"field.{name}.value"])
+            for name, field in self._terms.items()
+        ]
 
     def _bind_copies(self, active: ActiveStack, law: Record) -> RowCopies:
         """Return what copies the law's arrays, those of the active tasks and terms."""
