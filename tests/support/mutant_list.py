@@ -53,6 +53,7 @@ OF_LIMITS = UNIT + "control/test_limits.py -k "
 OF_STEPS = UNIT + "control/test_limited_step.py -k "
 OF_QP = UNIT + "control/test_dual_active_set.py -k "
 OF_COMPENSATION = UNIT + "control/test_compensation.py -k "
+OF_STRETCHES = UNIT + "simulation/test_stretch.py -k "
 OF_IMPERFECTIONS = UNIT + "simulation/test_imperfections.py -k "
 
 MUTANTS = (
@@ -710,6 +711,34 @@ MUTANTS = (
         "q, v = plant.advance(t, stop, held if t > times[0] else tau)\n"
         "            held = tau",
         UNIT + "simulation/test_closed_loop.py -k sampled_control_holds",
+    ),
+    Mutant(
+        "stretch: the first effort is held throughout",
+        SIMULATION + "stretch.py",
+        "held[i] = effort[i]",
+        "held[i] += 0.0",
+        OF_STRETCHES + "last_bit",
+    ),
+    Mutant(
+        "stretch: limits that bind are not noticed",
+        SIMULATION + "stretch.py",
+        "if not is_free(code):",
+        "if code < 0.0:",
+        OF_STRETCHES + "limit_binds",
+    ),
+    Mutant(
+        "stretch: held efforts are not observed",
+        ACTUATION + "actuation.py",
+        "calls = [self._held.expect(state.v, a)]",
+        "calls = self._checks.get(state, a, self._held, True)[:0]",
+        OF_STRETCHES + "limit_binds",
+    ),
+    Mutant(
+        "stretch: states between rows are not seen",
+        SIMULATION + "stretch.py",
+        "moving = _table([steps.native, *self._seeing])",
+        "moving = _table([steps.native])",
+        OF_STRETCHES + "between_two_rows",
     ),
     Mutant(
         "the row's period for the control period",

@@ -17,7 +17,13 @@ from hsp_control.common import adapters
 from hsp_control.common.arrays import Array
 from hsp_control.common.kernels import PLAIN, kernel
 from hsp_control.common.native import NativeCall, Timed, bind, once, sequence
-from hsp_control.common.step_plan import CallSequence, StepPlan, TimeWindow, steps
+from hsp_control.common.step_plan import (
+    CallSequence,
+    StepPlan,
+    TimeWindow,
+    merged,
+    steps,
+)
 
 compiled = pytest.mark.skipif(
     not hasattr(kernel(lambda: None), "py_func"), reason="NUMBA_DISABLE_JIT is set"
@@ -224,6 +230,22 @@ def test_several_calls_as_one_return_what_one_of_them_says() -> None:
     assert CallSequence(*calls)() == 2.0
     assert CallSequence(*calls, result=1)() == 1.0
     assert called(log) == [0.0, 1.0, 2.0, 0.0, 1.0, 2.0]
+
+
+@compiled
+def test_native_parts_of_a_call_of_the_time_are_merged() -> None:
+    """Windows of time included; with one part in Python the call stays as it is."""
+    log = np.zeros(9)
+    early = TimeWindow(bind(_note_time, log, 1.0, timed=True), 0.0, 1.0)
+    always = bind(_note_time, log, 20.0, timed=True)
+    follow = merged(CallSequence(early, CallSequence(always)))
+    assert isinstance(follow, NativeCall)
+    follow(0.5)
+    assert called(log) == [1.5, 20.5]
+    follow(1.0)
+    assert called(log) == [21.0]
+    mixed = CallSequence(early, lambda t: None)
+    assert merged(mixed) is mixed
 
 
 class _Pair(NamedTuple):

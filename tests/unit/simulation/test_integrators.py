@@ -1,5 +1,6 @@
 """Check integrators: orders of convergence, invariants, charts, shortened steps."""
 
+import pickle
 from collections.abc import Callable
 from typing import Any
 
@@ -23,6 +24,7 @@ from hsp_control.common.exceptions import (
     LogError,
     SimulationError,
 )
+from hsp_control.common.kernels import PLAIN
 from hsp_control.robot import integrators
 from hsp_control.robot.integrators import Dop853, Rk4, SemiImplicitEuler
 from hsp_control.robot.step_count import number_of_steps
@@ -199,6 +201,32 @@ def test_steps_are_equal_and_none_is_longer() -> None:
         assert len(times) == 4 * stages
     assert number_of_steps(0.3, 0.1) == 3  # 0.3/0.1 is 2.9999999999999996
     assert number_of_steps(0.1, 0.3) == 1
+
+
+@pytest.mark.skipif(PLAIN, reason="plain Python has no native calls")
+@pytest.mark.parametrize("method", [Rk4, SemiImplicitEuler])
+def test_native_steps_are_those_that_are_made_one_by_one(method: Any) -> None:
+    """To the last bit, over intervals of 10 ms by steps of at most 3 ms."""
+    robot = load("panda")
+    tau = np.linspace(-3.0, 3.0, 7)
+
+    def begin() -> integrators.Steps:
+        return method(0.003).begin(
+            robot, lambda q, v: robot.bind_forward_dynamics(q, v, tau)
+        )
+
+    native, single = begin(), begin()
+    assert native.native is not None
+    single.native = None
+    ours = theirs = start(robot, 8)
+    for k in range(10):
+        t, end = 0.01 * k, 0.01 * (k + 1)
+        ours, theirs = native(t, end, *ours), single(t, end, *theirs)
+        assert ours[0].tobytes() == theirs[0].tobytes()
+        assert ours[1].tobytes() == theirs[1].tobytes()
+    copy = pickle.loads(pickle.dumps(native.native))
+    copy()  # it owns what it reads
+    assert native.h[0] == pytest.approx(0.0025)
 
 
 def test_trials_that_stray_are_shortened() -> None:
