@@ -6,13 +6,12 @@ limit is violated and nothing comes from outside. It makes the calls that a sing
 period makes, by their addresses: the motion is the same, to the last bit.
 """
 
-from collections.abc import Callable, Sequence
-from functools import cache, partial
+from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
-from numba import types
 
-from hsp_control.common.adapters import entry_point, run
+from hsp_control.common.adapters import run
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import NativeCall
@@ -37,7 +36,7 @@ class Stretch:
         steps: Steps,
         excess: LimitExcess,
     ) -> None:
-        """Load or compile the loop.
+        """Keep the parts.
 
         Args:
             controller: The controller, without compensation.
@@ -47,9 +46,9 @@ class Stretch:
         """
         self._controller, self._excess = controller, excess
         self._plant, self._steps = plant, steps
-        self._loop = _entry()
         self._step: FreeStep | None = None
-        self._calls: tuple[Array | Indices, ...] = ()
+        self._loop: NativeCall | None = None
+        self._which = np.zeros(5)  # the loop's last argument
         self._seeing: list[NativeCall] = []
 
     def advance(
@@ -84,26 +83,28 @@ class Stretch:
         step: FreeStep,
     ) -> int:
         """Make periods from the k-th on; return how many."""
-        if step is not self._step:
-            self._bind(step)
+        if self._loop is None or step is not self._step:
+            self._step, self._loop = step, self._bind(step)
         self._plant.hold(self._steps, tau)
-        last = min(periods, k + MOST)
-        made = self._loop(*self._calls, start, span, periods, k, last) - k
+        which = self._which
+        which[0], which[1], which[2] = start, span, periods
+        which[3], which[4] = k, min(periods, k + MOST)
+        made = int(self._loop()) - k
         if made > 1:  # calls in Python read it
             state = self._controller.state
             state.t = start + (k + made - 1) * span / periods
         return made
 
-    def _bind(self, step: FreeStep) -> None:
-        """Gather what the loop calls."""
+    def _bind(self, step: FreeStep) -> NativeCall:
+        """Return the loop of these steps."""
         steps = self._steps
         assert steps.native is not None
         # Rows are addresses: what they lead to is kept, here and in the steps.
-        self._step = step
         self._seeing = self._excess.seeing(self._controller.limits, steps.q, steps.v)
         moving = _table([steps.native, *self._seeing])
         own = steps.q, steps.v, self._plant.effort, step.effort, steps.interval
-        self._calls = (*moving, *step.move.args, *_table(step.sending), *own)
+        calls = *moving, *step.move.args, *_table(step.sending)
+        return NativeCall.of(_stretch, (*calls, *own, self._which), timed=False)
 
 
 def _table(calls: Sequence[NativeCall]) -> tuple[Indices, Array]:
@@ -130,13 +131,9 @@ def _stretch(
     held: Array,
     effort: Array,
     interval: Array,
-    start: float,
-    span: float,
-    periods: int,
-    first: int,
-    last: int,
+    which: Array,
 ) -> int:
-    """Move on from period ``first`` to ``last``, or to one that is not free.
+    """Move on from one period to another, or to one that is not free.
 
     Args:
         moving: Calls that move q and v over the interval, and see them there.
@@ -154,15 +151,15 @@ def _stretch(
         held: The effort that it is under, shape (nv,).
         effort: What the law writes, shape (nv,).
         interval: Written: when a period begins and ends [s], shape (2,).
-        start: When period 0 begins [s].
-        span: The length of all periods [s].
-        periods: Their number.
-        first: The present period, whose effort is held.
-        last: The period to move on to.
+        which: When period 0 begins, and the length of all periods together [s]; how
+            many they are, the present one, whose effort is held, and the one to move on
+            to.
 
     Returns:
         The period that begins where it ended.
     """
+    start, span, periods = which[0], which[1], which[2]
+    first, last = int(which[3]), int(which[4])
     t = start + first * span / periods
     for k in range(first + 1, last + 1):
         interval[0] = t
@@ -181,14 +178,3 @@ def _stretch(
             return k
         run(sending, sending_when, t)
     return last
-
-
-@cache
-def _entry() -> Callable[..., int]:
-    table, windows = types.int64[:, ::1], types.float64[:, ::1]
-    vector, number, count = types.float64[::1], types.float64, types.int64
-    move = table, windows, vector, vector, table, types.int64[::1]
-    own = (vector,) * 5
-    kinds = table, windows, *move, table, windows, *own, number, number, *(count,) * 3
-    entry: Callable[..., int] = entry_point(_stretch, kinds)
-    return entry
