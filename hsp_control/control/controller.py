@@ -227,8 +227,8 @@ class Controller:
     def _bind(self) -> None:
         """Bind the move, the law and the check of its limits as one call."""
         active, state = self.active_stack, self._state
-        code = active.resolution.code
-        checks = self._actuation.checks(state, active.acceleration, code)
+        actuation, law = self._actuation, active.resolution
+        checks = actuation.checks(state, active.acceleration, law, active.support)
         move = state.bind_move([*active.calls, *checks])
         self._whole = active, move, self._actuation.is_direct(active.support)
 
@@ -299,7 +299,9 @@ class Controller:
                     code, violated = divmod(int(value), CODES)
                     if code == BEYOND_ANY_LEVEL:
                         self._raise_not_finite()
-                    damped, direct = active.damped, direct and not violated
+                    if code:
+                        damped = active.damped
+                    direct = direct and not violated
             if direct:
                 tau, forces = state.effort, active.forces
                 status, relaxation = EXACT, 0.0

@@ -255,6 +255,25 @@ def test_rows_that_come_and_go_find_room() -> None:
 
 
 @pytest.mark.skipif(PLAIN, reason="about what Numba compiles")
+@pytest.mark.parametrize("strength", [0.5, 0.01])
+def test_one_native_call_is_the_same_as_its_parts(strength: float) -> None:
+    """A modifier that changes nothing takes the other way: check, and then deliver."""
+    made, rng, seen = arm(), np.random.default_rng(0), set()
+    made.at(0.0).limits(hsp.Limits(effort=Scaled(strength)))
+    for _ in range(60):
+        q = panda().home() + 0.3 * rng.standard_normal(7)
+        v = 0.3 * rng.standard_normal(7)
+        parts = made.compute(0.3, q, v, modifier=lambda _, __, a: (a, None))
+        once = made.compute(0.3, q, v)
+        seen.add(once.status)
+        assert once.status is parts.status
+        assert once.relaxation == parts.relaxation
+        assert once.damped == parts.damped
+        np.testing.assert_array_equal(once.tau, parts.tau)
+        np.testing.assert_array_equal(once.acceleration, parts.acceleration)
+    assert {Status.LIMITED, Status.RELAXED if strength < 0.5 else Status.EXACT} <= seen
+
+
 def test_nothing_is_compiled_where_a_limit_binds() -> None:
     """Neither in the first limited step, nor in a relaxed one, nor after a change."""
     from hsp_control.common import adapters
