@@ -253,7 +253,7 @@ def run_if(calls: Indices, found: Array) -> float:
     Returns:
         ``found[0]``, plus what the last call returned if they were made.
     """
-    value = found[0]
+    value = float(found[0])
     if found[1] != 0.0:
         last = 0.0
         for k in range(calls.shape[0]):
