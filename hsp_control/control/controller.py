@@ -20,7 +20,7 @@ from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits, RobotLimits
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation import Actuation
-from hsp_control.control.actuation.actuation import CODES
+from hsp_control.control.actuation.actuation import CODES, FLAGS
 from hsp_control.control.actuation.status import EXACT, RELAXED
 from hsp_control.control.changes import Change, Changes
 from hsp_control.control.composition import Base, priority_of
@@ -305,6 +305,8 @@ class Controller:
             if direct:
                 tau, forces = state.effort, active.forces
                 status, relaxation = EXACT, 0.0
+            elif violated % FLAGS:  # the call that found it has limited the step
+                tau, a, forces, status, relaxation = self._actuation.limited
             else:
                 tau, a, forces, status, relaxation = self._actuation.deliver(
                     state, a, violated, active.resolution, active.support, offset

@@ -49,9 +49,10 @@ from hsp_control.robot import Robot, RobotState
 
 _NO_ROWS: Barriers = {}
 
-_FLAGS, CODES = 4, 16
+FLAGS, CODES = 4, 16
 """What `Actuation.checks` finds is the law's code times `CODES`, plus the flags of
-violated limits times `_FLAGS`, plus the `Status` of a step that is limited already."""
+violated limits times `FLAGS`, plus the `Status` of a step that is limited already: that
+is in `Actuation.limited`, and nothing is left to `deliver`."""
 
 Delivered = tuple[Array, Array, Array, Status, float]
 """What the actuation delivers: effort, shape (nv,) [N·m or N], zero where there is no
@@ -70,6 +71,7 @@ class Actuation:
         limits: The limits in force, if any.
         base: Indices of the degrees of freedom without a motor.
         delivered: The acceleration of the last step, shape (nv,).
+        limited: What the last step delivers that was limited within a call of `checks`.
     """
 
     def __init__(
@@ -99,7 +101,7 @@ class Actuation:
         self._steps: WeakKeyDictionary[Resolution, LimitedStep] = WeakKeyDictionary()
         self._resolution: Resolution | None = None
         self._step: LimitedStep | None = None
-        self._limited: Delivered  # by the call that found what is violated
+        self.limited: Delivered
         self.delivered: Array = np.zeros(nv)
         self.period = 0.0
         self._held = HeldEffort(nv)
@@ -243,15 +245,13 @@ class Actuation:
         Args:
             state: The robot's state.
             a: The law's acceleration, shape (nv,).
-            violated: The limits that it violates, see `checks`; without the law's code.
+            violated: What `checks` found, without the law's code.
             resolution: The resolved law, with its levels in order of priority.
             support: The forces of the active contacts; updated here.
             offset: Effort besides M a + N, for friction for example, shape (nv,)
                 [N·m or N]; None: none. The limits hold for the sum.
         """
-        if violated % _FLAGS:  # the call that found it has limited the step
-            return self._limited
-        violated //= _FLAGS
+        violated //= FLAGS
         wanted = state.effort  # M a + N
         unsupported = self.is_direct(support)
         if offset is None and unsupported:
@@ -285,7 +285,7 @@ class Actuation:
 
         The last one returns a sum, see `CODES`: 0 if the law is exact and a and the
         effort without contacts are within their bounds. If they are not, and a QP is
-        all that is needed then, it is solved at once; `deliver` returns the result.
+        all that is needed then, it is solved at once; `limited` has the result.
 
         Args:
             state: The robot's state; the calls read it each time.
@@ -311,7 +311,7 @@ class Actuation:
         if not self.is_direct(support):
             return None
         step = self._step_of(state, resolution, support)
-        self._limited = *step.result, LIMITED, 0.0
+        self.limited = *step.result, LIMITED, 0.0
         return step.nearest_if(resolution.acceleration, state.effort, self._found)
 
     def violated(self, state: RobotState, a: Array, code: Indices) -> int:
@@ -482,5 +482,5 @@ def _check(
     observe(v, held, t)
     error, disturbance = held.error, held.disturbance
     flags = violated_limits(q, v, a, tau, where, limits, error, disturbance, bounds)
-    found[0], found[1] = CODES * code[0] + _FLAGS * flags, flags
+    found[0], found[1] = CODES * code[0] + FLAGS * flags, flags
     return float(found[0])
