@@ -696,7 +696,7 @@ MUTANTS = (
         UNIT + "control/test_deviation_cost.py -k projector",
     ),
     Mutant(
-        "limits: what one level lost is not shared by those below",
+        "limits: no level below shares what is lost",
         CONTROL + "actuation/deviation_cost.py",
         "if costs[0, k] > 0.0:",
         "if costs[0, k] < 0.0:",
