@@ -295,7 +295,11 @@ class Actuation:
         """
         calls = self._compile_checks(state, a, resolution.code)
         limit = self._limit_if_violated(state, resolution, support)
-        return calls if limit is None else [*calls, *in_order([limit])]
+        if limit is None:
+            return calls
+        step = self._step_of(state, resolution, support)
+        self.limited = *step.result, LIMITED, 0.0
+        return [*calls, *in_order([limit])]
 
     def _limit_if_violated(
         self, state: RobotState, resolution: Resolution, support: Support
@@ -311,7 +315,6 @@ class Actuation:
         if not self.is_direct(support):
             return None
         step = self._step_of(state, resolution, support)
-        self.limited = *step.result, LIMITED, 0.0
         return step.nearest_if(resolution.acceleration, state.effort, self._found)
 
     def violated(self, state: RobotState, a: Array, code: Indices) -> int:
