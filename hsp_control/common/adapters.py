@@ -246,6 +246,22 @@ def run_once(calls: Indices, stamp: Indices, made: Indices) -> None:
             _invoke(calls[k, 0], calls[k, 1], 0.0)  # type: ignore[call-arg]
 
 
+@kernel
+def run_if(calls: Indices, found: Array) -> float:
+    """Make calls that do not depend on the time, if ``found[1]`` is not zero.
+
+    Returns:
+        ``found[0]``, plus what the last call returned if they were made.
+    """
+    value = float(found[0])
+    if found[1] != 0.0:
+        last = 0.0
+        for k in range(calls.shape[0]):
+            last = _invoke(calls[k, 0], calls[k, 1], 0.0)  # type: ignore[call-arg]
+        value += last
+    return value
+
+
 def entry_point(function: Callable[..., Any], kinds: tuple[Any, ...]) -> Any:
     """Return a kernel for these types, as Python calls it without asking for them."""
     compiled = cast("Any", function)

@@ -292,11 +292,13 @@ def _rotate_rows(Y: Array, U: Array, p: int, q: int) -> bool:
         alpha += Y[p, i] * Y[p, i]
         beta += Y[q, i] * Y[q, i]
         gamma += Y[p, i] * Y[q, i]
-    if abs(gamma) <= 1e-15 * np.sqrt(alpha * beta) or gamma == 0.0:
+    if abs(gamma) <= 1e-15 * np.sqrt(alpha * beta) or gamma * gamma == 0.0:
         return False
-    zeta = (beta - alpha) / (2.0 * gamma)
-    sign = 1.0 if zeta >= 0.0 else -1.0
-    t = sign / (abs(zeta) + np.sqrt(1.0 + zeta * zeta))
+    # The tangent of the smaller angle, where a quotient of the two might overflow.
+    apart, twice = beta - alpha, 2.0 * gamma
+    t = twice / (abs(apart) + np.sqrt(apart * apart + twice * twice))
+    if apart < 0.0:
+        t = -t
     c = 1.0 / np.sqrt(1.0 + t * t)
     s = c * t
     for i in range(n):

@@ -126,6 +126,31 @@ def _make_once(
             call()
 
 
+def only_if(calls: Sequence[Callable[[], float]], found: Array) -> Callable[[], float]:
+    """Return one call that makes several if ``found[1]`` is not zero, found (2,).
+
+    It returns ``found[0]``, plus what the last one returned if they were made.
+    """
+    native = [call for call in calls if isinstance(call, NativeCall)]
+    if len(native) < len(calls):
+        return partial(_make_if, calls, found)
+    from hsp_control.common import adapters
+
+    rows = np.concatenate([call.args[0] for call in native])
+    call = NativeCall.of(adapters.run_if, (rows, found), timed=False)
+    call.recipe, call.kept = (only_if, (calls, found)), rows
+    return call
+
+
+def _make_if(calls: Sequence[Callable[[], float]], found: Array) -> float:
+    """Do the same, where calls are made one by one."""
+    value, last = float(found[0]), 0.0
+    if found[1] != 0.0:
+        for call in calls:
+            last = call()
+    return value + last
+
+
 def sequence(calls: Sequence[Timed], *free: float) -> NativeCall:
     """Return one call of the time that makes several; it returns the last result.
 

@@ -20,7 +20,7 @@ from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits, RobotLimits
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation import Actuation
-from hsp_control.control.actuation.actuation import CODES
+from hsp_control.control.actuation.actuation import CODES, FLAGS
 from hsp_control.control.actuation.status import EXACT, RELAXED
 from hsp_control.control.changes import Change, Changes
 from hsp_control.control.composition import Base, priority_of
@@ -231,8 +231,8 @@ class Controller:
     def _bind(self) -> None:
         """Bind the move, the law and the check of its limits as one call."""
         active, state = self.active_stack, self._state
-        code = active.resolution.code
-        checks = self._actuation.checks(state, active.acceleration, code)
+        actuation, law = self._actuation, active.resolution
+        checks = actuation.checks(state, active.acceleration, law, active.support)
         move = state.bind_move([*active.calls, *checks])
         self._whole = active, move, self._actuation.is_direct(active.support)
 
@@ -303,10 +303,14 @@ class Controller:
                     code, violated = divmod(int(value), CODES)
                     if code == BEYOND_ANY_LEVEL:
                         self._raise_not_finite()
-                    damped, direct = active.damped, direct and not violated
+                    if code:
+                        damped = active.damped
+                    direct = direct and not violated
             if direct:
                 tau, forces = state.effort, active.forces
                 status, relaxation = EXACT, 0.0
+            elif violated % FLAGS:  # the call that found it has limited the step
+                tau, a, forces, status, relaxation = self._actuation.limited
             else:
                 tau, a, forces, status, relaxation = self._actuation.deliver(
                     state, a, violated, active.resolution, active.support, offset

@@ -50,6 +50,22 @@ class Factors(NamedTuple):
     X: Array
 
 
+class Projectors(NamedTuple):
+    """What `resolve_levels` leaves of its projectors, where it was needed.
+
+    Level k takes Q_{k-1} J_kᵀ q(G_k) J_k Q_{k-1} of W⁻¹, and leaves Q_k.
+
+    Attributes:
+        Q: What the last level leaves, Q_K = P W⁻¹, shape (nv, nv).
+        QJ: Q_{k-1} J_kᵀ of all levels side by side, shape (nv, m).
+        G_inverse: q(G_k) of all levels along the diagonal, shape (m, m).
+    """
+
+    Q: Array
+    QJ: Array
+    G_inverse: Array
+
+
 class Scratch(NamedTuple):
     """Memory of the law between its steps.
 
@@ -84,6 +100,9 @@ class Resolution:
         null_space_error: e_N of the last `resolve`, shape (nv,).
         code: What the last `resolve` returned, see `outcome_of`, shape (1,).
         factors: The stack's pseudo-inverse at the last `resolve`.
+        alone: Whether the tasks of one level are resolved at once, whatever happens.
+        projectors: The levels' projectors at the last `resolve`, if its code is not 0
+            and the level is not alone.
     """
 
     def __init__(
@@ -113,6 +132,11 @@ class Resolution:
             np.zeros((nv, m)),
             np.zeros((nv, nv)),
         )
+        # A conflict takes two levels, or more rows than degrees of freedom. Its kernel
+        # is the largest of all: only who needs it compiles it.
+        self.alone = len(self.ends) == 1 and m <= nv
+        scratch = self._scratch
+        self.projectors = Projectors(scratch.inner, scratch.tall, scratch.square[2])
         self.acceleration = self.problem.record.acceleration
         self.null_space_error = self.problem.record.null_space_error
         self.code: Indices = np.zeros(1, dtype=np.int64)
@@ -136,10 +160,7 @@ class Resolution:
             controls: False for φ_N = 0.
         """
         problem = self.problem
-        m, n = problem.task.jacobian.shape
-        # A conflict takes two levels, or more rows than degrees of freedom. Its kernel
-        # is the largest of all: only who needs it compiles it.
-        alone = len(self.ends) == 1 and m <= n
+        alone = self.alone
         return bind(
             _resolve_at_once if alone else _resolve_levels,
             *(problem.task, problem.field, problem.metric, self.form),

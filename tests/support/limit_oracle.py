@@ -73,6 +73,29 @@ def deviation_cost(
     return np.asarray(L @ H @ L.T)
 
 
+def shared_cost(resolution: Resolution, weight: float = 1e-8) -> tuple[Array, Array]:
+    """Return H and P where levels share directions, shape (nv, nv) each.
+
+    log H = log weight Σ t_k (P_{k-1} - P_k), with P_k from the spectra of the levels.
+    """
+    J, L = resolution.problem.task.jacobian, resolution.problem.metric.L
+    whitened = np.linalg.solve(L, J.T).T
+    floor, n, levels = resolution.threshold**2, len(L), len(resolution.ends)
+    P, T, start = np.eye(n), np.zeros((n, n)), 0
+    for k, end in enumerate(resolution.ends):
+        B = whitened[start:end]
+        sizes, U = np.linalg.eigh(B @ P @ B.T)
+        above = np.maximum(sizes, floor)
+        inverse = np.where(sizes < floor, (2.0 - sizes / floor) / floor, 1.0 / above)
+        own = P @ B.T @ (U * inverse) @ U.T @ B @ P
+        T += k / levels * own
+        P = P - own
+        start = end
+    steps, V = np.linalg.eigh(T + P)
+    H = (V * weight**steps) @ V.T
+    return L @ H @ L.T, np.linalg.solve(L.T, P @ L.T)
+
+
 def second_weight(
     resolution: Resolution, supported: bool, H: Array, deviation: Array
 ) -> float:

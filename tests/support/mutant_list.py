@@ -692,9 +692,16 @@ MUTANTS = (
     Mutant(
         "limits: a lost direction is all the task's",
         CONTROL + "actuation/deviation_cost.py",
-        "share[count] = lost * lost",
-        "share[count] = 0.0",
+        "share = lost * lost",
+        "share = 0.0",
         UNIT + "control/test_deviation_cost.py -k projector",
+    ),
+    Mutant(
+        "limits: no level below shares what is lost",
+        CONTROL + "actuation/deviation_cost.py",
+        "if costs[0, k] > 0.0:",
+        "if costs[0, k] < 0.0:",
+        UNIT + "control/test_deviation_cost.py -k levels_share",
     ),
     # ------------------------------------------------------------------ simulation
     Mutant(

@@ -40,7 +40,7 @@ from hsp_control.control.actuation.held_effort import (
     observe,
 )
 from hsp_control.control.actuation.limited_step import Barriers, LimitedStep
-from hsp_control.control.actuation.status import EXACT, Status
+from hsp_control.control.actuation.status import EXACT, LIMITED, Status
 from hsp_control.control.actuation.support import Support
 from hsp_control.control.planned_contact import PlannedContact
 from hsp_control.control.planned_limits import PlannedLimits
@@ -49,8 +49,10 @@ from hsp_control.robot import Robot, RobotState
 
 _NO_ROWS: Barriers = {}
 
-CODES = 4
-"""The law's code counts so much, so that flags of violated limits fit below it."""
+FLAGS, CODES = 4, 16
+"""What `Actuation.checks` finds is the law's code times `CODES`, plus the flags of
+violated limits times `FLAGS`, plus the `Status` of a step that is limited already: that
+is in `Actuation.limited`, and nothing is left to `deliver`."""
 
 Delivered = tuple[Array, Array, Array, Status, float]
 """What the actuation delivers: effort, shape (nv,) [N·m or N], zero where there is no
@@ -69,6 +71,7 @@ class Actuation:
         limits: The limits in force, if any.
         base: Indices of the degrees of freedom without a motor.
         delivered: The acceleration of the last step, shape (nv,).
+        limited: What the last step delivers that was limited within a call of `checks`.
     """
 
     def __init__(
@@ -93,10 +96,12 @@ class Actuation:
             self._a_lower, self._a_upper, self._tau_lower, self._tau_upper
         )
         self._effort = np.zeros(nv)
+        self._found = np.zeros(2)  # what a check returned, and its flags
         self._decay_rate = DecayRate()
         self._steps: WeakKeyDictionary[Resolution, LimitedStep] = WeakKeyDictionary()
         self._resolution: Resolution | None = None
         self._step: LimitedStep | None = None
+        self.limited: Delivered
         self.delivered: Array = np.zeros(nv)
         self.period = 0.0
         self._held = HeldEffort(nv)
@@ -181,6 +186,7 @@ class Actuation:
         if limited and resolution not in self._steps:
             step = self._limited_step(state, resolution, support, 0)
             step.prepare(resolution.acceleration, state.effort)
+            self._limit_if_violated(state, resolution, support)
         if self.limits is not None:
             self._held.prepare(state.v, resolution.acceleration)
 
@@ -256,12 +262,13 @@ class Actuation:
         Args:
             state: The robot's state.
             a: The law's acceleration, shape (nv,).
-            violated: The limits that it violates, see `violated`.
+            violated: What `checks` found, without the law's code.
             resolution: The resolved law, with its levels in order of priority.
             support: The forces of the active contacts; updated here.
             offset: Effort besides M a + N, for friction for example, shape (nv,)
                 [N·m or N]; None: none. The limits hold for the sum.
         """
+        violated //= FLAGS
         wanted = state.effort  # M a + N
         unsupported = self.is_direct(support)
         if offset is None and unsupported:
@@ -289,18 +296,62 @@ class Actuation:
         return self._limit(state, wanted, a, motion_ok, resolution, support, barriers)
 
     def checks(
-        self, state: RobotState, a: Array, code: Indices
+        self, state: RobotState, a: Array, resolution: Resolution, support: Support
     ) -> list[Callable[[float], Any]]:
         """Return the calls of the time that write M a + N, and compare with the bounds.
 
-        The last one returns the law's code times `CODES`, plus `MOTION` if a violates
-        its bounds, plus `EFFORT` if the effort without contacts does.
+        The last one returns a sum, see `CODES`: 0 if the law is exact and a and the
+        effort without contacts are within their bounds. If they are not, and a QP is
+        all that is needed then, it is solved at once; `limited` has the result.
 
         Args:
             state: The robot's state; the calls read it each time.
             a: The acceleration, shape (nv,); this array, too.
-            code: The law's code, see `Resolution.code`; this array, too.
+            resolution: The law.
+            support: The forces of the active contacts.
         """
+        calls = self._compile_checks(state, a, resolution.code)
+        limit = self._limit_if_violated(state, resolution, support)
+        if limit is None:
+            return calls
+        step = self._step_of(state, resolution, support)
+        self.limited = *step.result, LIMITED, 0.0
+        return [*calls, *in_order([limit])]
+
+    def _limit_if_violated(
+        self, state: RobotState, resolution: Resolution, support: Support
+    ) -> Callable[[], float] | None:
+        """Return the call that solves the QP if a bound is violated.
+
+        It is None where a step may need more: forces, barriers, or a bound that depends
+        on the gain.
+        """
+        limits = self.limits
+        if limits is None or limits.null_space_speed is not None:
+            return None
+        if not self.is_direct(support):
+            return None
+        step = self._step_of(state, resolution, support)
+        return step.nearest_if(resolution.acceleration, state.effort, self._found)
+
+    def violated(self, state: RobotState, a: Array, code: Indices) -> int:
+        """Write M a + N and the bounds on a; return which of them are violated.
+
+        See `checks` for arguments and result, which is without the law's code.
+        """
+        value = 0.0
+        for call in self._checks.get(state, a, code, self.limits is None):
+            value = call(state.t)
+        return int(value) % CODES
+
+    def _bind_permits(self, tau: Array) -> Callable[[], float]:
+        """Return a call that says whether this effort, (nv,), is within its bounds."""
+        return bind(within, tau, self._tau_lower, self._tau_upper)
+
+    def _compile_checks(
+        self, state: RobotState, a: Array, code: Indices, _: bool = False
+    ) -> list[Callable[[float], Any]]:
+        """Return the calls of `checks` that solve nothing."""
         check = (
             bind(_unlimited, code, timed=True)
             if self.limits is None
@@ -315,29 +366,11 @@ class Actuation:
                 self._held.memory_of_kernels,
                 self._bounds,
                 code,
+                self._found,
                 timed=True,
             )
         )
         return [*in_order([state.bind_inverse_dynamics(a)]), check]
-
-    def violated(self, state: RobotState, a: Array, code: Indices) -> int:
-        """Write M a + N and the bounds on a; return which of them are violated.
-
-        See `checks` for the arguments; the sum is without the law's code.
-        """
-        value = 0.0
-        for call in self._checks.get(state, a, code, self.limits is None):
-            value = call(state.t)
-        return int(value) % CODES
-
-    def _bind_permits(self, tau: Array) -> Callable[[], float]:
-        """Return a call that says whether this effort, (nv,), is within its bounds."""
-        return bind(within, tau, self._tau_lower, self._tau_upper)
-
-    def _compile_checks(
-        self, state: RobotState, a: Array, code: Indices, _: bool
-    ) -> list[Callable[[float], Any]]:
-        return self.checks(state, a, code)
 
     def _barriers(self, state: RobotState, support: Support) -> Barriers:
         """Return the rows A a ≥ lower for distances and static efforts, by kind."""
@@ -383,8 +416,7 @@ class Actuation:
         """
         step = self._step
         if step is None or resolution is not self._resolution:
-            found = self._steps.get(resolution)
-            step = found or self._limited_step(state, resolution, support, 0)
+            step = self._step_of(state, resolution, support)
             self._step, self._resolution = step, resolution
         if barriers:
             count = sum(len(least) for _, least in barriers.values())
@@ -411,6 +443,13 @@ class Actuation:
         if redistribute and status is Status.REDISTRIBUTED:
             acceleration = a
         return tau, acceleration, forces, status, relaxation
+
+    def _step_of(
+        self, state: RobotState, resolution: Resolution, support: Support
+    ) -> LimitedStep:
+        """Return the QP of a stack of tasks, made now if there is none."""
+        found = self._steps.get(resolution)
+        return found or self._limited_step(state, resolution, support, 0)
 
     def _limited_step(
         self, state: RobotState, resolution: Resolution, support: Support, count: int
@@ -452,18 +491,19 @@ def _check(
     held: Held,
     bounds: Bounds,
     code: Indices,
+    found: Array,
     t: float,
-) -> int:
+) -> float:
     """Observe the last period's effort, and return which limits the next violates.
 
-    And the law's code, see `Actuation.checks`; `observe` and `violated_limits`.
+    And the law's code, see `CODES`; `observe` and `violated_limits`. It writes what it
+    returns, and the flags, to ``found``.
     """
     observe(v, held, t)
     error, disturbance = held.error, held.disturbance
-    return int(
-        CODES * code[0]
-        + violated_limits(q, v, a, tau, where, limits, error, disturbance, bounds)
-    )
+    flags = violated_limits(q, v, a, tau, where, limits, error, disturbance, bounds)
+    found[0], found[1] = CODES * code[0] + FLAGS * flags, flags
+    return float(found[0])
 
 
 @kernel

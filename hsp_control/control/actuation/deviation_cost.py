@@ -18,7 +18,7 @@ from hsp_control.common.linalg import (
 )
 from hsp_control.law import Resolution
 from hsp_control.law.pseudo_inverse import whiten
-from hsp_control.law.resolution import Factors
+from hsp_control.law.resolution import Factors, Projectors
 from hsp_control.null_space.metrics.metric import IDENTITY
 
 _ONE_LEVEL, _SEVERAL_LEVELS = 1e-6, 1e-8
@@ -41,24 +41,36 @@ class Directions(NamedTuple):
     that are orthonormal in whitened coordinates Lᵀδ. So H⁻¹ = J Jᵀ, with the columns
     L⁻ᵀ n_k / √ρ_k in J: no matrix is factorised.
 
+    With P_k what the law leaves to the levels below k, P_0 = 1, a level has the share
+    P_{k-1} - P_k of all motions, and the null space what remains, P_K. Their costs are
+    whole^t_k, t_1 = 0 to t_N = 1, and that of all is
+
+        log H = log whole Σ t_k (P_{k-1} - P_k),      in whitened coordinates
+
+    Away from singularities each share is a projector, and each n_k belongs to one
+    level. Near one the law leaves a part of a direction to the levels below, and so it
+    does here: H is a continuous function of the law's own projectors.
+
     Attributes:
         jacobian: Jacobian of all tasks, level after level, shape (m, nv).
         L: Cholesky factor of the metric, shape (nv, nv).
         form: The metric's form.
         ends: Where each level's rows end in the stack.
-        threshold: Singular value below which a direction belongs to no level, or for
-            the last level only in part.
-        wide: Scratch, shape (2, m, nv).
-        square: Scratch, shape (m, m).
-        remainders: Scratch, shape (nv,).
-        shares: Scratch, shape (nv,).
+        threshold: Singular value below which a direction belongs to a level in part.
         factors: The law's pseudo-inverse of the stack.
+        projectors: What its levels left, where it went level by level.
         code: The law's outcome, see `Resolution.code`.
+        alone: Whether it never goes level by level.
+        wide: Scratch, shape (m, nv).
+        square: Scratch, shape (m, m).
+        inner: Scratch, shape (3, nv, max(nv, m)).
+        scratch: Scratch, shape (2, max(nv, m)).
         N: The directions n_k as rows, shape (nv, nv).
-        level: The level of each, the number of levels for the null space, shape (nv,).
-        share: How much of each the null space has: 0 for a level's own, 1 for its own,
-            shape (nv,).
-        roots: 1/√ρ of each level and of the null space.
+        kept: How many of the first belong to the first level alone, shape (1,).
+        share: How much of each the null space has: 0 for the levels' own, 1 for its
+            own, shape (nv,).
+        root: 1/√ρ of each, shape (nv,).
+        costs: t_k and 1/√ρ of each level and of the null space, shape (2, levels + 1).
     """
 
     jacobian: Array
@@ -66,16 +78,19 @@ class Directions(NamedTuple):
     form: int
     ends: Indices
     threshold: float
+    factors: Factors
+    projectors: Projectors
+    code: Indices
+    alone: bool
     wide: Array
     square: Array
-    remainders: Array
-    shares: Array
-    factors: Factors
-    code: Indices
+    inner: Array
+    scratch: Array
     N: Array
-    level: Indices
+    kept: Indices
     share: Array
-    roots: Array
+    root: Array
+    costs: Array
 
     @classmethod
     def of(
@@ -103,16 +118,19 @@ class Directions(NamedTuple):
             resolution.form,
             resolution.ends,
             resolution.threshold,
-            np.empty((2, m, n)),
-            np.empty((m, m)),
-            np.empty(n),
-            np.empty(n),
             resolution.factors,
+            resolution.projectors,
             resolution.code,
+            resolution.alone,
+            np.empty((m, n)),
+            np.empty((m, m)),
+            np.empty((3, n, max(n, m))),
+            np.empty((2, max(n, m))),
             np.empty((n, n)),
-            np.empty(n, dtype=np.int64),
+            np.zeros(1, dtype=np.int64),
             np.empty(n),
-            whole ** (-0.5 * steps),
+            np.empty(n),
+            np.array([steps, whole ** (-0.5 * steps)]),
         )
 
 
@@ -124,20 +142,32 @@ def write_directions(directions: Directions) -> None:
     orthonormal, one after the other; else they are found here.
     """
     Q, N, ends = directions.factors.Q, directions.N, directions.ends
-    level, share = directions.level, directions.share
-    n, levels = N.shape[0], ends.shape[0]
-    if directions.code[0] == 0 and _orthonormalised(directions.factors):
-        count, k = Q.shape[0], 0
+    share, root, costs = directions.share, directions.root, directions.costs
+    n, first_damped = N.shape[0], directions.code[0]
+    last = costs.shape[1] - 1
+    exact = first_damped == 0
+    if exact and _orthonormalised(directions.factors):
+        count = Q.shape[0]
         for r in range(count):
             copy(Q[r], N[r])
+    elif exact:
+        count = _write_levels(directions, ends.shape[0])
+    elif directions.alone:
+        count = _write_damped_level(directions)
+    else:
+        count = _write_levels(directions, first_damped)
+    if exact or not directions.alone:
+        k = 0
+        for r in range(count):
             while r >= ends[k]:
                 k += 1
-            level[r], share[r] = k, 0.0
-    else:
-        count = _write_levels(directions)
-    _complete(N, count, directions.remainders, directions.shares)
+            root[r], share[r] = costs[1, k], 0.0
+        directions.kept[0] = min(count, ends[0])
+    _complete(N, count, directions.scratch[0, :n], directions.scratch[1, :n])
     for r in range(n - count):
-        level[n - 1 - r], share[n - 1 - r] = levels, 1.0
+        root[n - 1 - r], share[n - 1 - r] = costs[1, last], 1.0
+    if not exact and not directions.alone:
+        _write_shared(directions, count)
 
 
 @kernel
@@ -157,46 +187,134 @@ def _orthonormalised(factors: Factors) -> bool:
 
 
 @kernel
-def _write_levels(directions: Directions) -> int:
-    """Write the directions of all levels, and return their number.
+def _write_levels(directions: Directions, levels: int) -> int:
+    """Write the directions that the first levels have for themselves; return how many.
 
-    Below the threshold the law's inverse is bounded: of a direction with the singular
-    value s, the projector on the null space has the share (1 - s²/threshold²)². A
-    direction of the last level belongs to the null space in that share, so that no
-    effort jumps where s passes the threshold. One of a level above others belongs to it
-    or not: what it lacks, the levels below may use.
+    The last of them may have singular values below the threshold: these are left out.
     """
-    J, L, form, ends = (
-        directions.jacobian, directions.L, directions.form, directions.ends
+    J, ends, N, square = (
+        directions.jacobian, directions.ends, directions.N, directions.square
     )  # fmt: skip
-    threshold, wide, square = directions.threshold, directions.wide, directions.square
-    N, level, share = directions.N, directions.level, directions.share
-    n = N.shape[0]
+    B, threshold, n = directions.wide, directions.threshold, directions.N.shape[0]
     count = start = 0
-    whiten(J, L, form, wide[0])
+    whiten(J, directions.L, directions.form, B)
+    for k in range(levels):
+        rows = B[start : ends[k]]
+        for r in range(rows.shape[0]):
+            _project_out(N[:count], rows[r])
+        if k < directions.code[0] - 1 or directions.code[0] == 0:
+            # No singular value is small: any orthonormal rows will do, at a tenth of
+            # the cost.
+            orthonormalise_rows(rows, N[count : count + rows.shape[0]], square)
+            count += rows.shape[0]
+        else:
+            orthogonalise_rows(rows, square[:0])
+            for r in range(rows.shape[0]):
+                size = np.sqrt(squared_norm(rows[r]))
+                if size >= threshold and count < n:
+                    for i in range(n):
+                        N[count, i] = rows[r, i] / size
+                    count += 1
+        start = ends[k]
+    return int(count)
+
+
+@kernel
+def _write_damped_level(directions: Directions) -> int:
+    """Write the directions of the only level, where the law has found its spectrum.
+
+    First those that it has for itself. Of a direction with the singular value s below
+    the threshold the null space has the share (1 - s²/threshold²)². Returns how many.
+    """
+    Q, N, threshold = directions.factors.Q, directions.N, directions.threshold
+    costs, n, count = directions.costs, directions.N.shape[0], 0
+    own, free = costs[1, 0], costs[1, costs.shape[1] - 1]
+    for partly in range(2):
+        for r in range(Q.shape[0]):
+            size = np.sqrt(squared_norm(Q[r]))
+            if (size < threshold) != (partly == 1) or size <= _LOST * threshold:
+                continue
+            lost = max(1.0 - (size / threshold) ** 2, 0.0)
+            share = lost * lost
+            for i in range(n):
+                N[count, i] = Q[r, i] / size
+            directions.share[count] = share
+            directions.root[count] = own * (free / own) ** share
+            count += 1
+        if partly == 0:
+            directions.kept[0] = count
+    return int(count)
+
+
+@kernel
+def _write_shared(directions: Directions, count: int) -> None:
+    """Overwrite the directions after the first ones, which levels share.
+
+    These are the eigenvectors of T = Σ t_k (P_{k-1} - P_k) + P_K in the rows of N from
+    ``count`` on, and their costs whole^t for the eigenvalues t. Of such a direction the
+    null space has what t is beyond that of the last level.
+    """
+    Q, QJ, G_inverse = directions.projectors
+    L, ends, costs = directions.L, directions.ends, directions.costs
+    N, n = directions.N[count:], directions.N.shape[0]
+    d, last = N.shape[0], costs.shape[1] - 1
+    if d == 0:
+        return
+    F, T, U = (
+        directions.inner[0, :d], directions.inner[1, :d], directions.inner[2, :d]
+    )  # fmt: skip
+    row = directions.scratch[0]
+    for r in range(d):  # Lᵀ Q L is what Q is in whitened coordinates
+        for i in range(n):
+            F[r, i] = N[r, i]
+        if directions.form != IDENTITY:
+            multiply(L, N[r], F[r, :n])
+    for r in range(d):
+        multiply(Q, F[r, :n], row[:n])
+        for s in range(d):
+            total = 0.0
+            for i in range(n):
+                total += row[i] * F[s, i]
+            T[r, s] = total
+        for s in range(d, T.shape[1]):
+            T[r, s] = 0.0
+    start = 0
     for k in range(ends.shape[0]):
         end = ends[k]
-        B, Q = wide[0, start:end], wide[1, start:end]
-        for r in range(end - start):
-            _project_out(N[:count], B[r])
-        # If no singular value is small, any orthonormal rows will do, at a tenth of the
-        # cost.
-        regular = orthonormalise_rows(B, Q, square) >= threshold
-        if not regular:
-            orthogonalise_rows(B, square[:0])
-        for r in range(end - start):
-            size = 1.0 if regular else np.sqrt(squared_norm(B[r]))
-            least = _LOST * threshold if k == ends.shape[0] - 1 else threshold
-            if count == n or not (regular or size > least):
-                continue
-            lost = 0.0 if regular else max(1.0 - (size / threshold) ** 2, 0.0)
-            share[count] = lost * lost
-            for i in range(n):
-                N[count, i] = Q[r, i] if regular else B[r, i] / size
-            level[count] = k
-            count += 1
+        if costs[0, k] > 0.0:
+            for r in range(d):
+                for p in range(end - start):
+                    total = 0.0
+                    for i in range(n):
+                        total += F[r, i] * QJ[i, start + p]
+                    U[r, p] = total
+            for r in range(d):
+                for p in range(end - start):
+                    row[p] = 0.0
+                    for q in range(end - start):
+                        row[p] += G_inverse[start + p, start + q] * U[r, q]
+                for s in range(d):
+                    total = 0.0
+                    for p in range(end - start):
+                        total += row[p] * U[s, p]
+                    T[r, s] += costs[0, k] * total
         start = end
-    return int(count)
+    for r in range(d):  # eigenvalues between 1 and 2: their vectors are well defined
+        T[r, r] += 1.0
+    orthogonalise_rows(T, U)
+    beyond = costs[0, last - 1]
+    for r in range(d):
+        t = min(max(np.sqrt(squared_norm(T[r])) - 1.0, 0.0), 1.0)
+        directions.root[count + r] = costs[1, last] ** t
+        free = (t - beyond) / (1.0 - beyond) if beyond < 1.0 else 1.0
+        directions.share[count + r] = max(free, 0.0)
+        for i in range(n):
+            total = 0.0
+            for s in range(d):
+                total += U[r, s] * N[s, i]
+            F[r, i] = total
+    for r in range(d):
+        copy(F[r, :n], N[r])
 
 
 @kernel
@@ -262,28 +380,15 @@ def write_inverse_root(directions: Directions, first: int, JT: Array) -> int:
     Returns:
         The number of its rows.
     """
-    N, level, L = directions.N, directions.level, directions.L
+    N, root, L = directions.N, directions.root, directions.L
     n, rows = N.shape[0], 0
-    for k in range(n):
-        if level[k] < first:
-            continue
-        root = _root(directions, k)
+    for k in range(directions.kept[0] if first > 0 else 0, n):
         for i in range(n):
-            JT[rows, i] = root * N[k, i]
+            JT[rows, i] = root[k] * N[k, i]
         if directions.form != IDENTITY:
             solve_lower_transposed(L, JT[rows, :n])
         rows += 1
     return rows
-
-
-@kernel
-def _root(directions: Directions, k: int) -> float:
-    """Return 1/√ρ of a direction: between its level's and the null space's."""
-    roots, share = directions.roots, directions.share[k]
-    own, free = roots[directions.level[k]], roots[roots.shape[0] - 1]
-    if 0.0 < share < 1.0:
-        return float(own * (free / own) ** share)
-    return float(own)  # of the null space, that is its own
 
 
 @kernel
@@ -295,10 +400,10 @@ def freedom(directions: Directions, k: int) -> float:
     free by its share alone, the null space, which has no other task, would jump by
     100 rad/s² for a part in 300 of this one.
     """
-    roots, share = directions.roots, directions.share[k]
+    costs, share = directions.costs, directions.share[k]
     if share == 0.0:
         return 0.0
-    return float(share * (_root(directions, k) / roots[roots.shape[0] - 1]) ** 2)
+    return float(share * (directions.root[k] / costs[1, costs.shape[1] - 1]) ** 2)
 
 
 @kernel
@@ -320,14 +425,14 @@ def null_space_scale(directions: Directions, y: Array) -> float:
         directions: The directions.
         y: The first optimum δ = J y in terms of `write_inverse_root`, shape (count,).
     """
-    roots, missed, moved = directions.roots, 0.0, 0.0
+    costs, missed, moved = directions.costs, 0.0, 0.0
     without = directions.share.shape[0] - y.shape[0]  # those that may not move
     for r in range(y.shape[0]):
         k = without + r
-        free, root = freedom(directions, k), _root(directions, k)
+        free, root = freedom(directions, k), directions.root[k]
         missed += (1.0 - free) * y[r] * y[r]
         moved += free * root * root * y[r] * y[r]
-    weight = roots[roots.shape[0] - 1] ** -2.0
+    weight = costs[1, costs.shape[1] - 1] ** -2.0
     if _SHARE * missed <= weight * moved or moved == 0.0:
         return 1.0
     return float(np.sqrt(weight / min(_SHARE * missed / moved, 1.0)))
@@ -342,9 +447,13 @@ def write_null_space_rows(directions: Directions, A: Array) -> None:
     δ = 0 always satisfies them. With m the columns of L⁻ᵀ N, P = Σ s_k m_k (L n_k)ᵀ
     with the shares s_k of the null space: the law's own projector.
     """
-    L, form, raised = directions.L, directions.form, directions.remainders
+    L, form = directions.L, directions.form
     N, share = directions.N, directions.share
     n = N.shape[0]
+    if directions.code[0] > 0 and not directions.alone:
+        _write_projector(directions, A)
+        return
+    raised = directions.scratch[0, :n]
     for i in range(n):
         for j in range(n):
             A[i, j] = 0.0
@@ -363,6 +472,22 @@ def write_null_space_rows(directions: Directions, A: Array) -> None:
                     lowered += L[j, i] * N[k, i]
             for i in range(n):
                 A[i, j] += raised[i] * lowered
+
+
+@kernel
+def _write_projector(directions: Directions, A: Array) -> None:
+    """Write P = Q_K W, W = L Lᵀ, from what the last level left."""
+    Q, L, row = directions.projectors.Q, directions.L, directions.scratch[0]
+    n = Q.shape[0]
+    for i in range(n):
+        for j in range(n):
+            row[j] = 0.0
+            for k in range(j, n):
+                row[j] += Q[i, k] * L[k, j]
+        for j in range(n):
+            A[i, j] = 0.0
+            for k in range(j + 1):
+                A[i, j] += row[k] * L[j, k]
 
 
 class DecayRate:

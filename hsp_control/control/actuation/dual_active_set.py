@@ -221,9 +221,8 @@ def _prepare(problem: Problem, warm: bool, x: Array, work: Workspace) -> bool:
     copy(x, work.origin)
     for j in range(x.shape[0]):
         size += abs(x[j])
-    rounding = squared_norm(problem.own)
-    for r in range(problem.JT.shape[0]):
-        rounding += squared_norm(problem.JT[r])
+    JT = problem.JT
+    rounding = squared_norm(problem.own) + squared_norm(JT.reshape(JT.size))
     work.rounding[0] = _DEPENDENT * _DEPENDENT * rounding
     possible = size + rounding < np.inf
     for i in range(held.shape[0]):

@@ -9,7 +9,14 @@ from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.identity_cache import IdentityCache
 from hsp_control.common.kernels import kernel
 from hsp_control.common.linalg import copy
-from hsp_control.common.native import FOREVER, NativeCall, Timed, bind, sequence
+from hsp_control.common.native import (
+    FOREVER,
+    NativeCall,
+    Timed,
+    bind,
+    only_if,
+    sequence,
+)
 from hsp_control.common.step_plan import CallSequence
 from hsp_control.constraints.limits.acceleration_bounds import Bounds
 from hsp_control.control.actuation.deviation_cost import Directions
@@ -169,16 +176,34 @@ class LimitedStep:
         """Compile what `solve` calls, for these arrays."""
         self._calls.get(acceleration, effort)
 
-    def _after_input(
-        self, acceleration: Array, effort: Array
-    ) -> tuple[Callable[[], float], Callable[[], float]]:
-        """Return the calls for forces and for the nearest, with all that they read.
+    def nearest_if(
+        self, acceleration: Array, effort: Array, found: Array
+    ) -> Callable[[], float]:
+        """Return a call that writes the nearest, as `solve`, if ``found[1]`` is not 0.
+
+        It returns ``found[0]``, plus the `Status` if the QP was solved.
+
+        Args:
+            acceleration: The law's acceleration, shape (nv,); this array.
+            effort: The effort for it, shape (nv,) [N·m or N]; this array.
+            found: What was found about them, shape (2,); this array.
+        """
+        return only_if([*self._input(acceleration, effort), self._nearest], found)
+
+    def _input(self, acceleration: Array, effort: Array) -> list[Callable[[], Any]]:
+        """Return the calls that write what the QP reads.
 
         To bind the copies of two arrays takes a fiftieth of the time of binding all.
         """
         _, own, own_effort = self._wanted
         copies = bind(_copy_both, acceleration, own, effort, own_effort)
-        first = self._write_mass_matrix, copies
+        return [self._write_mass_matrix, copies]
+
+    def _after_input(
+        self, acceleration: Array, effort: Array
+    ) -> tuple[Callable[[], float], Callable[[], float]]:
+        """Return the calls for forces and for the nearest, with all that they read."""
+        first = self._input(acceleration, effort)
         return _one_call(*first, self._forces), _one_call(*first, self._nearest)
 
     def solve(

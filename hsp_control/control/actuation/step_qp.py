@@ -44,8 +44,8 @@ _FORCE_COST = 1e-6
 forces unique, and is small beside the cost of any deviation."""
 _LEAST_INVERSE_COST = 1e-6
 """While a contact fades its forces become dear, but not infinitely so."""
-UNSOLVED = -1
-"""The constraints contradict each other, or the solver gave up."""
+UNSOLVED = 0
+"""No `Status` of a QP: the constraints contradict each other, or the solver gave up."""
 FORCES, NEAREST, NEAREST_AGAIN, LEAST_VIOLATION = 0, 1, 2, 3
 """What to find: forces for the law's acceleration, and if there are none the nearest
 acceleration; this acceleration at once; it again, with the rows as they are, those of

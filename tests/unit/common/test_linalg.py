@@ -299,6 +299,16 @@ def test_orthogonalise_rows(
     assert np.abs(off).max(initial=0.0) < 1e-12
 
 
+@pytest.mark.parametrize("exponent", range(-320, -60, 20))
+def test_a_row_of_rounding_is_no_row(exponent: int) -> None:
+    """What is left of it may be so small that its square, or a quotient, is none."""
+    Y = np.vstack([normal(1, 5), 10.0**exponent * normal(2, 2, 5)])
+    turned, U = Y.copy(), junk(3, 3)
+    orthogonalise_rows(turned, U)
+    close(U @ U.T, np.eye(3), 20 * EPS)
+    close(turned, U @ Y, 20 * EPS)
+
+
 @given(st.lists(st.integers(-999, 999), min_size=8, max_size=8), st.integers(20, 60))
 def test_small_singular_values_to_high_relative_accuracy(
     entries: list[int], shift: int

@@ -16,7 +16,7 @@ import hsp_control as hsp
 from hsp_control.common import adapters
 from hsp_control.common.arrays import Array
 from hsp_control.common.kernels import PLAIN, kernel
-from hsp_control.common.native import NativeCall, Timed, bind, once, sequence
+from hsp_control.common.native import NativeCall, Timed, bind, once, only_if, sequence
 from hsp_control.common.step_plan import (
     CallSequence,
     StepPlan,
@@ -220,6 +220,31 @@ def test_calls_are_made_once_at_a_stamp(plain: bool) -> None:
     own_stamp[0] = 5
     copied()
     copied()
+    assert called(own) == [1.0, 2.0]
+    assert called(log) == []
+
+
+@pytest.mark.parametrize("plain", [False, True])
+def test_calls_are_made_only_if_something_was_found(plain: bool) -> None:
+    """Also by a copy, which looks at its own array."""
+    log, found = np.zeros(20), np.array([16.0, 0.0])
+    calls: list[Any] = [bind(_note, log, 1.0), bind(_note, log, 2.0)]
+    if plain:
+        calls[1] = partial(_note, log, 2.0)
+    call = only_if(calls, found)
+    if not plain and not PLAIN:
+        assert isinstance(call, NativeCall)
+    gc.collect()  # nothing that the call points to may be gone
+    assert call() == 16.0
+    assert called(log) == []
+    found[:] = 4.0, 1.0
+    assert call() == 6.0
+    assert called(log) == [1.0, 2.0]
+    copied, own, own_found = copy.deepcopy((call, log, found))
+    own_found[1] = 0.0
+    assert copied() == 4.0
+    own_found[1] = 3.0
+    assert copied() == 6.0
     assert called(own) == [1.0, 2.0]
     assert called(log) == []
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from hsp_control import (
     Circle,
     Controller,
+    FramePose,
     FramePosition,
     Gains,
     Hold,
@@ -22,8 +23,10 @@ from hsp_control import (
     Robot,
     RobotState,
     Rollout,
+    TargetPosture,
     simulate,
 )
+from hsp_control.common.kernels import PLAIN
 from hsp_control.constraints.limits import Scaled, StaticEffort
 from hsp_control.control.actuation import Status
 from hsp_control.control.actuation.deviation_cost import (
@@ -46,6 +49,7 @@ Array = NDArray[np.float64]
 seeds = st.integers(0, 2**32 - 1)
 NOWHERE = np.zeros(0, dtype=np.int64)
 SPEED = 0.4
+compiled = pytest.mark.skipif(PLAIN, reason="many steps")
 
 
 @cache
@@ -147,6 +151,86 @@ def test_the_root_of_the_inverse_cost_is_that(metric: str, seed: int) -> None:
     np.testing.assert_allclose(JT.T @ JT @ H, np.eye(7), atol=1e-6)
     expected = limit_oracle.null_space_projector(resolution)
     np.testing.assert_allclose(projector(resolution), expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("threshold", [0.2, 0.5, 5.0])
+@pytest.mark.parametrize("metric", METRICS)
+@given(seeds)
+@settings(max_examples=10)
+def test_levels_share_directions_as_the_law_does(
+    metric: str, threshold: float, seed: int
+) -> None:
+    """J Jᵀ H = 1 with log H from the levels' projectors; P is the law's own."""
+    robot, rng = panda(), np.random.default_rng(seed)
+    posture = JointPosture(robot.home(), joints=["panda_joint2"], priority=2)
+    elbow = FramePosition("panda_link4", Hold([0.1, 0.2, 0.5]), priority=3)
+    controller = Controller(
+        robot,
+        [hand(), posture, elbow],
+        JointCentering(),
+        metric=METRICS[metric],
+        limits=None,
+        singularity_threshold=threshold,
+    )
+    state = robot.state(0.1, robot.random_configuration(rng), rng.standard_normal(7))
+    out = controller.compute(state)
+    resolution = controller.active_stack.resolution
+    directions, JT = Directions.of(resolution, supported=False), np.zeros((7, 7))
+    write_directions(directions)
+    assert write_inverse_root(directions, 0, JT) == 7
+    H, P = limit_oracle.shared_cost(resolution)
+    np.testing.assert_allclose(JT.T @ JT @ H, np.eye(7), atol=1e-5)
+    np.testing.assert_allclose(projector(resolution), P, atol=1e-9)
+    e_N = P @ (out.field.g - state.v)
+    np.testing.assert_allclose(e_N, out.null_space_error, rtol=0, atol=1e-9)
+
+
+def straight_elbow(limits: Limits | None) -> Controller:
+    """Return a hand's pose above an elbow's position: 9 rows on 7 joints."""
+    gains = Gains(natural_frequency=10.0)
+    tasks = [
+        FramePose("panda_tcp", gains=gains),
+        FramePosition("panda_link4", Hold(), gains=gains, priority=2),
+    ]
+    home = panda().home()
+    field = TargetPosture("home")
+    return Controller(panda(), tasks, field, limits=limits, start=home)
+
+
+@compiled
+@pytest.mark.parametrize("limits", [None, Limits()])
+def test_efforts_are_continuous_near_a_straight_elbow(limits: Limits | None) -> None:
+    """The elbow opens by 0.4 mrad in a step, from 0.55 rad to its limit.
+
+    Efforts change by less than 40 N·m, where directions pass from the hand to the elbow
+    and to the null space. And none jumps: the largest change of an effort fades as its
+    interval is halved. (It was 174 N·m, whatever the interval.)
+    """
+    controller, (lower, upper) = straight_elbow(limits), panda().position_limits()
+
+    def effort(angle: float) -> Array:
+        q[3] = angle
+        tau = controller.compute(0.0, q, v).tau
+        # At half a turn from its target an orientation has no error to follow.
+        turned = np.linalg.norm(controller.active_stack.rows.error[3:6])
+        return tau if turned < 3.1 else np.full(7, np.nan)
+
+    for seed in range(24):
+        rng = np.random.default_rng(seed)
+        q = panda().home() + 0.3 * rng.standard_normal(7)
+        q, v = np.clip(q, lower + 0.2, upper - 0.2), 0.2 * rng.standard_normal(7)
+        angles = np.arange(-0.55, upper[3] - 0.01, 4e-4)
+        efforts = np.array([effort(angle) for angle in angles])
+        changes = np.abs(np.diff(efforts, axis=0)).max(axis=1)
+        worst = int(np.nanargmax(changes))
+        assert changes[worst] < 40.0
+        low, high = angles[worst : worst + 2]
+        for _ in range(8):
+            middle = 0.5 * (low + high)
+            parts = [effort(each) for each in (low, middle, high)]
+            first, second = np.abs(np.diff(parts, axis=0)).max(axis=1)
+            low, high = (low, middle) if first > second else (middle, high)
+        assert max(first, second) < 0.02 * changes[worst]
 
 
 @given(seeds)

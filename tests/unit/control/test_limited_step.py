@@ -26,7 +26,7 @@ def panda() -> hsp.Robot:
     return hsp.Robot.load("panda")
 
 
-def arm(**options: Any) -> hsp.Controller:
+def arm(strength: float = 0.5, **options: Any) -> hsp.Controller:
     """Return a weak arm whose posture is less important than its hand."""
     path = hsp.Circle(0.2, 4.0, [0.45, 0.0, 0.45], normal=[0.0, 0.0, 1.0])
     gains = hsp.Gains(natural_frequency=10.0)
@@ -35,7 +35,7 @@ def arm(**options: Any) -> hsp.Controller:
         panda().home(), gains=gains, joints=["panda_joint1"], name="j1", priority=2
     )
     field = 20.0 * hsp.JointCentering()
-    limits = hsp.Limits(effort=Scaled(0.5))
+    limits = hsp.Limits(effort=Scaled(strength))
     return hsp.Controller(panda(), [hand, elbow], field, limits=limits, **options)
 
 
@@ -255,6 +255,27 @@ def test_rows_that_come_and_go_find_room() -> None:
 
 
 @pytest.mark.skipif(PLAIN, reason="about what Numba compiles")
+@pytest.mark.parametrize("strength", [0.5, 0.01])
+def test_one_native_call_is_the_same_as_its_parts(strength: float) -> None:
+    """A modifier that changes nothing takes the other way: check, and then deliver."""
+    made, rng, seen = arm(strength), np.random.default_rng(0), set()
+    for k in range(60):
+        if k == 30:  # another stack is prepared, for later
+            made.prepare(made.state, without=["j1"])
+        q = panda().home() + 0.3 * rng.standard_normal(7)
+        v = 0.3 * rng.standard_normal(7)
+        parts = made.compute(0.3, q, v, modifier=lambda _, __, a: (a, None))
+        assert made._whole is not None
+        once = made.compute(0.3, q, v)
+        seen.add(once.status)
+        assert once.status is parts.status
+        assert once.relaxation == parts.relaxation
+        assert once.damped == parts.damped
+        np.testing.assert_array_equal(once.tau, parts.tau)
+        np.testing.assert_array_equal(once.acceleration, parts.acceleration)
+    assert {Status.LIMITED, Status.RELAXED if strength < 0.5 else Status.EXACT} <= seen
+
+
 def test_nothing_is_compiled_where_a_limit_binds() -> None:
     """Neither in the first limited step, nor in a relaxed one, nor after a change."""
     from hsp_control.common import adapters
