@@ -13,6 +13,8 @@ import numba
 from llvmlite.binding import Linkage
 from numba.core import codegen, compiler, compiler_machinery, registry, types
 
+from hsp_control.common.kernel_lowering import KernelLowering
+
 _target = cast("Any", registry).cpu_target
 _Library = cast("Any", codegen).JITCodeLibrary
 
@@ -87,7 +89,8 @@ class KernelCompiler(cast("Any", compiler).CompilerBase):  # type: ignore[misc]
         manager = cast("Any", compiler_machinery).PassManager("kernel")
         for each, description in whole(self.state).passes:
             if each.__name__ not in _NEEDLESS:
-                manager.add_pass(each, description)
+                lowers = each.__name__ == "NativeLowering"
+                manager.add_pass(KernelLowering if lowers else each, description)
         manager.finalize()
         return [manager]
 
