@@ -76,29 +76,42 @@ class _CallableLibrary(_Library):  # type: ignore[misc,valid-type]
         passes.run(self._final_module, options)
 
 
+class _Passes(cast("Any", compiler_machinery).PassManager):  # type: ignore[misc]
+    """Numba's passes, without timing them and analysing the code anew after each."""
+
+    def _runPass(self, index: int, pss: Any, internal_state: Any) -> None:  # noqa: N802
+        pss.analysis = self._analysis
+        pss.run_initialization(internal_state)
+        pss.run_pass(internal_state)
+        pss.run_finalizer(internal_state)
+
+
 class KernelCompiler(cast("Any", compiler).CompilerBase):  # type: ignore[misc]
     """Numba's compiler without the passes that find nothing in kernels.
 
-    These look for array expressions, which would allocate, for closures, and for what
-    is inlined before it is typed: a twentieth of a cold start.
+    These look for array expressions, which would allocate, for closures, for what
+    is inlined before it is typed, and for the last use of what has to be freed.
     """
 
     def define_pipelines(self) -> list[Any]:
         """Return the passes."""
-        whole = cast("Any", compiler).DefaultPassBuilder.define_nopython_pipeline
-        manager = cast("Any", compiler_machinery).PassManager("kernel")
-        for each, description in whole(self.state).passes:
-            if each.__name__ not in _NEEDLESS:
-                lowers = each.__name__ == "NativeLowering"
-                manager.add_pass(KernelLowering if lowers else each, description)
-        manager.finalize()
-        return [manager]
+        if not _passes:
+            whole = cast("Any", compiler).DefaultPassBuilder.define_nopython_pipeline
+            manager = _Passes("kernel")
+            for each, description in whole(self.state).passes:
+                if each.__name__ not in _NEEDLESS:
+                    lowers = each.__name__ == "NativeLowering"
+                    manager.add_pass(KernelLowering if lowers else each, description)
+            manager.finalize()
+            _passes.append(manager)
+        return _passes
 
 
+_passes: list[_Passes] = []
 _NEEDLESS = (
     "WithLifting", "InlineClosureLikes", "MakeFunctionToJitFunction",
     "InlineInlinables", "LiteralUnroll", "InlineOverloads", "NopythonRewrites",
-    "AnnotateTypes", "DumpParforDiagnostics",
+    "AnnotateTypes", "DumpParforDiagnostics", "IRLegalization",
 )  # fmt: skip
 
 
