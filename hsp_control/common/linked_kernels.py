@@ -7,6 +7,8 @@ what calls it in the end optimises the whole. This halves the time of a cold sta
 """
 
 from collections.abc import Callable
+from copy import copy
+from functools import cache
 from typing import Any, cast
 
 import numba
@@ -130,6 +132,37 @@ class _Flags(cast("Any", compiler).Flags):  # type: ignore[misc]
         return self
 
 
+class _Typing(type(_target.typing_context)):  # type: ignore[misc]
+    """Says what calls mean for the types of their arguments; of Numba's own once.
+
+    Numba tries out all that an operator can mean each time: most of type inference.
+    """
+
+    def resolve_function_type(self, func: Any, args: Any, kws: Any) -> Any:
+        """Return the signature of a call."""
+        if kws or type(func) is not types.Function:
+            return super().resolve_function_type(func, args, kws)
+        key = func, *map(id, args)
+        found = _meanings.get(key)
+        if found is None:
+            signature = super().resolve_function_type(func, args, kws)
+            found = _meanings[key] = signature, args
+        return found[0]
+
+
+_meanings: dict[tuple[Any, ...], Any] = {}
+"""Signatures by function and the types' identities; and the types, which are to live as
+long."""
+
+
+@cache
+def _typing() -> _Typing:
+    """Return Numba's context of types, with all it knows."""
+    context = copy(_target.typing_context)
+    context.__class__ = _Typing
+    return cast("_Typing", context)
+
+
 class _Entry:
     """Stands for a kernel's address, which it does not have."""
 
@@ -163,7 +196,7 @@ def compile_callable(own: Any, function: Callable[..., Any], args: Any, to: Any)
     library = _CallableLibrary(target.codegen(), function.__qualname__)
     library.enable_object_caching()  # its machine code is kept
     return cast("Any", compiler).compile_extra(
-        _target.typing_context,
+        _typing(),
         target,
         function,
         args=args,
@@ -191,7 +224,7 @@ def linked(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     def compile_core(args: Any, return_type: Any) -> Any:
         target = _target.target_context
         result = cast("Any", compiler).compile_extra(
-            _target.typing_context,
+            _typing(),
             target,
             function,
             args=args,
