@@ -11,9 +11,10 @@ import operator
 from typing import Any, cast
 
 from llvmlite import ir as llvm
-from numba.core import cgutils, compiler, compiler_machinery, ir, lowering, types
+from numba.core import cgutils, compiler_machinery, ir, lowering, types
 from numba.core import typed_passes as typed
 
+_code, _types = cast("Any", cgutils), cast("Any", types)
 _DATA, _SHAPE, _STRIDES = 4, 5, 6
 """Where these are among an array's words."""
 _implementations: dict[tuple[Any, ...], Any] = {}
@@ -21,7 +22,7 @@ _implementations: dict[tuple[Any, ...], Any] = {}
 are to live as long."""
 
 
-class _Builder(llvm.IRBuilder):
+class _Builder(cast("Any", llvm).IRBuilder):  # type: ignore[misc]
     """Writes instructions, but none to read what is known.
 
     A record's fields are arguments of a function, put together where it begins and
@@ -120,7 +121,7 @@ class _KernelLower(cast("Any", lowering).Lower):  # type: ignore[misc]
         """Make a place for a variable that is not a value."""
         if name not in self.varmap and name not in self._singly_assigned_vars:
             kind = self.context.get_value_type(fetype)
-            self.varmap[name] = cgutils.alloca_once(self.builder, kind, name=name)
+            self.varmap[name] = _code.alloca_once(self.builder, kind, name=name)
 
     def storevar(self, value: Any, name: str, argidx: int | None = None) -> None:
         """Assign."""
@@ -141,7 +142,9 @@ class _KernelLower(cast("Any", lowering).Lower):  # type: ignore[misc]
         kinds = self.typeof(value.name), self.typeof(index.name)
         array, place = (
             self.context.cast(self.builder, each, kind, to)
-            for each, kind, to in zip((array, place), kinds, signature.args, strict=True)
+            for each, kind, to in zip(
+                (array, place), kinds, signature.args, strict=True
+            )
         )
         kind, of_index = signature.args
         if _is_element(kind, of_index, signature.return_type):
@@ -179,16 +182,12 @@ class _KernelLower(cast("Any", lowering).Lower):  # type: ignore[misc]
         if expr.op == "getattr" and expr.attr == "shape":
             kind = self.typeof(expr.value.name)
             if type(kind) is types.Array:
-                return self.builder.extract_value(
-                    self.loadvar(expr.value.name), _SHAPE
-                )
+                return self.builder.extract_value(self.loadvar(expr.value.name), _SHAPE)
         return super().lower_expr(resty, expr)
 
     def lower_binop(self, resty: Any, expr: Any, op: Any) -> Any:
         """Compute; powers with a written exponent are as in Numba."""
-        if ir.UNDEFINED not in (expr.static_lhs, expr.static_rhs) or not (
-            expr.static_lhs is ir.UNDEFINED and expr.static_rhs is ir.UNDEFINED
-        ):
+        if not expr.static_lhs is expr.static_rhs is ir.UNDEFINED:
             return super().lower_binop(resty, expr, op)
         signature = self.fndesc.calltypes[expr]
         operands = [
@@ -216,9 +215,9 @@ class _KernelLower(cast("Any", lowering).Lower):  # type: ignore[misc]
     def _pointer(self, kind: Any, array: Any, of_index: Any, place: Any) -> Any:
         """Return where an element of an array is; negative indices count back."""
         builder = self.builder
-        if isinstance(of_index, types.BaseTuple):
-            given = cgutils.unpack_tuple(builder, place, count=len(of_index))
-            of_indices = of_index.types
+        if isinstance(of_index, _types.BaseTuple):
+            given = _code.unpack_tuple(builder, place, count=len(of_index))
+            of_indices = tuple(of_index)
         else:
             given, of_indices = [place], (of_index,)
         shape = [
@@ -227,7 +226,7 @@ class _KernelLower(cast("Any", lowering).Lower):  # type: ignore[misc]
         indices = []
         for index, of_one, size in zip(given, of_indices, shape, strict=True):
             signed = of_one.signed
-            index = self.context.cast(  # noqa: PLW2901 (the same, as a word)
+            index = self.context.cast(
                 builder, index, of_one, types.intp if signed else types.uintp
             )
             if isinstance(index, llvm.Constant) and index.constant >= 0:
@@ -247,7 +246,7 @@ class _KernelLower(cast("Any", lowering).Lower):  # type: ignore[misc]
                 stride = builder.extract_value(array, (_STRIDES, axis))
                 part = builder.mul(stride, index)
                 offset = part if offset is None else builder.add(offset, part)
-            return cgutils.pointer_add(builder, data, offset)
+            return _code.pointer_add(builder, data, offset)
         axes = list(zip(indices, shape, strict=True))
         (offset, _), *others = axes if kind.layout == "C" else axes[::-1]
         for index, size in others:
@@ -257,12 +256,12 @@ class _KernelLower(cast("Any", lowering).Lower):  # type: ignore[misc]
 
 def _is_element(kind: Any, of_index: Any, found: Any) -> bool:
     """Say whether integers name one element of an array of numbers."""
-    if type(kind) is not types.Array or found is not None and found is not kind.dtype:
+    if type(kind) is not types.Array or (found is not None and found is not kind.dtype):
         return False
-    if not isinstance(kind.dtype, types.Number | types.Boolean):
+    if kind.ndim == 0 or not isinstance(kind.dtype, types.Number | types.Boolean):
         return False
-    if isinstance(of_index, types.BaseTuple):
-        integers = all(isinstance(each, types.Integer) for each in of_index.types)
+    if isinstance(of_index, _types.BaseTuple):
+        integers = all(isinstance(each, types.Integer) for each in of_index)
         return integers and len(of_index) == kind.ndim
     return kind.ndim == 1 and isinstance(of_index, types.Integer)
 

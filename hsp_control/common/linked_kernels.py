@@ -81,7 +81,7 @@ class _CallableLibrary(_Library):  # type: ignore[misc,valid-type]
 class _Passes(cast("Any", compiler_machinery).PassManager):  # type: ignore[misc]
     """Numba's passes, without timing them and analysing the code anew after each."""
 
-    def _runPass(self, index: int, pss: Any, internal_state: Any) -> None:  # noqa: N802
+    def _runPass(self, index: int, pss: Any, internal_state: Any) -> None:
         pss.analysis = self._analysis
         pss.run_initialization(internal_state)
         pss.run_pass(internal_state)
