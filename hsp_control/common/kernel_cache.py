@@ -39,7 +39,7 @@ _COMPILERS = ("llvmlite", "math", "numba", "numpy")
 
 _HOW = b"".join(
     Path(__file__).with_name(file).read_bytes()
-    for file in ("kernels.py", "linked_kernels.py")
+    for file in ("kernels.py", "kernel_lowering.py", "linked_kernels.py")
 )
 """The files that say how kernels are compiled."""
 

@@ -7,11 +7,15 @@ what calls it in the end optimises the whole. This halves the time of a cold sta
 """
 
 from collections.abc import Callable
+from copy import copy
+from functools import cache
 from typing import Any, cast
 
 import numba
 from llvmlite.binding import Linkage
 from numba.core import codegen, compiler, compiler_machinery, registry, types
+
+from hsp_control.common.kernel_lowering import KernelLowering
 
 _target = cast("Any", registry).cpu_target
 _Library = cast("Any", codegen).JITCodeLibrary
@@ -74,28 +78,42 @@ class _CallableLibrary(_Library):  # type: ignore[misc,valid-type]
         passes.run(self._final_module, options)
 
 
+class _Passes(cast("Any", compiler_machinery).PassManager):  # type: ignore[misc]
+    """Numba's passes, without timing them and analysing the code anew after each."""
+
+    def _runPass(self, index: int, pss: Any, internal_state: Any) -> None:
+        pss.analysis = self._analysis
+        pss.run_initialization(internal_state)
+        pss.run_pass(internal_state)
+        pss.run_finalizer(internal_state)
+
+
 class KernelCompiler(cast("Any", compiler).CompilerBase):  # type: ignore[misc]
     """Numba's compiler without the passes that find nothing in kernels.
 
-    These look for array expressions, which would allocate, for closures, and for what
-    is inlined before it is typed: a twentieth of a cold start.
+    These look for array expressions, which would allocate, for closures, for what
+    is inlined before it is typed, and for the last use of what has to be freed.
     """
 
     def define_pipelines(self) -> list[Any]:
         """Return the passes."""
-        whole = cast("Any", compiler).DefaultPassBuilder.define_nopython_pipeline
-        manager = cast("Any", compiler_machinery).PassManager("kernel")
-        for each, description in whole(self.state).passes:
-            if each.__name__ not in _NEEDLESS:
-                manager.add_pass(each, description)
-        manager.finalize()
-        return [manager]
+        if not _passes:
+            whole = cast("Any", compiler).DefaultPassBuilder.define_nopython_pipeline
+            manager = _Passes("kernel")
+            for each, description in whole(self.state).passes:
+                if each.__name__ not in _NEEDLESS:
+                    lowers = each.__name__ == "NativeLowering"
+                    manager.add_pass(KernelLowering if lowers else each, description)
+            manager.finalize()
+            _passes.append(manager)
+        return _passes
 
 
+_passes: list[_Passes] = []
 _NEEDLESS = (
     "WithLifting", "InlineClosureLikes", "MakeFunctionToJitFunction",
     "InlineInlinables", "LiteralUnroll", "InlineOverloads", "NopythonRewrites",
-    "AnnotateTypes", "DumpParforDiagnostics",
+    "AnnotateTypes", "DumpParforDiagnostics", "IRLegalization",
 )  # fmt: skip
 
 
@@ -112,6 +130,37 @@ class _Flags(cast("Any", compiler).Flags):  # type: ignore[misc]
 
     def copy(self) -> Any:
         return self
+
+
+class _Typing(type(_target.typing_context)):  # type: ignore[misc]
+    """Says what calls mean for the types of their arguments; of Numba's own once.
+
+    Numba tries out all that an operator can mean each time: most of type inference.
+    """
+
+    def resolve_function_type(self, func: Any, args: Any, kws: Any) -> Any:
+        """Return the signature of a call."""
+        if kws or type(func) is not types.Function:
+            return super().resolve_function_type(func, args, kws)
+        key = func, *map(id, args)
+        found = _meanings.get(key)
+        if found is None:
+            signature = super().resolve_function_type(func, args, kws)
+            found = _meanings[key] = signature, args
+        return found[0]
+
+
+_meanings: dict[tuple[Any, ...], Any] = {}
+"""Signatures by function and the types' identities; and the types, which are to live as
+long."""
+
+
+@cache
+def _typing() -> _Typing:
+    """Return Numba's context of types, with all it knows."""
+    context = copy(_target.typing_context)
+    context.__class__ = _Typing
+    return cast("_Typing", context)
 
 
 class _Entry:
@@ -147,7 +196,7 @@ def compile_callable(own: Any, function: Callable[..., Any], args: Any, to: Any)
     library = _CallableLibrary(target.codegen(), function.__qualname__)
     library.enable_object_caching()  # its machine code is kept
     return cast("Any", compiler).compile_extra(
-        _target.typing_context,
+        _typing(),
         target,
         function,
         args=args,
@@ -175,7 +224,7 @@ def linked(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     def compile_core(args: Any, return_type: Any) -> Any:
         target = _target.target_context
         result = cast("Any", compiler).compile_extra(
-            _target.typing_context,
+            _typing(),
             target,
             function,
             args=args,

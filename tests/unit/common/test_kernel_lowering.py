@@ -1,0 +1,114 @@
+"""The code that is written for kernels does what Python does."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.kernels import PLAIN, kernel
+
+pytestmark = pytest.mark.skipif(PLAIN, reason="compiled code is tested")
+
+
+class Pair(NamedTuple):
+    """Two arrays and a number."""
+
+    a: Array
+    b: Array
+    scale: float
+
+
+@kernel
+def _elements(a: Array, b: Array) -> float:
+    """Read and write elements, also from the end and of rows."""
+    value = 0.0
+    for i in range(a.shape[0]):
+        k = -1 - i
+        for j in range(a.shape[1]):
+            b[i, j] = a[k, j] + 2.0 * a[i, -1]
+            value += b[i, j] * (i + 10 * j)
+        row = a[i]
+        value -= row[-1] ** 2 + row[0]
+    return value
+
+
+@kernel
+def _chosen(a: Array, n: int) -> float:
+    """Assign in branches and loops, and use what only some of them assign."""
+    last = 0.0
+    for i in range(n):
+        x = a[i]
+        if x > 0.0:
+            y = x * 2.0
+            last = y
+        elif x < -1.0:
+            y = -x
+        else:
+            continue
+        last += y
+    first = abs(a[0])
+    while first < 10.0:
+        first = first * 2.0 + 1.0
+    return last + first
+
+
+@kernel
+def _swapped(pair: Pair) -> Pair:
+    a, b, scale = pair
+    return Pair(b, a[1:], scale + 1.0)
+
+
+@kernel
+def _of_records(pair: Pair) -> float:
+    """Hand over records, made anew."""
+    other = _swapped(pair)
+    third = _swapped(other) if other.scale > 2.0 else other
+    value = third.scale
+    for i in range(third.a.shape[0]):
+        value += third.a[i] * (i + 1)
+    for i in range(third.b.shape[0]):
+        value -= third.b[i] * (i + 2)
+    return value
+
+
+def _plain(function):  # type: ignore[no-untyped-def]
+    return getattr(function, "py_func", function)
+
+
+@pytest.mark.parametrize("layout", ["C", "F", "every second", "reversed"])
+def test_elements_lie_where_numpy_has_them(layout: str) -> None:
+    """Whole numbers: sums are exact in any order."""
+    whole = np.arange(48.0).reshape(6, 8)
+    a = {
+        "C": np.ascontiguousarray(whole),
+        "F": np.asfortranarray(whole),
+        "every second": whole[::2, 1::3],
+        "reversed": whole[::-1, ::-1],
+    }[layout]
+    written, expected = np.zeros(a.shape), np.zeros(a.shape)
+    value = _elements(a, written)
+    assert value == _plain(_elements)(a, expected)
+    np.testing.assert_array_equal(written, expected)
+
+
+@pytest.mark.parametrize("first", [3.0, -0.5, -2.0])
+def test_a_variable_has_the_value_that_was_assigned_last(first: float) -> None:
+    """Whichever branch assigned it."""
+    a = np.array([first, 1.0, -3.0, 0.0, -4.0, 2.0])
+    for n in range(1, 7):
+        assert _chosen(a, n) == _plain(_chosen)(a, n)
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0])
+def test_a_record_that_a_kernel_returns_has_the_values_it_was_made_of(
+    scale: float,
+) -> None:
+    """Its fields are in their order, views of arrays too."""
+    pair = Pair(np.array([1.0, 2.0, 4.0]), np.array([8.0, 16.0, 32.0, 64.0]), scale)
+    a, b = pair.a, pair.b
+    if scale == 1.0:  # once: (b, a[1:])
+        expected = 2.0 + b @ [1, 2, 3, 4] - a[1:] @ [2, 3]
+    else:  # twice: (a[1:], b[1:])
+        expected = 4.0 + a[1:] @ [1, 2] - b[1:] @ [2, 3, 4]
+    assert _of_records(pair) == expected
