@@ -15,7 +15,7 @@ class ControlOutput:
     """The effort at one state, and everything that explains it.
 
     It belongs to the caller: the controller does not write into it again, unless it is
-    given to `Controller.compute` as ``out``.
+    given to `Controller.compute` as ``out``. What explains the effort may be read-only.
 
     Attributes:
         tau: Effort M a + N minus what the contact forces supply, shape (nv,)
