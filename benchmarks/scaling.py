@@ -325,7 +325,7 @@ Written by `make bench` (`benchmarks/scaling.py`); do not edit.
 
 One `Controller.compute(t, q, v)` [µs], medians over {rounds} interleaved rounds of
 {block} steps on one core, and the fitted t = a + b nᵖ, n ≥ 1.
-Near a singularity a step takes more, up to the levels *in conflict* below (Jacobi's method).
+Near a singularity a step takes more (Jacobi's method), up to the levels *in conflict*.
 Ratios are valid for other machines, microseconds are not.
 
 ![Time of a step against joints, tasks, fields, obstacles, levels](figures/scaling.png)
