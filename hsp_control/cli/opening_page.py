@@ -62,7 +62,11 @@ class OpeningPage:
 
     @contextmanager
     def compiling(self) -> Iterator[None]:
-        """Say on the page how many kernels are compiled; the first one opens it."""
+        """Say on the page how many kernels are compiled; the first one opens it.
+
+        Where what is done then fails, an open page says why: it stays, and would count
+        kernels for ever.
+        """
 
         def tell(text: str) -> None:
             if self._ready:
@@ -72,8 +76,14 @@ class OpeningPage:
                 self._say(text)
             self.open()
 
-        with compiling_told(tell):
-            yield
+        try:
+            with compiling_told(tell):
+                yield
+        except HspControlError as error:
+            if self._done and not self._ready:
+                with suppress(ViewerError):
+                    self._say(str(error))
+            raise
 
 
 def status_line(transport: Transport) -> Callable[[str], object]:

@@ -47,6 +47,9 @@ def compose(document: Document, setup: Setup) -> Composed:
     folder = Path(document.name).resolve().parent
     contacts = tuple(scenario.contacts.values())
     null_space, tasks = scenario.null_space, tuple(scenario.tasks.values())
+    # First, as its engine may not be installed: what follows may compile for a while.
+    scenario = replace(scenario, plant=scenario.plant.located(folder))
+    plant = _plant(document, scenario, robot)
     with document.at("start"):
         q0 = scenario.start.configuration_of(
             robot, contacts, tasks, scene, null_space.singularity_threshold
@@ -80,8 +83,6 @@ def compose(document: Document, setup: Setup) -> Composed:
     if scenario.plan is not None:
         with document.at("plan"):
             scenario.plan.begin(controller).start(robot.state(0.0, q0, v0))
-    scenario = replace(scenario, plant=scenario.plant.located(folder))
-    plant = _plant(document, scenario, robot)
     with document.at():
         begun(scenario.estimators, controller, plant.inertial())
     check_compensation(document, scenario, controller)

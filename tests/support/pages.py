@@ -26,6 +26,7 @@ class Page(threading.Thread):
         super().__init__(daemon=True)
         self.url, self.pause = url, pause
         self.commands: list[dict[str, Any]] = []
+        self.messages: list[list[dict[str, Any]]] = []
         self.start()
 
     def run(self) -> None:
@@ -40,7 +41,8 @@ class Page(threading.Thread):
         self.loop, self.socket = asyncio.get_running_loop(), page
         try:
             while (message := await page.read_message()) is not None:
-                for command in umsgpack.unpackb(message):
+                self.messages.append(umsgpack.unpackb(message))
+                for command in self.messages[-1]:
                     self.commands.append(command)
                     if command["type"] == "ask":
                         await page.write_message(str(command["number"]))

@@ -33,7 +33,7 @@ from hsp_control.visualization.viewer import (
     browser,
     server,
 )
-from hsp_control.visualization.viewer.commands import CAMERA, CLIP
+from hsp_control.visualization.viewer.commands import CAMERA, CAPTION, CLIP
 from hsp_control.visualization.viewer.export import inline
 from hsp_control.visualization.viewer.latest_commands import LatestCommands, key_of
 from hsp_control.visualization.viewer.pipe_protocol import (
@@ -289,7 +289,22 @@ def test_a_page_that_opens_late_sees_everything(arm: Robot, run: Rollout) -> Non
         assert ("trail", "/paths/tip/desired") in kinds
         assert ("clip", CLIP) in kinds
         assert ("camera", CAMERA) in kinds
+        stage, whole = first.messages[0], [c for m in first.messages[1:] for c in m]
+        kinds = [(command["type"], command.get("path")) for command in whole]
         assert len(kinds) == len(set(kinds)) + 1  # the background's two colours
+        assert all(command in whole for command in stage)
+        found = {(command["type"], command["path"]) for command in stage}
+        assert {
+            ("caption", CAPTION),
+            ("status", CAPTION),
+            ("camera", CAMERA),
+            ("set_property", "/Background"),
+            ("set_object", "/lights/key"),
+            ("set_object", "/floor/grid"),
+            ("set_transform", "/robot/joint3"),
+        } <= found
+        assert not any(kind == "set_object" and path.startswith("/robot")
+                       for kind, path in found)  # fmt: skip
         viewer.draw_scene(Scene())
         second = Page(viewer.url)
         assert viewer.wait_for_browser(200.0)

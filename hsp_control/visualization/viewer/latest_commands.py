@@ -4,6 +4,7 @@ The server's process imports this module too: it needs only the standard library
 """
 
 _SEPARATOR = "\0"
+_STAGE = {"Background", "camera", "caption", "floor", "lights"}
 
 
 def key_of(path: str, name: str) -> str:
@@ -59,6 +60,17 @@ class LatestCommands:
         other = LatestCommands()
         other._packed = dict(self._packed)
         return other
+
+    def stage(self) -> list[bytes]:
+        """Return the packed commands that a page can show without waiting for meshes.
+
+        Title, status, background, lights, floor, camera, and where all nodes are.
+        """
+        return [
+            packed
+            for path, name, packed in self.items()
+            if name == "transform" or path.lstrip("/").partition("/")[0] in _STAGE
+        ]
 
     def __len__(self) -> int:
         return len(self._packed)

@@ -155,11 +155,15 @@ class Page(WebSocketHandler):
             raise HTTPError(403, reason="The connection names no origin")
 
     def open(self, *args: str, **kwargs: str) -> None:
-        """Send the page the whole scene, then all changes."""
+        """Send the page the whole scene, then all changes.
+
+        The stage comes first, and once more in its turn: meshes may be older than it,
+        and would be shown in the dark, without a word, until the last one is read.
+        """
         self.pending = self.hub.scene.copy()
         self.has_pending.set()
         self.hub.pages.add(self)
-        self._delivery = asyncio.create_task(self._deliver())
+        self._delivery = asyncio.create_task(self._deliver(self.hub.scene.stage()))
         if self.hub.steering is not None:
             self.hub.steering.enter(self)
             self.hub.tell_who_steers()
@@ -209,11 +213,11 @@ class Page(WebSocketHandler):
             self.pending.put(key_of("", "ask"), packed)
             self.has_pending.set()
 
-    async def _deliver(self) -> None:
+    async def _deliver(self, stage: list[bytes]) -> None:
+        """Send the stage, and from then on what is pending."""
+        commands = stage
         while True:
-            await self.has_pending.wait()
-            self.has_pending.clear()
-            for message in batch_messages(self.pending.take()):
+            for message in batch_messages(commands):
                 self._ready.clear()
                 try:
                     await self.write_message(message, binary=True)
@@ -222,6 +226,9 @@ class Page(WebSocketHandler):
                 await (
                     self._ready.wait()
                 )  # meanwhile newer commands replace pending ones
+            await self.has_pending.wait()
+            self.has_pending.clear()
+            commands = self.pending.take()
 
 
 class FileHandler(RequestHandler):

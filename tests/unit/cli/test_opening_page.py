@@ -1,12 +1,13 @@
 """When a page opens, and what it says before all is ready."""
 
 from argparse import Namespace
+from collections.abc import Callable
 
 import pytest
 
 from hsp_control.cli.opening_page import OpeningPage, draw_before
 from hsp_control.common import adapters, kernels
-from hsp_control.common.exceptions import ViewerError
+from hsp_control.common.exceptions import SimulationError, ViewerError
 from hsp_control.config.setup import set_up
 from hsp_control.config.source import read_document
 from hsp_control.visualization.viewer import Recorder, Viewer, browser
@@ -72,6 +73,28 @@ def test_a_page_that_is_ready_is_told_no_more(said: Said) -> None:
         said.page.ready()
         compiled()
     assert said.events == ["http://x/", "browser"]
+
+
+def fail_at_last(page: OpeningPage, *events: Callable[[], object]) -> None:
+    with page.compiling():
+        for event in events:
+            event()
+        raise SimulationError("why")
+
+
+def test_an_open_page_says_why_the_rest_failed(said: Said) -> None:
+    with pytest.raises(SimulationError):
+        fail_at_last(said.page)
+    assert said.events == []  # no page was opened
+    with pytest.raises(SimulationError):
+        fail_at_last(said.page, compiled)
+    assert said.events[-1] == "why"
+
+
+def test_a_page_that_is_ready_says_itself_what_failed(said: Said) -> None:
+    with pytest.raises(SimulationError):
+        fail_at_last(said.page, compiled, said.page.ready)
+    assert said.events[-1] == ""
 
 
 def test_a_server_that_has_ended_stops_no_compilation(said: Said) -> None:

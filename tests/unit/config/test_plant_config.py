@@ -1,6 +1,7 @@
 """Plants from YAML: the configurations on another engine, and every imperfection."""
 
 import re
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import yaml
 from places import ROOT
 
 from hsp_control import Rollout, load_experiment
+from hsp_control.common import adapters
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.common.resources import bundled_configs
 from hsp_control.geometry.shapes import Box
@@ -282,3 +284,16 @@ def test_what_moves_by_itself_needs_a_control_period(plant: Any) -> None:
     message = r"plant: this plant needs efforts that are held for a period: set "
     with pytest.raises(HspControlError, match=message):
         load_experiment(config)
+
+
+def test_a_missing_engine_is_found_before_anything_is_compiled(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def compile_none(*_: object) -> int:
+        raise AssertionError("a kernel was asked for")
+
+    monkeypatch.setattr(adapters, "adapter", compile_none)
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    message = "whole_body/talos_walk.yaml:23: plant: the plant cannot be made: a MuJoCo"
+    with pytest.raises(HspControlError, match=re.escape(message)):
+        load_experiment("whole_body/talos_walk")
