@@ -14,6 +14,9 @@ from hsp_control.cli.loading import load
 from hsp_control.config import Experiment
 from hsp_control.control import ControlOutput, Diagnostics
 
+ROUNDING = 1e-9
+"""A singular value below this share of the largest one is zero but for rounding."""
+
 
 def check(options: argparse.Namespace) -> int:
     """Build all objects, evaluate the law once, and print a summary."""
@@ -42,6 +45,9 @@ def _checked(
 ) -> dict[str, Any]:
     """Return what a configuration is made of, and its numbers at the start."""
     robot, controller = experiment.robot, experiment.controller
+    values = diagnostics.singular_values
+    rank = int(np.sum(values > ROUNDING * values.max(initial=0.0)))
+    held = controller.active_stack.first_task_row  # by contacts, or without motors
     tasks = {}
     for task in controller.tasks:
         rows = controller.task_rows.get(task.name)  # not before its schedule begins
@@ -55,12 +61,12 @@ def _checked(
         "robot": {"name": robot.name, "nq": robot.nq, "nv": robot.nv},
         "tasks": tasks,
         "null_space": {
-            "degrees_of_freedom": robot.nv - sum(t.rows for t in controller.tasks),
+            "degrees_of_freedom": robot.nv - held - rank,
             "field": controller.field.name,
         },
         "plant": experiment.plant.describe()["type"],
         "compensation": list(experiment.compensation.names),
-        "singular_values": list(map(float, diagnostics.singular_values)),
+        "singular_values": list(map(float, values)),
         "largest_effort": float(np.abs(output.tau).max()),
     }
 

@@ -68,6 +68,22 @@ def test_check_tells_a_program_what_a_configuration_is(
     assert told["advice"] == []
 
 
+@pytest.mark.parametrize(
+    ("config", "freedom"),
+    [
+        (["whole_body/solo12_trunk"], 18 - 12 - 6),  # four feet hold three rows each
+        ([MOVING, "--set", "start.coordinates=[0, 0, 0]"], 3 - 1),  # stretched
+        ([MOVING, "--set", "tasks.tip.schedule={intervals: [[1, null]]}"], 3),
+    ],
+)
+def test_check_counts_what_contacts_and_tasks_leave(
+    config: list[str], freedom: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["check", "--json", *config]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["null_space"]["degrees_of_freedom"] == freedom
+
+
 def test_what_a_run_lacks_is_null_and_not_nan(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
