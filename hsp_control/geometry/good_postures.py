@@ -17,7 +17,7 @@ from hsp_control.geometry.links import link_shapes
 from hsp_control.geometry.proximity import Proximity
 from hsp_control.geometry.scene import Obstacle
 from hsp_control.geometry.self_pairs import self_pairs
-from hsp_control.robot import Robot
+from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.inverse_kinematics import Reached, Target, reach
 
 _SAMPLES = 48
@@ -83,6 +83,7 @@ class PostureSearch:
             obstacles: What the robot must not touch, where it is at the time 0.
         """
         self.robot = robot
+        self._state = robot.state(0.0, robot.home(), np.zeros(robot.nv))
         self._rows = tuple(rows)
         lower, upper = robot.position_limits()
         bounded = upper - lower < _WIDE  # also not where there is no limit
@@ -104,8 +105,7 @@ class PostureSearch:
 
     def judge(self, q: Array) -> Judgement:
         """Return what counts for a configuration, shape (nq,)."""
-        robot = self.robot
-        state = robot.state(0.0, q, np.zeros(robot.nv))
+        robot, state = self.robot, self._state_at(q)
         regularity = np.inf
         if self._rows:
             blocks = [state.frame(f).jacobian[list(rows)] for f, rows in self._rows]
@@ -131,8 +131,7 @@ class PostureSearch:
         rough = self._proximity
         if rough is None:
             return 0.0, ""
-        robot = self.robot
-        state = robot.state(0.0, q, np.zeros(robot.nv))
+        robot, state = self.robot, self._state_at(q)
         names = [each.link for each in rough.links] + [o.name for o in rough.obstacles]
         suspected = {
             (names[i], names[j])
@@ -240,6 +239,10 @@ class PostureSearch:
             share = np.array([_halton(number, k) for k in range(self.robot.nv)])
             yield self._lower + share * (self._upper - self._lower)
 
+    def _state_at(self, q: Array) -> RobotState:
+        """Return the state at rest in a configuration; the next call moves it."""
+        return self._state.update(0.0, q, np.zeros(self.robot.nv))
+
     def _at(self, x: Array) -> Array:
         return self.robot.integrate(self.robot.neutral(), x)
 
@@ -256,9 +259,8 @@ class PostureSearch:
         pairs = self_pairs(robot, links)
         if pairs:
             everywhere = Proximity(robot, links, (), pairs)
-            rest = np.zeros(robot.nv)
             overlaps = [
-                everywhere.measure(robot.state(0.0, self._at(x), rest)) <= 0.0
+                everywhere.measure(self._state_at(self._at(x))) <= 0.0
                 for x in self._displacements()
             ]
             apart = np.mean(overlaps, axis=0) < _ALWAYS
