@@ -703,6 +703,41 @@ MUTANTS = (
         "if costs[0, k] < 0.0:",
         UNIT + "control/test_deviation_cost.py -k levels_share",
     ),
+    Mutant(
+        "limits: levels have the null space's share",
+        ACTUATION + "deviation_cost.py",
+        "directions.share[count + r] = max(free, 0.0)",
+        "directions.share[count + r] = t",
+        UNIT + "control/test_deviation_cost.py -k levels_share",
+    ),
+    Mutant(
+        "limits: rows of a spectrum as directions",
+        ACTUATION + "deviation_cost.py",
+        "return bool(found)",
+        "return True",
+        UNIT + "control/test_deviation_cost.py -k projector",
+    ),
+    Mutant(
+        "decay rate: what turns e_N counts",
+        ACTUATION + "deviation_cost.py",
+        "both = 0.5 * (lowered + lowered.T)",
+        "both = lowered",
+        UNIT + "control/test_deviation_cost.py -k decay_rate",
+    ),
+    Mutant(
+        "free step: a law that is not finite is free",
+        CONTROL + "free_step.py",
+        "0.0 <= value < CODES * BEYOND_ANY_LEVEL",
+        "0.0 <= value",
+        UNIT + "control/test_free_step.py -k finite",
+    ),
+    Mutant(
+        "free step: calls in Python are left out",
+        CONTROL + "free_step.py",
+        " or len(native) < len(sending)",
+        "",
+        UNIT + "control/test_free_step.py -k native",
+    ),
     # ------------------------------------------------------------------ simulation
     Mutant(
         "RK4: weights of k3 and k4 swapped",
@@ -746,6 +781,27 @@ MUTANTS = (
         "moving = _table([steps.native, *self._seeing])",
         "moving = _table([steps.native])",
         OF_STRETCHES + "between_two_rows",
+    ),
+    Mutant(
+        "stretch: efforts that are held teach nothing",
+        SIMULATION + "stretch.py",
+        "        run(sending, sending_when, t)\n",
+        "",
+        OF_STRETCHES + "teaches",
+    ),
+    Mutant(
+        "stretch: steps before a change go on",
+        SIMULATION + "stretch.py",
+        "if self._loop is None or step is not self._step:",
+        "if self._loop is None:",
+        OF_STRETCHES + "change_is_made",
+    ),
+    Mutant(
+        "stretch: the controller's time stays behind",
+        SIMULATION + "stretch.py",
+        "state.t = start + (k + made - 1) * span / periods",
+        "state.t += 0.0",
+        OF_STRETCHES + "last_step",
     ),
     Mutant(
         "the row's period for the control period",
@@ -930,6 +986,21 @@ MUTANTS = (
         "sign = 1.0 if side == 1 else -1.0",
         "sign = 1.0",
         UNIT + "simulation/test_mujoco_scene.py -k push_each_other",
+    ),
+    # --------------------------------------------------------- view, command line
+    Mutant(
+        "view: meshes come before light and title",
+        PACKAGE + "visualization/viewer/page_server.py",
+        "self._deliver(self.hub.scene.stage())",
+        "self._deliver([])",
+        "tests/system/test_viewer_server.py -k late",
+    ),
+    Mutant(
+        "check: rows of contacts are null space",
+        CLI + "check.py",
+        "robot.nv - held - rank",
+        "robot.nv - rank",
+        UNIT + "cli/test_cli.py -k contacts",
     ),
 )
 """All of them, from the lowest room to the highest."""

@@ -8,15 +8,24 @@ import numpy as np
 import pytest
 from closed_loops import load, panda_controller
 
-from hsp_control import Rollout, TargetPosture, load_experiment, simulate
+from hsp_control import (
+    FramePosition,
+    Limits,
+    Rollout,
+    TargetPosture,
+    load_experiment,
+    simulate,
+)
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.common.kernels import PLAIN
 from hsp_control.config import Experiment
 from hsp_control.constraints.limits import RobotLimits
+from hsp_control.control.changes import Changes
 from hsp_control.control.controller import Controller
 from hsp_control.robot.integrators import SemiImplicitEuler
 from hsp_control.simulation import loops
 from hsp_control.simulation.limit_excess import LimitExcess
+from hsp_control.trajectories import Hold
 
 if not PLAIN:
     from hsp_control.simulation.stretch import MOST
@@ -123,6 +132,38 @@ def test_periods_in_which_a_limit_binds_are_made_alone(counted: Counted) -> None
     assert ((made > 0) & (made < 8)).sum() >= 2
 
 
+def test_what_a_held_effort_teaches_is_the_same(counted: Counted) -> None:
+    """How far speeds were off widens the margin of a speed limit that binds later."""
+    slow = "panda_obstacle", "limits.velocity={scale: 0.3}"
+    theirs = counted.alone(short(*slow, duration=2.0).run)
+    ours = short(*slow, duration=2.0).run()
+    assert_same(ours, theirs)
+    assert (ours["status"] == 2).sum() > 10
+    assert sum(counted.many) > 1000
+
+
+def test_after_it_the_controller_is_at_its_last_step(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its time, too: who reads the state then reads q, v and t of one instant."""
+    times: list[tuple[float, float, int]] = []
+    while_free = Controller.while_free
+
+    def timed(controller: Controller, advance: Any) -> int:
+        before = controller.state.t
+        made = while_free(controller, advance)
+        times.append((before, controller.state.t, made))
+        return made
+
+    monkeypatch.setattr(Controller, "while_free", timed)
+    short("panda_obstacle").run()
+    before, after, made = map(np.array, zip(*times, strict=True))
+    assert made.max() > 5
+    # The effort of the last period was computed where that period began.
+    expected = before + 1e-3 * np.maximum(made - 1, 0)
+    np.testing.assert_allclose(after, expected, rtol=0, atol=1e-12)
+
+
 def test_no_state_between_two_rows_is_missed(
     counted: Counted, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -147,17 +188,31 @@ def test_no_state_between_two_rows_is_missed(
     assert sum(counted.many) > 2000
 
 
-def test_a_change_is_made_where_it_begins(counted: Counted) -> None:
-    """What changes is made in Python; a second after its end the loop goes on."""
+ELBOW = FramePosition("panda_link4", Hold(), axes="z", name="elbow")
+CHANGES: dict[str, Callable[[Changes], object]] = {
+    "gain": lambda at: at.null_space_gain(20.0),
+    "field": lambda at: at.field(TargetPosture("home", weight=3.0)),
+    "task": lambda at: at.add(ELBOW),
+    "limits": lambda at: at.limits(Limits(velocity=2.0)),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES.keys())
+def test_a_change_is_made_where_it_begins(
+    change: Callable[[Changes], object], counted: Counted
+) -> None:
+    """What changes is made in Python; a second after its end the loop goes on.
+
+    It goes on with what is in force then.
+    """
 
     def run() -> Rollout:
         experiment = short("panda_obstacle", EULER)
         controller = experiment.controller
 
-        def change(recorder: Any) -> None:
+        def on_row(recorder: Any) -> None:
             if recorder.count == 11:  # at 0.1 s
-                at = controller.at(0.1234)
-                at.ramp(0.05).null_space_gain(20.0)
+                change(controller.at(0.1234).ramp(0.05))
 
         return simulate(
             controller,
@@ -165,7 +220,7 @@ def test_a_change_is_made_where_it_begins(counted: Counted) -> None:
             duration=1.4,
             control_period=0.001,
             integrator=SemiImplicitEuler(),
-            on_row=change,
+            on_row=on_row,
         )
 
     theirs = counted.alone(run)
@@ -175,6 +230,7 @@ def test_a_change_is_made_where_it_begins(counted: Counted) -> None:
     (native,) = np.nonzero(made)
     assert len(native) > 20
     assert (np.diff(native) > 100).any()  # calls that were refused, while it changed
+    assert made[native[-10:]].sum() > 80  # and it went on
 
 
 @pytest.mark.parametrize("log_period", [0.05, 1.0])

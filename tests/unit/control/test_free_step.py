@@ -1,0 +1,57 @@
+"""Which steps a compiled loop may make, and which it leaves to Python."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from hsp_control import load_experiment
+from hsp_control.common.kernels import PLAIN
+from hsp_control.control.actuation import Status
+from hsp_control.control.actuation.actuation import CODES, FLAGS
+from hsp_control.law.outcome import BEYOND_ANY_LEVEL
+from hsp_control.robot.valid_state import REFUSED
+
+if PLAIN:
+    pytest.skip("plain Python has no native calls", allow_module_level=True)
+
+from hsp_control.control.free_step import free_step, is_free
+
+
+@pytest.mark.parametrize(
+    ("value", "free"),
+    [
+        (0.0, True),
+        (float(CODES), True),  # bounded at the first level
+        (float(9 * CODES), True),
+        (REFUSED, False),
+        (-float(CODES), False),
+        (float(FLAGS), False),  # a limit is violated
+        (float(CODES + FLAGS), False),
+        (float(Status.LIMITED), False),  # and was solved
+        (float(CODES * BEYOND_ANY_LEVEL), False),
+        (np.nan, False),
+        (np.inf, False),
+    ],
+)
+def test_a_step_is_free_whose_law_is_finite_within_limits(
+    value: float, free: bool
+) -> None:
+    assert is_free(value) is free
+
+
+def test_what_is_not_native_is_no_free_step() -> None:
+    """A call in Python, of those that record what was sent, or within the move."""
+    experiment = load_experiment("panda_obstacle")
+    controller = experiment.controller
+    controller.compute(0.0, experiment.q0, experiment.v0)
+    found = []
+    controller.while_free(lambda step: len(found) or found.append(step) or 0)
+    (step,) = found
+    sending: list[Callable[[float], float]] = list(step.sending)
+    assert sending
+    again = free_step(step.move, step.effort, sending)
+    assert again is not None
+    assert list(again.sending) == sending
+    assert free_step(step.move, step.effort, [*sending, float]) is None
+    assert free_step(lambda t, q, v: 0.0, step.effort, sending) is None
