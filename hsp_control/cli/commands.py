@@ -48,8 +48,8 @@ def run(options: argparse.Namespace) -> int:
     """Simulate, save the log and print a summary; rows computed so far are kept."""
     document = read(options)
     setup = set_up(document)
-    log = options.out / f"{Path(document.name).stem}.npz"
-    log.parent.mkdir(parents=True, exist_ok=True)  # fails before the work, not after
+    options.out.mkdir(parents=True, exist_ok=True)  # fails before the work, not after
+    log = _log_of(Path(document.name), options.out)
     tell = _tell_json if options.json else _tell
     if not options.view:
         return _run_and_save(_built(document, setup), log, tell, None)
@@ -61,6 +61,14 @@ def run(options: argparse.Namespace) -> int:
         if screen is not None and screen.begin(experiment):
             return _run_and_save(experiment, log, tell, screen)
         return max(_run_and_save(experiment, log, tell, None), 2)
+
+
+def _log_of(source: Path, folder: Path) -> Path:
+    """Return the path of a run's log, which never replaces the log that it repeats."""
+    log = folder / f"{source.stem}.npz"
+    if log.exists() and source.exists() and log.samefile(source):
+        return log.with_stem(f"{log.stem}-again")
+    return log
 
 
 def _built(document: Document, setup: Setup) -> Experiment:

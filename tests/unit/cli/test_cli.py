@@ -68,6 +68,24 @@ def test_check_tells_a_program_what_a_configuration_is(
     assert told["advice"] == []
 
 
+def test_a_log_is_not_replaced_by_its_repetition(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It may be that of a robot."""
+    run = ["run", "--out", str(tmp_path), "--no-view", "--json"]
+    assert main([*run, MOVING, *SHORT]) == 0
+    log = tmp_path / "4_moving_obstacle.npz"
+    before = log.read_bytes()
+    capsys.readouterr()
+    assert main([*run, str(log), "--set", "null_space.gain=20"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["log"] == str(tmp_path / "4_moving_obstacle-again.npz")
+    assert log.read_bytes() == before
+    elsewhere = tmp_path / "elsewhere"
+    assert main([*run[:2], str(elsewhere), *run[3:], str(log)]) == 0
+    assert [file.name for file in elsewhere.iterdir()] == [log.name]
+
+
 @pytest.mark.parametrize(
     ("config", "freedom"),
     [
