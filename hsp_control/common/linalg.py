@@ -182,7 +182,7 @@ def orthonormalise_rows(J: Array, Q: Array, X: Array) -> float:
 
     Returns:
         1/‖X‖_F, a lower bound of J's smallest singular value, too small by a factor of
-        √m at most; 0 if a row became zero.
+        √m at most; 0 if a row became zero, inf without rows.
     """
     m, n = J.shape
     for j in range(m):
@@ -201,7 +201,7 @@ def orthonormalise_rows(J: Array, Q: Array, X: Array) -> float:
         if X[j, j] == 0.0:
             return 0.0
         total += squared_norm(X[j, : j + 1])
-    return float(1.0 / np.sqrt(total))
+    return float(1.0 / np.sqrt(total)) if total > 0.0 else np.inf
 
 
 @kernel

@@ -266,6 +266,13 @@ def test_orthonormalise_a_zero_row() -> None:
     close(Q[::2] @ Q[::2].T, np.eye(2), 1e-15)
 
 
+@pytest.mark.filterwarnings("error")
+def test_no_rows_are_orthonormal_also_in_plain_python() -> None:
+    plain = getattr(orthonormalise_rows, "py_func", orthonormalise_rows)
+    for each in (orthonormalise_rows, plain):
+        assert each(np.zeros((0, 7)), np.zeros((0, 7)), np.zeros((0, 0))) == np.inf
+
+
 def test_orthonormalise_twice_is_needed() -> None:
     """Läuchli's matrix: one sweep of Gram-Schmidt leaves rows at 60 degrees."""
     J = np.vstack([np.ones(3), 1e-9 * np.eye(3)]).T.copy()
