@@ -311,9 +311,11 @@ def _singular_values(
     """Write the singular values of J L⁻ᵀ, largest first; J of any shape.
 
     Returns:
-        Their product squared.
+        Their product squared; 1 without rows.
     """
     m, n = J.shape
+    if m == 0:
+        return 1.0
     width = min(m, n)
     B, T, U = wide[0, :m], small[0, :m, :m], small[1, :m, :m]
     whiten(J, L, form, B)
