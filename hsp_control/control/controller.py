@@ -708,9 +708,11 @@ class Controller:
 
     def diagnose(self) -> Diagnostics:
         """Return quantities to plot, after `compute`, at the same state."""
-        active = self.active_stack
-        values, product, norm = active.resolution.diagnose(active.first_task_row)
-        return Diagnostics(active.field_value(), norm, values, product)
+        active, out = self.active_stack, Diagnostics()
+        found = active.resolution.diagnose(active.first_task_row)
+        out.null_space_norm, out.manipulability, out._triangle = found
+        out.field_value = active.field_value()
+        return out
 
     def flow(self, t: float, q: ArrayLike) -> Array:
         """Return v = J# x_d' + P g, shape (nv,): the robot once both errors have died.
