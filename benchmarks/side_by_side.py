@@ -363,7 +363,7 @@ MARKERS = ("<!-- make bench: begin -->", "<!-- make bench: end -->")
 SUMMARY_ROWS = {
     "this law": "joint centering",
     "this law, and `diagnose`": "joint centering, `diagnose` included",
-    "this law, and its singular values": "joint centering, `diagnose` and singular values",
+    "this law, and its singular values": "joint centering, `diagnose`, singular values",
     "this law, manipulability": "manipulability",
 }
 
