@@ -3,6 +3,7 @@
 from .limits import Limits as Limits
 from .limits import LimitsOrNone as LimitsOrNone
 from .limits import own_limits as own_limits
+from .maximum import ByJoint as ByJoint
 from .maximum import Scaled as Scaled
 from .minimum_distance import MinimumDistance as MinimumDistance
 from .minimum_distance import ObstacleDistance as ObstacleDistance

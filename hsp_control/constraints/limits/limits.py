@@ -65,13 +65,14 @@ class Limits(Part, error=LimitError):
 
     _: KW_ONLY
     effort: Maximum = "robot"
-    """Maximum effort [N·m or N]: the robot's own, none, a factor, one number or nv."""
+    """Maximum effort [N·m or N]: the robot's own, none, a factor, numbers by joint, one
+    number or nv."""
     effort_rate: Positives | None = None
     """Maximum rate of the effort [N·m/s or N/s], one number or nv; a Panda's is 1000.
     Unlimited by default."""
     velocity: Maximum = "robot"
-    """Maximum speed [rad/s or m/s]: the robot's own, none, a factor, one number or
-    nv."""
+    """Maximum speed [rad/s or m/s]: the robot's own, none, a factor, numbers by joint,
+    one number or nv."""
     acceleration: Positives | None = None
     """Maximum acceleration [rad/s² or m/s²], one number or nv. Unlimited by default."""
     position: Annotated[

@@ -21,6 +21,7 @@ from hsp_control.common.exceptions import (
     SceneError,
 )
 from hsp_control.constraints.limits import (
+    ByJoint,
     MinimumDistance,
     ObstacleDistance,
     PositionRange,
@@ -147,6 +148,18 @@ def test_a_part_of_the_robots_own() -> None:
     assert np.isinf(of(talos(), effort=Scaled(0.5)).effort[:6]).all()
 
 
+def test_numbers_for_some_joints() -> None:
+    """Also for those that have no limit of their own."""
+    own = of(panda()).effort
+    some = ByJoint({"panda_joint3": 200.0, "panda_joint1": 5})
+    expected = [5.0, own[1], 200.0, *own[3:]]
+    np.testing.assert_array_equal(of(panda(), effort=some).effort, expected)
+    continuous = Robot.load("bravo7_no_ee")
+    assert np.isinf(of(continuous).velocity[[0, 3, 5]]).all()
+    limits = of(continuous, velocity=ByJoint({"joint4": 1.5}))
+    np.testing.assert_array_equal(limits.velocity, [np.inf, 0.5, 0.5, 1.5, 0.5, np.inf])
+
+
 def test_a_range_without_limits_for_a_root() -> None:
     nv = talos().nv
     lower, upper = np.full((2, nv), -np.inf)
@@ -189,6 +202,20 @@ def test_kernels_take_them() -> None:
             JointNotFoundError,
             ("effort", "scale", "panda_joint9"),
             "did you mean 'panda_joint",
+        ),
+        (
+            panda,
+            {"velocity": ByJoint({"panda_joint9": 0.5})},
+            JointNotFoundError,
+            ("velocity", "joints", "panda_joint9"),
+            "did you mean 'panda_joint",
+        ),
+        (
+            talos,
+            {"effort": ByJoint({"root_joint": 9.0})},
+            LimitError,
+            ("effort", "joints", "root_joint"),
+            "no motor moves root_joint",
         ),
         (
             talos,

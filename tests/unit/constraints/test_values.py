@@ -25,6 +25,7 @@ from hsp_control.constraints.contacts import (
     SurfaceContact,
 )
 from hsp_control.constraints.limits import (
+    ByJoint,
     Limits,
     MinimumDistance,
     ObstacleDistance,
@@ -56,6 +57,7 @@ BALL = Obstacle("ball", Sphere(0.1), Hold([0.4, 0.0, 0.5]))
 
 EXAMPLES: dict[type[Part], Part] = {
     BallContact: BallContact("foot", radius=0.02),
+    ByJoint: ByJoint({"joint": 20.0}),
     CommandedForce: CommandedForce(20.0),
     Limits: Limits(),
     ObstacleDistance: ObstacleDistance(),
@@ -77,10 +79,14 @@ _CONTACT: dict[str, Any] = {
     "force": CommandedForce(5.0),
     "name": "left",
 }
-_MAXIMUM = ["none", Scaled(0.5), Scaled({"b": 0.5, "a": 2}), 9, np.ones(7)]
+_MAXIMUM = [
+    *("none", Scaled(0.5), Scaled({"b": 0.5, "a": 2}), ByJoint({"b": 5, "a": 2})),
+    *(9, np.ones(7)),
+]
 _NUMBERS = [1000.0, [1, 2.5], [3.0, None], np.array([1.0, np.inf])]
 OTHERS: dict[type[Part], dict[str, Any]] = {
     BallContact: {**_CONTACT, "radius": 0.03},
+    ByJoint: {"joints": [{"joint": 3}, {"b": 2.0, "a": 1}]},
     CommandedForce: {"value": [3, [1, 0, 5.0], np.array([0, 0, 9, 0, 0, 1.0])]},
     Limits: {
         "effort": _MAXIMUM,
@@ -257,7 +263,7 @@ def test_none_is_no_limit() -> None:
 def test_limits_as_yaml_says_them() -> None:
     data: dict[str, Any] = {
         "effort": {"scale": {"a": 0.5}},
-        "velocity": "none",
+        "velocity": {"joints": {"a": 2}},
         "effort_rate": 1000,
         "acceleration": [1, None],
         "position": {"lower": [-1, None], "upper": [1, 2]},
@@ -266,7 +272,7 @@ def test_limits_as_yaml_says_them() -> None:
     }
     assert Limits(**data) == Limits(
         effort=Scaled({"a": 0.5}),
-        velocity=None,
+        velocity=ByJoint({"a": 2.0}),
         effort_rate=1000.0,
         acceleration=[1.0, np.inf],
         position=PositionRange([-1.0, -np.inf], [1.0, 2.0]),
@@ -356,6 +362,13 @@ WRONG: dict[type[Part], dict[str, list[tuple[Any, str]]]] = {
             ([0.0, 2.0], "lower must be below upper"),
         ],
         "upper": [(np.nan, "not a finite number"), (-1.0, "lower must be below")],
+    },
+    ByJoint: {
+        "joints": [
+            ({}, "at least 1"),
+            ({"a": 0.0}, "a: 0.0 is too small; must be greater than 0"),
+            (20.0, "expected a mapping"),
+        ]
     },
     Scaled: {
         "scale": [
