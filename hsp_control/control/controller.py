@@ -331,7 +331,7 @@ class Controller:
                 out.tau[:] = tau
                 out._keep(active.memory)
             out._rows = active.row_count
-            out._acceleration = None if a is active.acceleration else a.copy()
+            out._acceleration = None if a is active.acceleration else a.tobytes()
             out.forces = forces.copy() if active.has_forces else forces
             out.damped, out.status, out.relaxation = damped, status, relaxation
             return out

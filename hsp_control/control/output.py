@@ -47,8 +47,9 @@ class ControlOutput:
     forces: Array
     status: Status
     relaxation: float
-    _acceleration: Array | None  # None: the law's own
-    _memory: Array | bytes  # bytes are made faster, and most are never looked at
+    # Bytes are made faster than arrays, and most are never looked at.
+    _acceleration: bytes | None  # None: the law's own
+    _memory: Array | bytes
     _rows: int
     _views: Record | None  # of the memory, once they were asked for
 
@@ -56,7 +57,7 @@ class ControlOutput:
     def acceleration(self) -> Array:
         """The acceleration that the effort produces, shape (nv,)."""
         own = self._acceleration
-        return self._record.acceleration if own is None else own
+        return self._record.acceleration if own is None else np.frombuffer(own)
 
     @property
     def task(self) -> TaskSample:
@@ -84,7 +85,7 @@ class ControlOutput:
             own = Record.allocate(rows, len(self.tau))
         own.memory[:] = np.frombuffer(self._memory)
         if self._acceleration is not None:
-            own.acceleration[:] = self._acceleration
+            own.acceleration[:] = np.frombuffer(self._acceleration)
         return own
 
     def _keep(self, memory: Array) -> None:

@@ -302,7 +302,7 @@ _WRONG_MAXIMUM: list[tuple[Any, str]] = [
     ([], "needs at least 1"),
     ([[1.0]], "expected a number"),
     (np.nan, "not a finite number"),
-    ({"factor": 1}, "unknown key 'factor'"),
+    ({"factor": 1}, r"unknown key 'factor' \(allowed: scale, joints\)"),
 ]
 _WRONG_NUMBERS: list[tuple[Any, str]] = [
     ("robot", "'robot' is text; expected a number or a list of numbers"),
