@@ -9,5 +9,6 @@ from .minimum_distance import MinimumDistance as MinimumDistance
 from .minimum_distance import ObstacleDistance as ObstacleDistance
 from .minimum_distance import SelfDistance as SelfDistance
 from .position_range import PositionRange as PositionRange
+from .position_range import PositionsByJoint as PositionsByJoint
 from .robot_limits import RobotLimits as RobotLimits
 from .static_effort import StaticEffort as StaticEffort

@@ -13,7 +13,10 @@ from hsp_control.constraints.limits.acceleration_bounds import MotionLimits
 from hsp_control.constraints.limits.maximum import Maximum, maximum, none_for_nothing
 from hsp_control.constraints.limits.minimum_distance import MinimumDistance
 from hsp_control.constraints.limits.numbers_by_joint import Positives, by_dof
-from hsp_control.constraints.limits.position_range import PositionRange
+from hsp_control.constraints.limits.position_range import (
+    PositionRange,
+    PositionsByJoint,
+)
 from hsp_control.constraints.limits.robot_limits import RobotLimits
 from hsp_control.constraints.limits.static_effort import StaticEffort
 from hsp_control.declaration import Part, within
@@ -76,10 +79,11 @@ class Limits(Part, error=LimitError):
     acceleration: Positives | None = None
     """Maximum acceleration [rad/s² or m/s²], one number or nv. Unlimited by default."""
     position: Annotated[
-        Literal["robot", "none"] | PositionRange | None,
+        Literal["robot", "none"] | PositionRange | PositionsByJoint | None,
         BeforeValidator(none_for_nothing),
     ] = "robot"
-    """Joint position limits [rad or m]: the robot's own, none, or numbers."""
+    """Joint position limits [rad or m]: the robot's own, none, numbers for some joints,
+    or numbers."""
     position_margin: NonNegative | None = None
     """Margin inside the position limits [rad or m]: 0.005 by default, at most a tenth
     of a joint's range. With efforts held for a period, a barrier may be crossed by the
@@ -166,7 +170,7 @@ class Limits(Part, error=LimitError):
         Raises:
             LimitError: If the limits do not fit the robot, or leave no room.
         """
-        if isinstance(self.position, PositionRange):
+        if isinstance(self.position, PositionRange | PositionsByJoint):
             lower, upper = self.position.of(robot)
         elif self.position == "robot":
             lower, upper = robot.position_limits()

@@ -1,6 +1,6 @@
 """Maximum efforts and speeds: the robot's own, changed or scaled, or numbers."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
@@ -8,38 +8,14 @@ from pydantic import BeforeValidator, Field
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LimitError
-from hsp_control.constraints.limits.numbers_by_joint import Positives, by_dof
+from hsp_control.constraints.limits.numbers_by_joint import (
+    Positives,
+    by_dof,
+    of_joints,
+)
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import ArrayField, Positive
 from hsp_control.robot import Robot
-
-
-class OfJoints(Mapping[str, float]):
-    """Numbers by joint name; they never change."""
-
-    def __init__(self, numbers: Mapping[str, float]) -> None:
-        """Copy the numbers."""
-        self._numbers = dict(numbers)
-
-    def __getitem__(self, joint: str) -> float:
-        return self._numbers[joint]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._numbers)
-
-    def __len__(self) -> int:
-        return len(self._numbers)
-
-    def __hash__(self) -> int:
-        return hash(frozenset(self._numbers.items()))
-
-    def __repr__(self) -> str:
-        return repr(self._numbers)
-
-
-def _stored(value: Any) -> Any:
-    return OfJoints(value) if isinstance(value, Mapping) else value
-
 
 _PositiveOfJoints = Annotated[dict[str, Positive], Field(min_length=1)]
 
@@ -49,7 +25,7 @@ class Scaled(Part, error=LimitError):
 
     scale: Annotated[
         float | Mapping[str, float],
-        ArrayField(Positive | _PositiveOfJoints, _stored),
+        ArrayField(Positive | _PositiveOfJoints, of_joints),
     ]
     """The factor [-]; 0.5 halves the limit. Or factors by joint name; the other joints
     keep their own limits."""
@@ -76,7 +52,7 @@ class Scaled(Part, error=LimitError):
 class ByJoint(Part, error=LimitError):
     """Numbers for some joints; the others keep the robot's own limits."""
 
-    joints: Annotated[Mapping[str, float], ArrayField(_PositiveOfJoints, _stored)]
+    joints: Annotated[Mapping[str, float], ArrayField(_PositiveOfJoints, of_joints)]
     """Limits by joint name [N·m or N, rad/s or m/s]."""
 
     def of(self, own: Array, robot: Robot) -> Array:

@@ -25,6 +25,7 @@ from hsp_control.constraints.limits import (
     MinimumDistance,
     ObstacleDistance,
     PositionRange,
+    PositionsByJoint,
     RobotLimits,
     Scaled,
     SelfDistance,
@@ -160,6 +161,17 @@ def test_numbers_for_some_joints() -> None:
     np.testing.assert_array_equal(limits.velocity, [np.inf, 0.5, 0.5, 1.5, 0.5, np.inf])
 
 
+def test_positions_of_some_joints() -> None:
+    own = of(panda())
+    limits = of(panda(), position=PositionsByJoint({"panda_joint4": (-2.5, -0.5)}))
+    lower, upper = own.lower.copy(), own.upper.copy()
+    lower[3], upper[3] = -2.5, -0.5
+    np.testing.assert_array_equal(limits.lower, lower)
+    np.testing.assert_array_equal(limits.upper, upper)
+    assert limits.guarded_upper[3] == -0.505
+    np.testing.assert_array_equal(of(panda()).lower, own.lower)  # the robot's stay
+
+
 def test_a_range_without_limits_for_a_root() -> None:
     nv = talos().nv
     lower, upper = np.full((2, nv), -np.inf)
@@ -253,6 +265,13 @@ def test_kernels_take_them() -> None:
             LimitError,
             ("position", "upper"),
             "has 2 numbers",
+        ),
+        (
+            talos,
+            {"position": PositionsByJoint({"root_joint": (-1.0, 1.0)})},
+            LimitError,
+            ("position", "joints", "root_joint"),
+            "without a single coordinate .* it has no limits",
         ),
         (
             talos,

@@ -30,6 +30,7 @@ from hsp_control.constraints.limits import (
     MinimumDistance,
     ObstacleDistance,
     PositionRange,
+    PositionsByJoint,
     Scaled,
     SelfDistance,
 )
@@ -63,6 +64,7 @@ EXAMPLES: dict[type[Part], Part] = {
     ObstacleDistance: ObstacleDistance(),
     PointContact: PointContact("foot"),
     PositionRange: PositionRange([-1.0, None], [1.0, 2.0]),
+    PositionsByJoint: PositionsByJoint({"joint": (-1.0, 2.0)}),
     Scaled: Scaled(0.5),
     SelfDistance: SelfDistance(),
     SlidingContact: SlidingContact("foot", force=CommandedForce(20.0)),
@@ -93,7 +95,11 @@ OTHERS: dict[type[Part], dict[str, Any]] = {
         "effort_rate": _NUMBERS,
         "velocity": _MAXIMUM,
         "acceleration": _NUMBERS,
-        "position": ["none", PositionRange(-1.0, [1.0, None])],
+        "position": [
+            "none",
+            PositionRange(-1.0, [1.0, None]),
+            PositionsByJoint({"joint": [-1, 2]}),
+        ],
         "position_margin": 0.0,
         "velocity_margin": 0,
         "distances": [[SelfDistance()], (ObstacleDistance(0.1), SelfDistance(0.0))],
@@ -112,6 +118,7 @@ OTHERS: dict[type[Part], dict[str, Any]] = {
         "lower": [-2.0, [-2.0, None], (-np.inf, -3.0)],
         "upper": [9.0, np.array([1.5, np.inf])],
     },
+    PositionsByJoint: {"joints": [{"joint": [-2, 2.0]}, {"a": (0, 1), "b": (0, 1)}]},
     Scaled: {"scale": [2, {"joint": 0.5}]},
     SelfDistance: {"minimum": 0.1},
     SlidingContact: {
@@ -332,6 +339,8 @@ WRONG: dict[type[Part], dict[str, list[tuple[Any, str]]]] = {
             ((0.0, 1.0), "expected 'robot', 'none' or a mapping"),
             ({"lower": 1.0}, "missing key 'upper'"),
             ({"lower": 1.0, "upper": 0.0}, "lower must be below upper"),
+            ({"joint": [0, 1]}, r"unknown key 'joint'; did you mean 'joints'\?"),
+            ({"least": 0}, r"'least' \(allowed: lower, upper, joints\)"),
         ],
         "position_margin": [(-0.1, "must be at least 0")],
         "velocity_margin": [(1.0, "must be less than 1"), (-0.1, "at least 0")],
@@ -368,6 +377,14 @@ WRONG: dict[type[Part], dict[str, list[tuple[Any, str]]]] = {
             ({}, "at least 1"),
             ({"a": 0.0}, "a: 0.0 is too small; must be greater than 0"),
             (20.0, "expected a mapping"),
+        ]
+    },
+    PositionsByJoint: {
+        "joints": [
+            ({}, "at least 1"),
+            ({"a": [1.0, 0.0]}, "joints.a: lower must be below upper; got 1.0, 0.0"),
+            ({"a": [1.0]}, "a: .* has 1 entry, needs 2"),
+            ({"a": [1.0, None]}, "a.1: nothing given; expected a number"),
         ]
     },
     Scaled: {
