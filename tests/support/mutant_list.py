@@ -464,6 +464,13 @@ MUTANTS = (
         OF_LIMITS + "margin_of_the_speed",
     ),
     Mutant(
+        "position barrier: the drift moves no bound",
+        LIMITS + "acceleration_bounds.py",
+        "high -= min(max(drift[i], 0.0), most)",
+        "high -= 0.0",
+        OF_LIMITS + "drives_no_joint_beyond",
+    ),
+    Mutant(
         "position barrier: damping drives",
         LIMITS + "acceleration_bounds.py",
         "low = -bandwidth * bandwidth * (position - lower[i]) - damping",

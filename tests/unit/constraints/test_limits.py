@@ -197,9 +197,8 @@ def test_kernels_take_them() -> None:
     a_lower, a_upper = np.zeros((2, 7))
     q, v = robot.home(), np.full(7, 0.1)
     motion = of(robot, acceleration=3.0).motion
-    acceleration_bounds(
-        q, v, robot.dof_indices, motion, np.zeros(robot.nv), a_lower, a_upper
-    )
+    none = np.zeros(7)
+    acceleration_bounds(q, v, robot.dof_indices, motion, none, none, a_lower, a_upper)
     assert (a_upper == 3.0).all()
     assert (a_lower >= -3.0).all()
 
