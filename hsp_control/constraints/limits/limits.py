@@ -86,8 +86,8 @@ class Limits(Part, error=LimitError):
     or numbers."""
     position_margin: NonNegative | None = None
     """Margin inside the position limits [rad or m]: 0.005 by default, at most a tenth
-    of a joint's range. With efforts held for a period, a barrier may be crossed by the
-    error of the acceleration over α²."""
+    of a joint's range. A barrier may be crossed by an error of the acceleration over
+    α², but not by its mean of late, once `Controller.applied` tells the period."""
     velocity_margin: Share = 0.02
     """Margin inside the speed limits, as a fraction of the limit [-]."""
     distances: Annotated[Sequence[MinimumDistance], AfterValidator(tuple)] = ()
