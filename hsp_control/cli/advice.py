@@ -52,7 +52,7 @@ def start_advice(experiment: Experiment, damped: str = "") -> Iterator[str]:
     limits = experiment.controller.limits
     if limits is not None:
         for joint, why in too_weak(robot, experiment.q0, limits.effort):
-            yield f"Nothing holds the robot at the start: {joint}: {why}."
+            yield f"At the start {joint} cannot hold the robot: {why}."
     tasks = experiment.scenario.tasks.values()
     search = posture_search(robot, tasks, experiment.scene)
     start = search.judge(experiment.q0)

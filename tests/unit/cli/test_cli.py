@@ -131,8 +131,11 @@ def test_check_warns_of_motors_that_cannot_hold_the_robot(
     assert main(["check", "panda_obstacle", *weak]) == 0
     text = capsys.readouterr().out
     assert "bind at the start: the law is not exact there" in text
-    (line,) = [line for line in text.splitlines() if "Nothing holds" in line]
-    assert "'panda_joint2': gravity asks 23.2 N·m of it, its limit is 20." in line
+    (line,) = [line for line in text.splitlines() if "cannot hold" in line]
+    assert line == (
+        "At the start joint 'panda_joint2' cannot hold the robot: gravity asks 23.2 "
+        "N·m of it, its limit is 20."
+    )
     assert main(["check", "panda_obstacle", *weak, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert (told["limits"], told["advice"]) == ("limited", [line])
