@@ -743,8 +743,8 @@ MUTANTS = (
     Mutant(
         "stretch: states between rows are not seen",
         SIMULATION + "stretch.py",
-        "moving = _table([steps.native, *self._seeing])",
-        "moving = _table([steps.native])",
+        "moving = table([steps.native, *self._seeing])",
+        "moving = table([steps.native])",
         OF_STRETCHES + "between_two_rows",
     ),
     Mutant(
