@@ -43,12 +43,12 @@ class NativeCall(partial[float]):
         """Pack the arguments, and compile or load the adapter."""
         from hsp_control.common import adapters
 
-        kinds, table = adapters.packed(arguments)
+        kinds, words = adapters.packed(arguments)
         address = adapters.adapter(kernel, kinds, timed)
-        row = address, table.ctypes.data
+        row = address, words.ctypes.data
         free = () if timed else (0.0,)
         call = cls(adapters.entry(), np.array([row]), np.array([FOREVER]), *free)
-        call.words = table
+        call.words = words
         call.recipe = cls.of, (kernel, arguments, timed)
         return call
 
@@ -59,10 +59,10 @@ class NativeCall(partial[float]):
         """Return a call of a C function whose arguments are integers and pointers."""
         from hsp_control.common import adapters
 
-        table = np.array([address, *words], dtype=np.int64)
-        row = adapters.foreign_adapter(len(words)), table.ctypes.data
+        packed = np.array([address, *words], dtype=np.int64)
+        row = adapters.foreign_adapter(len(words)), packed.ctypes.data
         call = cls(adapters.entry(), np.array([row]), np.array([FOREVER]), 0.0)
-        call.words, call.recipe = table, recipe
+        call.words, call.recipe = packed, recipe
         return call
 
     @classmethod
