@@ -777,7 +777,7 @@ MUTANTS = (
     ),
     Mutant(
         "log: friction_used without μ",
-        SIMULATION + "recorder.py",
+        SIMULATION + "contact_columns.py",
         "ratios = tangential[loaded] / (contact.friction * local[loaded, 2])",
         "ratios = tangential[loaded] / local[loaded, 2]",
         OF_CONTACTS + "how_much_friction",
