@@ -315,12 +315,7 @@ class RunningQuadruped(RunningPlan):
         h = t - self._last
         most = self.gait.acceleration * h
         # A metre per second and a radian per second change equally fast.
-        self._velocity = Velocity(
-            *(
-                a + min(max(b - a, -most), most)
-                for a, b in zip(self._velocity, self._wanted(t), strict=True)
-            )
-        )
+        self._velocity = self._velocity.towards(self._wanted(t), (most, most, most))
         self._yaw += h * self._velocity.turn
 
     def _world_velocity(self) -> Array:
