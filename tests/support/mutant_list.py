@@ -750,8 +750,8 @@ MUTANTS = (
     Mutant(
         "stretch: states between rows are not seen",
         SIMULATION + "stretch.py",
-        "moving = _table([steps.native, *self._seeing])",
-        "moving = _table([steps.native])",
+        "moving = table([steps.native, *self._seeing])",
+        "moving = table([steps.native])",
         OF_STRETCHES + "between_two_rows",
     ),
     Mutant(
@@ -784,7 +784,7 @@ MUTANTS = (
     ),
     Mutant(
         "log: friction_used without μ",
-        SIMULATION + "recorder.py",
+        SIMULATION + "contact_columns.py",
         "ratios = tangential[loaded] / (contact.friction * local[loaded, 2])",
         "ratios = tangential[loaded] / local[loaded, 2]",
         OF_CONTACTS + "how_much_friction",

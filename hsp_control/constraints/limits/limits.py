@@ -161,8 +161,7 @@ class Limits(Part, error=LimitError):
     def _numbers(self, field: str, robot: Robot) -> Array:
         """Return the numbers of a field, shape (nv,); inf where there is no limit."""
         with within(field):
-            given = getattr(self, field)
-            return read_only(by_dof(np.inf if given is None else given, robot.nv))
+            return read_only(by_dof(getattr(self, field), robot.nv))
 
     def _positions(self, robot: Robot) -> tuple[Array, Array, Array]:
         """Return lower and upper joint positions and their margin, shape (nv,).

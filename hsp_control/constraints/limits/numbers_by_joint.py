@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from pydantic import BeforeValidator, Field
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import LimitError
+from hsp_control.common.exceptions import HspControlError, LimitError
 from hsp_control.declaration.quantities import ArrayField, Number, Positive, plain
 
 T = TypeVar("T")
@@ -53,21 +53,27 @@ Numbers = Annotated[
 """A number, or nv of them in a tuple; ±inf is stored as None: no limit."""
 
 
-def by_dof(numbers: Any, nv: int, none: float = np.inf) -> Array:
+def by_dof(
+    numbers: Any,
+    nv: int,
+    none: float = np.inf,
+    error: type[HspControlError] = LimitError,
+) -> Array:
     """Return numbers as an array of shape (nv,).
 
     Args:
         numbers: One number, or nv numbers.
         nv: The robot's degrees of freedom.
         none: What None stands for.
+        error: What is raised.
 
     Raises:
-        LimitError: If there are neither one nor nv numbers.
+        HspControlError: If there are neither one nor nv numbers.
     """
     array = np.array(numbers, dtype=float)  # None becomes NaN
     array[np.isnan(array)] = none
     if array.ndim and array.shape != (nv,):
-        raise LimitError(f"has {len(array)} numbers; needs one number or {nv}")
+        raise error(f"has {len(array)} numbers; needs one number or {nv}")
     return np.full(nv, array)
 
 
