@@ -123,7 +123,9 @@ def beyond(
     rollout: hsp.Rollout, limits: RobotLimits, period: float
 ) -> tuple[Array, ...]:
     """Return by how much each limit is exceeded, step by step and joint by joint."""
-    q, v, tau = rollout["q"], rollout["v"], rollout["tau"]
+    # Whatever is at -1: joints without a single coordinate have no limits.
+    q = rollout["q"][:, limits.robot.dof_indices]
+    v, tau = rollout["v"], rollout["tau"]
     return (
         np.abs(tau) - limits.effort,
         np.abs(np.diff(tau, axis=0)) / period - limits.effort_rate,

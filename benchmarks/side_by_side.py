@@ -59,7 +59,11 @@ def peers() -> tuple[dict[str, Make], dict[str, tuple[str, Make]], dict[str, str
     timed: dict[str, tuple[str, Make]] = {
         "the Pinocchio calls alone": (law, _pinocchio_calls),
         law: (law, _this_law),
-        "this law, and `diagnose`": (law, partial(_this_law, diagnoses=True)),
+        "this law, and `diagnose`": (
+            law,
+            partial(_this_law, reads=hsp.Controller.diagnose),
+        ),
+        "this law, and its singular values": (law, partial(_this_law, reads=_values)),
         "this law, manipulability": (law, partial(_this_law, name="manipulability")),
         "this law, one obstacle (capsules)": (law, partial(_this_law, name="obstacle")),
         KHATIB: (khatib, operational_space.make),
@@ -87,14 +91,18 @@ def peers() -> tuple[dict[str, Make], dict[str, tuple[str, Make]], dict[str, str
 
 
 def _this_law(
-    case: Case, name: str = "centering", *, diagnoses: bool = False
+    case: Case, name: str = "centering", *, reads: this_law.Reads | None = None
 ) -> Compute:
     fields: dict[str, hsp.NullSpaceField] = {
         "centering": hsp.JointCentering(weights=2.0),
         "manipulability": Manipulability(FRAME),
         "obstacle": hsp.TargetPosture(case.q0) + 0.3 * case.clearance,
     }
-    return this_law.make(case, fields[name], diagnoses=diagnoses)
+    return this_law.make(case, fields[name], reads=reads)
+
+
+def _values(controller: hsp.Controller) -> Array:
+    return controller.diagnose().singular_values
 
 
 def _pinocchio_calls(case: Case) -> Compute:
@@ -355,6 +363,7 @@ MARKERS = ("<!-- make bench: begin -->", "<!-- make bench: end -->")
 SUMMARY_ROWS = {
     "this law": "joint centering",
     "this law, and `diagnose`": "joint centering, `diagnose` included",
+    "this law, and its singular values": "joint centering, `diagnose`, singular values",
     "this law, manipulability": "manipulability",
 }
 

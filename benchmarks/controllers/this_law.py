@@ -7,13 +7,16 @@ from cases import FRAME, Case
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
 
+Reads = Callable[[hsp.Controller], object]
+"""What is read of a controller after a step."""
+
 
 def make(
     case: Case,
     field: hsp.NullSpaceField | None = None,
     metric: hsp.metrics.Metric | None = None,
     *,
-    diagnoses: bool = False,
+    reads: Reads | None = None,
 ) -> Callable[[float, Array, Array], Array]:
     """Return the controller, with another field or metric if given.
 
@@ -37,9 +40,12 @@ def make(
     def compute(t: float, q: Array, v: Array) -> Array:
         return controller.compute(t, q, v).tau
 
-    def compute_and_diagnose(t: float, q: Array, v: Array) -> Array:
-        tau = controller.compute(t, q, v).tau
-        controller.diagnose()
+    if reads is None:
+        return compute
+
+    def compute_and_read(t: float, q: Array, v: Array) -> Array:
+        tau = compute(t, q, v)
+        reads(controller)
         return tau
 
-    return compute_and_diagnose if diagnoses else compute
+    return compute_and_read

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from hsp_control.common.exceptions import ConfigurationError
 from hsp_control.common.suggestions import listing
 from hsp_control.config import Experiment
+from hsp_control.inspection.strength import too_weak
 from hsp_control.robot import Robot
 from hsp_control.robot.description.inertias import impossible_inertias
 from hsp_control.robot.description.urdf_checks import read_urdf
@@ -32,7 +33,9 @@ def robot_advice(robot: Robot) -> Iterator[str]:
 
 
 def start_advice(experiment: Experiment, damped: str = "") -> Iterator[str]:
-    """Yield lines about a start that is singular or in collision, and a better one.
+    """Yield lines about a start that is singular, in collision or cannot be held.
+
+    Where it is singular or in collision, a better one follows.
 
     Args:
         experiment: The experiment.
@@ -46,6 +49,10 @@ def start_advice(experiment: Experiment, damped: str = "") -> Iterator[str]:
         )
     if robot.unactuated:
         return
+    limits = experiment.controller.limits
+    if limits is not None:
+        for joint, why in too_weak(robot, experiment.q0, limits.effort):
+            yield f"At the start {joint} cannot hold the robot: {why}."
     tasks = experiment.scenario.tasks.values()
     search = posture_search(robot, tasks, experiment.scene)
     start = search.judge(experiment.q0)

@@ -66,6 +66,7 @@ def _checked(
         },
         "plant": experiment.plant.describe()["type"],
         "compensation": list(experiment.compensation.names),
+        "limits": "none" if controller.limits is None else output.status.name.lower(),
         "singular_values": list(map(float, values)),
         "largest_effort": float(np.abs(output.tau).max()),
     }
@@ -86,10 +87,21 @@ def _check_table(found: dict[str, Any]) -> Table:
     table.add_row("null space", f"{dofs}, {null_space['field']}")
     table.add_row("plant", found["plant"])
     table.add_row("compensation", ", ".join(found["compensation"]) or "none")
+    table.add_row("limits", _LIMITS[found["limits"]])
     values = ", ".join(f"{value:.3g}" for value in found["singular_values"])
     table.add_row("singular values", f"{values} at the start")
     table.add_row("largest effort", f"{found['largest_effort']:.3g} at the start")
     return table
+
+
+_LIMITS = {
+    "none": "none",
+    "exact": "none binds at the start",
+    "redistributed": "shift contact forces at the start",
+    "limited": "bind at the start: the law is not exact there",
+    "relaxed": "contradict each other at the start",
+}
+"""What the step's status says of the limits."""
 
 
 def warn_of_rates(experiment: Experiment) -> None:

@@ -31,9 +31,7 @@ from hsp_control.cli.startup import INTERRUPTED
 from hsp_control.cli.stopwatch import Stopwatch
 from hsp_control.common.exceptions import LogError, SimulationError
 from hsp_control.config import Experiment, json_schema
-from hsp_control.config.document import Document
-from hsp_control.config.experiment import build
-from hsp_control.config.setup import Setup, set_up
+from hsp_control.config.loaded_scenario import LoadedScenario, load_scenario
 from hsp_control.robot import Robot
 from hsp_control.robot.description.sources import example_robots
 from hsp_control.simulation import Rollout
@@ -46,18 +44,17 @@ if TYPE_CHECKING:
 @renamed_keys_printed()
 def run(options: argparse.Namespace) -> int:
     """Simulate, save the log and print a summary; rows computed so far are kept."""
-    document = read(options)
-    setup = set_up(document)
+    loaded = load_scenario(read(options))
     options.out.mkdir(parents=True, exist_ok=True)  # fails before the work, not after
-    log = _log_of(Path(document.name), options.out)
+    log = _log_of(Path(loaded.document.name), options.out)
     tell = _tell_json if options.json else _tell
     if not options.view:
-        return _run_and_save(_built(document, setup), log, tell, None)
+        return _run_and_save(_built(loaded), log, tell, None)
     from hsp_control.cli.screen import Screen
 
     said = _errors if options.json else _out
-    with Screen.open(setup, options, lambda url: said.print(f"View: {url}")) as screen:
-        experiment = _built(document, setup)
+    with Screen.open(loaded, options, lambda url: said.print(f"View: {url}")) as screen:
+        experiment = _built(loaded)
         if screen is not None and screen.begin(experiment):
             return _run_and_save(experiment, log, tell, screen)
         return max(_run_and_save(experiment, log, tell, None), 2)
@@ -71,8 +68,8 @@ def _log_of(source: Path, folder: Path) -> Path:
     return log
 
 
-def _built(document: Document, setup: Setup) -> Experiment:
-    experiment = build(document, setup)
+def _built(loaded: LoadedScenario) -> Experiment:
+    experiment = Experiment.of(loaded)
     checks.warn_of_rates(experiment)
     return experiment
 

@@ -2,7 +2,6 @@
 
 from math import floor, inf
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 from hsp_control.common.exceptions import LogError
@@ -58,12 +57,7 @@ class BoxLog:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
         if error is None:
             self._log.end("completed", "the box was switched off")
         else:

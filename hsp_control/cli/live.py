@@ -25,8 +25,7 @@ from hsp_control.cli.robot_start import begun_where_it_is
 from hsp_control.cli.steering import let_steer, steering_page
 from hsp_control.common.exceptions import LiveError, LogError
 from hsp_control.config import Experiment
-from hsp_control.config.experiment import build
-from hsp_control.config.setup import set_up
+from hsp_control.config.loaded_scenario import load_scenario
 from hsp_control.control.compensation import Command
 from hsp_control.live import (
     Faults,
@@ -52,9 +51,8 @@ _DRY_RUN_OF_A_PLAN = 3.0
 def live(options: argparse.Namespace) -> int:
     """Run a loop in real time, print its response times and why it ended."""
     faults, kill = Faults.parse(options.faults), _parse_kill(options.kill)
-    document = read(options)
-    setup = set_up(document)
-    simulation = setup.scenario.simulation
+    loaded = load_scenario(read(options))
+    simulation = loaded.scenario.simulation
     duration = simulation.duration if options.duration is None else options.duration
     if not duration > 0.0:
         raise LiveError(f"--duration {duration:g}; must be positive")
@@ -70,14 +68,14 @@ def live(options: argparse.Namespace) -> int:
         )
     if options.steer is None and (options.port, options.host) != (None, "127.0.0.1"):
         raise LiveError("--port and --host are those of a page: they need --steer")
-    name = Path(document.name).stem
+    name = Path(loaded.document.name).stem
     loop_log = options.out / f"{name}-live.journal"
     robot_log = options.out / f"{name}-robot.journal"
     requests = OperatorRequests()
     on_period: list[Callable[[float], object]] = []
     with ExitStack() as stack:
-        page = stack.enter_context(steering_page(options, setup))
-        experiment = build(document, setup)
+        page = stack.enter_context(steering_page(options, loaded.scenario))
+        experiment = Experiment.of(loaded)
         check_live(experiment)
         stack.enter_context(stop_signals(requests, takes_over=True))
         command = Command(experiment.controller, experiment.compensation)

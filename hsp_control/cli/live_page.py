@@ -22,7 +22,7 @@ from hsp_control.cli.opening_page import draw_before, draw_empty, status_line
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.config import load_experiment
 from hsp_control.config.document import Document
-from hsp_control.config.setup import Setup, set_up
+from hsp_control.config.loaded_scenario import LoadedScenario, load_scenario
 from hsp_control.play.channel import Channel
 from hsp_control.play.mirror import Mirror
 from hsp_control.play.picture import FRAME, Picture
@@ -64,7 +64,7 @@ def _run(settings: dict[str, Any]) -> None:
                     say(text)
                 case {"prepare": dict(config)}:
                     viewer = _drawn(
-                        set_up(Document(config, {}, "configuration")), server
+                        load_scenario(Document(config, {}, "configuration")), server
                     )
                 case {"begin": dict(config), "journal": str(file), "period": period}:
                     assert viewer is not None
@@ -80,9 +80,9 @@ def _run(settings: dict[str, Any]) -> None:
         server.close()
 
 
-def _drawn(setup: Setup, server: Server) -> Viewer:
-    viewer = Viewer(setup.robot, transport=server, **setup.scenario.view.all_fields())
-    draw_before(viewer, setup)
+def _drawn(loaded: LoadedScenario, server: Server) -> Viewer:
+    viewer = Viewer(loaded.robot, transport=server, **loaded.scenario.view.all_fields())
+    draw_before(viewer, loaded)
     return viewer
 
 

@@ -6,7 +6,7 @@ from contextlib import contextmanager, suppress
 
 from hsp_control.cli.compiling import compiling_told
 from hsp_control.common.exceptions import HspControlError, ViewerError
-from hsp_control.config.setup import Setup
+from hsp_control.config.loaded_scenario import LoadedScenario
 from hsp_control.config.view_settings import ViewSettings
 from hsp_control.visualization.viewer import Viewer, browser
 from hsp_control.visualization.viewer.commands import set_caption, set_status
@@ -100,15 +100,15 @@ def draw_empty(transport: Transport, title: str) -> None:
     transport.send([*draw_background(ViewSettings()), set_caption(title, [])])
 
 
-def draw_before(viewer: Viewer, setup: Setup) -> None:
+def draw_before(viewer: Viewer, loaded: LoadedScenario) -> None:
     """Show the robot at its start, and the scene, before a controller is composed.
 
     Raises:
         ViewerError: If the server has ended.
     """
-    viewer.draw_scene(setup.scene, title=setup.scenario.title or None)
+    viewer.draw_scene(loaded.scene, title=loaded.scenario.title or None)
     try:
-        start = setup.start()
-    except HspControlError:  # `build` says where the mistake is
-        start = setup.robot.home()
+        start = loaded.start()
+    except HspControlError:  # `Experiment.of` says where the mistake is
+        start = loaded.robot.home()
     viewer.show(start)

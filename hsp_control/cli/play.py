@@ -15,8 +15,8 @@ from hsp_control.cli.opening_page import (
     status_line,
 )
 from hsp_control.common.exceptions import HspControlError
-from hsp_control.config.experiment import build
-from hsp_control.config.setup import set_up
+from hsp_control.config import Experiment
+from hsp_control.config.loaded_scenario import load_scenario
 from hsp_control.play import Picture, Session
 from hsp_control.play import play as play_in_real_time
 from hsp_control.play.playable import playable_document
@@ -44,11 +44,11 @@ def play(options: argparse.Namespace) -> int:
                 strict=options.strict or bool(options.allow),
                 allow=options.allow,
             )
-            setup = set_up(document)
-            view = setup.scenario.view.all_fields()
-            viewer = Viewer(setup.robot, transport=server, **view)
-            draw_before(viewer, setup)
-            experiment = build(document, setup)
+            loaded = load_scenario(document)
+            view = loaded.scenario.view.all_fields()
+            viewer = Viewer(loaded.robot, transport=server, **view)
+            draw_before(viewer, loaded)
+            experiment = Experiment.of(loaded)
             page.open()
             session = Session(experiment)
             session.rehearse()

@@ -9,7 +9,6 @@ from contextlib import suppress
 from pathlib import Path
 from select import select
 from time import monotonic
-from types import TracebackType
 from typing import Any, Self
 
 from hsp_control.cli.live_experiment import (
@@ -85,12 +84,7 @@ class RobotProcess:
         self.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def start(self, timeout: float = 180.0) -> None:

@@ -94,11 +94,6 @@ class Row:
     pose: int = 0
     note: str = ""
 
-    @property
-    def usable(self) -> bool:
-        """Whether the controller can drive it as it is loaded."""
-        return self.nv is not None and self.root != "free_flyer"
-
 
 def count() -> int:
     """Return how many rows there are, without loading a robot."""

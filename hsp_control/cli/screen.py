@@ -15,7 +15,7 @@ from hsp_control.cli.opening_page import (
 )
 from hsp_control.common.exceptions import ViewerError
 from hsp_control.config import Experiment
-from hsp_control.config.setup import Setup
+from hsp_control.config.loaded_scenario import LoadedScenario
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.recorder import Recorder
 from hsp_control.visualization.viewer import LiveView, Viewer, view_logs
@@ -37,7 +37,7 @@ class Screen:
     @contextmanager
     def open(
         cls,
-        setup: Setup,
+        loaded: LoadedScenario,
         options: argparse.Namespace,
         announce: Callable[[str], None],
     ) -> Iterator[Self | None]:
@@ -47,16 +47,16 @@ class Screen:
         that fails, print why and yield None.
 
         Args:
-            setup: What the configuration is about.
+            loaded: What will run.
             options: The command's.
             announce: Prints the page's address.
         """
-        view = setup.scenario.view.all_fields()
+        view = loaded.scenario.view.all_fields()
         with ExitStack() as stack:
             try:
-                viewer = Viewer(setup.robot, port=options.port, **view)
+                viewer = Viewer(loaded.robot, port=options.port, **view)
                 stack.enter_context(viewer)
-                draw_before(viewer, setup)
+                draw_before(viewer, loaded)
             except ViewerError as error:
                 _say_without(error)
                 yield None

@@ -13,8 +13,7 @@ from hsp_control.cli.live_experiment import live_period
 from hsp_control.cli.opening_page import OpeningPage
 from hsp_control.cli.page_process import PageProcess
 from hsp_control.common.exceptions import ViewerError
-from hsp_control.config import Experiment
-from hsp_control.config.setup import Setup
+from hsp_control.config import Experiment, Scenario
 from hsp_control.control.controller import Controller
 from hsp_control.live import OperatorRequests
 from hsp_control.play.dead_mans_key import DeadMansKey
@@ -40,7 +39,7 @@ class SteeringPage(NamedTuple):
 
 @contextmanager
 def steering_page(
-    options: argparse.Namespace, setup: Setup
+    options: argparse.Namespace, scenario: Scenario
 ) -> Iterator[SteeringPage | None]:
     """Yield the page, if there is to be one; it shows the robot and the scene.
 
@@ -48,7 +47,7 @@ def steering_page(
 
     Args:
         options: The command's.
-        setup: What the configuration is about.
+        scenario: What will run.
 
     Raises:
         ViewerError: If it does not start.
@@ -58,7 +57,7 @@ def steering_page(
         return
     held = options.steer == "hardware"
     with PageProcess(port=options.port, host=options.host, held=held) as process:
-        process.prepare(setup.scenario)
+        process.prepare(scenario)
         opening = OpeningPage(
             process.url,
             options,

@@ -238,16 +238,15 @@ def run(calls: Indices, when: Array, t: float) -> float:
 
 
 @kernel
-def run_once(calls: Indices, stamp: Indices, made: Indices) -> None:
+def run_once(calls: Indices, when: Array, stamp: Indices, made: Indices) -> None:
     """Make calls that do not depend on the time, unless ``made`` equals ``stamp``."""
     if made[0] != stamp[0]:
         made[0] = stamp[0]
-        for k in range(calls.shape[0]):
-            _invoke(calls[k, 0], calls[k, 1], 0.0)  # type: ignore[call-arg]
+        run(calls, when, 0.0)
 
 
 @kernel
-def run_if(calls: Indices, found: Array) -> float:
+def run_if(calls: Indices, when: Array, found: Array) -> float:
     """Make calls that do not depend on the time, if ``found[1]`` is not zero.
 
     Returns:
@@ -255,10 +254,7 @@ def run_if(calls: Indices, found: Array) -> float:
     """
     value = float(found[0])
     if found[1] != 0.0:
-        last = 0.0
-        for k in range(calls.shape[0]):
-            last = _invoke(calls[k, 0], calls[k, 1], 0.0)  # type: ignore[call-arg]
-        value += last
+        value += run(calls, when, 0.0)
     return value
 
 

@@ -53,12 +53,3 @@ class IdentityCache(Generic[Made]):
 
     def __reduce__(self) -> tuple[Any, ...]:
         return IdentityCache, (self._make,)
-
-
-def without_caches(owner: object) -> dict[str, Any]:
-    """Return the attributes of an object that a copy, shallow ones too, may have.
-
-    A cache calls a method of its owner, so a copy needs its own: keep the cache as a
-    `functools.cached_property`, and return this from ``__getstate__``.
-    """
-    return {k: v for k, v in vars(owner).items() if not isinstance(v, IdentityCache)}

@@ -9,7 +9,7 @@ call them by their addresses.
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple, Self, TypeGuard
 
 import numpy as np
 
@@ -43,12 +43,12 @@ class NativeCall(partial[float]):
         """Pack the arguments, and compile or load the adapter."""
         from hsp_control.common import adapters
 
-        kinds, table = adapters.packed(arguments)
+        kinds, words = adapters.packed(arguments)
         address = adapters.adapter(kernel, kinds, timed)
-        row = address, table.ctypes.data
+        row = address, words.ctypes.data
         free = () if timed else (0.0,)
         call = cls(adapters.entry(), np.array([row]), np.array([FOREVER]), *free)
-        call.words = table
+        call.words = words
         call.recipe = cls.of, (kernel, arguments, timed)
         return call
 
@@ -59,28 +59,53 @@ class NativeCall(partial[float]):
         """Return a call of a C function whose arguments are integers and pointers."""
         from hsp_control.common import adapters
 
-        table = np.array([address, *words], dtype=np.int64)
-        row = adapters.foreign_adapter(len(words)), table.ctypes.data
+        packed = np.array([address, *words], dtype=np.int64)
+        row = adapters.foreign_adapter(len(words)), packed.ctypes.data
         call = cls(adapters.entry(), np.array([row]), np.array([FOREVER]), 0.0)
-        call.words, call.recipe = table, recipe
+        call.words, call.recipe = packed, recipe
+        return call
+
+    @classmethod
+    def over(
+        cls, kernel: Callable[..., Any], calls: "Sequence[NativeCall]", *arguments: Any
+    ) -> Self:
+        """Return a call of a kernel that makes calls: their `table` is given first."""
+        given = *table(calls), *arguments
+        call = cls.of(kernel, given, timed=False)
+        call.recipe, call.kept = (cls.over, (kernel, calls, *arguments)), given
         return call
 
     def __reduce__(self) -> tuple[Any, ...]:
         return self.recipe
 
 
+def are_native(calls: Sequence[object]) -> TypeGuard[Sequence[NativeCall]]:
+    """Return whether all of these calls are native."""
+    return all(isinstance(call, NativeCall) for call in calls)
+
+
+def table(calls: Sequence[NativeCall]) -> tuple[Indices, Array]:
+    """Return what `adapters.run` reads of calls: where they are, and their windows.
+
+    Both are of shape (parts, 2). They are addresses: who uses them keeps the calls.
+    """
+    rows = [np.zeros((0, 2), dtype=np.int64), *(call.args[0] for call in calls)]
+    when = [np.zeros((0, 2)), *(call.args[1] for call in calls)]
+    return np.concatenate(rows), np.concatenate(when)
+
+
 class Timed(NamedTuple):
-    """A native call within a sequence.
+    """A call and when it is made.
 
     Attributes:
-        call: The call.
+        call: The call; a native one in a `sequence`.
         start: Start of its window of time [s].
         end: End of its window [s].
     """
 
-    call: NativeCall
-    start: float
-    end: float
+    call: Any
+    start: float = FOREVER[0]
+    end: float = FOREVER[1]
 
 
 def bind(
@@ -104,16 +129,12 @@ def bind(
 
 def once(calls: Sequence[Callable[[], object]], stamp: Indices) -> Callable[[], object]:
     """Return one call that makes several, unless it made them at this stamp, (1,)."""
-    native = [call for call in calls if isinstance(call, NativeCall)]
     made = np.full(1, -1)
-    if len(native) < len(calls):
+    if not are_native(calls):
         return partial(_make_once, calls, stamp, made)
-    from hsp_control.common import adapters
+    from hsp_control.common.adapters import run_once
 
-    rows = np.concatenate([call.args[0] for call in native])
-    call = NativeCall.of(adapters.run_once, (rows, stamp, made), timed=False)
-    call.recipe, call.kept = (once, (calls, stamp)), (rows, made)
-    return call
+    return NativeCall.over(run_once, calls, stamp, made)
 
 
 def _make_once(
@@ -131,15 +152,11 @@ def only_if(calls: Sequence[Callable[[], float]], found: Array) -> Callable[[], 
 
     It returns ``found[0]``, plus what the last one returned if they were made.
     """
-    native = [call for call in calls if isinstance(call, NativeCall)]
-    if len(native) < len(calls):
+    if not are_native(calls):
         return partial(_make_if, calls, found)
-    from hsp_control.common import adapters
+    from hsp_control.common.adapters import run_if
 
-    rows = np.concatenate([call.args[0] for call in native])
-    call = NativeCall.of(adapters.run_if, (rows, found), timed=False)
-    call.recipe, call.kept = (only_if, (calls, found)), rows
-    return call
+    return NativeCall.over(run_if, calls, found)
 
 
 def _make_if(calls: Sequence[Callable[[], float]], found: Array) -> float:

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hsp_control.common.native import FOREVER, NativeCall, Timed, sequence
+from hsp_control.common.native import FOREVER, NativeCall, Timed, are_native, sequence
 
 
 def stay(t: float) -> None:
@@ -78,13 +78,13 @@ def steps(
     parts = [part for p in plans for follow in p.follow for part in _parts(follow)]
     for write in [*(write for p in plans for write in p.write), last]:
         parts += [
-            part if isinstance(part.call, NativeCall) else _Part(_whenever(part.call))
+            part if isinstance(part.call, NativeCall) else Timed(_whenever(part.call))
             for part in _parts(write)
         ]
     found: list[Callable[[float], Any]] = []
     for native, group in groupby(parts, lambda p: isinstance(p.call, NativeCall)):
         if native:
-            found.append(sequence([Timed(*part) for part in group]))
+            found.append(sequence(list(group)))
         else:
             found += [_when(*part) for part in group]
     return found
@@ -93,9 +93,9 @@ def steps(
 def merged(call: Callable[[float], Any]) -> Callable[[float], Any]:
     """Return a call of the time as one native call, if all its parts are native."""
     parts = list(_parts(call))
-    if len(parts) < 2 or not all(isinstance(each.call, NativeCall) for each in parts):
+    if len(parts) < 2 or not are_native([each.call for each in parts]):
         return call
-    return sequence([Timed(*each) for each in parts])
+    return sequence(parts)
 
 
 def in_order(calls: Sequence[Callable[[], object]]) -> list[Callable[[float], Any]]:
@@ -103,15 +103,9 @@ def in_order(calls: Sequence[Callable[[], object]]) -> list[Callable[[float], An
     return steps([StepPlan(write=tuple(calls[:-1]))], calls[-1])
 
 
-class _Part(NamedTuple):
-    call: Any
-    start: float = FOREVER[0]
-    end: float = FOREVER[1]
-
-
 def _parts(
     call: Callable[..., Any], start: float = -np.inf, end: float = np.inf
-) -> Iterator[_Part]:
+) -> Iterator[Timed]:
     """Yield the single calls of a call, each with its window of time."""
     if isinstance(call, CallSequence):
         for each in call.calls:
@@ -121,7 +115,7 @@ def _parts(
     elif isinstance(call, TimeWindow):
         yield from _parts(call.call, max(start, call.start), min(end, call.end))
     else:
-        yield _Part(call, start, end)
+        yield Timed(call, start, end)
 
 
 def _when(

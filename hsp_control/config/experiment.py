@@ -1,19 +1,21 @@
 """An experiment: the objects of a configuration, ready to run."""
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from os import PathLike
-from typing import Any, Literal, NoReturn
+from pathlib import Path
+from typing import Any, Literal, NoReturn, Self
 
 import yaml
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ConfigError, ImmutableError, ModelError
-from hsp_control.config.composing import compose
 from hsp_control.config.document import Document
+from hsp_control.config.loaded_scenario import LoadedScenario, load_scenario
+from hsp_control.config.loop_check import check_compensation, check_rates
 from hsp_control.config.named_obstacles import named_obstacles
 from hsp_control.config.scenario import Scenario
-from hsp_control.config.setup import Setup, set_up
 from hsp_control.config.source import read_document
 from hsp_control.config.view_settings import ViewSettings
 from hsp_control.constraints.contacts import Contact
@@ -25,7 +27,7 @@ from hsp_control.control.controller import Controller
 from hsp_control.declaration.named import keyed
 from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.plain_data import plain_data
-from hsp_control.estimation import Estimator
+from hsp_control.estimation import Estimator, begun
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.live.settings import LiveSettings
 from hsp_control.null_space.fields import NullSpaceField
@@ -37,10 +39,11 @@ from hsp_control.robot.description.robot_description import RobotDescription
 from hsp_control.robot.integrators import Integrator
 from hsp_control.simulation import Rollout, simulate
 from hsp_control.simulation.initial_state import InitialState
-from hsp_control.simulation.plants import Plant, PlantPart
+from hsp_control.simulation.plants import Plant, PlantPart, SampledPlant
 from hsp_control.simulation.real_time import in_real_time
 from hsp_control.simulation.recorder import Recorder
 from hsp_control.simulation.settings import SimulationSettings
+from hsp_control.simulation.simulate import check_steps
 from hsp_control.tasks import Task
 from hsp_control.trajectories.streams.stream import Streamed
 
@@ -165,8 +168,76 @@ class Experiment:
             "plant": plant,
             **{key: part for key, part in given.items() if part is not None},
         }
-        document = Document(data, {}, name)
-        vars(self).update(compose(document, set_up(document))._asdict())
+        self._compose(load_scenario(Document(data, {}, name)))
+
+    @classmethod
+    def of(cls, loaded: LoadedScenario) -> Self:
+        """Build the experiment of a configuration whose robot is loaded.
+
+        Raises:
+            HspControlError: If the configuration is wrong; see `load_experiment`.
+        """
+        experiment = cls.__new__(cls)
+        experiment._compose(loaded)
+        return experiment
+
+    def _compose(self, loaded: LoadedScenario) -> None:
+        """Make the objects, in the order in which one needs another."""
+        document, scenario, robot, scene = loaded
+        folder = Path(document.name).resolve().parent
+        contacts = tuple(scenario.contacts.values())
+        null_space, tasks = scenario.null_space, tuple(scenario.tasks.values())
+        # First: its engine may not be installed, and what follows may compile for long.
+        scenario = replace(scenario, plant=scenario.plant.located(folder))
+        plant = _plant(document, scenario, robot)
+        with document.at("start"):
+            q0 = scenario.start.configuration_of(
+                robot, contacts, tasks, scene, null_space.singularity_threshold
+            )
+            if scenario.start.is_found:  # a run of the log begins there, too
+                found = InitialState(configuration=q0, velocity=scenario.start.velocity)
+                scenario = replace(scenario, start=found)
+        with document.at():
+            limits = scenario.limits
+            if scenario.plan is not None:
+                tasks, contacts = scenario.plan.parts(robot, tasks, contacts)
+                limits = scenario.plan.limits(limits)
+            controller = Controller(
+                robot,
+                tasks,
+                null_space.field,
+                null_space_gain=null_space.gain,
+                metric=null_space.metric,
+                singularity_threshold=null_space.singularity_threshold,
+                limits=limits,
+                contacts=contacts,
+                base=scenario.base,
+                scene=scene,
+                start=q0,
+                changes=scenario.changes,
+            )
+        with document.at("start"):
+            v0 = scenario.start.velocity_of(controller, q0)
+            if controller.limits is not None:
+                controller.limits.check_start(q0, v0)
+        if scenario.plan is not None:
+            with document.at("plan"):
+                scenario.plan.begin(controller).start(robot.state(0.0, q0, v0))
+        with document.at():
+            begun(scenario.estimators, controller, plant.inertial())
+        check_compensation(document, scenario, controller)
+        rates = check_rates(document, scenario, controller, q0, plant.robot)
+        vars(self).update(
+            name=Path(document.name).stem,
+            scenario=scenario,
+            robot=robot,
+            controller=controller,
+            scene=scene,
+            q0=q0,
+            v0=v0,
+            plant=plant,
+            rate_findings=rates,
+        )
 
     def __setattr__(self, attribute: str, value: object) -> NoReturn:
         """Raise: an experiment does not change.
@@ -285,20 +356,30 @@ def load_experiment(
     return build(document)
 
 
-def build(document: Document, setup: Setup | None = None) -> Experiment:
+def build(document: Document) -> Experiment:
     """Build the experiment of a configuration.
-
-    Args:
-        document: The configuration.
-        setup: What `set_up` made of it, if it is there.
 
     Raises:
         HspControlError: If the configuration is wrong; see `load_experiment`.
     """
-    experiment = object.__new__(Experiment)
-    composed = compose(document, setup or set_up(document))
-    vars(experiment).update(composed._asdict())
-    return experiment
+    return Experiment.of(load_scenario(document))
+
+
+def _plant(document: Document, scenario: Scenario, robot: Robot) -> Plant:
+    """Return the plant, which has the control period and the steps that it needs."""
+    settings = scenario.simulation
+    if (step := scenario.plant.longest_step) is not None:
+        with document.at("simulation"):
+            check_steps(settings.duration, step, "plant.timestep")
+    with document.at("plant"):
+        plant = scenario.plant.build(robot, settings.integrator, access=document.access)
+    if isinstance(plant, SampledPlant) and settings.control_period is None:
+        raise document.error(
+            ("plant",),
+            "this plant needs efforts that are held for a period: set "
+            "simulation.control_period [s], for example to 0.001",
+        )
+    return plant
 
 
 def _description(robot: str | Robot | RobotDescription) -> RobotDescription:

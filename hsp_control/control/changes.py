@@ -88,9 +88,9 @@ class RemoveTask(Change, type="remove_task"):
 
     def apply(self, setup: Setup) -> Setup:
         """Return the setup without the task; see `Change.apply`."""
-        k = setup.find_task(self.task)
-        gone = setup.tasks[k].presence.then(self.at, self.ramp, 0.0)
-        return setup.with_task(k, presence=gone)
+        planned = setup.task(self.task)
+        gone = planned.presence.then(self.at, self.ramp, 0.0)
+        return setup.with_task(planned, presence=gone)
 
 
 class ChangeGains(Change, type="gains"):
@@ -107,8 +107,7 @@ class ChangeGains(Change, type="gains"):
         Raises:
             GainError: If the gains do not fit the task.
         """
-        k = setup.find_task(self.task)
-        planned = setup.tasks[k]
+        planned = setup.task(self.task)
         if planned.task.order != 2:
             raise ControllerError(
                 f"task {self.task!r} has no gains: its error equation is of first order"
@@ -120,7 +119,8 @@ class ChangeGains(Change, type="gains"):
             )
         with within("gains"):
             target = np.stack(self.gains.matrices(planned.task.rows))
-        return setup.with_task(k, gains=planned.gains.then(self.at, self.ramp, target))
+        gains = planned.gains.then(self.at, self.ramp, target)
+        return setup.with_task(planned, gains=gains)
 
 
 class ChangeImpedance(Change, type="impedance"):
@@ -143,8 +143,7 @@ class ChangeImpedance(Change, type="impedance"):
             ControllerError: If the task has no impedance.
             GainError: If the impedance does not fit the task, or what it was.
         """
-        k = setup.find_task(self.task)
-        planned = setup.tasks[k]
+        planned = setup.task(self.task)
         if impedance_of(planned.task) is None:
             raise ControllerError(
                 f"task {self.task!r} has no impedance from the start, so none can "
@@ -158,7 +157,7 @@ class ChangeImpedance(Change, type="impedance"):
             if any(parts_of(each)[3].any() for each in values):
                 for each in values:
                     check_bounded(parts_of(each)[0])
-        return setup.with_task(k, gains=numbers)
+        return setup.with_task(planned, gains=numbers)
 
 
 class ChangeReference(Change, type="reference"):
@@ -175,7 +174,7 @@ class ChangeReference(Change, type="reference"):
 
     def placed(self, start: Start, setup: Setup) -> Self:
         """Return the change with its trajectory in the world."""
-        task = setup.tasks[setup.find_task(self.task)].task
+        task = setup.task(self.task).task
         trajectory = self.trajectory
         if isinstance(trajectory, Streamed):  # YAML has one word for all kinds
             with within("trajectory"):
@@ -186,13 +185,13 @@ class ChangeReference(Change, type="reference"):
 
     def apply(self, setup: Setup) -> Setup:
         """Return the setup with the trajectory; see `Change.apply`."""
-        k = setup.find_task(self.task)
-        task = setup.tasks[k].task
+        planned = setup.task(self.task)
+        task = planned.task
         assert task.followed is not None
         changed = crossfade(
             task.followed, self.trajectory, start_time=self.at, duration=self.ramp
         )
-        return setup.with_task(k, task=task.following(changed))
+        return setup.with_task(planned, task=task.following(changed))
 
 
 class ChangeNullSpaceGain(Change, type="null_space_gain"):

@@ -23,10 +23,9 @@ class ChangeContact(Change, type="contact"):
 
     def apply(self, setup: Setup) -> Setup:
         """Return the setup with the contact; see `Change.apply`."""
-        contacts, k = list(setup.contacts), setup.find_contact(self.contact)
-        presence = contacts[k].presence.then(self.at, self.ramp, float(self.bears))
-        contacts[k] = replace(contacts[k], presence=presence)
-        return replace(setup, contacts=tuple(contacts))
+        planned = setup.contact(self.contact)
+        presence = planned.presence.then(self.at, self.ramp, float(self.bears))
+        return setup.with_contact(planned, presence=presence)
 
 
 class ChangeForce(Change, type="force"):
@@ -43,7 +42,7 @@ class ChangeForce(Change, type="force"):
         Raises:
             ContactError: If the contact cannot exert the force.
         """
-        contact = setup.contacts[setup.find_contact(self.contact)].contact
+        contact = setup.contact(self.contact).contact
         replace(contact, force=self.force).placed(start)
         return self
 
@@ -54,8 +53,8 @@ class ChangeForce(Change, type="force"):
             ContactError: If the contact has no commanded force, or one with another
                 number of coordinates.
         """
-        contacts, k = list(setup.contacts), setup.find_contact(self.contact)
-        contact = contacts[k].contact
+        planned = setup.contact(self.contact)
+        contact = planned.contact
         old, new = contact.force, self.force
         with within("force"):
             if old is None:
@@ -72,5 +71,4 @@ class ChangeForce(Change, type="force"):
             old.followed, new.followed, start_time=self.at, duration=self.ramp
         )
         following = replace(contact, force=CommandedForce(trajectory=changed))
-        contacts[k] = replace(contacts[k], contact=following)
-        return replace(setup, contacts=tuple(contacts))
+        return setup.with_contact(planned, contact=following)

@@ -16,6 +16,7 @@ from hsp_control.common.exceptions import (
     ImmutableError,
     NonFiniteError,
 )
+from hsp_control.common.identity_cache import IdentityCache
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits, RobotLimits
 from hsp_control.control.active_stack import ActiveStack
@@ -42,7 +43,7 @@ from hsp_control.robot.state import Move
 from hsp_control.tasks import Task, TaskSample
 from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.impedance import parts_of
-from hsp_control.tasks.task import Feedback, InForce
+from hsp_control.tasks.task import Feedback
 
 if TYPE_CHECKING:
     from hsp_control.control.free_step import FreeStep
@@ -147,7 +148,7 @@ class Controller:
         # While nothing changes: the stack, all calls of a step as one, and whether the
         # effort is M a + N wherever no limit is violated.
         self._whole: tuple[ActiveStack, Move, bool] | None = None
-        self._free: tuple[object, FreeStep | None] = None, None  # what it gives a loop
+        self._free = IdentityCache(_free_step)  # what it gives a compiled loop
         q = robot.home() if given is None else given
         state = robot.state(0.0, q, np.zeros(robot.nv))
         start = Start(state, self._declared.scene, known=given is not None)
@@ -331,7 +332,7 @@ class Controller:
                 out.tau[:] = tau
                 out._keep(active.memory)
             out._rows = active.row_count
-            out._acceleration = None if a is active.acceleration else a.copy()
+            out._acceleration = None if a is active.acceleration else a.tobytes()
             out.forces = forces.copy() if active.has_forces else forces
             out.damped, out.status, out.relaxation = damped, status, relaxation
             return out
@@ -410,26 +411,11 @@ class Controller:
             streamed, is no native call, or the last effort was not the law's own.
         """
         with self._lock:
-            step = None if self._gains.stiffening else self._free_step()
+            whole = None if self._gains.stiffening else self._whole
+            if whole is None or self._actuation.delivered is not whole[0].acceleration:
+                return 0
+            step = self._free.get(whole, self._state, self._actuation)
             return 0 if step is None else advance(step)
-
-    def _free_step(self) -> "FreeStep | None":
-        whole = self._whole
-        if whole is None or self._actuation.delivered is not whole[0].acceleration:
-            return None
-        if self._free[0] is not whole:
-            self._free = whole, self._bind_free_step(*whole)
-        return self._free[1]
-
-    def _bind_free_step(
-        self, active: ActiveStack, move: Move, direct: bool
-    ) -> "FreeStep | None":
-        from hsp_control.control.free_step import free_step  # here: it imports Numba
-
-        if active.streamed or not direct:
-            return None
-        sending = self._actuation.sending(self._state, active.acceleration)
-        return free_step(move, self._state.effort, sending)
 
     def disturbed(self, acceleration: ArrayLike) -> None:
         """Store an acceleration that something else than the efforts causes.
@@ -606,7 +592,7 @@ class Controller:
         Raises:
             ControllerError: If there is no such task.
         """
-        return self._in_force(task).feedback
+        return self._gains.feedback[self._setup.task(task).key].feedback
 
     def linear_feedback(self, task: str, state: RobotState) -> dict[float, Feedback]:
         """Return a task's feedback for small errors about a state, now and later.
@@ -642,16 +628,13 @@ class Controller:
             raise ControllerError(f"task {task!r} has gains, and no stiffness")
         return parts_of(self._gains.feedback[planned.key].numbers)[0].copy()
 
-    def _in_force(self, task: str) -> InForce:
-        return self._gains.feedback[self._setup.tasks[self._setup.find_task(task)].key]
-
     def weight_of(self, task: str, t: float) -> float:
         """Return how much a task counts at time t [s], in [0, 1].
 
         Raises:
             ControllerError: If there is no such task.
         """
-        return self._setup.tasks[self._setup.find_task(task)].weight(t)
+        return self._setup.task(task).weight(t)
 
     def bearing_of(self, contact: str, t: float) -> float:
         """Return how much a contact bears at time t [s], in [0, 1].
@@ -659,7 +642,7 @@ class Controller:
         Raises:
             ControllerError: If there is no such contact.
         """
-        return self._setup.contacts[self._setup.find_contact(contact)].weight(t)
+        return self._setup.contact(contact).weight(t)
 
     def force_offset(self, contact: str) -> Array:
         """Return what is added to the commanded normal force of a contact, (1,) [N].
@@ -669,7 +652,7 @@ class Controller:
         Raises:
             ControllerError: If there is no such contact.
         """
-        return self._setup.contacts[self._setup.find_contact(contact)].force_offset
+        return self._setup.contact(contact).force_offset
 
     def priority_of(self, task: str) -> int:
         """Return the priority of a task, 1 the highest.
@@ -677,8 +660,7 @@ class Controller:
         Raises:
             ControllerError: If there is no such task.
         """
-        planned = self._setup.tasks[self._setup.find_task(task)]
-        return priority_of(planned.task, self._declared.robot)
+        return priority_of(self._setup.task(task).task, self._declared.robot)
 
     # -- what explains it -------------------------------------------------------------
 
@@ -708,9 +690,11 @@ class Controller:
 
     def diagnose(self) -> Diagnostics:
         """Return quantities to plot, after `compute`, at the same state."""
-        active = self.active_stack
-        values, product, norm = active.resolution.diagnose(active.first_task_row)
-        return Diagnostics(active.field_value(), norm, values, product)
+        active, out = self.active_stack, Diagnostics()
+        found = active.resolution.diagnose(active.first_task_row)
+        out.null_space_norm, out.manipulability, out._triangle = found
+        out.field_value = active.field_value()
+        return out
 
     def flow(self, t: float, q: ArrayLike) -> Array:
         """Return v = J# x_d' + P g, shape (nv,): the robot once both errors have died.
@@ -766,3 +750,14 @@ class Controller:
         self._gains.remember(saved["gains"])
         self._state.update(*saved["at"])
         self._actuation.remember(saved["last_effort"])
+
+
+def _free_step(
+    whole: tuple[ActiveStack, Move, bool], state: RobotState, actuation: Actuation
+) -> "FreeStep | None":
+    from hsp_control.control.free_step import free_step  # here: it imports Numba
+
+    active, move, direct = whole
+    if active.streamed or not direct:
+        return None
+    return free_step(move, state.effort, actuation.sending(state, active.acceleration))

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.kernels import kernel
-from hsp_control.common.native import NativeCall
+from hsp_control.common.native import NativeCall, are_native
 from hsp_control.control.actuation.actuation import CODES
 from hsp_control.law.outcome import BEYOND_ANY_LEVEL
 from hsp_control.robot.native_move import NativeMove
@@ -32,10 +32,9 @@ def free_step(
     move: Move, effort: Array, sending: Sequence[Callable[[float], Any]]
 ) -> FreeStep | None:
     """Return a free step of these parts; None where one of them is not native."""
-    native = [call for call in sending if isinstance(call, NativeCall)]
-    if not isinstance(move, NativeMove) or len(native) < len(sending):
+    if not isinstance(move, NativeMove) or not are_native(sending):
         return None
-    return FreeStep(move, effort, native)
+    return FreeStep(move, effort, sending)
 
 
 @kernel

@@ -1,11 +1,10 @@
 """What a controller returns: an effort, and everything that explains it."""
 
-from typing import NamedTuple
-
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.actuation.status import Status
+from hsp_control.law import singular_values
 from hsp_control.law.problem import Record
 from hsp_control.null_space.fields import FieldSample
 from hsp_control.tasks import TaskSample
@@ -48,8 +47,9 @@ class ControlOutput:
     forces: Array
     status: Status
     relaxation: float
-    _acceleration: Array | None  # None: the law's own
-    _memory: Array | bytes  # bytes are made faster, and most are never looked at
+    # Bytes are made faster than arrays, and most are never looked at.
+    _acceleration: bytes | None  # None: the law's own
+    _memory: Array | bytes
     _rows: int
     _views: Record | None  # of the memory, once they were asked for
 
@@ -57,7 +57,7 @@ class ControlOutput:
     def acceleration(self) -> Array:
         """The acceleration that the effort produces, shape (nv,)."""
         own = self._acceleration
-        return self._record.acceleration if own is None else own
+        return self._record.acceleration if own is None else np.frombuffer(own)
 
     @property
     def task(self) -> TaskSample:
@@ -85,7 +85,7 @@ class ControlOutput:
             own = Record.allocate(rows, len(self.tau))
         own.memory[:] = np.frombuffer(self._memory)
         if self._acceleration is not None:
-            own.acceleration[:] = self._acceleration
+            own.acceleration[:] = np.frombuffer(self._acceleration)
         return own
 
     def _keep(self, memory: Array) -> None:
@@ -104,18 +104,23 @@ class ControlOutput:
         return self._views
 
 
-class Diagnostics(NamedTuple):
+class Diagnostics:
     """Quantities to plot beside the effort.
 
     Attributes:
         field_value: The field's cost f, or its norm.
         null_space_norm: ‖e_N‖_W, which decays like exp(-K_N t) for a scalar gain.
-        singular_values: Of the tasks' stacked Jacobian in the metric, J L⁻ᵀ, largest
-            first.
-        manipulability: det(J W⁻¹ Jᵀ), the product of their squares.
+        manipulability: det(J W⁻¹ Jᵀ) of the tasks' stacked Jacobian.
     """
+
+    __slots__ = ("_triangle", "field_value", "manipulability", "null_space_norm")
 
     field_value: float
     null_space_norm: float
-    singular_values: Array
     manipulability: float
+    _triangle: bytes
+
+    @property
+    def singular_values(self) -> Array:
+        """Those of J L⁻ᵀ, W = L Lᵀ, the largest first; computed when asked for."""
+        return singular_values(self._triangle)

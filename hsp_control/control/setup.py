@@ -1,6 +1,6 @@
 """What a controller is made of, and how that evolves: a function of time."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
@@ -123,23 +123,14 @@ class Setup:
             each.always for each in self.contacts
         )
 
-    def find_task(self, name: str) -> int:
-        """Return the index of the task that has a name, after all changes so far.
+    def task(self, name: str) -> PlannedTask:
+        """Return the task that has a name, after all changes so far.
 
         Raises:
             ControllerError: If there is none.
         """
-        there = {
-            each.task.name: k
-            for k, each in enumerate(self.tasks)
-            if each.presence.target == 1.0
-        }
-        if name not in there:
-            raise ControllerError(
-                f"there is no task {name!r}{did_you_mean(name, there)} "
-                f"(there are {listing(there) or 'none'})"
-            )
-        return there[name]
+        present = [each for each in self.tasks if each.presence.target == 1.0]
+        return _found("task", name, {each.task.name: each for each in present})
 
     def present_task(self, name: str, t: float) -> PlannedTask:
         """Return the task of a name that counts at time t [s], or is to come.
@@ -150,27 +141,24 @@ class Setup:
         for each in self.tasks:
             if each.task.name == name and each.presence.at(t) > 0.0:
                 return each
-        return self.tasks[self.find_task(name)]
+        return self.task(name)
 
-    def find_contact(self, name: str) -> int:
-        """Return the index of the contact that has a name.
+    def contact(self, name: str) -> PlannedContact:
+        """Return the contact that has a name.
 
         Raises:
             ControllerError: If there is none.
         """
-        there = {each.contact.name: k for k, each in enumerate(self.contacts)}
-        if name not in there:
-            raise ControllerError(
-                f"there is no contact {name!r}{did_you_mean(name, there)} "
-                f"(there are {listing(there) or 'none'})"
-            )
-        return there[name]
+        there = {each.contact.name: each for each in self.contacts}
+        return _found("contact", name, there)
 
-    def with_task(self, index: int, **changes: Any) -> "Setup":
-        """Return the setup with some attributes of one `PlannedTask` replaced."""
-        tasks = list(self.tasks)
-        tasks[index] = replace(tasks[index], **changes)
-        return replace(self, tasks=tuple(tasks))
+    def with_task(self, planned: PlannedTask, /, **changes: Any) -> "Setup":
+        """Return the setup with some attributes of one of its tasks replaced."""
+        return replace(self, tasks=_with(self.tasks, planned, changes))
+
+    def with_contact(self, planned: PlannedContact, /, **changes: Any) -> "Setup":
+        """Return the setup with some attributes of one of its contacts replaced."""
+        return replace(self, contacts=_with(self.contacts, planned, changes))
 
     def settled(self, t: float) -> "Setup":
         """Return the setup for times from t on: complete changes are folded."""
@@ -199,6 +187,21 @@ class Setup:
 
 
 Planned = TypeVar("Planned", PlannedTask, PlannedTerm, PlannedContact)
+
+
+def _found(kind: str, name: str, there: Mapping[str, Planned]) -> Planned:
+    if name not in there:
+        raise ControllerError(
+            f"there is no {kind} {name!r}{did_you_mean(name, there)} "
+            f"(there are {listing(there) or 'none'})"
+        )
+    return there[name]
+
+
+def _with(
+    planned: tuple[Planned, ...], one: Planned, changes: dict[str, Any]
+) -> tuple[Planned, ...]:
+    return tuple(replace(each, **changes) if each is one else each for each in planned)
 
 
 def _changed(planned: Planned, **changes: Any) -> Planned:

@@ -164,7 +164,7 @@ def _most_likely(
     It is the alternative whose outer type is right, with the fewest mistakes inside. If
     several are equally likely, it is the one whose first mistake is furthest down in
     the text. If all of them fail at the same value, that value has none of the expected
-    types.
+    types; if at the same key, none of them has it.
     """
 
     def unlikeliness(found: list[Finding]) -> tuple[bool, int]:
@@ -173,13 +173,13 @@ def _most_likely(
     lowest = min(map(unlikeliness, tries))
     likely = [found for found in tries if unlikeliness(found) == lowest]
     first = likely[0][0]
-    if len(likely) == 1 or not all(
-        len(found) == 1 and found[0].path == first.path and _misfit(found[0])
-        for found in likely
-    ):
-        return max(likely, key=lambda found: document.mark(found[0].path) or (0, 0))
     options = tuple(o for found in likely for o in found[0].expected.options)
-    return [first._replace(kind="mismatch", expected=Shape(options))]
+    if len(likely) > 1 and all(found[0].path == first.path for found in likely):
+        if all(found[0].kind == "extra_forbidden" for found in likely):
+            return [first._replace(expected=Shape(options))]
+        if all(len(found) == 1 and _misfit(found[0]) for found in likely):
+            return [first._replace(kind="mismatch", expected=Shape(options))]
+    return max(likely, key=lambda found: document.mark(found[0].path) or (0, 0))
 
 
 def _misfit(finding: Finding) -> bool:

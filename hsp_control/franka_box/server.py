@@ -6,7 +6,6 @@ from collections.abc import Callable
 from contextlib import suppress
 from select import select
 from time import monotonic
-from types import TracebackType
 from typing import Self
 
 import numpy as np
@@ -81,12 +80,7 @@ class Server:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._part("the box is switched off", broken=True)
         self._listener.close()
 

@@ -16,6 +16,7 @@ from hsp_control.inspection.limits import check_limits
 from hsp_control.inspection.mass_matrix import check_mass_matrix, worst_condition
 from hsp_control.inspection.meshes import check_meshes
 from hsp_control.inspection.self_collisions import check_self_collisions
+from hsp_control.inspection.strength import check_strength
 from hsp_control.robot import Robot, RobotDescription
 from hsp_control.robot.description.loading import load_model
 from hsp_control.robot.description.sources import RobotSource
@@ -123,6 +124,7 @@ def _of_robot(robot: Robot) -> Iterator[Finding]:
         message = f"not checked: {reason}"
         yield Finding("warning", "self-collision", "all links", message)
     yield from check_home(robot)
+    yield from check_strength(robot)
 
 
 def _reason(error: ModelError, source: RobotSource) -> str:

@@ -1,6 +1,7 @@
 """The law with its buffers: from tasks and a field to one acceleration."""
 
 from collections.abc import Callable, Sequence
+from math import isqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from hsp_control.common.linalg import (
     norm,
     orthogonalise_rows,
     orthonormalise_rows,
+    squared_norm,
 )
 from hsp_control.common.native import bind
 from hsp_control.law.hierarchy import LevelScratch, resolve_levels
@@ -140,7 +142,7 @@ class Resolution:
         self.acceleration = self.problem.record.acceleration
         self.null_space_error = self.problem.record.null_space_error
         self.code: Indices = np.zeros(1, dtype=np.int64)
-        self._spectra: dict[int, tuple[Callable[[], float], Array]] = {}
+        self._triangles: dict[int, tuple[Callable[[], float], Array, Array]] = {}
 
     def resolve(self, v: Array, *, controls_null_space: bool = True) -> Resolved:
         """Return the acceleration that tracks the tasks and the field.
@@ -169,29 +171,39 @@ class Resolution:
             *(self._scratch, self.null_space_error, self.acceleration, self.code),
         )
 
-    def diagnose(self, first: int = 0) -> tuple[Array, float, float]:
+    def diagnose(self, first: int = 0) -> tuple[float, float, bytes]:
         """Return what tells how near the last `resolve` was to singular and to rest.
 
         Args:
             first: The first row of the tasks: those before it belong to contacts.
 
         Returns:
-            The singular values of J L⁻ᵀ without the rows before ``first``, the largest
-            first; their squared product det(J W⁻¹ Jᵀ), the paper's manipulability; and
-            ‖e_N‖_W, the square root of 2 V.
+            ‖e_N‖_W, the square root of 2 V; det(J W⁻¹ Jᵀ) without the rows before
+            ``first``, the paper's manipulability; and what `singular_values` takes.
         """
-        found = self._spectra.get(first)
+        found = self._triangles.get(first)
         if found is None:
             J, metric = self.problem.task.jacobian[first:], self.problem.metric
-            out = np.zeros(min(J.shape) + 1)
-            m, n = self.problem.task.jacobian.shape
-            wide, small = np.zeros((2, m, n)), np.zeros((3, m, m))
-            e_N, form = self.null_space_error, self.form
-            call = bind(_diagnose, J, *metric[:2], form, e_N, wide, small, out)
-            self._spectra[first] = found = call, out
-        manipulability = found[0]()
-        numbers = found[1].copy()
-        return numbers[:-1], manipulability, float(numbers[-1])
+            small, large = sorted(J.shape)
+            scratch, e_N = np.zeros((4, large, large)), self.null_space_error
+            T, length = np.zeros((small, small)), np.zeros(1)
+            call = bind(_diagnose, J, *metric[:2], self.form, e_N, scratch, T, length)
+            self._triangles[first] = found = call, T, length
+        call, T, length = found
+        manipulability = call()
+        return length.item(), manipulability, T.tobytes()
+
+
+def singular_values(triangle: bytes) -> Array:
+    """Return the singular values of J L⁻ᵀ, the largest first, shape (min(m, nv),).
+
+    Args:
+        triangle: What `Resolution.diagnose` returned.
+    """
+    T = np.frombuffer(triangle).copy()
+    values = np.zeros(isqrt(len(T)))
+    _singular_values(T.reshape(len(values), len(values)), values)
+    return values
 
 
 @kernel
@@ -295,51 +307,47 @@ def _diagnose(
     L: Array,
     form: int,
     e_N: Array,
-    wide: Array,
-    small: Array,
-    out: Array,
+    scratch: Array,
+    T: Array,
+    length: Array,
 ) -> float:
-    """Write the singular values of J L⁻ᵀ and then ‖e_N‖_W; return det(J W⁻¹ Jᵀ)."""
-    out[-1] = norm(W, e_N)
-    return float(_singular_values(J, L, form, wide, small, out[:-1]))
+    """Write T, triangular with the singular values of J L⁻ᵀ, and ‖e_N‖_W.
+
+    Returns:
+        The product of their squares.
+    """
+    length[0] = norm(W, e_N)
+    m, n = J.shape
+    B = scratch[0, :m, :n]
+    whiten(J, L, form, B)
+    if m > n:
+        transposed = scratch[1, :n, :m]
+        for i in range(n):
+            for k in range(m):
+                transposed[i, k] = B[k, i]
+        B = transposed
+    Q = scratch[2, : B.shape[0], : B.shape[1]]
+    orthonormalise_rows(B, Q, scratch[3])
+    gram(Q, B, False, T)
+    product = 1.0
+    for i in range(T.shape[0]):
+        product *= T[i, i] * T[i, i]
+    return product
 
 
 @kernel
-def _singular_values(
-    J: Array, L: Array, form: int, wide: Array, small: Array, values: Array
-) -> float:
-    """Write the singular values of J L⁻ᵀ, largest first; J of any shape.
+def _singular_values(T: Array, values: Array) -> None:
+    """Write the singular values of a triangle, the largest first; T is overwritten.
 
-    Returns:
-        Their product squared; 1 without rows.
+    Its columns are nearer to orthogonal than the rows of what it is a factor of.
     """
-    m, n = J.shape
-    if m == 0:
-        return 1.0
-    width = min(m, n)
-    B, T, U = wide[0, :m], small[0, :m, :m], small[1, :m, :m]
-    whiten(J, L, form, B)
-    if m <= n:
-        # The columns of the triangular factor are nearer to orthogonal than the rows.
-        Q = wide[1, :m]
-        orthonormalise_rows(B, Q, U)
-        gram(Q, B, False, T)
-        for i in range(m):
-            for k in range(m):
-                B[i, k] = T[i, k]
-    orthogonalise_rows(B[:, :width], U[:0])
-    squares = small[2, 0, :m]
+    orthogonalise_rows(T, T[:0])
+    m = values.shape[0]
     for k in range(m):
-        squares[k] = 0.0
-        for i in range(width):
-            squares[k] += B[k, i] * B[k, i]
-    product = 1.0
-    for rank in range(values.shape[0]):
+        values[k] = np.sqrt(squared_norm(T[k]))
+    for rank in range(m):
         best = rank
         for k in range(rank + 1, m):
-            if squares[k] > squares[best]:
+            if values[k] > values[best]:
                 best = k
-        squares[rank], squares[best] = squares[best], squares[rank]
-        values[rank] = np.sqrt(squares[rank])
-        product *= squares[rank]
-    return product
+        values[rank], values[best] = values[best], values[rank]

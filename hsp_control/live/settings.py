@@ -2,12 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import KW_ONLY
-from typing import Any
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import LimitError, LiveError
+from hsp_control.common.exceptions import LiveError
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import RobotLimits
 from hsp_control.constraints.limits.numbers_by_joint import Positives, by_dof
@@ -109,7 +108,7 @@ class LiveSettings(Part, error=LiveError):
             LiveError: If they are neither one nor nv numbers.
         """
         with within("effort_rate"):
-            return _per_dof(self.effort_rate, robot)
+            return by_dof(self.effort_rate, robot.nv, error=LiveError)
 
     def effort_limits(self, robot: Robot, limits: RobotLimits | None = None) -> Array:
         """Return the limits of the efforts, shape (nv,), inf where unlimited.
@@ -127,7 +126,7 @@ class LiveSettings(Part, error=LiveError):
             own = np.array(limits.effort)
         elif self.effort is not None:
             with within("effort"):
-                own = _per_dof(self.effort, robot)
+                own = by_dof(self.effort, robot.nv, error=LiveError)
         else:
             own = np.array(robot.model.effortLimit, dtype=float)
             # URDFs contain 0, or the largest float, where there is no limit.
@@ -163,15 +162,3 @@ def check_held(
                 f"{robot.name} has a floating base: how its joints bear its weight "
                 "depends on its contacts, which it does not know; must be false"
             )
-
-
-def _per_dof(numbers: Any, robot: Robot) -> Array:
-    """Return limits as an array, shape (nv,), from None, one number or nv numbers.
-
-    Raises:
-        LiveError: If there are neither one nor nv numbers.
-    """
-    try:
-        return by_dof(np.inf if numbers is None else numbers, robot.nv)
-    except LimitError as error:
-        raise LiveError(error.bare_message) from None

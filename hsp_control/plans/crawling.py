@@ -1,13 +1,12 @@
 """A quadruped that crawls: one run, from foot to foot."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.controller import Controller
-from hsp_control.control.log_channel import LogChannel
 from hsp_control.control.measurement import Measurement
 from hsp_control.plans.footsteps import Footstep
 from hsp_control.plans.four_feet import PointFoot, RunningQuadruped
@@ -23,11 +22,11 @@ CLOSING = 4
 FADE = 0.3
 """Share of the time on four feet in which the force of the next foot fades."""
 
-Mode = Literal["standing", "four", "three"]
-
 
 class RunningCrawl(RunningQuadruped):
     """What a `Crawl` became for one run."""
+
+    _mode: Literal["standing", "four", "three"]
 
     def __init__(self, crawl: "Crawl", controller: Controller, margin: float) -> None:
         """Find the references and the switches; see `RunningQuadruped`.
@@ -49,33 +48,17 @@ class RunningCrawl(RunningQuadruped):
         mass = state.centroidal.position[:2]
         self._middle: Array = mass.copy()
         self._shift = to_rest(at_rest(mass), mass, state.t, 1.0)
-        self._since = state.t
-        self._mode: Mode = "standing"
-        self._swings, self._idle = 0, 0
 
     def _combinations(self) -> Sequence[Sequence[PointFoot]]:
         """Return each foot alone."""
         return [[foot] for foot in self._feet]
 
-    def log_channels(self) -> Mapping[str, LogChannel]:
-        """Return the phase, and the velocity."""
+    def _phase(self) -> tuple[float, str]:
+        """Return what to log of the phase; see `RunningQuadruped`."""
         phase = {"standing": 0.0, "four": 1.0, "three": 2.0}[self._mode]
         if self._mode == "three":
             phase += self._swings % 4
-        return {
-            "plan.phase": LogChannel(
-                phase, "-", "0 stands; 1 on four feet; 2 to 5 a foot swings, in order"
-            ),
-            "plan.steps": LogChannel(float(self._swings), "-", "swings so far"),
-            "plan.velocity": LogChannel(
-                np.array(self._velocity), "m/s and rad/s", "forward, left, turning"
-            ),
-        }
-
-    @property
-    def rests(self) -> bool:
-        """Whether it stands; see `RunningPlan.rests`."""
-        return self._mode == "standing"
+        return phase, "0 stands; 1 on four feet; 2 to 5 a foot swings, in order"
 
     # -- from swing to swing ----------------------------------------------------------
 

@@ -52,6 +52,13 @@ class Velocity(NamedTuple):
         """Whether it stands."""
         return self.forward == self.left == self.turn == 0.0
 
+    def towards(
+        self, wanted: "Velocity", most: tuple[float, float, float]
+    ) -> "Velocity":
+        """Return what is nearest to a wanted one; each part changes by this at most."""
+        parts = zip(self, wanted, most, strict=True)
+        return Velocity(*(a + min(max(b - a, -m), m) for a, b, m in parts))
+
 
 class Stance(NamedTuple):
     """How the feet of a biped stand beside each other.

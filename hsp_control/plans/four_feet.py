@@ -1,7 +1,7 @@
 """A quadruped that walks: what every gait has in one run."""
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FallError, PlanError
 from hsp_control.common.suggestions import listing
 from hsp_control.control.controller import Controller
+from hsp_control.control.log_channel import LogChannel
 from hsp_control.control.measurement import Measurement
 from hsp_control.plans.falling import FallDetector
 from hsp_control.plans.footsteps import Footstep, Velocity
@@ -96,6 +97,9 @@ class PointFoot:
 class RunningQuadruped(RunningPlan):
     """What a plan of four feet became for one run."""
 
+    _mode: str
+    """What it does; "standing" in each gait."""
+
     def __init__(self, plan: QuadrupedPlan, controller: Controller) -> None:
         """Find the references and the switches.
 
@@ -152,7 +156,9 @@ class RunningQuadruped(RunningPlan):
         frames = tuple(foot.frame for foot in self._feet)
         self._falling = FallDetector(self._trunk_frame, frames, state)
         self._velocity = Velocity(0.0, 0.0, 0.0)
-        self._last = state.t
+        self._last = self._since = state.t
+        self._mode = "standing"
+        self._swings, self._idle = 0, 0
         self._felt = {foot.name: False for foot in self._feet}
         self._controller.prepare(state, without=[foot.name for foot in self._feet])
         self._start_gait(state)
@@ -234,8 +240,28 @@ class RunningQuadruped(RunningPlan):
         """Return which feet may be in the air together."""
 
     @abstractmethod
+    def _phase(self) -> tuple[float, str]:
+        """Return the number of what it does, for the log, and what numbers mean."""
+
+    @abstractmethod
     def _step(self, t: float, measured: Measurement) -> None:
         """Go on with the gait, and write the reference of the centre of mass."""
+
+    def log_channels(self) -> Mapping[str, LogChannel]:
+        """Return the phase and the velocity."""
+        phase, meaning = self._phase()
+        return {
+            "plan.phase": LogChannel(phase, "-", meaning),
+            "plan.steps": LogChannel(float(self._swings), "-", "swings so far"),
+            "plan.velocity": LogChannel(
+                np.array(self._velocity), "m/s and rad/s", "forward, left, turning"
+            ),
+        }
+
+    @property
+    def rests(self) -> bool:
+        """Whether it stands; see `RunningPlan.rests`."""
+        return self._mode == "standing"
 
     def update(self, measured: Measurement) -> None:
         """Write references and switch contacts; see `RunningPlan.update`."""
@@ -289,12 +315,7 @@ class RunningQuadruped(RunningPlan):
         h = t - self._last
         most = self.gait.acceleration * h
         # A metre per second and a radian per second change equally fast.
-        self._velocity = Velocity(
-            *(
-                a + min(max(b - a, -most), most)
-                for a, b in zip(self._velocity, self._wanted(t), strict=True)
-            )
-        )
+        self._velocity = self._velocity.towards(self._wanted(t), (most, most, most))
         self._yaw += h * self._velocity.turn
 
     def _world_velocity(self) -> Array:

@@ -183,12 +183,7 @@ class StepPlanner:
         wanted = self.wanted(t, taken)
         largest = self._walk.acceleration * self.period
         bounds = largest, largest, largest / max(0.5 * self._stance.width, 0.1)
-        return Velocity(
-            *(
-                a + min(max(b - a, -most), most)
-                for a, b, most in zip(now, wanted, bounds, strict=True)
-            )
-        )
+        return now.towards(wanted, bounds)
 
 
 def stance_of(feet: Mapping[float, Foot], state: RobotState, crouch: float) -> Stance:

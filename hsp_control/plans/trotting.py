@@ -1,12 +1,11 @@
 """A quadruped that trots: one run, from swing to swing."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.control.log_channel import LogChannel
 from hsp_control.control.measurement import Measurement
 from hsp_control.plans.footsteps import Footstep
 from hsp_control.plans.four_feet import PointFoot, RunningQuadruped
@@ -26,11 +25,11 @@ CLOSING = 2
 _COMMITTED = 0.05
 """A step is not moved so shortly before it lands [s]."""
 
-Mode = Literal["standing", "ready", "four", "two"]
-
 
 class RunningTrot(RunningQuadruped):
     """What a `Trot` became for one run."""
+
+    _mode: Literal["standing", "ready", "four", "two"]
 
     def _start_gait(self, state: RobotState) -> None:
         """Begin standing; see `RunningQuadruped`."""
@@ -41,9 +40,6 @@ class RunningTrot(RunningQuadruped):
         self._check_stride(state, 0.5 * (self.gait.swing + 2.0 * self.gait.stance))
         self._reference: Array = mass[:2].copy()
         self._line: Array = mass[:2].copy()
-        self._since = state.t
-        self._mode: Mode = "standing"
-        self._swings, self._idle = 0, 0
 
     def _combinations(self) -> Sequence[Sequence[PointFoot]]:
         """Return the pairs, and each of their feet: one may land before the other."""
@@ -54,25 +50,12 @@ class RunningTrot(RunningQuadruped):
         front_left, front_right, hind_left, hind_right = self._corners()
         return [front_left, hind_right], [front_right, hind_left]
 
-    def log_channels(self) -> Mapping[str, LogChannel]:
-        """Return the phase and the velocity."""
+    def _phase(self) -> tuple[float, str]:
+        """Return what to log of the phase; see `RunningQuadruped`."""
         phase = {"standing": 0.0, "ready": 1.0, "four": 1.0, "two": 2.0}[self._mode]
         if self._mode == "two" and self._swings % 2:
             phase = 3.0
-        return {
-            "plan.phase": LogChannel(
-                phase, "-", "0 stands; 1 on four feet; 2, 3 a diagonal pair swings"
-            ),
-            "plan.steps": LogChannel(float(self._swings), "-", "swings so far"),
-            "plan.velocity": LogChannel(
-                np.array(self._velocity), "m/s and rad/s", "forward, left, turning"
-            ),
-        }
-
-    @property
-    def rests(self) -> bool:
-        """Whether it stands; see `RunningPlan.rests`."""
-        return self._mode == "standing"
+        return phase, "0 stands; 1 on four feet; 2, 3 a diagonal pair swings"
 
     # -- from swing to swing ----------------------------------------------------------
 

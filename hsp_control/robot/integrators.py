@@ -7,7 +7,6 @@ with δ' = v for single-dof joints and δ' = J_r(δ)⁻¹ v for a root.
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -15,7 +14,7 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HspControlError, SimulationError
 from hsp_control.common.kernels import kernel
-from hsp_control.common.native import NativeCall, bind
+from hsp_control.common.native import NativeCall, are_native, bind
 from hsp_control.common.step_plan import in_order
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Positive
@@ -195,11 +194,12 @@ class Steps(ABC):
         self._t = 0.0
         self._calls = in_order(self._bind())
         self.native: NativeCall | None = None
-        if all(isinstance(call, NativeCall) for call in self._calls):
-            from hsp_control.robot.native_steps import bind_steps
+        if are_native(self._calls):
+            from hsp_control.robot.native_steps import make_steps
 
-            native: Any = self._calls
-            self.native = bind_steps(native, self.interval, longest, self.h)
+            self.native = NativeCall.over(
+                make_steps, self._calls, self.interval, longest, self.h
+            )
 
     @abstractmethod
     def _bind(self) -> list[Callable[[], object]]:

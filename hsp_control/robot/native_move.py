@@ -4,13 +4,12 @@ from collections.abc import Callable, Sequence
 from functools import cache, partial
 from typing import Self
 
-import numpy as np
 from numba import types
 
 from hsp_control.common.adapters import entry_point, run
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
-from hsp_control.common.native import NativeCall
+from hsp_control.common.native import NativeCall, table
 from hsp_control.robot.valid_state import REFUSED, copy_valid
 
 
@@ -43,8 +42,7 @@ class NativeMove(partial[float]):
             unit_blocks: (start, size) of what is of norm 1 in q, shape (blocks, 2).
             stamp: Counted up, shape (1,).
         """
-        rows, when = (np.concatenate([c.args[k] for c in calls]) for k in (0, 1))
-        move = cls(_entry(), rows, when, q, v, unit_blocks, stamp)
+        move = cls(_entry(), *table(calls), q, v, unit_blocks, stamp)
         move.calls = calls
         return move
 

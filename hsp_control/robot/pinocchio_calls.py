@@ -21,7 +21,7 @@ from pinocchio import pinocchio_pywrap_default
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import PLAIN, kernel
-from hsp_control.common.native import FOREVER, NativeCall, Timed, sequence
+from hsp_control.common.native import NativeCall, Timed, sequence
 from hsp_control.robot.matrix_view import matrix_view
 
 _MODEL = b"N9pinocchio8ModelTplIdLi0ENS_25JointCollectionDefaultTplEEE"
@@ -187,7 +187,7 @@ def _native(
     call.kept = references
     if what == "crba":  # writes one triangle
         both = call, NativeCall.of(_mirror, (matrix_view(data.M),), timed=False)
-        mirrored = sequence([Timed(each, *FOREVER) for each in both], 0.0)
+        mirrored = sequence([*map(Timed, both)], 0.0)
         mirrored.recipe, mirrored.kept = recipe, both
         return mirrored
     return call

@@ -6,7 +6,6 @@ limit is violated and nothing comes from outside. It makes the calls that a sing
 period makes, by their addresses: the motion is the same, to the last bit.
 """
 
-from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -14,7 +13,7 @@ import numpy as np
 from hsp_control.common.adapters import run
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
-from hsp_control.common.native import NativeCall
+from hsp_control.common.native import NativeCall, table
 from hsp_control.control.controller import Controller
 from hsp_control.control.free_step import FreeStep, is_free
 from hsp_control.robot.integrators import Steps
@@ -101,17 +100,10 @@ class Stretch:
         assert steps.native is not None
         # Rows are addresses: what they lead to is kept, here and in the steps.
         self._seeing = self._excess.seeing(self._controller.limits, steps.q, steps.v)
-        moving = _table([steps.native, *self._seeing])
+        moving = table([steps.native, *self._seeing])
         own = steps.q, steps.v, self._plant.effort, step.effort, steps.interval
-        calls = *moving, *step.move.args, *_table(step.sending)
+        calls = *moving, *step.move.args, *table(step.sending)
         return NativeCall.of(_stretch, (*calls, *own, self._which), timed=False)
-
-
-def _table(calls: Sequence[NativeCall]) -> tuple[Indices, Array]:
-    """Return the rows of calls, and their windows, for `run`."""
-    rows = [np.zeros((0, 2), dtype=np.int64), *(call.args[0] for call in calls)]
-    when = [np.zeros((0, 2)), *(call.args[1] for call in calls)]
-    return np.concatenate(rows), np.concatenate(when)
 
 
 @kernel

@@ -11,7 +11,7 @@ from hsp_control.common.exceptions import HspControlError
 from hsp_control.config import Experiment
 from hsp_control.config.document import Document
 from hsp_control.config.experiment import build
-from hsp_control.simulation.recorder import versions
+from hsp_control.simulation.run_meta import versions
 from hsp_control.sweeps.factor import Factor
 
 _TRIALS = 20  # if so many runs cannot be built, the sweep itself is wrong

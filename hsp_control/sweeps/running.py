@@ -13,7 +13,7 @@ import numpy as np
 from hsp_control.common.exceptions import HspControlError, SimulationError
 from hsp_control.config.experiment import build
 from hsp_control.simulation import Rollout
-from hsp_control.simulation.recorder import versions
+from hsp_control.simulation.run_meta import versions
 from hsp_control.sweeps.metrics import Measure, measures
 from hsp_control.sweeps.plan import document
 from hsp_control.sweeps.row import CRASHED, TIMED_OUT, Row

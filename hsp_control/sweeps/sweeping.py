@@ -12,7 +12,7 @@ import numpy as np
 from hsp_control.common.exceptions import HspControlError, SweepError
 from hsp_control.config.experiment import build
 from hsp_control.config.source import read_document
-from hsp_control.simulation.recorder import versions
+from hsp_control.simulation.run_meta import versions
 from hsp_control.sweeps.dask_workers import DaskWorkers
 from hsp_control.sweeps.design import chosen_design, points
 from hsp_control.sweeps.factor import factors

@@ -336,7 +336,7 @@ def test_a_log_too_large_is_refused_before_it_is_computed(
     home: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     experiment = load_experiment(home / "config.yaml")
-    monkeypatch.setattr("hsp_control.simulation.recorder.MAX_SIZE", 100)
+    monkeypatch.setattr("hsp_control.simulation.log_columns.MAX_SIZE", 100)
     with pytest.raises(SimulationError, match="a log of 2 rows is larger than"):
         experiment.run()
 

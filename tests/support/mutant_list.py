@@ -464,6 +464,13 @@ MUTANTS = (
         OF_LIMITS + "margin_of_the_speed",
     ),
     Mutant(
+        "position barrier: the drift moves no bound",
+        LIMITS + "acceleration_bounds.py",
+        "high -= min(max(drift[i], 0.0), most)",
+        "high -= 0.0",
+        OF_LIMITS + "drives_no_joint_beyond",
+    ),
+    Mutant(
         "position barrier: damping drives",
         LIMITS + "acceleration_bounds.py",
         "low = -bandwidth * bandwidth * (position - lower[i]) - damping",
@@ -734,7 +741,7 @@ MUTANTS = (
     Mutant(
         "free step: calls in Python are left out",
         CONTROL + "free_step.py",
-        " or len(native) < len(sending)",
+        " or not are_native(sending)",
         "",
         UNIT + "control/test_free_step.py -k native",
     ),
@@ -778,8 +785,8 @@ MUTANTS = (
     Mutant(
         "stretch: states between rows are not seen",
         SIMULATION + "stretch.py",
-        "moving = _table([steps.native, *self._seeing])",
-        "moving = _table([steps.native])",
+        "moving = table([steps.native, *self._seeing])",
+        "moving = table([steps.native])",
         OF_STRETCHES + "between_two_rows",
     ),
     Mutant(
@@ -833,7 +840,7 @@ MUTANTS = (
     ),
     Mutant(
         "log: friction_used without μ",
-        SIMULATION + "recorder.py",
+        SIMULATION + "contact_columns.py",
         "ratios = tangential[loaded] / (contact.friction * local[loaded, 2])",
         "ratios = tangential[loaded] / local[loaded, 2]",
         OF_CONTACTS + "how_much_friction",

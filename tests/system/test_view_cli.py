@@ -11,11 +11,9 @@ from pages import Page
 from played import wait_until
 
 from hsp_control import Experiment, Rollout
-from hsp_control.cli import commands, main
+from hsp_control.cli import main
 from hsp_control.common import kernels
-from hsp_control.config import experiment
-from hsp_control.config.document import Document
-from hsp_control.config.setup import Setup
+from hsp_control.config.loaded_scenario import LoadedScenario
 from hsp_control.visualization.viewer import browser, server
 
 pytestmark = pytest.mark.process
@@ -86,17 +84,18 @@ def test_the_page_of_a_run_opens_before_its_kernels_are_compiled(
     """It shows the robot and its title, and says what is being done."""
     pages: list[Page] = []
 
-    def build(document: Document, setup: Setup) -> Experiment:
+    def of(loaded: LoadedScenario) -> Experiment:
         def compile_one() -> None:
             line = "Compiling kernels (once, 10 to 20 s) ... 0 done"
             wait_until(lambda: line in [c.get("text") for c in pages[0].commands])
 
         kernels._watched(compile_one)
-        assert pages[0].last("caption", "/caption")["title"] == setup.scenario.title
+        assert pages[0].last("caption", "/caption")["title"] == loaded.scenario.title
         assert pages[0].last("set_object", "/robot/joint3/link3")
-        return experiment.build(document, setup)
+        return made(loaded)
 
-    monkeypatch.setattr(commands, "build", build)
+    made = Experiment.of
+    monkeypatch.setattr(Experiment, "of", of)
     monkeypatch.setattr(
         browser, "open_browser", lambda url: pages.append(Page(url)) or False
     )

@@ -14,6 +14,9 @@ _GROWTH = 1.25
 """How much larger the error of the acceleration may be in the next period than it was
 in the last ones: without it one random rollout passed a limit by 0.1 % at 100 Hz."""
 
+_SHIFT = 0.1
+"""How much of a joint's range the drift may take away at one end: a joint that
+something blocks drifts by all that it should accelerate."""
 
 MOTION, EFFORT = 1, 2
 """Flags of what is violated: bounds on the acceleration, bounds on the effort."""
@@ -60,6 +63,7 @@ def acceleration_bounds(
     where: Indices,
     limits: MotionLimits,
     error: Array,
+    drift: Array,
     a_lower: Array,
     a_upper: Array,
 ) -> None:
@@ -77,6 +81,8 @@ def acceleration_bounds(
         limits: What the barriers keep.
         error: Largest error that the acceleration had of late, shape (nv,); the margin
             of the speed covers it and its growth, up to half the speed.
+        drift: Mean error of late, shape (nv,); the barrier of the position makes up for
+            it where it leads beyond the limit.
         a_lower: Written: lower bound on the acceleration, shape (nv,).
         a_upper: Written: upper bound on the acceleration, shape (nv,).
     """
@@ -89,6 +95,10 @@ def acceleration_bounds(
             damping = 2.0 * bandwidth * v[i]
             low = -bandwidth * bandwidth * (position - lower[i]) - damping
             high = bandwidth * bandwidth * (upper[i] - position) - damping
+            # While it lasts, a limit would be passed by the drift over α².
+            most = _SHIFT * bandwidth * bandwidth * (upper[i] - lower[i])
+            low += min(max(-drift[i], 0.0), most)
+            high -= min(max(drift[i], 0.0), most)
         speed = velocity[i] - _GROWTH * error[i] / (2.0 * bandwidth * _STEEPER)
         speed = max(speed, 0.5 * velocity[i])
         slowing = 2.0 * bandwidth * (-speed - v[i])
@@ -113,6 +123,7 @@ def violated_limits(
     where: Indices,
     limits: MotionLimits,
     error: Array,
+    drift: Array,
     disturbance: Array,
     bounds: Bounds,
 ) -> int:
@@ -126,7 +137,9 @@ def violated_limits(
     Returns:
         0 for none, `MOTION`, `EFFORT`, or the sum of both.
     """
-    acceleration_bounds(q, v, where, limits, error, bounds.a_lower, bounds.a_upper)
+    acceleration_bounds(
+        q, v, where, limits, error, drift, bounds.a_lower, bounds.a_upper
+    )
     for i in range(a.shape[0]):
         most = 2.0 * limits.bandwidth[0] * limits.velocity[i]
         up, down = max(disturbance[i], 0.0), min(disturbance[i], 0.0)

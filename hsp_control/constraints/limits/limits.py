@@ -13,7 +13,10 @@ from hsp_control.constraints.limits.acceleration_bounds import MotionLimits
 from hsp_control.constraints.limits.maximum import Maximum, maximum, none_for_nothing
 from hsp_control.constraints.limits.minimum_distance import MinimumDistance
 from hsp_control.constraints.limits.numbers_by_joint import Positives, by_dof
-from hsp_control.constraints.limits.position_range import PositionRange
+from hsp_control.constraints.limits.position_range import (
+    PositionRange,
+    PositionsByJoint,
+)
 from hsp_control.constraints.limits.robot_limits import RobotLimits
 from hsp_control.constraints.limits.static_effort import StaticEffort
 from hsp_control.declaration import Part, within
@@ -65,24 +68,26 @@ class Limits(Part, error=LimitError):
 
     _: KW_ONLY
     effort: Maximum = "robot"
-    """Maximum effort [N·m or N]: the robot's own, none, a factor, one number or nv."""
+    """Maximum effort [N·m or N]: the robot's own, none, a factor, numbers by joint, one
+    number or nv."""
     effort_rate: Positives | None = None
     """Maximum rate of the effort [N·m/s or N/s], one number or nv; a Panda's is 1000.
     Unlimited by default."""
     velocity: Maximum = "robot"
-    """Maximum speed [rad/s or m/s]: the robot's own, none, a factor, one number or
-    nv."""
+    """Maximum speed [rad/s or m/s]: the robot's own, none, a factor, numbers by joint,
+    one number or nv."""
     acceleration: Positives | None = None
     """Maximum acceleration [rad/s² or m/s²], one number or nv. Unlimited by default."""
     position: Annotated[
-        Literal["robot", "none"] | PositionRange | None,
+        Literal["robot", "none"] | PositionRange | PositionsByJoint | None,
         BeforeValidator(none_for_nothing),
     ] = "robot"
-    """Joint position limits [rad or m]: the robot's own, none, or numbers."""
+    """Joint position limits [rad or m]: the robot's own, none, numbers for some joints,
+    or numbers."""
     position_margin: NonNegative | None = None
     """Margin inside the position limits [rad or m]: 0.005 by default, at most a tenth
-    of a joint's range. With efforts held for a period, a barrier may be crossed by the
-    error of the acceleration over α²."""
+    of a joint's range. A barrier may be crossed by an error of the acceleration over
+    α², but not by its mean of late, once `Controller.applied` tells the period."""
     velocity_margin: Share = 0.02
     """Margin inside the speed limits, as a fraction of the limit [-]."""
     distances: Annotated[Sequence[MinimumDistance], AfterValidator(tuple)] = ()
@@ -156,8 +161,7 @@ class Limits(Part, error=LimitError):
     def _numbers(self, field: str, robot: Robot) -> Array:
         """Return the numbers of a field, shape (nv,); inf where there is no limit."""
         with within(field):
-            given = getattr(self, field)
-            return read_only(by_dof(np.inf if given is None else given, robot.nv))
+            return read_only(by_dof(getattr(self, field), robot.nv))
 
     def _positions(self, robot: Robot) -> tuple[Array, Array, Array]:
         """Return lower and upper joint positions and their margin, shape (nv,).
@@ -165,7 +169,7 @@ class Limits(Part, error=LimitError):
         Raises:
             LimitError: If the limits do not fit the robot, or leave no room.
         """
-        if isinstance(self.position, PositionRange):
+        if isinstance(self.position, PositionRange | PositionsByJoint):
             lower, upper = self.position.of(robot)
         elif self.position == "robot":
             lower, upper = robot.position_limits()

@@ -1,6 +1,6 @@
-"""Maximum efforts and speeds: the robot's own, a part of them, or numbers."""
+"""Maximum efforts and speeds: the robot's own, changed or scaled, or numbers."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
@@ -8,37 +8,16 @@ from pydantic import BeforeValidator, Field
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LimitError
-from hsp_control.constraints.limits.numbers_by_joint import Positives, by_dof
+from hsp_control.constraints.limits.numbers_by_joint import (
+    Positives,
+    by_dof,
+    of_joints,
+)
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import ArrayField, Positive
 from hsp_control.robot import Robot
 
-
-class Factors(Mapping[str, float]):
-    """Factors by joint name; they never change."""
-
-    def __init__(self, factors: Mapping[str, float]) -> None:
-        """Copy the factors."""
-        self._factors = dict(factors)
-
-    def __getitem__(self, joint: str) -> float:
-        return self._factors[joint]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._factors)
-
-    def __len__(self) -> int:
-        return len(self._factors)
-
-    def __hash__(self) -> int:
-        return hash(frozenset(self._factors.items()))
-
-    def __repr__(self) -> str:
-        return repr(self._factors)
-
-
-def _stored(scale: Any) -> Any:
-    return Factors(scale) if isinstance(scale, Mapping) else scale
+_PositiveOfJoints = Annotated[dict[str, Positive], Field(min_length=1)]
 
 
 class Scaled(Part, error=LimitError):
@@ -46,9 +25,7 @@ class Scaled(Part, error=LimitError):
 
     scale: Annotated[
         float | Mapping[str, float],
-        ArrayField(
-            Positive | Annotated[dict[str, Positive], Field(min_length=1)], _stored
-        ),
+        ArrayField(Positive | _PositiveOfJoints, of_joints),
     ]
     """The factor [-]; 0.5 halves the limit. Or factors by joint name; the other joints
     keep their own limits."""
@@ -72,16 +49,40 @@ class Scaled(Part, error=LimitError):
         return scaled
 
 
+class ByJoint(Part, error=LimitError):
+    """Numbers for some joints; the others keep the robot's own limits."""
+
+    joints: Annotated[Mapping[str, float], ArrayField(_PositiveOfJoints, of_joints)]
+    """Limits by joint name [N·m or N, rad/s or m/s]."""
+
+    def of(self, own: Array, robot: Robot) -> Array:
+        """Return the robot's own limit with these numbers, shape (nv,).
+
+        Raises:
+            JointNotFoundError: If a joint does not exist.
+            LimitError: If no motor moves a joint.
+        """
+        limit = own.copy()
+        for joint, number in self.joints.items():
+            with within("joints", joint):
+                dofs = robot.velocity_index(joint)
+                if dofs.start in robot.unactuated:
+                    raise LimitError(f"no motor moves {joint}")
+                limit[dofs] = number
+        return limit
+
+
 def none_for_nothing(value: Any) -> Any:
     """Return "none" for None: both say that there is no limit."""
     return "none" if value is None else value
 
 
 Maximum: TypeAlias = Annotated[
-    Literal["robot", "none"] | Scaled | Positives | None,
+    Literal["robot", "none"] | Scaled | ByJoint | Positives | None,
     BeforeValidator(none_for_nothing),
 ]
-"""The robot's own limit, none (or None), the robot's own scaled, or numbers."""
+"""The robot's own limit, none (or None), the robot's own scaled, with numbers for some
+joints, or numbers for all."""
 
 
 def maximum(value: Maximum, own: Array, robot: Robot) -> Array:
@@ -96,7 +97,7 @@ def maximum(value: Maximum, own: Array, robot: Robot) -> Array:
         LimitError: If it does not fit the robot.
         JointNotFoundError: If a joint does not exist.
     """
-    if isinstance(value, Scaled):
+    if isinstance(value, Scaled | ByJoint):
         return value.of(_own_limit(own, robot), robot)
     if isinstance(value, str):
         if value == "none":

@@ -1,15 +1,17 @@
-"""Limits in numbers: one number for all degrees of freedom, or one for each."""
+"""Limits in numbers: one for all degrees of freedom, one for each, or by joint name."""
 
-from collections.abc import Sequence
-from typing import Annotated, Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import BeforeValidator, Field
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import LimitError
+from hsp_control.common.exceptions import HspControlError, LimitError
 from hsp_control.declaration.quantities import ArrayField, Number, Positive, plain
+
+T = TypeVar("T")
 
 
 def _without_infinity(value: Any) -> Any:
@@ -51,19 +53,53 @@ Numbers = Annotated[
 """A number, or nv of them in a tuple; ±inf is stored as None: no limit."""
 
 
-def by_dof(numbers: Any, nv: int, none: float = np.inf) -> Array:
+def by_dof(
+    numbers: Any,
+    nv: int,
+    none: float = np.inf,
+    error: type[HspControlError] = LimitError,
+) -> Array:
     """Return numbers as an array of shape (nv,).
 
     Args:
         numbers: One number, or nv numbers.
         nv: The robot's degrees of freedom.
         none: What None stands for.
+        error: What is raised.
 
     Raises:
-        LimitError: If there are neither one nor nv numbers.
+        HspControlError: If there are neither one nor nv numbers.
     """
     array = np.array(numbers, dtype=float)  # None becomes NaN
     array[np.isnan(array)] = none
     if array.ndim and array.shape != (nv,):
-        raise LimitError(f"has {len(array)} numbers; needs one number or {nv}")
+        raise error(f"has {len(array)} numbers; needs one number or {nv}")
     return np.full(nv, array)
+
+
+class OfJoints(Mapping[str, T]):
+    """Values by joint name; they never change."""
+
+    def __init__(self, values: Mapping[str, T]) -> None:
+        """Copy the values."""
+        self._values = dict(values)
+
+    def __getitem__(self, joint: str) -> T:
+        return self._values[joint]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def __hash__(self) -> int:
+        return hash(frozenset(self._values.items()))
+
+    def __repr__(self) -> str:
+        return repr(self._values)
+
+
+def of_joints(value: Any) -> Any:
+    """Return a mapping as one that never changes; other values as they are."""
+    return OfJoints(value) if isinstance(value, Mapping) else value

@@ -500,8 +500,10 @@ def _check(
     returns, and the flags, to ``found``.
     """
     observe(v, held, t)
-    error, disturbance = held.error, held.disturbance
-    flags = violated_limits(q, v, a, tau, where, limits, error, disturbance, bounds)
+    error, drift, disturbance = held.error, held.drift, held.disturbance
+    flags = violated_limits(
+        q, v, a, tau, where, limits, error, drift, disturbance, bounds
+    )
     found[0], found[1] = CODES * code[0] + FLAGS * flags, flags
     return float(found[0])
 

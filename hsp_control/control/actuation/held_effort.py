@@ -14,7 +14,8 @@ _WINDOW = 0.01
 """The acceleration is observed over this time, or over one period if that is longer
 [s]: over 1 ms noise of 0.02 rad/s would be 28 rad/s², over 10 ms it is 3."""
 _MEMORY = 0.1
-"""An error counts less after this time [s]."""
+"""An error counts less after this time; over it the error that persists is averaged
+[s]."""
 
 
 class Held(NamedTuple):
@@ -25,6 +26,7 @@ class Held(NamedTuple):
         expected: The velocity that is expected then, shape (nv,).
         stray: Differences from it, summed over about `_WINDOW`, shape (nv,).
         error: The largest error of late, shape (nv,).
+        drift: The mean error of late, shape (nv,).
         disturbance: Acceleration that something else causes, shape (nv,).
     """
 
@@ -32,6 +34,7 @@ class Held(NamedTuple):
     expected: Array
     stray: Array
     error: Array
+    drift: Array
     disturbance: Array
 
 
@@ -43,10 +46,12 @@ class HeldEffort:
     at the beginning of each period, so that a speed limit is exceeded by the error over
     the barrier's bandwidth, unless the margin grows by as much. The error is
     observed: it is the difference between the speed at the end of a period and what was
-    expected. So it includes whatever else the model lacks.
+    expected. So it includes whatever else the model lacks. A position limit is exceeded
+    by an error only while it lasts: by its mean over the bandwidth's square.
 
     Attributes:
         error: The largest error of late, shape (nv,) [rad/s² or m/s²].
+        drift: The mean error of late, shape (nv,) [rad/s² or m/s²].
         disturbance: Acceleration that something else than the effort is known to cause,
             shape (nv,) [rad/s² or m/s²].
     """
@@ -54,6 +59,7 @@ class HeldEffort:
     def __init__(self, nv: int) -> None:
         """Begin without an error."""
         self.error: Array = np.zeros(nv)
+        self.drift: Array = np.zeros(nv)
         self.disturbance: Array = np.zeros(nv)
         self._expected, self._stray = np.zeros(nv), np.zeros(nv)
         self._timing = np.full(2, np.nan)
@@ -86,9 +92,8 @@ class HeldEffort:
     @property
     def memory_of_kernels(self) -> "Held":
         """What `observe` reads and writes."""
-        return Held(
-            self._timing, self._expected, self._stray, self.error, self.disturbance
-        )
+        observed = self._stray, self.error, self.drift
+        return Held(self._timing, self._expected, *observed, self.disturbance)
 
     def prepare(self, v: Array, a: Array) -> None:
         """Compile what `sent` calls, for these arrays."""
@@ -97,13 +102,13 @@ class HeldEffort:
     def forget(self) -> None:
         """Begin anew."""
         self.error[:] = self.disturbance[:] = 0.0
-        self._stray[:] = 0.0
+        self._stray[:] = self.drift[:] = 0.0
         self._timing[:] = np.nan
 
     @property
     def _memories(self) -> tuple[Array, ...]:
         kept = self._stray, self._expected, self._timing
-        return (self.error, self.disturbance, *kept)
+        return (self.error, self.drift, self.disturbance, *kept)
 
     def memory(self) -> tuple[Array, ...]:
         """Return a copy of what it remembers."""
@@ -136,7 +141,7 @@ def observe(v: Array, held: Held, t: float) -> None:
         held: The memory; updated at the end of a period, once.
         t: Time [s].
     """
-    timing, expected, stray, error, _ = held
+    timing, expected, stray, error, drift, _ = held
     period = timing[1]
     if not abs(t - timing[0]) < 0.01 * period:
         return
@@ -144,7 +149,9 @@ def observe(v: Array, held: Held, t: float) -> None:
     fresh = min(period / _WINDOW, 1.0)
     fading = np.exp(-period / _MEMORY)
     for i in range(v.shape[0]):
-        stray[i] = (1.0 - fresh) * stray[i] + v[i] - expected[i]
+        gained = v[i] - expected[i]
+        drift[i] = fading * drift[i] + (1.0 - fading) * gained / period
+        stray[i] = (1.0 - fresh) * stray[i] + gained
         present = abs(stray[i]) / max(period, _WINDOW)
         error[i] = max(fading * error[i], present)
 

@@ -9,14 +9,7 @@ from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.identity_cache import IdentityCache
 from hsp_control.common.kernels import kernel
 from hsp_control.common.linalg import copy
-from hsp_control.common.native import (
-    FOREVER,
-    NativeCall,
-    Timed,
-    bind,
-    only_if,
-    sequence,
-)
+from hsp_control.common.native import Timed, are_native, bind, only_if, sequence
 from hsp_control.common.step_plan import CallSequence
 from hsp_control.constraints.limits.acceleration_bounds import Bounds
 from hsp_control.control.actuation.deviation_cost import Directions
@@ -325,9 +318,8 @@ class LimitedStep:
 
 def _one_call(*calls: Callable[[], Any]) -> Callable[[], float]:
     """Return one call for several, with the result of the last one."""
-    native = [call for call in calls if isinstance(call, NativeCall)]
-    if len(native) == len(calls):
-        return sequence([Timed(call, *FOREVER) for call in native], 0.0)
+    if are_native(calls):
+        return sequence([*map(Timed, calls)], 0.0)
     return CallSequence(*calls)
 
 

@@ -9,8 +9,7 @@ import numpy as np
 from hsp_control.common.exceptions import CompensationError
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import RobotLimits
-from hsp_control.constraints.limits.numbers_by_joint import Positives
-from hsp_control.control.compensation.checks import per_dof
+from hsp_control.constraints.limits.numbers_by_joint import Positives, by_dof
 from hsp_control.control.compensation.force_feedback import ForceFeedback
 from hsp_control.control.compensation.friction_feed_forward import FrictionFeedForward
 from hsp_control.control.compensation.integral_action import IntegralAction
@@ -94,7 +93,7 @@ class Compensation(Part, error=CompensationError):
                 self.integral_action.check(tasks)
         if self.effort_rate is not None:
             with within("effort_rate"):
-                per_dof(robot, self.effort_rate)
+                by_dof(self.effort_rate, robot.nv, error=CompensationError)
                 if limits is not None and np.isfinite(limits.effort_rate).any():
                     raise CompensationError(
                         "limits.effort_rate keeps the rate already, and deviates in "

@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.control.compensation.checks import per_dof
+from hsp_control.common.exceptions import CompensationError
+from hsp_control.constraints.limits.numbers_by_joint import by_dof
 from hsp_control.robot import Robot
 
 
@@ -26,7 +27,7 @@ class EffortRateClip:
         Raises:
             CompensationError: If there are neither one nor nv numbers.
         """
-        self._rate = per_dof(robot, rate)
+        self._rate = by_dof(rate, robot.nv, error=CompensationError)
         self._last: Array | None = None
 
     def apply(self, tau: Array, period: float) -> bool:

@@ -15,8 +15,8 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError
-from hsp_control.constraints.limits.numbers_by_joint import Positives
-from hsp_control.control.compensation.checks import check_fixed_base, per_dof
+from hsp_control.constraints.limits.numbers_by_joint import Positives, by_dof
+from hsp_control.control.compensation.checks import check_fixed_base
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import Flag, Positive
 from hsp_control.robot import Robot, RobotState
@@ -75,7 +75,7 @@ class MomentumObserver(Part, error=CompensationError):
         if not self.cancel:
             return np.zeros(robot.nv)
         with within("clip"):
-            return per_dof(robot, self.clip)
+            return by_dof(self.clip, robot.nv, error=CompensationError)
 
 
 class RunningObserver:

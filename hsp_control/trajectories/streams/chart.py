@@ -46,11 +46,6 @@ class State:
         self.x, self.rate, self.acceleration = x, rate, acceleration
         self.base = base
 
-    @property
-    def resting(self) -> bool:
-        """Whether it does not move."""
-        return not (self.rate.any() or self.acceleration.any())
-
 
 class Chart:
     """Converts values of a stream to local coordinates about a base, and back."""

@@ -9,13 +9,8 @@ _HANDLE, _GAP, _LETTER = 2.2, 1.3, 0.55
 """Widths in a legend over its font size: handle, gap of columns, mean letter."""
 
 
-def legend_below(axes: Axes, columns: int | None = None) -> None:
-    """Add a legend of all labelled artists below the axes.
-
-    Args:
-        axes: The axes; without labelled artists no legend is added.
-        columns: Number of columns; None: as many as fit.
-    """
+def legend_below(axes: Axes) -> None:
+    """Add a legend of all labelled artists, if there are any, below the axes."""
     handles, labels = axes.get_legend_handles_labels()
     if not handles:
         return
@@ -30,7 +25,7 @@ def legend_below(axes: Axes, columns: int | None = None) -> None:
         loc="upper left",
         bbox_to_anchor=(0.0, 0.0),
         bbox_transform=axes.transAxes + below,
-        ncols=_fitting(axes, labels) if columns is None else columns,
+        ncols=_fitting(axes, labels),
     )
 
 

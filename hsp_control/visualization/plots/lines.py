@@ -72,17 +72,15 @@ def time_axis(axes: Axes, t: Array) -> None:
         axes.set_xlim(float(t[0]), float(t[-1]))
 
 
-def log_scale(
-    axes: Axes, values: Array, *, floor: float = 1e-17, top: float = 0.0
-) -> None:
+def log_scale(axes: Axes, values: Array, *, top: float = 0.0) -> None:
     """Make the y axis logarithmic, with limits around the positive finite values.
 
     Args:
         axes: The axes.
         values: The drawn values.
-        floor: Values up to it are rounding errors and do not extend the axis.
         top: Minimum upper end of the axis, so that rounding errors do not fill it.
     """
+    floor = 1e-17  # values up to it are rounding errors and do not extend the axis
     shown = values[np.isfinite(values) & (values > floor)]
     highest = max(float(shown.max(initial=floor)), top)
     # A norm that crosses zero has dips at single rows; the axis ignores them.

@@ -21,7 +21,6 @@ def draw_skeleton(
     *,
     link: str = palette.LINK,
     joint: str = palette.JOINT,
-    width: float = 3.0,
     zorder: float = 3.0,
 ) -> None:
     """Draw a robot: links from every point to its parent; joints, roots and ends.
@@ -35,9 +34,9 @@ def draw_skeleton(
         parents: Index of every point's parent, -1 for none.
         link: Colour of the links.
         joint: Colour of joints and roots, and of the edge of ends.
-        width: Width of the links [pt].
         zorder: Drawing order: higher is in front.
     """
+    width = 3.0  # of the links [pt]
     axes.plot(
         *view.project(link_segments(points, parents)),
         color=link,

@@ -76,7 +76,6 @@ def set_trail(
     radius: float,
     color: int,
     *,
-    opacity: float = 1.0,
     sleeve: bool = False,
 ) -> Command:
     """Return the command that sets a node's object to a path in space, a tube.
@@ -86,7 +85,6 @@ def set_trail(
         points: The path [m], shape (N, 3).
         radius: The tube's radius [m].
         color: Its colour as a number, see `color_number`; the same in any light.
-        opacity: 1 solid, 0 invisible.
         sleeve: Draw only the back faces, so that it never hides its content.
     """
     return _command(
@@ -96,7 +94,6 @@ def set_trail(
         points=typed_array(points, np.float32),
         radius=float(radius),
         color=color,
-        opacity=float(opacity),
         sleeve=sleeve,
     )
 

@@ -37,18 +37,13 @@ def always_visible(surface: Json) -> Json:
     return surface | {"transparent": True, "depthTest": False, "depthWrite": False}
 
 
-def unlit_material(color: str, *, inside: bool = False) -> Json:
-    """Return a material that has the same colour in any light.
-
-    Args:
-        color: ``#RRGGBB``.
-        inside: Draw only the back faces: a sleeve that never hides its content.
-    """
+def unlit_material(color: str) -> Json:
+    """Return a material that has the same colour, ``#RRGGBB``, in any light."""
     return {
         "uuid": unique_name(),
         "type": "MeshBasicMaterial",
         "color": color_number(color),
-        "side": 1 if inside else 0,
+        "side": 0,
     }
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 from hsp_control.common.exceptions import AccessError, HspControlError, ViewerError
 from hsp_control.config.document import Document
 from hsp_control.config.experiment import build
+from hsp_control.config.loaded_scenario import load_robot
 from hsp_control.config.scenario import Scenario
-from hsp_control.config.setup import load_robot
 from hsp_control.config.validation import validate
 from hsp_control.robot import Robot
 from hsp_control.robot.description.access import ANYWHERE, Access, only_within

@@ -7,8 +7,9 @@ import numpy as np
 from hsp_control.common.arrays import Indices
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
-from hsp_control.simulation.recorder import Recorder, continuous_dofs
+from hsp_control.simulation.recorder import Recorder
 from hsp_control.simulation.rollout import complete_columns
+from hsp_control.simulation.run_meta import continuous_dofs
 from hsp_control.visualization.viewer.commands import Command, Json, set_plots
 from hsp_control.visualization.viewer.comparison import ComparedRun
 from hsp_control.visualization.viewer.packed.packing import ArrayTable

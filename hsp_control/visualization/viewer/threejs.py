@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.arrays import Array
 from hsp_control.visualization.viewer.commands import Json, typed_array
 
 _serial = count(1)
@@ -122,16 +122,12 @@ def group(things: Sequence[Json]) -> Json:
     }
 
 
-def buffer_geometry(
-    attributes: dict[str, Array], triangles: Indices | None = None, segment: int = 0
-) -> Json:
+def buffer_geometry(attributes: dict[str, Array]) -> Json:
     """Return a geometry of explicit vertices.
 
     Args:
         attributes: ``position``, and optionally ``normal`` and ``color``; one row per
             vertex.
-        triangles: Indices of vertices, shape (k, 3); None for lines.
-        segment: Number of indices of one segment of a tube, for tracks of ``length``.
     """
     packed = {
         name: {
@@ -142,15 +138,7 @@ def buffer_geometry(
         }
         for name, rows in attributes.items()
     }
-    data: Json = {"attributes": packed}
-    if triangles is not None:
-        data["index"] = {
-            "itemSize": 1,
-            "type": "Uint32Array",
-            "array": typed_array(triangles, np.uint32),
-            "normalized": False,
-        }
-    return _geometry("BufferGeometry", data=data, userData={"segment": segment})
+    return _geometry("BufferGeometry", data={"attributes": packed})
 
 
 def segments(points: Array, colors: Array) -> Json:

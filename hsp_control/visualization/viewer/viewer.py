@@ -3,7 +3,6 @@
 import logging
 from collections.abc import Mapping, Sequence
 from html import escape
-from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
@@ -275,12 +274,7 @@ class Viewer:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _repr_html_(self) -> str:

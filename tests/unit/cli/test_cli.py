@@ -66,6 +66,7 @@ def test_check_tells_a_program_what_a_configuration_is(
     assert told["null_space"]["degrees_of_freedom"] == 1
     assert len(told["singular_values"]) == 2
     assert told["advice"] == []
+    assert told["limits"] == "none"
 
 
 def test_a_log_is_not_replaced_by_its_repetition(
@@ -152,6 +153,26 @@ def test_check_warns_of_a_singular_start(capsys: pytest.CaptureFixture[str]) -> 
     stretched = ["--set", "start.coordinates=[0, 0, 0]"]
     assert main(["check", MOVING, *stretched]) == 0
     assert "singular at the start" in capsys.readouterr().out
+
+
+def test_check_warns_of_motors_that_cannot_hold_the_robot(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """At the start of this run gravity asks 23 N·m of joint 2."""
+    assert main(["check", "panda_obstacle"]) == 0
+    assert "none binds at the start" in capsys.readouterr().out
+    weak = ["--set", "limits={effort: {joints: {panda_joint2: 20}}}"]
+    assert main(["check", "panda_obstacle", *weak]) == 0
+    text = capsys.readouterr().out
+    assert "bind at the start: the law is not exact there" in text
+    (line,) = [line for line in text.splitlines() if "cannot hold" in line]
+    assert line == (
+        "At the start joint 'panda_joint2' cannot hold the robot: gravity asks 23.2 "
+        "N·m of it, its limit is 20."
+    )
+    assert main(["check", "panda_obstacle", *weak, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["limits"], told["advice"]) == ("limited", [line])
 
 
 @pytest.mark.slow

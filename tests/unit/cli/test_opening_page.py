@@ -8,7 +8,7 @@ import pytest
 from hsp_control.cli.opening_page import OpeningPage, draw_before
 from hsp_control.common import adapters, kernels
 from hsp_control.common.exceptions import SimulationError, ViewerError
-from hsp_control.config.setup import set_up
+from hsp_control.config.loaded_scenario import load_scenario
 from hsp_control.config.source import read_document
 from hsp_control.visualization.viewer import Recorder, Viewer, browser
 from hsp_control.visualization.viewer.commands import unpack
@@ -117,15 +117,15 @@ def test_the_robot_is_drawn_at_its_start_before_any_kernel_is_compiled(
     monkeypatch.setattr(adapters, "adapter", compile_none)
     document = read_document("panda_obstacle")
     document.override("start={joints: {panda_joint4: -1.0}}")
-    setup = set_up(document)
+    loaded = load_scenario(document)
     recorder = Recorder()
-    viewer = Viewer(setup.robot, transport=recorder)
-    draw_before(viewer, setup)
+    viewer = Viewer(loaded.robot, transport=recorder)
+    draw_before(viewer, loaded)
     captions = [unpack(packed)["title"] for _, kind, packed in recorder.scene.items()
                 if kind == "caption"]  # fmt: skip
-    assert captions == [setup.scenario.title]
+    assert captions == [loaded.scenario.title]
     drawn = transforms(recorder)
-    viewer.show(setup.robot.home())
+    viewer.show(loaded.robot.home())
     home = transforms(recorder)
     moved = {path for path in drawn if drawn[path] != home[path]}
     assert "/robot/panda_joint5" in moved

@@ -21,9 +21,11 @@ from hsp_control.common.exceptions import (
     SceneError,
 )
 from hsp_control.constraints.limits import (
+    ByJoint,
     MinimumDistance,
     ObstacleDistance,
     PositionRange,
+    PositionsByJoint,
     RobotLimits,
     Scaled,
     SelfDistance,
@@ -147,6 +149,29 @@ def test_a_part_of_the_robots_own() -> None:
     assert np.isinf(of(talos(), effort=Scaled(0.5)).effort[:6]).all()
 
 
+def test_numbers_for_some_joints() -> None:
+    """Also for those that have no limit of their own."""
+    own = of(panda()).effort
+    some = ByJoint({"panda_joint3": 200.0, "panda_joint1": 5})
+    expected = [5.0, own[1], 200.0, *own[3:]]
+    np.testing.assert_array_equal(of(panda(), effort=some).effort, expected)
+    continuous = Robot.load("bravo7_no_ee")
+    assert np.isinf(of(continuous).velocity[[0, 3, 5]]).all()
+    limits = of(continuous, velocity=ByJoint({"joint4": 1.5}))
+    np.testing.assert_array_equal(limits.velocity, [np.inf, 0.5, 0.5, 1.5, 0.5, np.inf])
+
+
+def test_positions_of_some_joints() -> None:
+    own = of(panda())
+    limits = of(panda(), position=PositionsByJoint({"panda_joint4": (-2.5, -0.5)}))
+    lower, upper = own.lower.copy(), own.upper.copy()
+    lower[3], upper[3] = -2.5, -0.5
+    np.testing.assert_array_equal(limits.lower, lower)
+    np.testing.assert_array_equal(limits.upper, upper)
+    assert limits.guarded_upper[3] == -0.505
+    np.testing.assert_array_equal(of(panda()).lower, own.lower)  # the robot's stay
+
+
 def test_a_range_without_limits_for_a_root() -> None:
     nv = talos().nv
     lower, upper = np.full((2, nv), -np.inf)
@@ -172,9 +197,8 @@ def test_kernels_take_them() -> None:
     a_lower, a_upper = np.zeros((2, 7))
     q, v = robot.home(), np.full(7, 0.1)
     motion = of(robot, acceleration=3.0).motion
-    acceleration_bounds(
-        q, v, robot.dof_indices, motion, np.zeros(robot.nv), a_lower, a_upper
-    )
+    none = np.zeros(7)
+    acceleration_bounds(q, v, robot.dof_indices, motion, none, none, a_lower, a_upper)
     assert (a_upper == 3.0).all()
     assert (a_lower >= -3.0).all()
 
@@ -189,6 +213,20 @@ def test_kernels_take_them() -> None:
             JointNotFoundError,
             ("effort", "scale", "panda_joint9"),
             "did you mean 'panda_joint",
+        ),
+        (
+            panda,
+            {"velocity": ByJoint({"panda_joint9": 0.5})},
+            JointNotFoundError,
+            ("velocity", "joints", "panda_joint9"),
+            "did you mean 'panda_joint",
+        ),
+        (
+            talos,
+            {"effort": ByJoint({"root_joint": 9.0})},
+            LimitError,
+            ("effort", "joints", "root_joint"),
+            "no motor moves root_joint",
         ),
         (
             talos,
@@ -226,6 +264,13 @@ def test_kernels_take_them() -> None:
             LimitError,
             ("position", "upper"),
             "has 2 numbers",
+        ),
+        (
+            talos,
+            {"position": PositionsByJoint({"root_joint": (-1.0, 1.0)})},
+            LimitError,
+            ("position", "joints", "root_joint"),
+            "without a single coordinate .* it has no limits",
         ),
         (
             talos,

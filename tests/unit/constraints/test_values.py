@@ -25,10 +25,12 @@ from hsp_control.constraints.contacts import (
     SurfaceContact,
 )
 from hsp_control.constraints.limits import (
+    ByJoint,
     Limits,
     MinimumDistance,
     ObstacleDistance,
     PositionRange,
+    PositionsByJoint,
     Scaled,
     SelfDistance,
 )
@@ -56,11 +58,13 @@ BALL = Obstacle("ball", Sphere(0.1), Hold([0.4, 0.0, 0.5]))
 
 EXAMPLES: dict[type[Part], Part] = {
     BallContact: BallContact("foot", radius=0.02),
+    ByJoint: ByJoint({"joint": 20.0}),
     CommandedForce: CommandedForce(20.0),
     Limits: Limits(),
     ObstacleDistance: ObstacleDistance(),
     PointContact: PointContact("foot"),
     PositionRange: PositionRange([-1.0, None], [1.0, 2.0]),
+    PositionsByJoint: PositionsByJoint({"joint": (-1.0, 2.0)}),
     Scaled: Scaled(0.5),
     SelfDistance: SelfDistance(),
     SlidingContact: SlidingContact("foot", force=CommandedForce(20.0)),
@@ -77,17 +81,25 @@ _CONTACT: dict[str, Any] = {
     "force": CommandedForce(5.0),
     "name": "left",
 }
-_MAXIMUM = ["none", Scaled(0.5), Scaled({"b": 0.5, "a": 2}), 9, np.ones(7)]
+_MAXIMUM = [
+    *("none", Scaled(0.5), Scaled({"b": 0.5, "a": 2}), ByJoint({"b": 5, "a": 2})),
+    *(9, np.ones(7)),
+]
 _NUMBERS = [1000.0, [1, 2.5], [3.0, None], np.array([1.0, np.inf])]
 OTHERS: dict[type[Part], dict[str, Any]] = {
     BallContact: {**_CONTACT, "radius": 0.03},
+    ByJoint: {"joints": [{"joint": 3}, {"b": 2.0, "a": 1}]},
     CommandedForce: {"value": [3, [1, 0, 5.0], np.array([0, 0, 9, 0, 0, 1.0])]},
     Limits: {
         "effort": _MAXIMUM,
         "effort_rate": _NUMBERS,
         "velocity": _MAXIMUM,
         "acceleration": _NUMBERS,
-        "position": ["none", PositionRange(-1.0, [1.0, None])],
+        "position": [
+            "none",
+            PositionRange(-1.0, [1.0, None]),
+            PositionsByJoint({"joint": [-1, 2]}),
+        ],
         "position_margin": 0.0,
         "velocity_margin": 0,
         "distances": [[SelfDistance()], (ObstacleDistance(0.1), SelfDistance(0.0))],
@@ -106,6 +118,7 @@ OTHERS: dict[type[Part], dict[str, Any]] = {
         "lower": [-2.0, [-2.0, None], (-np.inf, -3.0)],
         "upper": [9.0, np.array([1.5, np.inf])],
     },
+    PositionsByJoint: {"joints": [{"joint": [-2, 2.0]}, {"a": (0, 1), "b": (0, 1)}]},
     Scaled: {"scale": [2, {"joint": 0.5}]},
     SelfDistance: {"minimum": 0.1},
     SlidingContact: {
@@ -257,7 +270,7 @@ def test_none_is_no_limit() -> None:
 def test_limits_as_yaml_says_them() -> None:
     data: dict[str, Any] = {
         "effort": {"scale": {"a": 0.5}},
-        "velocity": "none",
+        "velocity": {"joints": {"a": 2}},
         "effort_rate": 1000,
         "acceleration": [1, None],
         "position": {"lower": [-1, None], "upper": [1, 2]},
@@ -266,7 +279,7 @@ def test_limits_as_yaml_says_them() -> None:
     }
     assert Limits(**data) == Limits(
         effort=Scaled({"a": 0.5}),
-        velocity=None,
+        velocity=ByJoint({"a": 2.0}),
         effort_rate=1000.0,
         acceleration=[1.0, np.inf],
         position=PositionRange([-1.0, -np.inf], [1.0, 2.0]),
@@ -296,7 +309,7 @@ _WRONG_MAXIMUM: list[tuple[Any, str]] = [
     ([], "needs at least 1"),
     ([[1.0]], "expected a number"),
     (np.nan, "not a finite number"),
-    ({"factor": 1}, "unknown key 'factor'"),
+    ({"factor": 1}, r"unknown key 'factor' \(allowed: scale, joints\)"),
 ]
 _WRONG_NUMBERS: list[tuple[Any, str]] = [
     ("robot", "'robot' is text; expected a number or a list of numbers"),
@@ -326,6 +339,8 @@ WRONG: dict[type[Part], dict[str, list[tuple[Any, str]]]] = {
             ((0.0, 1.0), "expected 'robot', 'none' or a mapping"),
             ({"lower": 1.0}, "missing key 'upper'"),
             ({"lower": 1.0, "upper": 0.0}, "lower must be below upper"),
+            ({"joint": [0, 1]}, r"unknown key 'joint'; did you mean 'joints'\?"),
+            ({"least": 0}, r"'least' \(allowed: lower, upper, joints\)"),
         ],
         "position_margin": [(-0.1, "must be at least 0")],
         "velocity_margin": [(1.0, "must be less than 1"), (-0.1, "at least 0")],
@@ -356,6 +371,21 @@ WRONG: dict[type[Part], dict[str, list[tuple[Any, str]]]] = {
             ([0.0, 2.0], "lower must be below upper"),
         ],
         "upper": [(np.nan, "not a finite number"), (-1.0, "lower must be below")],
+    },
+    ByJoint: {
+        "joints": [
+            ({}, "at least 1"),
+            ({"a": 0.0}, "a: 0.0 is too small; must be greater than 0"),
+            (20.0, "expected a mapping"),
+        ]
+    },
+    PositionsByJoint: {
+        "joints": [
+            ({}, "at least 1"),
+            ({"a": [1.0, 0.0]}, "joints.a: lower must be below upper; got 1.0, 0.0"),
+            ({"a": [1.0]}, "a: .* has 1 entry, needs 2"),
+            ({"a": [1.0, None]}, "a.1: nothing given; expected a number"),
+        ]
     },
     Scaled: {
         "scale": [

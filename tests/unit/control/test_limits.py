@@ -32,6 +32,7 @@ from hsp_control.control.actuation.held_effort import HeldEffort
 from hsp_control.geometry import Scene
 from hsp_control.geometry.start import Start
 from hsp_control.robot.integrators import Rk4
+from hsp_control.simulation.plants import Push, RigidBodyPlant
 from hsp_control.trajectories import Lissajous
 
 Array = NDArray[np.float64]
@@ -63,11 +64,12 @@ def at_home(robot: Robot, *scene: Obstacle) -> Start:
 
 
 def bounds(
-    limits: RobotLimits, q: Array, v: Array, error: float = 0.0
+    limits: RobotLimits, q: Array, v: Array, error: float = 0.0, drift: float = 0.0
 ) -> tuple[Array, Array]:
     a_lower, a_upper = np.zeros(7), np.zeros(7)
-    where, errors = limits.robot.dof_indices, np.full(7, error)
-    acceleration_bounds(q, v, where, limits.motion, errors, a_lower, a_upper)
+    observed = np.full(7, error), np.full(7, drift)
+    where = limits.robot.dof_indices
+    acceleration_bounds(q, v, where, limits.motion, *observed, a_lower, a_upper)
     return a_lower, a_upper
 
 
@@ -95,6 +97,35 @@ def test_position_bounds_are_the_barriers_of_both_limits(seed: int) -> None:
     for a, h, side in ((a_lower, q - lower, 1.0), (a_upper, upper - q, -1.0)):
         barrier = side * a + 16.0 * side * v + 64.0 * h
         np.testing.assert_allclose(barrier, 0.0, rtol=0, atol=1e-11)
+
+
+@given(seeds, st.floats(-9.0, 9.0))
+def test_the_drift_is_made_up_for_where_it_leads_beyond_a_limit(
+    seed: int, drift: float
+) -> None:
+    """The acceleration with the drift keeps the barrier; no bound is ever wider."""
+    robot, rng = panda(), np.random.default_rng(seed)
+    limits = of(robot, velocity=None)
+    lower, upper = robot.position_limits()
+    q, v = rng.uniform(lower, upper), rng.normal(0.0, 1.0, 7)
+    plain, (a_lower, a_upper) = bounds(limits, q, v), bounds(limits, q, v, 0.0, drift)
+    up, down = max(drift, 0.0), min(drift, 0.0)
+    np.testing.assert_allclose(a_upper + up, plain[1], rtol=0, atol=1e-11)
+    np.testing.assert_allclose(a_lower + down, plain[0], rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("drift", [-1e4, 1e4])
+def test_a_drift_moves_a_limit_by_a_tenth_of_the_range_at_most(drift: float) -> None:
+    limits = of(panda(), velocity=None, bandwidth=8.0)
+    q, v = panda().home(), np.zeros(7)
+    plain, drifting = bounds(limits, q, v), bounds(limits, q, v, 0.0, drift)
+    span = limits.guarded_upper - limits.guarded_lower
+    moved = [(new - old) / 64.0 for new, old in zip(drifting, plain, strict=True)]
+    np.testing.assert_allclose(
+        moved[0 if drift < 0.0 else 1], -np.sign(drift) * span / 10.0
+    )
+    assert not moved[1 if drift < 0.0 else 0].any()
+    assert (drifting[0] < drifting[1]).all()
 
 
 def test_too_fast_is_slowed_down_more_steeply() -> None:
@@ -278,6 +309,34 @@ def test_speed_limits_are_kept_at_any_period(seed: int, period: float) -> None:
     assert used.max() > 0.9
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("period", [0.001, 0.01])
+def test_a_load_that_the_model_lacks_drives_no_joint_beyond_its_limit(
+    period: float,
+) -> None:
+    """It hangs at a joint that moves to its limit: 27 mrad beyond it, and 15 at rest,
+    where the bounds know the model alone. At rest it is where the margin begins."""
+    robot = panda()
+    _, upper = robot.position_limits()
+    beyond, q0 = robot.home(), robot.home()
+    beyond[1], q0[1] = upper[1] + 0.2, upper[1] - 0.5
+    beyond[3] = q0[3] = -0.5
+    task = JointPosture(beyond, gains=Gains(natural_frequency=6.0), name="beyond")
+    load = Push("panda_tcp", (0.0, 0.0, -30.0), duration=10.0)
+    rollout = simulate(
+        Controller(robot, [task]),
+        q0,
+        duration=2.5,
+        control_period=period,
+        log_period=period,
+        integrator=Rk4(1e-3),
+        plant=RigidBodyPlant(robot, [load]),
+    )
+    joint = rollout["q"][:, 1]
+    assert joint.max() < upper[1]
+    assert joint[-1] == pytest.approx(upper[1] - 0.005, abs=1e-5)
+
+
 def test_the_error_of_the_acceleration_is_what_is_observed() -> None:
     held, v, a = HeldEffort(2), np.array([0.1, 0.2]), np.array([1.0, -1.0])
     for k in range(100):
@@ -286,13 +345,18 @@ def test_the_error_of_the_acceleration_is_what_is_observed() -> None:
         held.observe(0.001 * k + 0.0005, 9.0 * v)  # not the end of the period
         held.observe(0.001 * (k + 1), v)
     np.testing.assert_allclose(held.error, [3.0, 0.0], rtol=1e-3, atol=1e-9)
+    # The mean over 0.1 s, of an error that has lasted as long.
+    mean = [3.0 * (1.0 - np.exp(-1.0)), 0.0]
+    np.testing.assert_allclose(held.drift, mean, rtol=1e-9, atol=1e-9)
     held.sent(0.1, v, a, 0.02)  # a longer period counts alone
     held.observe(0.12, v + 0.02 * (a - 8.0))
     np.testing.assert_allclose(held.error, [8.0, 8.0], rtol=1e-9)
-    memory = held.memory()
+    memory, drift = held.memory(), held.drift.copy()
     held.forget()
     assert not held.error.any()
+    assert not held.drift.any()
     held.remember(memory)
+    np.testing.assert_array_equal(held.drift, drift)
     np.testing.assert_allclose(held.error, [8.0, 8.0], rtol=1e-9)
 
 

@@ -7,8 +7,11 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+import pinocchio as pin
 import pytest
 import umsgpack
+from numpy.typing import NDArray
 from odd_robots import FACES, OCTAHEDRON, write_stl
 from robot_texts import ARM, INERTIA, joint, link, robot_xml
 
@@ -143,6 +146,27 @@ def test_home_that_is_singular_comes_with_a_start(look: Look) -> None:
     (found,) = look(straight.replace("</robot>", tool + "</robot>"))["home"]
     assert "singular for 'tool' (smallest singular value 0)" in found.message
     assert found.cure.startswith("start: {joints: [")
+
+
+def test_motors_that_cannot_hold_the_robot_at_home(look: Look, tmp_path: Path) -> None:
+    """What gravity asks is the slope of the potential energy."""
+    assert "effort" not in look(ARM)
+    robot = Robot.load(tmp_path / "arm.urdf")
+    model, home = robot.model, robot.home()
+
+    def energy(q: NDArray[np.float64]) -> float:
+        return float(pin.computePotentialEnergy(model, model.createData(), q))
+
+    turns = 1e-4 * np.eye(2)
+    slope = [abs(energy(home + turn) - energy(home - turn)) / 2e-4 for turn in turns]
+    assert min(slope) < 0.9 * max(slope)  # the limit between them is one joint's
+    limit = 0.5 * (min(slope) + max(slope))
+    weak = ARM.replace('effort="9"', f'effort="{limit}"')
+    (found,) = look(weak)["effort"]
+    assert found.element == f"joint {robot.dof_names[int(np.argmax(slope))]!r}"
+    asked = f"gravity asks {max(slope):.3g} N·m of it, its limit is {limit:.3g}"
+    assert found.message == f"at home {asked}"
+    assert "effort" not in look(ARM.replace('effort="9"', 'effort="0"'))  # none is kept
 
 
 def test_a_robot_that_does_not_load_is_an_error(look: Look) -> None:

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from law_numbers import Numbers, numbers, orthogonal, resolve
 from numpy.typing import NDArray
 
+from hsp_control.law import Resolution, singular_values
 from hsp_control.null_space.metrics import CoordinatesMetric, MetricSample
 from hsp_control.null_space.metrics.metric import CONSTANT, IDENTITY, VARYING
 
@@ -145,6 +146,31 @@ def test_constant_metric_is_the_papers_law_in_other_coordinates(
     np.testing.assert_allclose(e_N, A_inverse @ e_theta, rtol=1e-11, atol=1e-11)
     # It is another law than that of W = I.
     assert np.abs(a - resolve(x, IDENTITY)[0]).max() > 1e-6
+
+
+@forms
+@given(seeds, st.integers(1, 10), st.integers(1, 10))
+def test_singular_values_of_stacks_of_any_shape(
+    form: int, seed: int, m: int, rank: int
+) -> None:
+    """Also with more rows than joints, and of any rank."""
+    x, rng = numbers(seed, 6, 7, form), np.random.default_rng(seed)
+    J = rng.standard_normal((m, rank)) @ rng.standard_normal((rank, 7))
+    resolution = Resolution([m], 7, form, x.K_N, 0.01)
+    resolution.problem.task.jacobian[:] = J
+    resolution.problem.metric.W[:] = x.W
+    resolution.problem.metric.L[:] = np.linalg.cholesky(x.W)
+    resolution.null_space_error[:] = x.g
+    length, determinant, triangle = resolution.diagnose()
+    expected = np.linalg.svd(J @ np.linalg.inv(np.linalg.cholesky(x.W)).T)[1]
+    np.testing.assert_allclose(
+        singular_values(triangle), expected, rtol=0, atol=1e-13 * expected[0]
+    )
+    # Each singular value has an error of a few roundings of the largest one.
+    error = 1e-14 * expected[0]
+    most, least = np.prod((expected + error) ** 2), np.prod((expected - error) ** 2)
+    assert (least if expected[-1] > error else 0.0) <= determinant <= most
+    np.testing.assert_allclose(length, np.sqrt(x.g @ x.W @ x.g), rtol=1e-13)
 
 
 @given(seeds, rows)

@@ -27,9 +27,7 @@ def weld(
     return vertices[first], triangles[(a != b) & (b != c) & (c != a)]
 
 
-def split_creases(
-    vertices: Array, triangles: Indices, crease: float = CREASE
-) -> tuple[Array, Indices]:
+def split_creases(vertices: Array, triangles: Indices) -> tuple[Array, Indices]:
     """Duplicate the vertices of creases, so that each side has its own.
 
     Normals that the page computes from the triangles are then smooth across all
@@ -52,7 +50,7 @@ def split_creases(
     shared = np.flatnonzero((edges[1:] == edges[:-1]).all(axis=1))
     here, there = ends[shared], ends[shared + 1]
     cosine = np.sum(normals[here[:, 0] // 3] * normals[there[:, 0] // 3], axis=1)
-    smooth = cosine > np.cos(crease)
+    smooth = cosine > np.cos(CREASE)
     a, b = here[smooth].ravel(), there[smooth].ravel()
     joined = scipy.sparse.coo_array(
         (np.ones(len(a), bool), (a, b)), shape=(corners.size, corners.size)

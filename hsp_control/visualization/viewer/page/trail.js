@@ -58,11 +58,9 @@ function trailGeometry(points, radius, sides = 8) {
 
 // A trail in one colour, the same in any light. Of a sleeve only the back faces are drawn,
 // so that it never hides its content.
-function trailMesh({points, radius, color, opacity, sleeve}) {
+function trailMesh({points, radius, color, sleeve}) {
   const {Mesh, MeshBasicMaterial, BackSide, FrontSide} = MeshCat.THREE;
-  const material = new MeshBasicMaterial({
-    color, opacity, transparent: opacity < 1, side: sleeve ? BackSide : FrontSide,
-  });
+  const material = new MeshBasicMaterial({color, side: sleeve ? BackSide : FrontSide});
   const mesh = new Mesh(trailGeometry(points, radius), material);
   mesh.userData = {radius};
   mesh.frustumCulled = false;  // it grows

@@ -1,4 +1,4 @@
-"""A configuration's robot and scene: what can be shown before anything is compiled."""
+"""A checked configuration with its robot and scene: nothing is compiled for it."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -14,15 +14,17 @@ from hsp_control.geometry.scene import Scene
 from hsp_control.robot import Robot
 
 
-class Setup(NamedTuple):
-    """What a configuration is about, before anything is compiled for it.
+class LoadedScenario(NamedTuple):
+    """A checked configuration, with its robot and its scene.
 
     Attributes:
-        scenario: The checked configuration.
+        document: The configuration as it was read; it locates errors.
+        scenario: The configuration, checked.
         robot: The robot.
         scene: Its obstacles.
     """
 
+    document: Document
     scenario: Scenario
     robot: Robot
     scene: Scene
@@ -31,7 +33,7 @@ class Setup(NamedTuple):
         """Return the start configuration, shape (nq,); home where it has to be found.
 
         Raises:
-            HspControlError: If it is wrong; `build` says where.
+            HspControlError: If it is wrong; `Experiment.of` says where.
         """
         start, contacts = self.scenario.start, self.scenario.contacts.values()
         if start.is_found:
@@ -39,7 +41,7 @@ class Setup(NamedTuple):
         return start.configuration_of(self.robot, contacts)
 
 
-def set_up(document: Document) -> Setup:
+def load_scenario(document: Document) -> LoadedScenario:
     """Check a configuration, and load its robot and its scene: it compiles no kernel.
 
     Raises:
@@ -58,7 +60,7 @@ def set_up(document: Document) -> Setup:
             robot.frame_id(contact.frame)
     with document.at():
         scene = located_scene(scenario.scene, folder, document.access)
-    return Setup(replace(scenario, scene=scene), robot, scene)
+    return LoadedScenario(document, replace(scenario, scene=scene), robot, scene)
 
 
 def load_robot(document: Document, scenario: Scenario) -> Robot:
