@@ -159,6 +159,14 @@ class Document:
             value = value[part]
         return True
 
+    def says_nothing(self, key: str) -> bool:
+        """Return whether the text has the key with nothing behind it.
+
+        Logs and dictionaries can have None there, as Python has.
+        """
+        given = self._data.get(key, self) is None
+        return given and isinstance(self._origins.get((key,)), Mark)
+
     def mark(self, path: KeyPath) -> Mark | None:
         """Return the place of a key path in the text, None if it was overridden.
 

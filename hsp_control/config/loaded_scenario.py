@@ -47,6 +47,12 @@ def load_scenario(document: Document) -> LoadedScenario:
     Raises:
         HspControlError: If the configuration is wrong; see `load_experiment`.
     """
+    if document.says_nothing("limits"):
+        raise document.error(
+            ("limits",),
+            "nothing given; write none for no limits, or remove the key to keep the "
+            "robot's own",
+        )
     scenario = validate(document, Scenario)
     if not scenario.tasks and scenario.plan is None:
         raise document.error(("tasks",), "needs at least one task, or a plan")

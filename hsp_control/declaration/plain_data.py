@@ -57,6 +57,9 @@ def _of_part(part: "Part", defaults: bool) -> dict[str, Any]:
         field = schema.fields(type(part)).get(name)
         if isinstance(value, tuple) and field is not None:
             value = _keyed(value, field, defaults)
+        if value is None and field is not None:
+            words = (getattr(each, "none", None) for each in field.metadata)
+            value = next(filter(None, words), None)
         data[name] = _inside(name, value, defaults)
     return data
 

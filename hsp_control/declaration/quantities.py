@@ -104,12 +104,16 @@ class ArrayField:
     Attributes:
         items: What pydantic checks first, such as nested lists of numbers.
         convert: Makes the array of them, and may check more.
+        none: What plain data say for None.
     """
 
-    def __init__(self, items: Any, convert: Callable[[Any], object]) -> None:
-        """Set both."""
+    def __init__(
+        self, items: Any, convert: Callable[[Any], object], none: str | None = None
+    ) -> None:
+        """Set all."""
         self.items = items
         self.convert = convert
+        self.none = none
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler

@@ -194,9 +194,10 @@ LimitsOrNone = Annotated[
     ArrayField(
         Limits | Literal["none"] | None,
         lambda limits: None if limits == "none" else limits,
+        none="none",
     ),
 ]
-"""Limits, or none: in YAML the word, or nothing."""
+"""Limits, or None: in YAML the word none."""
 
 
 def own_limits(robot: Robot) -> RobotLimits:

@@ -134,8 +134,22 @@ def test_limits_are_the_robot_s_own_unless_there_are_to_be_none(
 
     free = load_experiment(changed("limits", word))
     assert free.controller.limits is None
-    for again in (yaml.safe_load(free.to_yaml()), free.run().save(tmp_path / "a.npz")):
+    mine = tmp_path / "mine.yaml"
+    mine.write_text(free.to_yaml())
+    for again in (mine, free.run().save(tmp_path / "a.npz")):
         assert load_experiment(again).controller.limits is None
+
+
+def test_limits_that_are_all_commented_out_are_not_none(tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    lines = yaml.safe_dump(PANDA).splitlines()
+    file.write_text("\n".join([*lines, "limits:", "#  effort: 9"]))
+    with pytest.raises(exceptions.ConfigError) as raised:
+        load_experiment(file)
+    assert str(raised.value) == (
+        f"{file}:{len(lines) + 1}: limits: nothing given; write none for no limits, or "
+        "remove the key to keep the robot's own"
+    )
 
 
 def test_the_same_run_from_yaml_and_from_python(tmp_path: Path) -> None:
