@@ -226,6 +226,40 @@ def _project_out_row(Q: Array, X: Array, j: int) -> float:
 
 
 @kernel
+def triangularise_rows(Y: Array) -> float:
+    """Overwrite the lower triangle of Y with that of Y H, which is zero elsewhere.
+
+    H is orthogonal, a product of Householder's reflections: the triangle has Y's
+    singular values. The rest of Y is used.
+
+    Args:
+        Y: Shape (m, n), m ≤ n, of any rank.
+
+    Returns:
+        det(Y Yᵀ).
+    """
+    m, n = Y.shape
+    product = 1.0
+    for j in range(m):
+        first, square = Y[j, j], squared_norm(Y[j, j:])
+        product *= square
+        if square > 0.0:
+            length = np.sqrt(square)
+            diagonal = -length if first > 0.0 else length
+            Y[j, j] = first - diagonal
+            scale = 1.0 / (length * (length + abs(first)))
+            for k in range(j + 1, m):
+                component = 0.0
+                for i in range(j, n):
+                    component += Y[j, i] * Y[k, i]
+                component *= scale
+                for i in range(j, n):
+                    Y[k, i] -= component * Y[j, i]
+            Y[j, j] = diagonal
+    return product
+
+
+@kernel
 def squared_norm(x: Array) -> float:
     """Return x·x, shape (n,)."""
     total = 0.0

@@ -9,11 +9,10 @@ import numpy as np
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
 from hsp_control.common.linalg import (
-    gram,
     norm,
     orthogonalise_rows,
-    orthonormalise_rows,
     squared_norm,
+    triangularise_rows,
 )
 from hsp_control.common.native import bind
 from hsp_control.law.hierarchy import LevelScratch, resolve_levels
@@ -185,7 +184,7 @@ class Resolution:
         if found is None:
             J, metric = self.problem.task.jacobian[first:], self.problem.metric
             small, large = sorted(J.shape)
-            scratch, e_N = np.zeros((4, large, large)), self.null_space_error
+            scratch, e_N = np.zeros((2, large, large)), self.null_space_error
             T, length = np.zeros((small, small)), np.zeros(1)
             call = bind(_diagnose, J, *metric[:2], self.form, e_N, scratch, T, length)
             self._triangles[first] = found = call, T, length
@@ -326,13 +325,11 @@ def _diagnose(
             for k in range(m):
                 transposed[i, k] = B[k, i]
         B = transposed
-    Q = scratch[2, : B.shape[0], : B.shape[1]]
-    orthonormalise_rows(B, Q, scratch[3])
-    gram(Q, B, False, T)
-    product = 1.0
+    product = triangularise_rows(B)
     for i in range(T.shape[0]):
-        product *= T[i, i] * T[i, i]
-    return product
+        for k in range(i + 1):
+            T[i, k] = B[i, k]
+    return float(product)
 
 
 @kernel

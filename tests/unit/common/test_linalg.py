@@ -39,6 +39,7 @@ from hsp_control.common.linalg import (
     solve_lower_transposed,
     solve_rows,
     solve_rows_transposed,
+    triangularise_rows,
 )
 from hsp_control.law import law
 from hsp_control.null_space.metrics import (
@@ -273,6 +274,22 @@ def test_no_rows_are_orthonormal_also_in_plain_python() -> None:
         assert each(np.zeros((0, 7)), np.zeros((0, 7)), np.zeros((0, 0))) == np.inf
 
 
+@given(seeds, sizes, st.data(), scales)
+def test_triangularise_rows(
+    seed: int, n: int, data: st.DataObject, scale: float
+) -> None:
+    """T Tᵀ = Y Yᵀ: T is Y in other coordinates; any rank."""
+    m = data.draw(st.integers(1, n))
+    rank = data.draw(st.integers(0, m))
+    Y = scale * normal(seed, m, rank) @ normal(seed + 1, rank, n)
+    T = Y.copy()
+    determinant = triangularise_rows(T)
+    T = np.tril(T[:, :m])
+    size = np.abs(Y).max(initial=0.0) ** 2
+    close(T @ T.T, Y @ Y.T, 20 * n * m * EPS * size)
+    np.testing.assert_allclose(determinant, np.prod(np.diag(T) ** 2), rtol=1e-13)
+
+
 def test_orthonormalise_twice_is_needed() -> None:
     """Läuchli's matrix: one sweep of Gram-Schmidt leaves rows at 60 degrees."""
     J = np.vstack([np.ones(3), 1e-9 * np.eye(3)]).T.copy()
@@ -382,6 +399,7 @@ def arguments(name: str) -> tuple[Any, ...]:
         "norm": (spd, normal(17, 6)),
         "orthonormalise_rows": (independent, np.zeros((5, 7)), np.zeros((5, 5))),
         "_project_out_row": (independent.copy(), triangular(5), 2),
+        "triangularise_rows": (independent.copy(),),
         "squared_norm": (sample[0],),
         "smallest_singular_value_bound": (triangular(6),),
         "_rotate_rows": (independent.copy(), np.eye(5), 1, 3),
