@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.native import bind
 from hsp_control.common.step_plan import StepPlan, steps
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.contacts.unactuated import UnactuatedRows, unactuated_count
@@ -14,15 +15,13 @@ from hsp_control.control.actuation.support import Support
 from hsp_control.control.setup import PlannedTask
 from hsp_control.law import Outcome, Resolution
 from hsp_control.law.outcome import outcome_of
+from hsp_control.law.threshold import STIFFNESS
 from hsp_control.null_space.fields import FieldSample, FieldSum, NullSpaceField
 from hsp_control.null_space.metrics import Metric
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import Task, TaskSample
-from hsp_control.tasks.task import InForce
+from hsp_control.tasks.task import Feedback, InForce, write_asked
 from hsp_control.trajectories.streams.stream import Streamed
-
-Measure = Callable[[], tuple[Array, Array]]
-"""Returns reference and actual value of a task; see `Task.measure`."""
 
 
 class ActiveStack:
@@ -46,7 +45,7 @@ class ActiveStack:
         has_forces: Whether contacts exert forces.
         memory: The rows, the field and the law's results, in one block: see `Record`.
         acceleration: The law's acceleration, shape (nv,).
-        streamed: The streams that tasks follow, and what measures these tasks.
+        streamed: Whether a task follows a stream.
         term_samples: The weighted sample of each term of the field.
     """
 
@@ -87,15 +86,20 @@ class ActiveStack:
         first = [held + free] if held + free else []
         sizes = [sum(task.rows for task in level) for level in self.levels]
         self.resolution = Resolution(
-            first + sizes, robot.nv, metric.form, gain, threshold
+            first + sizes,
+            robot.nv,
+            metric.form,
+            gain,
+            threshold,
+            STIFFNESS / robot.size if robot.size else np.inf,
         )
         self.rows = self.resolution.problem.task
         self.row_count = len(self.rows.error)
-        self.streamed: list[tuple[Streamed, Measure]] = []
-        for task in (task for level in self.levels for task in level):
-            followed: object = task.followed
-            if isinstance(followed, Streamed):
-                self.streamed.append((followed, partial(task.measure, state)))
+        self.streamed = any(
+            isinstance(task.followed, Streamed)
+            for level in self.levels
+            for task in level
+        )
         self.forces, self.has_forces = support.forces, support.size > 0
         self.memory = self.resolution.problem.record.memory
         self.acceleration = self.resolution.acceleration
@@ -117,6 +121,9 @@ class ActiveStack:
             self._parts.append((each.task, sample))
             in_force = feedback[each.key]
             plans.append(partial(each.task.compile_in_force, state, in_force, sample))
+            asked = self.resolution.problem.asked[row : row + each.task.rows]
+            if len(in_force.feedback.largest):
+                plans.append(partial(_asked, in_force.feedback, sample, asked))
             row += each.task.rows
         self._plans = plans
         self.level_names = [
@@ -209,3 +216,9 @@ def _jacobian(contacts: Sequence[Contact], state: RobotState) -> Array:
         for contact in contacts
     ]
     return np.vstack([np.zeros((0, nv)), *rows])
+
+
+def _asked(feedback: Feedback, sample: TaskSample, asked: Array) -> StepPlan:
+    """Return the step plan that writes what a task's feedback asks for."""
+    call = bind(write_asked, feedback, sample.error, sample.error_rate, asked)
+    return StepPlan(write=(call,))

@@ -363,9 +363,8 @@ class Controller:
         """Store the effort that was sent to the robot.
 
         It counts for the limit on the effort's rate, and for the margin of speed
-        limits, which covers what the robot does while the effort is held. And streams
-        look now and then at where the robot is (`Stream.lead`). Without limits and
-        streams it has no effect.
+        limits, which covers what the robot does while the effort is held. Without
+        limits it has no effect.
 
         Args:
             tau: Effort, shape (nv,) [N·m or N].
@@ -388,11 +387,7 @@ class Controller:
             raise NonFiniteError(f"period is {period}; needs a finite number")
         if not period > 0.0:
             raise ControllerError(f"period is {period} s; must be positive")
-        active = self._mixture.active
-        streamed = active.streamed if active is not None else ()
         self._actuation.applied(self._state, tau, period)
-        for stream, measure in streamed:
-            stream.see(self._state.t, measure)
         if self._gains.stiffening:
             self._gains.wait(self.active_stack, self._state.t, period)
 

@@ -46,7 +46,7 @@ def check_held(old: Setup, new: Setup, state: RobotState, period: float) -> None
 def _check_task(planned: PlannedTask, state: RobotState, period: float) -> None:
     task, in_force = planned.task, planned.task.in_force()
     in_force.numbers[:] = planned.gains.target
-    Kp, Kv, _ = task.linear_feedback(state, in_force)
+    Kp, Kv, *_ = task.linear_feedback(state, in_force)
     compliant = impedance_of(task) is not None
     if task.order == 1:  # e' + K e = 0, with K in the place of Kp
         Kp, Kv = np.zeros_like(Kp), Kp

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import LimitError
 from hsp_control.constraints.limits import MinimumDistance, RobotLimits, StaticEffort
 from hsp_control.constraints.limits.acceleration_bounds import MotionLimits
 from hsp_control.control.evolution import ABSENT, PRESENT, Evolution
@@ -53,17 +52,7 @@ class PlannedLimits:
     def then(
         self, start: float, ramp: float, limits: RobotLimits | None, robot: Robot
     ) -> "PlannedLimits":
-        """Return the limits with a change to other ones.
-
-        Raises:
-            LimitError: If the cost of null-space deviation differs: it cannot change.
-        """
-        weights = {each.null_space_weight for each in (self.sets[-1], limits) if each}
-        if len(weights) > 1:
-            raise LimitError(
-                "null_space_weight cannot change while the controller runs: it is "
-                f"{self.sets[-1] and self.sets[-1].null_space_weight}"
-            )
+        """Return the limits with a change to other ones."""
         new = () if limits is None else limits.distances
         counts = [
             (each, count.then(start, ramp, float(each in new)))
@@ -80,9 +69,7 @@ class PlannedLimits:
         """Return the numbers in force at time t [s], without the distances."""
         if self.numbers.constant:
             return self.sets[-1]
-        weights = [each.null_space_weight for each in self.sets if each is not None]
-        weight = weights[-1] if weights else None
-        return _decoded(self.numbers.at(t), robot, weight)
+        return _decoded(self.numbers.at(t), robot)
 
     def slacks(self, t: float) -> list[tuple[MinimumDistance, float]]:
         """Return the distances that count at time t [s], with their slacks [m/s²]."""
@@ -113,7 +100,6 @@ def _encoded(limits: RobotLimits | None, robot: Robot) -> Array:
         rows = [endless] * 3 + [-endless, endless] * 2 + [endless] * 3
         bandwidth, share = 10.0, np.inf
     else:
-        speed = limits.null_space_speed
         motion = limits.motion
         rows = [
             limits.effort,
@@ -125,7 +111,7 @@ def _encoded(limits: RobotLimits | None, robot: Robot) -> Array:
             motion.upper,
             motion.velocity,
             motion.acceleration,
-            endless if speed is None else speed,
+            motion.jerk,
         ]
         bandwidth = limits.bandwidth
         static = limits.static_effort
@@ -136,13 +122,12 @@ def _encoded(limits: RobotLimits | None, robot: Robot) -> Array:
     return np.asarray(np.where(finite, shrunk, np.sign(x)))
 
 
-def _decoded(code: Array, robot: Robot, weight: float | None) -> RobotLimits:
+def _decoded(code: Array, robot: Robot) -> RobotLimits:
     inside = np.abs(code) < 1.0
     safe = np.where(inside, code, 0.0)
     x = np.where(inside, safe / (1.0 - np.abs(safe)), np.sign(code) * np.inf)
     rows, (bandwidth, share) = x[:-2].reshape(10, robot.nv), x[-2:]
     effort = rows[0]
-    speed = rows[9] if np.isfinite(rows[9]).any() else None
     return RobotLimits(
         robot=robot,
         effort=effort,
@@ -150,8 +135,8 @@ def _decoded(code: Array, robot: Robot, weight: float | None) -> RobotLimits:
         velocity=rows[2],
         lower=rows[3],
         upper=rows[4],
-        motion=MotionLimits(rows[5], rows[6], rows[7], rows[8], np.array([bandwidth])),
+        motion=MotionLimits(
+            rows[5], rows[6], rows[7], rows[8], rows[9], np.array([bandwidth])
+        ),
         static_effort=StaticEffort(effort, share) if np.isfinite(share) else None,
-        null_space_speed=speed,
-        null_space_weight=weight,
     )

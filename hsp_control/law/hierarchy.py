@@ -62,7 +62,7 @@ def resolve_levels(
     form: int,
     v: Array,
     K_N: Array,
-    threshold: float,
+    thresholds: Array,
     controls: bool,
     ends: Indices,
     scratch: LevelScratch,
@@ -80,8 +80,8 @@ def resolve_levels(
         form: The metric's form.
         v: Velocity, shape (nv,).
         K_N: Null-space gain [1/s], shape (nv, nv).
-        threshold: Singular value of a level's whitened Jacobian, in the null space of
-            those above, below which it is damped.
+        thresholds: Singular value of each level's whitened Jacobian, in the null space
+            of those above, below which it is damped, shape (levels,).
         controls: False for φ_N = 0.
         ends: Where each level's rows end in the stack.
         scratch: Memory.
@@ -102,7 +102,9 @@ def resolve_levels(
         end = ends[level]
         block = slice(start, end)
         G_inv, rest = G_inverse[block, block], rows[0, start:end]
-        bounded = _open_level(J[block], Q, QJ[:, block], G_inv, square, threshold)
+        bounded = _open_level(
+            J[block], Q, QJ[:, block], G_inv, square, thresholds[level]
+        )
         if bounded and damped == 0:
             damped = level + 1
         for k in range(start, end):

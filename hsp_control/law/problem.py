@@ -64,6 +64,8 @@ class Problem:
         field: g and g'.
         metric: W, its Cholesky factor and W'; the identity until it is written.
         gain: K_N, shape (nv, nv) [1/s].
+        asked: Kv e' + Kp s(e), what the feedback asks for in the coordinates of e,
+            shape (m,); zero in rows without one, such as those of contacts.
     """
 
     def __init__(self, rows: int, nv: int, gain: Array) -> None:
@@ -79,3 +81,4 @@ class Problem:
         self.field = self.record.field
         self.metric = MetricSample.allocate(nv)
         self.gain = gain
+        self.asked = np.zeros(rows)

@@ -20,6 +20,7 @@ from hsp_control.law.law import acceleration, null_space_command
 from hsp_control.law.outcome import BEYOND_ANY_LEVEL, Outcome, outcome_of
 from hsp_control.law.problem import Problem
 from hsp_control.law.pseudo_inverse import weighted_pseudo_inverse, whiten
+from hsp_control.law.threshold import write_thresholds
 from hsp_control.null_space.fields import FieldSample
 from hsp_control.null_space.metrics import MetricSample
 from hsp_control.tasks import TaskSample
@@ -96,7 +97,8 @@ class Resolution:
         problem: The input, to be written before `resolve`.
         ends: End of each level's rows in the stack.
         form: The metric's form.
-        threshold: Singular value below which the inverse is bounded.
+        threshold: ε_0, the singular value below which the inverse is always bounded.
+        thresholds: ε of each level at the last `resolve`, shape (levels,).
         acceleration: a of the last `resolve`, shape (nv,).
         null_space_error: e_N of the last `resolve`, shape (nv,).
         code: What the last `resolve` returned, see `outcome_of`, shape (1,).
@@ -107,7 +109,13 @@ class Resolution:
     """
 
     def __init__(
-        self, levels: Sequence[int], nv: int, form: int, gain: Array, threshold: float
+        self,
+        levels: Sequence[int],
+        nv: int,
+        form: int,
+        gain: Array,
+        threshold: float,
+        steepest: float = np.inf,
     ) -> None:
         """Allocate.
 
@@ -116,14 +124,17 @@ class Resolution:
             nv: Number of degrees of freedom.
             form: The metric's form.
             gain: Null-space gain K_N, shape (nv, nv) [1/s].
-            threshold: Singular value of the whitened Jacobian below which its inverse
-                is bounded.
+            threshold: ε_0, the singular value of the whitened Jacobian below which its
+                inverse is always bounded.
+            steepest: L, see `threshold.py` [rad/s² for each unit of a singular value];
+                inf: the threshold does not follow the demand.
         """
         m = sum(levels)
         self.problem = Problem(m, nv, gain)
         self.ends: Indices = np.cumsum([*levels] or [0], dtype=np.int64)
         self.form = form
-        self.threshold = threshold
+        self.threshold, self._steepest = threshold, steepest
+        self.thresholds = np.full(len(self.ends), threshold)
         self.factors = Factors(np.zeros((m, nv)), np.zeros((m, m)))
         self._scratch = Scratch(
             self.factors,
@@ -165,8 +176,8 @@ class Resolution:
         return bind(
             _resolve_at_once if alone else _resolve_levels,
             *(problem.task, problem.field, problem.metric, self.form),
-            *(v, problem.gain, self.threshold, controls),
-            *(() if alone else (self.ends,)),
+            *(v, problem.gain, self.threshold, self._steepest, controls),
+            *(self.ends, problem.asked, self.thresholds),
             *(self._scratch, self.null_space_error, self.acceleration, self.code),
         )
 
@@ -214,7 +225,11 @@ def _resolve_at_once(
     v: Array,
     K_N: Array,
     threshold: float,
+    steepest: float,
     controls: bool,
+    ends: Indices,
+    asked: Array,
+    thresholds: Array,
     scratch: Scratch,
     e_N: Array,
     a: Array,
@@ -228,9 +243,10 @@ def _resolve_at_once(
     n = task.jacobian.shape[1]
     (Q, X), rows = scratch.factors, scratch.rows
     u = rows[6, :n]
+    largest = write_thresholds(asked, ends, threshold, steepest, thresholds)
     damped = int(
         weighted_pseudo_inverse(
-            task.jacobian, metric.L, form, threshold, scratch.wide, Q, X
+            task.jacobian, metric.L, form, largest, scratch.wide, Q, X
         )
     )
     null_space_command(task, field, metric, form, Q, X, v, K_N, rows, e_N, u)
@@ -251,8 +267,11 @@ def _resolve_levels(
     v: Array,
     K_N: Array,
     threshold: float,
+    steepest: float,
     controls: bool,
     ends: Indices,
+    asked: Array,
+    thresholds: Array,
     scratch: Scratch,
     e_N: Array,
     a: Array,
@@ -272,18 +291,35 @@ def _resolve_levels(
             v,
             K_N,
             threshold,
+            steepest,
             controls,
+            ends,
+            asked,
+            thresholds,
             scratch,
             e_N,
             a,
             code,
         )
+    else:
+        write_thresholds(asked, ends, threshold, steepest, thresholds)
     if damped > 0:
         levels = LevelScratch(
             scratch.inner, scratch.tall, scratch.square[2], scratch.square, scratch.rows
         )
         damped = resolve_levels(
-            task, field, metric, form, v, K_N, threshold, controls, ends, levels, e_N, a
+            task,
+            field,
+            metric,
+            form,
+            v,
+            K_N,
+            thresholds,
+            controls,
+            ends,
+            levels,
+            e_N,
+            a,
         )
         if not _all_finite(a):
             damped = BEYOND_ANY_LEVEL

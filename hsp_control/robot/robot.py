@@ -1,6 +1,7 @@
 """The robot: a model that was loaded, taken from a scene, or combined."""
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
@@ -267,6 +268,45 @@ class Robot(ConfigurationSpace):
         if named is not None and named in self._frame_ids:
             return named
         return end_effector_frame(self.model)
+
+    @cached_property
+    def size(self) -> float:
+        """Length of the longest chain from the first joint to a frame [m].
+
+        It is the sum of the distances between the origins of consecutive joints, and of
+        the ranges of prismatic ones: an arm reaches no farther from its first joint.
+        """
+        model, lengths = self.model, np.zeros(self.model.njoints)
+        lower, upper = self.position_limits()
+        for joint in range(1, model.njoints):
+            parent = model.parents[joint]
+            if parent > 0:
+                away = np.linalg.norm(model.jointPlacements[joint].translation)
+                lengths[joint] = lengths[parent] + away
+            moved = model.joints[joint]
+            if moved.nv == 1 and self.units[moved.idx_v] == "m":
+                slid = (upper - lower)[moved.idx_v]
+                lengths[joint] += slid if np.isfinite(slid) else 0.0
+        longest = lengths.max()
+        for frame in model.frames:
+            if frame.parentJoint > 0:
+                away = np.linalg.norm(frame.placement.translation)
+                longest = max(longest, lengths[frame.parentJoint] + away)
+        return float(longest)
+
+    @cached_property
+    def largest_inertias(self) -> Array:
+        """Largest M_ii in any posture, nearly, shape (nv,) [kg·m² or kg].
+
+        It is the largest of 64 postures, drawn once and for all.
+        """
+        rng, largest = np.random.default_rng(0), np.zeros(self.nv)
+        for _ in range(64):
+            turned = rng.uniform(-np.pi, np.pi, self.nv)
+            q = pin.integrate(self.model, self.neutral(), turned)
+            self._data.M[:] = 0.0
+            largest = np.maximum(largest, np.diag(pin.crba(self.model, self._data, q)))
+        return largest
 
     # -- names ------------------------------------------------------------------------
 

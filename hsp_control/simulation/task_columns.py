@@ -22,7 +22,6 @@ STREAM_CHANNELS = {
     "taken": "messages taken",
     "late": "of these, messages that came too late to count",
     "rejected": "invalid messages",
-    "held_back": "1 while the reference waits for the robot",
 }
 """What is logged of a stream; see `Streamed.counts`."""
 

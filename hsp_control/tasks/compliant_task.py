@@ -86,7 +86,8 @@ class CompliantTask(SecondOrderTask):
         rows = self.rows
         with within("impedance"):
             self.impedance.numbers(rows)
-        return Feedback(np.zeros((rows, rows)), np.zeros((rows, rows)), np.zeros(rows))
+        zeros = np.zeros((2, rows, rows))
+        return Feedback(zeros[0], zeros[1], np.zeros(rows), self._largest())
 
     def in_force(self) -> InForce:
         """Return new arrays of the task's own feedback; see `Task.in_force`."""
@@ -148,8 +149,7 @@ class CompliantTask(SecondOrderTask):
             follow(state.t)
         for write in plan.write:
             write()
-        Kp, Kv, offset = in_force.feedback
-        return Feedback(Kp.copy(), Kv.copy(), offset.copy())
+        return Feedback(*(array.copy() for array in in_force.feedback))
 
 
 def impedance_of(task: Task) -> Impedance | None:

@@ -113,7 +113,7 @@ def impedance_gains(
     m, nv = sample.jacobian.shape
     K, D, ratio = numbers[:m], numbers[m : 2 * m], numbers[2 * m, 0]
     inverse_bound, e = numbers[2 * m + 1], sample.error
-    Kp, Kv, _ = feedback
+    Kp, Kv = feedback.Kp, feedback.Kv
     L, B, B_dot, X = scratch.factor, scratch.wide[0], scratch.wide[1], scratch.wide[2]
     G, G_dot, GK, root = (
         mobility,

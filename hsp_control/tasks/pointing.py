@@ -241,7 +241,7 @@ def _pointing(
         e_dot[k] = e_dot_scaled[k] / s
         zero[k] = 0.0
     _stereographic(n, e)
-    gains = Feedback(feedback.Kp, feedback.Kv, zero)
+    gains = Feedback(feedback.Kp, feedback.Kv, zero, feedback.largest[:0])
     add_feedback(zero, gains, e_scaled, e_dot_scaled, wanted)
     for k in range(2):
         wanted[k] += s * feedback.offset[k]

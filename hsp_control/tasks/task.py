@@ -2,12 +2,13 @@
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, replace
 from functools import partial
-from typing import Any, ClassVar, Literal, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
+from pydantic import AfterValidator, BeforeValidator
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TaskError
@@ -15,7 +16,7 @@ from hsp_control.common.kernels import kernel
 from hsp_control.common.step_plan import StepPlan
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.nested import parts_within
-from hsp_control.declaration.quantities import PositiveCount
+from hsp_control.declaration.quantities import Positive, PositiveCount, plain
 from hsp_control.geometry.start import Start
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.gains import Gains
@@ -63,8 +64,14 @@ class TaskSample(NamedTuple):
         return TaskSample(*(array[start:stop] for array in self))
 
 
+_UNBOUNDED = np.zeros((0, 3))
+
+
 class Feedback(NamedTuple):
-    """Kv e' + Kp e + offset: a task's feedback, as one argument of a kernel.
+    """Kv e' + Kp s(e) + offset: a task's feedback, as one argument of a kernel.
+
+    s(e) is e with each part of it, such as its position, shortened to its largest
+    length: s(e) = e wherever no part is longer.
 
     The controller owns these arrays and changes them in place: gains by events, the
     offset by compensators such as integral action.
@@ -74,11 +81,14 @@ class Feedback(NamedTuple):
         Kv: Velocity gain, shape (m, m) [1/s].
         offset: Additional term of the error equation, shape (m,) [m/s² or rad/s²];
             zero unless a compensator writes it.
+        largest: Of each part of e that is bounded: its first row, the row after its
+            last, and its largest length, shape (parts, 3) [-, -, m or rad].
     """
 
     Kp: Array
     Kv: Array
     offset: Array
+    largest: Array = _UNBOUNDED
 
 
 class InForce(NamedTuple):
@@ -96,6 +106,18 @@ class InForce(NamedTuple):
     feedback: Feedback
     mobility: Array
 
+
+_OF_SIZE, _ANGLE = 0.3, 1.0
+"""The largest error by default: of a position, as a part of the robot's size [-]; and
+of an orientation [rad]. At ω0 = 10 rad/s the hand of an arm of 1 m then approaches at
+1.5 m/s, about as fast as its joints can."""
+
+LargestError = Annotated[
+    Literal["robot", "none"] | Positive | Sequence[Positive | None] | None,
+    BeforeValidator(plain),
+    AfterValidator(lambda given: tuple(given) if isinstance(given, list) else given),
+]
+"""The robot's own, none, one number, or one for each part of the error."""
 
 Drawn = Literal["position", "orientation", "direction"]
 """What can be drawn in the world; see `Task`."""
@@ -200,9 +222,9 @@ class Task(Part, ABC, family="tasks", error=TaskError):
 
     def in_force(self) -> InForce:
         """Return new arrays of the task's own feedback, for a run."""
-        Kp, Kv, offset = self.feedback()
-        numbers = np.stack([Kp, Kv])
-        feedback = Feedback(numbers[0], numbers[1], offset)
+        own = self.feedback()
+        numbers = np.stack([own.Kp, own.Kv])
+        feedback = own._replace(Kp=numbers[0], Kv=numbers[1])
         return InForce(numbers, feedback, np.zeros((0, 0)))
 
     def compile_in_force(
@@ -389,18 +411,80 @@ class Task(Part, ABC, family="tasks", error=TaskError):
 
 
 class SecondOrderTask(Task):
-    """A task with gains: e'' + Kv e' + Kp e + offset = 0."""
+    """A task with gains: e'' + Kv e' + Kp s(e) + offset = 0.
+
+    s(e) = e as long as no part of the error is longer than its `largest_error`.
+    """
 
     _: KW_ONLY
     gains: Gains = Gains(natural_frequency=10.0)
     """Kp and Kv of the rows [1/s², 1/s]; critically damped at 10 rad/s by default."""
+    largest_error: LargestError = "robot"
+    """Error whose feedback is the largest: a longer one counts as if it were as long,
+    so that a target far away, or out of reach, asks for no more [m or rad]. One number,
+    or one for each part of the error; "none": no bound, and near a singularity the
+    paper's law down to the controller's threshold. By default 0.3 of the robot's size
+    for a position (`Robot.size`), 1 rad for an orientation, and none for joints."""
 
     def feedback(self) -> Feedback:
         """Return new arrays of feedback; see `Task.feedback`."""
         rows = self.rows
         with within("gains"):
             Kp, Kv = self.gains.matrices(rows)
-        return Feedback(Kp, Kv, np.zeros(rows))
+        return Feedback(Kp, Kv, np.zeros(rows), self._largest())
+
+    def checked(self, robot: Robot) -> Self:
+        """Return the task with its largest errors in numbers; see `Task.checked`.
+
+        Raises:
+            TaskError: If there are as many of them as the error has no parts.
+        """
+        with within("largest_error"):
+            largest = largest_errors(self.largest_error, self.error_parts, robot)
+        changes: dict[str, Any] = {"largest_error": largest}
+        placed = replace(self, **changes)
+        return super(SecondOrderTask, placed).checked(robot)
+
+    def _largest(self) -> Array:
+        """Return `Feedback.largest`; a task that is not placed has no bound."""
+        if self.largest_error is None or isinstance(self.largest_error, str):
+            return _UNBOUNDED
+        found, first = [], 0
+        numbers: Any = self.largest_error
+        for part, length in zip(self.error_parts, numbers, strict=True):
+            if length is not None:
+                found.append((first, first + part.size, length))
+            first += part.size
+        return np.array(found).reshape(-1, 3)
+
+
+def largest_errors(
+    declared: Any, parts: Sequence[ErrorPart], robot: Robot
+) -> Sequence[float | None] | str:
+    """Return the largest error of each part, None for no bound; or "none" for all.
+
+    Args:
+        declared: As in `SecondOrderTask.largest_error`.
+        parts: The parts of the error.
+        robot: The robot.
+
+    Raises:
+        TaskError: If there is neither one number nor one for each part.
+    """
+    if declared == "none" or declared is None:
+        return "none"
+    if declared == "robot":
+        own = {"m": _OF_SIZE * robot.size, "rad": _ANGLE, "-": _ANGLE}
+        found = [own.get(each.unit) for each in parts]
+    else:
+        several = isinstance(declared, tuple)
+        found = [*declared] if several else [declared] * len(parts)
+        if len(found) != len(parts):
+            names = ", ".join(f"{each.name} [{each.unit}]" for each in parts)
+            raise TaskError(
+                f"has {len(found)} numbers; the error has {len(parts)} parts: {names}"
+            )
+    return tuple(None if each is None else float(each) for each in found)
 
 
 def default_name(frame: str) -> str:
@@ -427,10 +511,31 @@ def add_feedback(
     e_dot: Array,
     out: Array,
 ) -> None:
-    """Write feed_forward + offset + Kv e' + Kp e; ``out`` may be ``feed_forward``."""
-    Kp, Kv, offset = feedback
+    """Write feed_forward + offset + Kv e' + Kp s(e), s as in `Feedback`.
+
+    ``out`` may be ``feed_forward``.
+    """
+    Kp, Kv, offset, largest = feedback
     for i in range(e.shape[0]):
         total = feed_forward[i] + offset[i]
         for j in range(e.shape[0]):
             total += Kv[i, j] * e_dot[j] + Kp[i, j] * e[j]
         out[i] = total
+    for part in range(largest.shape[0]):
+        first, end = int(largest[part, 0]), int(largest[part, 1])
+        square = 0.0
+        for j in range(first, end):
+            square += e[j] * e[j]
+        if square > largest[part, 2] * largest[part, 2]:
+            beyond = 1.0 - largest[part, 2] / np.sqrt(square)
+            for i in range(e.shape[0]):
+                for j in range(first, end):
+                    out[i] -= Kp[i, j] * beyond * e[j]
+
+
+@kernel
+def write_asked(feedback: Feedback, e: Array, e_dot: Array, out: Array) -> None:
+    """Write Kv e' + Kp s(e), what the feedback asks for, shape (m,)."""
+    for i in range(e.shape[0]):
+        out[i] = -feedback.offset[i]
+    add_feedback(out, feedback, e, e_dot, out)

@@ -30,6 +30,8 @@ class MotionLimits(NamedTuple):
         upper: Upper position limit, shape (nv,) [rad or m].
         velocity: Maximum speed, shape (nv,) [rad/s or m/s].
         acceleration: Maximum acceleration, shape (nv,) [rad/s² or m/s²].
+        jerk: How fast the acceleration may change: the effort's rate over the joint's
+            largest inertia, shape (nv,) [rad/s³ or m/s³].
         bandwidth: α of the barriers, shape (1,) [1/s].
     """
 
@@ -37,6 +39,7 @@ class MotionLimits(NamedTuple):
     upper: Array
     velocity: Array
     acceleration: Array
+    jerk: Array
     bandwidth: Array
 
 
@@ -82,11 +85,12 @@ def acceleration_bounds(
         error: Largest error that the acceleration had of late, shape (nv,); the margin
             of the speed covers it and its growth, up to half the speed.
         drift: Mean error of late, shape (nv,); the barrier of the position makes up for
-            it where it leads beyond the limit.
+            it where it leads beyond the limit, and that of the speed is wider by what
+            holds the robot against it.
         a_lower: Written: lower bound on the acceleration, shape (nv,).
         a_upper: Written: upper bound on the acceleration, shape (nv,).
     """
-    lower, upper, velocity, acceleration, alpha = limits
+    lower, upper, velocity, acceleration, jerk, alpha = limits
     bandwidth = alpha[0]
     for i in range(v.shape[0]):
         low, high = -np.inf, np.inf
@@ -101,8 +105,12 @@ def acceleration_bounds(
             high -= min(max(drift[i], 0.0), most)
         speed = velocity[i] - _GROWTH * error[i] / (2.0 * bandwidth * _STEEPER)
         speed = max(speed, 0.5 * velocity[i])
-        slowing = 2.0 * bandwidth * (-speed - v[i])
-        rising = 2.0 * bandwidth * (speed - v[i])
+        rising = _speed_barrier(speed - v[i], bandwidth, jerk[i])
+        slowing = -_speed_barrier(speed + v[i], bandwidth, jerk[i])
+        # What is commanded against a steady force moves nothing. A force that ends
+        # leaves the robot with that acceleration until the mean has faded.
+        rising += max(-drift[i], 0.0)
+        slowing -= max(drift[i], 0.0)
         if slowing > 0.0:
             slowing *= _STEEPER
             rising = max(rising, slowing)
@@ -112,6 +120,20 @@ def acceleration_bounds(
         low, high = _narrow(low, high, slowing, rising)
         low, high = _narrow(low, high, -acceleration[i], acceleration[i])
         a_lower[i], a_upper[i] = low, high
+
+
+@kernel
+def _speed_barrier(gap: float, bandwidth: float, jerk: float) -> float:
+    """Return the largest acceleration towards a speed limit that is so far away.
+
+    It is 2α gap, and √(jerk gap) where that is less: then the acceleration ends at the
+    limit though it can fall by half the jerk only, and the rest of the effort's rate is
+    for what the other joints do.
+    """
+    barrier = 2.0 * bandwidth * gap
+    if gap > 0.0 and jerk < np.inf:
+        barrier = min(barrier, np.sqrt(jerk * gap))
+    return barrier
 
 
 @kernel

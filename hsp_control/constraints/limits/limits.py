@@ -10,7 +10,12 @@ from pydantic import AfterValidator, BeforeValidator
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LimitError
 from hsp_control.constraints.limits.acceleration_bounds import MotionLimits
-from hsp_control.constraints.limits.maximum import Maximum, maximum, none_for_nothing
+from hsp_control.constraints.limits.maximum import (
+    Maximum,
+    maximum,
+    none_for_nothing,
+    own_limit,
+)
 from hsp_control.constraints.limits.minimum_distance import MinimumDistance
 from hsp_control.constraints.limits.numbers_by_joint import Positives, by_dof
 from hsp_control.constraints.limits.position_range import (
@@ -25,7 +30,6 @@ from hsp_control.declaration.quantities import (
     Fraction,
     NonNegative,
     Positive,
-    ProperFraction,
     Share,
     read_only,
 )
@@ -35,6 +39,9 @@ from hsp_control.robot import Robot
 
 BANDWIDTH = 10.0
 """α of the barriers where nothing else is given [1/s]."""
+ARM_RATE, LEG_RATE = 12.0, 100.0
+"""Maximum rate of an effort where nothing else is given, in maximum efforts [1/s]: of a
+robot with a fixed base, and of one whose contacts change."""
 
 
 class Limits(Part, error=LimitError):
@@ -46,21 +53,18 @@ class Limits(Part, error=LimitError):
     bandwidth α):
 
         position        a ≤ α²(q_max - q) - 2α v
-        velocity        a ≤ 2α (v_max - v)
+        velocity        a ≤ 2α (v_max - v), and a ≤ √(j (v_max - v))
         acceleration    a ≤ a_max
 
     and likewise from below; the velocity barrier is four times as steep within its
-    margin. Distances have their own barriers, see `MinimumDistance`; the effort against
+    margin. j is what the effort's rate can do to the acceleration. Distances have their
+    own barriers, see `MinimumDistance`; the effort against
     gravity has its own too, see `StaticEffort`. Where limits contradict each other they
     are relaxed in this order: static effort, acceleration, velocity, position,
     distance. Effort limits are never relaxed.
 
-    Where a limit binds, the null space deviates from the law first, and then the tasks.
-    If `null_space_speed` is given, the deviation of the null space is bounded: with δ
-    the deviation from the law's acceleration, s this speed and λ the decay rate of K_N,
-    |(P δ)_j| ≤ λ s_j. Then e_N' = -K_N e_N - P δ is a stable system with a bounded
-    input, and ‖e_N‖_W ≤ ‖s‖_|W| at all times, |W| the absolute values of W
-    (docs/limits.md). This bound is the first of all to be relaxed.
+    Where a limit binds, the null space deviates from the law first, and then the tasks,
+    the lowest priority first.
 
     "robot" is the robot's own limit, from its URDF, and "none" is no limit. Numbers are
     one for all joints, or nv, with None where there is no limit.
@@ -70,9 +74,12 @@ class Limits(Part, error=LimitError):
     effort: Maximum = "robot"
     """Maximum effort [N·m or N]: the robot's own, none, a factor, numbers by joint, one
     number or nv."""
-    effort_rate: Positives | None = None
-    """Maximum rate of the effort [N·m/s or N/s], one number or nv; a Panda's is 1000.
-    Unlimited by default."""
+    effort_rate: Maximum = "robot"
+    """Maximum rate of the effort [N·m/s or N/s]: the robot's own, none, a factor,
+    numbers by joint, one number or nv. No URDF has it: the robot's own is 12 times its
+    maximum effort each second, which for a Panda's shoulder is 1000 N·m/s; so no effort
+    changes by more than 1.2 % of its maximum in a millisecond. With a floating base,
+    whose contacts change, it is 100 times."""
     velocity: Maximum = "robot"
     """Maximum speed [rad/s or m/s]: the robot's own, none, a factor, numbers by joint,
     one number or nv."""
@@ -99,14 +106,6 @@ class Limits(Part, error=LimitError):
     static_effort: Fraction | None = None
     """Fraction of the effort limit that gravity may use [-], so that an arm stays where
     its motors can hold it; for motors that carry no contact. Unlimited by default."""
-    null_space_speed: Positives | None = None
-    """How fast the null space may leave the field, where limits bind, before the tasks
-    deviate [rad/s or m/s], one number or nv. Unlimited by default."""
-    null_space_weight: ProperFraction | None = None
-    """Cost of null-space deviation relative to the first task, where limits bind [-];
-    1e-6 by default, 1e-8 if tasks have priorities. With 1e-3, a robot that cannot reach
-    its target comes to rest; 1e-3 of the null-space deviation then appears in the
-    task."""
 
     def placed(self, start: Start) -> RobotLimits:
         """Return the limits in numbers, for one robot and one scene.
@@ -134,12 +133,15 @@ class Limits(Part, error=LimitError):
                 raise LimitError(
                     f"does not support mimic joints; {robot.name} has some"
                 )
-        effort = read_only(effort)
-        share, speed = self.static_effort, self.null_space_speed
+        with within("effort_rate"):
+            own = own_limit(robot.model.effortLimit, robot)
+            rate = LEG_RATE if robot.unactuated else ARM_RATE
+            effort_rate = maximum(self.effort_rate, rate * own, robot)
+        effort, share = read_only(effort), self.static_effort
         return RobotLimits(
             robot=robot,
             effort=effort,
-            effort_rate=self._numbers("effort_rate", robot),
+            effort_rate=read_only(effort_rate),
             velocity=read_only(velocity),
             lower=read_only(lower),
             upper=read_only(upper),
@@ -148,14 +150,11 @@ class Limits(Part, error=LimitError):
                 read_only(upper - margin),
                 read_only((1.0 - self.velocity_margin) * velocity),
                 self._numbers("acceleration", robot),
+                read_only(effort_rate / robot.largest_inertias),
                 read_only([BANDWIDTH if self.bandwidth is None else self.bandwidth]),
             ),
             distances=tuple(distances),
             static_effort=None if share is None else StaticEffort(effort, share),
-            null_space_speed=(
-                None if speed is None else self._numbers("null_space_speed", robot)
-            ),
-            null_space_weight=self.null_space_weight,
         )
 
     def _numbers(self, field: str, robot: Robot) -> Array:

@@ -29,9 +29,6 @@ class RobotLimits:
             the maximum acceleration and α, as a record for kernels.
         distances: The minimum distances.
         static_effort: The limit on the effort against gravity, if any.
-        null_space_speed: s, shape (nv,) [rad/s or m/s]; None: no bound.
-        null_space_weight: Cost of null-space deviation relative to the first task,
-            where limits bind [-]; None: as small as rounding permits.
     """
 
     robot: Robot
@@ -43,8 +40,6 @@ class RobotLimits:
     motion: MotionLimits
     distances: tuple[MinimumDistance, ...] = ()
     static_effort: StaticEffort | None = None
-    null_space_speed: Array | None = None
-    null_space_weight: float | None = None
 
     @property
     def acceleration(self) -> Array:

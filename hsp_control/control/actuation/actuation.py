@@ -32,7 +32,6 @@ from hsp_control.constraints.limits.acceleration_bounds import (
     violated_limits,
     within,
 )
-from hsp_control.control.actuation.deviation_cost import DecayRate
 from hsp_control.control.actuation.held_effort import (
     Held,
     HeldEffort,
@@ -97,7 +96,6 @@ class Actuation:
         )
         self._effort = np.zeros(nv)
         self._found = np.zeros(2)  # what a check returned, and its flags
-        self._decay_rate = DecayRate()
         self._steps: WeakKeyDictionary[Resolution, LimitedStep] = WeakKeyDictionary()
         self._resolution: Resolution | None = None
         self._step: LimitedStep | None = None
@@ -110,7 +108,7 @@ class Actuation:
         self._efforts = np.full((2, nv), np.inf)
         zeros = np.zeros
         self._motion = MotionLimits(
-            zeros(nv), zeros(nv), zeros(nv), zeros(nv), zeros(1)
+            zeros(nv), zeros(nv), zeros(nv), zeros(nv), zeros(nv), zeros(1)
         )
         self._checks = IdentityCache(self._compile_checks)
         self._permits = IdentityCache(self._bind_permits)
@@ -127,8 +125,6 @@ class Actuation:
         self._write_numbers()
         self._steps.clear()
         self._resolution = None
-        bounded = self.limits is not None and self.limits.null_space_speed is not None
-        self._speed = np.zeros(self._robot.nv if bounded else 0)
         self._slacks = planned.slacks(t)
         self._find_rate()
         if self.limits is not None and self._window is None:
@@ -323,13 +319,9 @@ class Actuation:
     ) -> Callable[[], float] | None:
         """Return the call that solves the QP if a bound is violated.
 
-        It is None where a step may need more: forces, barriers, or a bound that depends
-        on the gain.
+        It is None where a step may need more: forces, or barriers.
         """
-        limits = self.limits
-        if limits is None or limits.null_space_speed is not None:
-            return None
-        if not self.is_direct(support):
+        if self.limits is None or not self.is_direct(support):
             return None
         step = self._step_of(state, resolution, support)
         return step.nearest_if(resolution.acceleration, state.effort, self._found)
@@ -427,11 +419,6 @@ class Actuation:
         if wanted is not state.effort:  # a sum, made anew in each step
             effort = self._effort
             effort[:] = wanted
-        limits = self.limits
-        if limits is not None and limits.null_space_speed is not None:
-            problem = resolution.problem
-            rate = self._decay_rate.of(problem.gain, problem.metric.L)
-            np.multiply(rate, limits.null_space_speed, out=self._speed)
         status, relaxation = step.solve(a, effort, redistribute, barriers)
         if status is None:  # the solver failed: the efforts stay within their limits
             tau = np.clip(
@@ -458,7 +445,6 @@ class Actuation:
         motors = self._motors
         some = np.isfinite(self._tau_lower) | np.isfinite(self._tau_upper)
         some |= not self._planned.numbers.constant  # a limit that comes is still inf
-        weight = None if self.limits is None else self.limits.null_space_weight
         self._steps[resolution] = LimitedStep(
             state,
             resolution,
@@ -467,8 +453,6 @@ class Actuation:
             self.base,
             motors[some[motors]],
             self._weight,
-            weight,
-            self._speed,
             1 << (count - 1).bit_length() if count else 0,
         )
         return self._steps[resolution]

@@ -1,4 +1,4 @@
-"""Cost of deviations from the law's acceleration; bound on their null-space part."""
+"""Cost of deviations from the law's acceleration, level by level."""
 
 from typing import NamedTuple, Self
 
@@ -13,7 +13,6 @@ from hsp_control.common.linalg import (
     orthogonalise_rows,
     orthonormalise_rows,
     solve_lower_transposed,
-    solve_rows,
     squared_norm,
 )
 from hsp_control.law import Resolution
@@ -22,12 +21,13 @@ from hsp_control.law.resolution import Factors, Projectors
 from hsp_control.null_space.metrics.metric import IDENTITY
 
 _ONE_LEVEL, _SEVERAL_LEVELS = 1e-6, 1e-8
-"""Cost of null-space deviation relative to the first level: two values, for one level
-and for several. The smaller it is, the stricter the priorities; at 1e-6 an error of
-1e-3 m/s² remains in the task (docs/limits.md)."""
+"""Least cost of null-space deviation relative to the first level: for one level and for
+several. The smaller it is, the stricter the priorities; at 1e-6 an error of 1e-3 m/s²
+remains in the task (docs/limits.md)."""
 
-_SHARE = 0.05
-"""What the null space may cost where tasks must miss, of what the tasks cost [-]."""
+_OF_ERROR, _MOST = 0.2, 0.1
+"""How much more what is below a level costs for an error of the robot's size, relative
+to the level itself, and the most that it costs [-]."""
 
 _LOST = 1e-3
 """Singular value, relative to the threshold, below which rounding decides where a
@@ -41,11 +41,17 @@ class Directions(NamedTuple):
     that are orthonormal in whitened coordinates Lᵀδ. So H⁻¹ = J Jᵀ, with the columns
     L⁻ᵀ n_k / √ρ_k in J: no matrix is factorised.
 
+    What is below a level costs a small part of what the level itself does, and the more
+    of it the larger the level's own error is: priorities are strict where the errors
+    are small. With a fixed tiny part, a hand that cannot reach its target would move
+    the null space as far as limits permit for the last bit of it, from one bound of the
+    efforts to the other between two periods.
+
     With P_k what the law leaves to the levels below k, P_0 = 1, a level has the share
     P_{k-1} - P_k of all motions, and the null space what remains, P_K. Their costs are
-    whole^t_k, t_1 = 0 to t_N = 1, and that of all is
+    ρ_k = ρ_N^t_k, t_1 = 0 to t_N = 1, and that of all is
 
-        log H = log whole Σ t_k (P_{k-1} - P_k),      in whitened coordinates
+        log H = log ρ_N Σ t_k (P_{k-1} - P_k),      in whitened coordinates
 
     Away from singularities each share is a projector, and each n_k belongs to one
     level. Near one the law leaves a part of a direction to the levels below, and so it
@@ -56,7 +62,12 @@ class Directions(NamedTuple):
         L: Cholesky factor of the metric, shape (nv, nv).
         form: The metric's form.
         ends: Where each level's rows end in the stack.
-        threshold: Singular value below which a direction belongs to a level in part.
+        error: Error e of all tasks, shape (m,).
+        size: The robot's size [m].
+        first: The first level that may deviate: 1 below contacts, else 0.
+        least: Least cost of a level relative to the one above it.
+        thresholds: Singular value of each level below which a direction belongs to it
+            in part, shape (levels,).
         factors: The law's pseudo-inverse of the stack.
         projectors: What its levels left, where it went level by level.
         code: The law's outcome, see `Resolution.code`.
@@ -67,8 +78,6 @@ class Directions(NamedTuple):
         scratch: Scratch, shape (2, max(nv, m)).
         N: The directions n_k as rows, shape (nv, nv).
         kept: How many of the first belong to the first level alone, shape (1,).
-        share: How much of each the null space has: 0 for the levels' own, 1 for its
-            own, shape (nv,).
         root: 1/√ρ of each, shape (nv,).
         costs: t_k and 1/√ρ of each level and of the null space, shape (2, levels + 1).
     """
@@ -77,7 +86,11 @@ class Directions(NamedTuple):
     L: Array
     form: int
     ends: Indices
-    threshold: float
+    error: Array
+    size: float
+    first: int
+    least: float
+    thresholds: Array
     factors: Factors
     projectors: Projectors
     code: Indices
@@ -88,36 +101,34 @@ class Directions(NamedTuple):
     scratch: Array
     N: Array
     kept: Indices
-    share: Array
     root: Array
     costs: Array
 
     @classmethod
-    def of(
-        cls, resolution: Resolution, supported: bool, weight: float | None = None
-    ) -> Self:
+    def of(cls, resolution: Resolution, supported: bool, size: float) -> Self:
         """Allocate for a law.
 
         Args:
             resolution: The law, with its levels and its metric.
             supported: Whether the first level is that of the contacts; it costs as much
                 as the one below, where it may move at all.
-            weight: Cost of null-space deviation relative to the first level; None: the
-                default, `_ONE_LEVEL` or `_SEVERAL_LEVELS`.
+            size: The robot's size [m].
         """
         J = resolution.problem.task.jacobian
         m, n = J.shape
         every = len(resolution.ends)
         levels = every - supported
-        whole = weight or (_ONE_LEVEL if levels <= 1 else _SEVERAL_LEVELS)
-        steps = np.maximum(np.arange(every + 1) - supported, 0) / max(levels, 1)
-        steps[-1] = 1.0
+        whole = _ONE_LEVEL if levels <= 1 else _SEVERAL_LEVELS
         return cls(
             J,
             resolution.problem.metric.L,
             resolution.form,
             resolution.ends,
-            resolution.threshold,
+            resolution.problem.task.error,
+            size,
+            int(supported),
+            whole ** (1.0 / max(levels, 1)),
+            resolution.thresholds,
             resolution.factors,
             resolution.projectors,
             resolution.code,
@@ -129,9 +140,31 @@ class Directions(NamedTuple):
             np.empty((n, n)),
             np.zeros(1, dtype=np.int64),
             np.empty(n),
-            np.empty(n),
-            np.array([steps, whole ** (-0.5 * steps)]),
+            np.zeros((2, every + 1)),
         )
+
+
+@kernel
+def _write_costs(directions: Directions) -> None:
+    """Write t and 1/√ρ of each level and of the null space."""
+    ends, costs, e = directions.ends, directions.costs, directions.error
+    last = costs.shape[1] - 1
+    start, exponent = 0, 0.0
+    for k in range(last):
+        costs[0, k] = exponent
+        if k >= directions.first:
+            square = 0.0
+            for r in range(start, ends[k]):
+                square += e[r] * e[r]
+            below = _OF_ERROR * np.sqrt(square) / directions.size
+            exponent += np.log(min(max(below, directions.least), _MOST))
+        start = ends[k]
+    if exponent == 0.0:  # nothing but contacts: the null space costs as little
+        exponent = np.log(directions.least)
+    costs[0, last] = exponent
+    for k in range(last + 1):
+        costs[1, k] = np.exp(-0.5 * costs[0, k])
+        costs[0, k] /= exponent
 
 
 @kernel
@@ -142,7 +175,8 @@ def write_directions(directions: Directions) -> None:
     orthonormal, one after the other; else they are found here.
     """
     Q, N, ends = directions.factors.Q, directions.N, directions.ends
-    share, root, costs = directions.share, directions.root, directions.costs
+    root, costs = directions.root, directions.costs
+    _write_costs(directions)
     n, first_damped = N.shape[0], directions.code[0]
     last = costs.shape[1] - 1
     exact = first_damped == 0
@@ -161,11 +195,11 @@ def write_directions(directions: Directions) -> None:
         for r in range(count):
             while r >= ends[k]:
                 k += 1
-            root[r], share[r] = costs[1, k], 0.0
+            root[r] = costs[1, k]
         directions.kept[0] = min(count, ends[0])
     _complete(N, count, directions.scratch[0, :n], directions.scratch[1, :n])
     for r in range(n - count):
-        root[n - 1 - r], share[n - 1 - r] = costs[1, last], 1.0
+        root[n - 1 - r] = costs[1, last]
     if not exact and not directions.alone:
         _write_shared(directions, count)
 
@@ -195,7 +229,7 @@ def _write_levels(directions: Directions, levels: int) -> int:
     J, ends, N, square = (
         directions.jacobian, directions.ends, directions.N, directions.square
     )  # fmt: skip
-    B, threshold, n = directions.wide, directions.threshold, directions.N.shape[0]
+    B, n = directions.wide, directions.N.shape[0]
     count = start = 0
     whiten(J, directions.L, directions.form, B)
     for k in range(levels):
@@ -211,7 +245,7 @@ def _write_levels(directions: Directions, levels: int) -> int:
             orthogonalise_rows(rows, square[:0])
             for r in range(rows.shape[0]):
                 size = np.sqrt(squared_norm(rows[r]))
-                if size >= threshold and count < n:
+                if size >= directions.thresholds[k] and count < n:
                     for i in range(n):
                         N[count, i] = rows[r, i] / size
                     count += 1
@@ -226,7 +260,7 @@ def _write_damped_level(directions: Directions) -> int:
     First those that it has for itself. Of a direction with the singular value s below
     the threshold the null space has the share (1 - s²/threshold²)². Returns how many.
     """
-    Q, N, threshold = directions.factors.Q, directions.N, directions.threshold
+    Q, N, threshold = directions.factors.Q, directions.N, directions.thresholds[0]
     costs, n, count = directions.costs, directions.N.shape[0], 0
     own, free = costs[1, 0], costs[1, costs.shape[1] - 1]
     for partly in range(2):
@@ -235,11 +269,9 @@ def _write_damped_level(directions: Directions) -> int:
             if (size < threshold) != (partly == 1) or size <= _LOST * threshold:
                 continue
             lost = max(1.0 - (size / threshold) ** 2, 0.0)
-            share = lost * lost
             for i in range(n):
                 N[count, i] = Q[r, i] / size
-            directions.share[count] = share
-            directions.root[count] = own * (free / own) ** share
+            directions.root[count] = own * (free / own) ** (lost * lost)
             count += 1
         if partly == 0:
             directions.kept[0] = count
@@ -251,8 +283,7 @@ def _write_shared(directions: Directions, count: int) -> None:
     """Overwrite the directions after the first ones, which levels share.
 
     These are the eigenvectors of T = Σ t_k (P_{k-1} - P_k) + P_K in the rows of N from
-    ``count`` on, and their costs whole^t for the eigenvalues t. Of such a direction the
-    null space has what t is beyond that of the last level.
+    ``count`` on, and their costs ρ_N^t for the eigenvalues t.
     """
     Q, QJ, G_inverse = directions.projectors
     L, ends, costs = directions.L, directions.ends, directions.costs
@@ -302,12 +333,9 @@ def _write_shared(directions: Directions, count: int) -> None:
     for r in range(d):  # eigenvalues between 1 and 2: their vectors are well defined
         T[r, r] += 1.0
     orthogonalise_rows(T, U)
-    beyond = costs[0, last - 1]
     for r in range(d):
         t = min(max(np.sqrt(squared_norm(T[r])) - 1.0, 0.0), 1.0)
         directions.root[count + r] = costs[1, last] ** t
-        free = (t - beyond) / (1.0 - beyond) if beyond < 1.0 else 1.0
-        directions.share[count + r] = max(free, 0.0)
         for i in range(n):
             total = 0.0
             for s in range(d):
@@ -389,139 +417,3 @@ def write_inverse_root(directions: Directions, first: int, JT: Array) -> int:
             solve_lower_transposed(L, JT[rows, :n])
         rows += 1
     return rows
-
-
-@kernel
-def freedom(directions: Directions, k: int) -> float:
-    """Return how much of a direction is the null space's by its cost, in [0, 1].
-
-    It is the share times what the null space costs of what the direction costs. In
-    half a share that is a thousandth: such a direction is a task's. If it counted as
-    free by its share alone, the null space, which has no other task, would jump by
-    100 rad/s² for a part in 300 of this one.
-    """
-    costs, share = directions.costs, directions.share[k]
-    if share == 0.0:
-        return 0.0
-    return float(share * (directions.root[k] / costs[1, costs.shape[1] - 1]) ** 2)
-
-
-@kernel
-def null_space_scale(directions: Directions, y: Array) -> float:
-    """Return by how much 1/√ρ of the null space shrinks after a first optimum.
-
-    Where limits let no motion keep the tasks, an optimum with a tiny ρ moves the null
-    space as far as it can for the last bit of a task: from one bound of the efforts to
-    the other between two periods. So the optimum is computed again, with ρ such that
-    the null space costs the share `_SHARE` of what the tasks cost, D². Since
-
-        D² + ρ N² ≤ D₁² + ρ N₁²      with ρ N₁² = share D₁²
-
-    the tasks then miss by (1 + share)^½ of the least that they must, at most. Where
-    they need not miss, D₁ = 0 and nothing changes. A direction that belongs to both in
-    part counts as the null space's by `freedom`.
-
-    Args:
-        directions: The directions.
-        y: The first optimum δ = J y in terms of `write_inverse_root`, shape (count,).
-    """
-    costs, missed, moved = directions.costs, 0.0, 0.0
-    without = directions.share.shape[0] - y.shape[0]  # those that may not move
-    for r in range(y.shape[0]):
-        k = without + r
-        free, root = freedom(directions, k), directions.root[k]
-        missed += (1.0 - free) * y[r] * y[r]
-        moved += free * root * root * y[r] * y[r]
-    weight = costs[1, costs.shape[1] - 1] ** -2.0
-    if _SHARE * missed <= weight * moved or moved == 0.0:
-        return 1.0
-    return float(np.sqrt(weight / min(_SHARE * missed / moved, 1.0)))
-
-
-@kernel
-def write_null_space_rows(directions: Directions, A: Array) -> None:
-    """Write P, the projector on the null space of all tasks, into A (nv, at least nv).
-
-    e_N' = -K_N e_N - P δ, up to terms that the law's correction cancels, so that
-    d/dt ‖e_N‖_W ≤ -λ ‖e_N‖_W + ‖P δ‖_W: rows |(P δ)_j| ≤ λ s_j keep e_N bounded, and
-    δ = 0 always satisfies them. With m the columns of L⁻ᵀ N, P = Σ s_k m_k (L n_k)ᵀ
-    with the shares s_k of the null space: the law's own projector.
-    """
-    L, form = directions.L, directions.form
-    N, share = directions.N, directions.share
-    n = N.shape[0]
-    if directions.code[0] > 0 and not directions.alone:
-        _write_projector(directions, A)
-        return
-    raised = directions.scratch[0, :n]
-    for i in range(n):
-        for j in range(n):
-            A[i, j] = 0.0
-    for k in range(n):
-        if share[k] == 0.0:
-            continue
-        for i in range(n):
-            raised[i] = share[k] * N[k, i]
-        if form != IDENTITY:
-            solve_lower_transposed(L, raised)
-        for j in range(n):
-            lowered = N[k, j]
-            if form != IDENTITY:
-                lowered = 0.0
-                for i in range(j + 1):
-                    lowered += L[j, i] * N[k, i]
-            for i in range(n):
-                A[i, j] += raised[i] * lowered
-
-
-@kernel
-def _write_projector(directions: Directions, A: Array) -> None:
-    """Write P = Q_K W, W = L Lᵀ, from what the last level left."""
-    Q, L, row = directions.projectors.Q, directions.L, directions.scratch[0]
-    n = Q.shape[0]
-    for i in range(n):
-        for j in range(n):
-            row[j] = 0.0
-            for k in range(j, n):
-                row[j] += Q[i, k] * L[k, j]
-        for j in range(n):
-            A[i, j] = 0.0
-            for k in range(j + 1):
-                A[i, j] += row[k] * L[j, k]
-
-
-class DecayRate:
-    """λ, the slowest rate at which ‖e_N‖_W decays [1/s], W = L Lᵀ.
-
-    With one number for all degrees of freedom it is that number, whatever the metric:
-    then it is found once for a gain, and not in each step.
-    """
-
-    def __init__(self) -> None:
-        """Begin without a gain."""
-        self._known = b""
-        self._number: float | None = None
-
-    def of(self, gain: Array, L: Array) -> float:
-        """Return λ.
-
-        Args:
-            gain: K_N, shape (nv, nv) [1/s].
-            L: Cholesky factor of the metric, shape (nv, nv).
-        """
-        written = gain.tobytes()
-        if written != self._known:
-            first = float(gain[0, 0])
-            alike = (gain == first * np.eye(len(gain))).all()
-            self._known, self._number = written, first if alike else None
-        return _least_rate(gain, L) if self._number is None else self._number
-
-
-def _least_rate(gain: Array, L: Array) -> float:
-    """Return the largest λ with xᵀW K_N x ≥ λ xᵀW x."""
-    lowered = L @ (L.T @ gain)
-    both = 0.5 * (lowered + lowered.T)
-    for _ in range(2):  # L⁻¹ from the left, then from the right
-        both = both.T.copy()
-        solve_rows(L, both)
-    return float(np.linalg.eigvalsh(both)[0])

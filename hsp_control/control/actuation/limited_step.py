@@ -36,11 +36,10 @@ _RELAXATION_COST = {
     "contacts": 1e3,
     "distances": 30.0,
     "motion": 1.0,
-    "null space": 1.0,
     "holding": 0.1,
 }
 """Cost of a violation, where limits contradict each other: the most expensive kind is
-relaxed last. The bound of the null space is relaxed by itself, before all others."""
+relaxed last."""
 _REGULARISATION, _ROUNDS = 1e-6, 4
 """Cost of all other unknowns while the violation is minimised, and the number of
 rounds. Each round penalises the difference from the result of the round before, so that
@@ -70,8 +69,6 @@ class LimitedStep:
         base: Indices,
         limited: Indices,
         weight: float,
-        null_space_weight: float | None,
-        speed: Array,
         capacity: int,
     ) -> None:
         """Allocate.
@@ -84,19 +81,15 @@ class LimitedStep:
             base: Indices of the degrees of freedom without a motor.
             limited: Those with a limit on their effort.
             weight: The robot's weight [N].
-            null_space_weight: Cost of null-space deviation, see `Directions.of`.
-            speed: λ s of the null space, shape (nv,), read by each step; shape (0,):
-                there is no such bound.
             capacity: How many rows of barriers there is room for.
         """
         n, p = state.robot.nv, support.size
         held = sum(contact.rows for contact in support.contacts)
         self.capacity = capacity
-        counts = [len(base) + len(limited), len(support.cone), len(speed), capacity]
+        counts = [len(base) + len(limited), len(support.cone), capacity]
         ends = np.cumsum([0, *counts, held])
-        cones, null_space, barriers, contacts, k = map(int, ends[1:])
+        cones, barriers, contacts, k = map(int, ends[1:])
         self._barriers, self._used = barriers, 0
-        self._null_space = np.arange(null_space, null_space + len(speed))
         self._motion = np.arange(k, k + n)
         self._contacts = np.arange(contacts, k)
         self._J = resolution.problem.task.jacobian[:held]
@@ -110,13 +103,12 @@ class LimitedStep:
         end[:cones] = np.where(supporting, width, n)
         force_begin, force_end = zeros((2, k), dtype=np.int64)
         force_begin[:cones][supporting], force_end[:cones][supporting] = n, width
-        A[cones:null_space, n:] = support.cone
-        lower[cones:null_space] = 0.0
-        for r in range(cones, null_space):
+        A[cones:barriers, n:] = support.cone
+        lower[cones:barriers] = 0.0
+        for r in range(cones, barriers):
             point = (r - cones) // 4
             begin[r] = force_begin[r] = n + 3 * point
             end[r] = force_end[r] = n + 3 * point + 3
-        end[self._null_space] = n
         alike = np.full(width, _REGULARISATION**-0.5)
         self._soft, none = zeros(k + width), zeros(0)
         shared = lower, upper, none, len(base)
@@ -128,10 +120,8 @@ class LimitedStep:
             nearest=self._rows,
             soft=Problem(zeros((0, 0)), alike, A, begin, end, *softened),
             x=zeros(width),
-            first=zeros(width),
             force_memory=Workspace.of(width, k),
             memory=Workspace.of(width, k),
-            second_memory=Workspace.of(width, k),
             soft_memory=Workspace.of(width, k, soft=True),
         )
         self._x = programmes.x
@@ -147,14 +137,9 @@ class LimitedStep:
                 support.inverse_cost,
                 weight,
             ),
-            Directions.of(resolution, p > 0, null_space_weight),
+            Directions.of(resolution, p > 0, state.robot.size or 1.0),
             bounds,
-            speed,
-            Places(
-                np.array([*base, *limited], dtype=np.int64),
-                len(base),
-                null_space,
-            ),
+            Places(np.array([*base, *limited], dtype=np.int64), len(base)),
             programmes,
             self.result,
         )
@@ -248,43 +233,24 @@ class LimitedStep:
     def _relax(self, barriers: dict[str, Indices]) -> tuple[Status | None, float]:
         """Relax the limits as little as possible, and solve again.
 
-        The bound of the null space is relaxed by itself first. If that is not enough,
-        contacts are kept longest, then distances, then joint motion, see
+        Contacts are kept longest, then distances, then joint motion, see
         `_RELAXATION_COST`.
         """
         A, end = self._rows.A, self._rows.end
         lower, upper = self._rows.lower, self._rows.upper
-        contacts, null_space = self._contacts, self._null_space
+        contacts = self._contacts
         A[contacts, : self._J.shape[1]] = self._J
         end[contacts] = self._J.shape[1]
         lower[contacts] = upper[contacts] = 0.0
-        bound = lower[null_space].copy(), upper[null_space].copy()
-        status, relaxation = Status.LIMITED, 0.0
-
-        def nearest() -> bool:
-            return bool(self._again() != UNSOLVED)
-
-        def without_bound() -> bool:
-            lower[null_space], upper[null_space] = -np.inf, np.inf
-            return nearest()
-
         try:
-            if not (len(null_space) and without_bound()):
-                soft = {"contacts": contacts, "motion": self._motion, **barriers}
-                relaxation = self._loosen(soft)
-                if not np.isfinite(relaxation):
-                    return None, np.inf
-                # If rounding leaves no room within the relaxed limits, the result is
-                # what violates them least.
-                status = Status.RELAXED
-                nearest()
-            if len(null_space):
-                lower[null_space], upper[null_space] = bound
-                if not nearest():
-                    self._loosen({"null space": null_space})
-                    if not nearest():
-                        without_bound()
-            return status, relaxation
+            soft = {"contacts": contacts, "motion": self._motion, **barriers}
+            relaxation = self._loosen(soft)
+            if not np.isfinite(relaxation):
+                return None, np.inf
+            # If rounding leaves no room within the relaxed limits, the result is what
+            # violates them least.
+            self._again()
+            return Status.RELAXED, relaxation
         finally:
             end[contacts] = 0
             lower[contacts], upper[contacts] = -np.inf, np.inf

@@ -6,7 +6,6 @@ contact forces in robot weights. The rows, in this order:
     base        (M a + N - F f)_base = 0                          no motor acts there
     effort      bounds on M a + N - F f, within the rate limit of the last effort
     cones       friction cones of f
-    null space  |P δ| ≤ λ s, see `write_null_space_rows`
     barriers    ∇d·a and ∇G·a from `MinimumDistance` and `StaticEffort`
     contacts    J_c δ = 0, only where limits contradict each other: else it holds
                 because no direction of the contacts is among those that may move
@@ -21,15 +20,11 @@ import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
-from hsp_control.common.linalg import copy
 from hsp_control.constraints.limits.acceleration_bounds import Bounds
 from hsp_control.control.actuation.deviation_cost import (
     Directions,
-    freedom,
-    null_space_scale,
     write_directions,
     write_inverse_root,
-    write_null_space_rows,
 )
 from hsp_control.control.actuation.dual_active_set import (
     SOLVED,
@@ -93,12 +88,10 @@ class Places(NamedTuple):
         dofs: Degrees of freedom of the first rows: those without a motor, then those
             with a limit on their effort.
         base: How many have no motor.
-        null_space: The first row of the null space.
     """
 
     dofs: Indices
     base: int
-    null_space: int
 
 
 class Programmes(NamedTuple):
@@ -109,10 +102,8 @@ class Programmes(NamedTuple):
         nearest: Of deviation and forces, at the law's cost.
         soft: Of deviation and forces, all at the same cost, with soft rows.
         x: The unknowns, shape (nv + p,).
-        first: The first optimum, where it is computed again, shape (nv + p,).
         force_memory: Of the first.
         memory: Of the second.
-        second_memory: Of the second, where its optimum is computed again.
         soft_memory: Of the third.
     """
 
@@ -120,10 +111,8 @@ class Programmes(NamedTuple):
     nearest: Problem
     soft: Problem
     x: Array
-    first: Array
     force_memory: Workspace
     memory: Workspace
-    second_memory: Workspace
     soft_memory: Workspace
 
 
@@ -142,7 +131,6 @@ def solve_step(
     forces: Forces,
     directions: Directions,
     bounds: Bounds,
-    speed: Array,
     places: Places,
     programmes: Programmes,
     result: Result,
@@ -155,7 +143,6 @@ def solve_step(
         forces: The possible contact forces.
         directions: The directions of the law's levels.
         bounds: Bounds on acceleration and effort.
-        speed: λ s of the null space, shape (nv,), or (0,) without such a bound.
         places: Where the rows are.
         programmes: The QPs.
         result: Written.
@@ -180,7 +167,6 @@ def solve_step(
             ):
                 return Status.REDISTRIBUTED
         write_directions(directions)
-        _write_null_space_bound(directions, speed, places, qp.nearest)
     _start(forces, x)
     contacts_held = what != NEAREST_AGAIN and forces.first.shape[0] > 0
     count = write_inverse_root(directions, 1 if contacts_held else 0, qp.nearest.JT)
@@ -188,13 +174,6 @@ def solve_step(
     problem, warm = _moving(qp.nearest, count), what != NEAREST_AGAIN
     if minimise(problem, warm, x, qp.memory) != SOLVED:
         return UNSOLVED
-    scale = null_space_scale(directions, qp.memory.vectors[0, :count])
-    if scale < 1.0:  # the tasks miss: once more, with a dearer null space
-        copy(x, qp.first)
-        _scale_null_space(directions, scale, problem.JT)
-        _start(forces, x)
-        if minimise(problem, warm, x, qp.second_memory) != SOLVED:
-            copy(qp.first, x)
     if _write_result(wanted, forces, bounds, places, x, result):
         return Status.LIMITED
     return UNSOLVED
@@ -208,19 +187,6 @@ def _start(forces: Forces, x: Array) -> None:
         x[i] = 0.0
     for j in range(forces.first.shape[0]):
         x[n + j] = forces.first[j] / forces.weight
-
-
-@kernel
-def _scale_null_space(directions: Directions, scale: float, JT: Array) -> None:
-    """Scale the rows of Jᵀ as far as they are free."""
-    count = JT.shape[0]
-    without = directions.share.shape[0] - count  # those of contacts
-    for row in range(count):
-        free = freedom(directions, without + row)
-        if free > 0.0:
-            factor = scale**free
-            for j in range(JT.shape[1]):
-                JT[row, j] *= factor
 
 
 @kernel
@@ -262,19 +228,6 @@ def _write_rows(
         upper[k + i] = bounds.a_upper[i] - a[i]
     for j in range(p):
         lower[k + n + j], upper[k + n + j] = f_lower[j] / weight, f_upper[j] / weight
-
-
-@kernel
-def _write_null_space_bound(
-    directions: Directions, speed: Array, places: Places, rows: Problem
-) -> None:
-    """Write the rows |P δ| ≤ λ s, if there is such a bound."""
-    if speed.shape[0] == 0:
-        return
-    first = places.null_space
-    write_null_space_rows(directions, rows.A[first : first + speed.shape[0]])
-    for i in range(speed.shape[0]):
-        rows.lower[first + i], rows.upper[first + i] = -speed[i], speed[i]
 
 
 @kernel

@@ -153,7 +153,7 @@ class RunningIntegral:
 
 def _check_decay(task: Task, Ki: Array) -> None:
     m = task.rows
-    Kp, Kv, _ = task.feedback()
+    Kp, Kv, *_ = task.feedback()
     zero, one = np.zeros((m, m)), np.eye(m)
     companion = np.block([[zero, one, zero], [zero, zero, one], [-Ki, -Kp, -Kv]])
     slowest = float(np.linalg.eigvals(companion).real.max())

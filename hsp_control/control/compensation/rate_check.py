@@ -189,7 +189,7 @@ def _task_findings(
     found: list[RateFinding | None] = []
     for task in tasks:
         feedbacks = controller.linear_feedback(task.name, state)
-        for since, (Kp, Kv, _) in feedbacks.items():
+        for since, (Kp, Kv, *_) in feedbacks.items():
             Ki = integral.get(task.name, np.zeros_like(Kp))
             found += _findings_of(task, Kp, Kv, Ki, since, period, delays)
     return found

@@ -18,7 +18,6 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import StreamError
 from hsp_control.trajectories.streams.bounds import MotionBounds
 from hsp_control.trajectories.streams.chart import Chart, State
-from hsp_control.trajectories.streams.governor import Lead
 from hsp_control.trajectories.streams.message import Message
 from hsp_control.trajectories.streams.segments import (
     Coast,
@@ -37,11 +36,6 @@ _CONSIDERED = 256
 """The reference joins one of the next waypoints, at most this many."""
 _AT_ONCE = 256
 """Of more messages that come at once the oldest do not count."""
-_LOOK = 0.01
-"""How often the reference looks at where the robot is [s]."""
-_NEARER = 1e-4
-"""A reference that is held back is planned again when the robot has come nearer to the
-target by this part of how far the reference may be ahead."""
 
 
 class Policy(NamedTuple):
@@ -71,7 +65,6 @@ class RunningStream:
     Attributes:
         chart: The local coordinates.
         taken: How many messages it has taken.
-        held_back: Whether the robot is so far behind that the reference waits for it.
         refused: How many asked for what no motion within the bounds can do.
         waypoints: The waypoints that were received.
     """
@@ -81,7 +74,6 @@ class RunningStream:
         chart: Chart,
         bounds: MotionBounds,
         policy: Policy,
-        lead: Lead,
         source: Source,
         start: State,
     ) -> None:
@@ -91,14 +83,11 @@ class RunningStream:
             chart: The local coordinates.
             bounds: Bounds in these coordinates.
             policy: How messages become goals.
-            lead: How far the reference may be ahead of the robot.
             source: Where they come from.
             start: Where the reference is until the first message.
         """
         self.chart, self._policy, self._source = chart, policy, source
-        self._joiner, self._lead = Joiner(bounds, chart.linear), lead
-        self._looked, self._actual = -inf, np.empty((1, 0))
-        self.held_back, self._remaining = False, inf
+        self._joiner = Joiner(bounds, chart.linear)
         self._begin = self._now = self._oldest = -inf
         self._heard = -inf
         self._silent = False
@@ -141,34 +130,6 @@ class RunningStream:
             )
         k = max(bisect_right(self._starts, t) - 1, 0)
         return self._segments[k].state(t)
-
-    def looks(self, t: float) -> bool:
-        """Return whether it is time to look at where the robot is; see `see`."""
-        return not -_LOOK < t - self._looked < _LOOK
-
-    def see(self, t: float, actual: Array) -> None:
-        """Look at where the robot is, and wait for it if it is too far behind.
-
-        Args:
-            t: The time [s].
-            actual: Where it is, as a message would say it, shape (width,).
-        """
-        self._looked = t
-        state = self.chart.rebased(self.at(t))
-        here = self.chart.local(actual[None], state.base)[0]
-        was, self.held_back = self.held_back, self._lead.exceeded(state.x, here)
-        if not self.held_back:
-            if was:
-                self._remaining = inf
-                self._plan(t)
-            return
-        goal = self._target(t, state)
-        remaining = inf if goal is None else self._lead.distance(goal, here)
-        # Only where the robot came nearer: if it swings, the reference rests.
-        if remaining < self._remaining - _NEARER or not was:
-            self._remaining = remaining
-            self._actual = actual[None].copy()
-            self._plan(t)
 
     def copy(self) -> "RunningStream":
         """Return one that goes on from here by itself."""
@@ -217,7 +178,7 @@ class RunningStream:
         only_newest = policy.name == "latest"
         if not self.waypoints.add(message, t, policy.delay, only_newest):
             return False
-        self._command, self._remaining = None, inf
+        self._command = None
         if message.values is None:
             assert message.velocities is not None
             self._command = message.velocities[0]
@@ -247,14 +208,6 @@ class RunningStream:
         policy, waypoints = self._policy, self.waypoints
         if self._silent:
             return self._to_rest(t, state)
-        if self.held_back and (target := self._target(t, state)) is not None:
-            here = self.chart.local(self._actual, state.base)[0]
-            nearer = self._lead.nearer_goal(target, state.x, here)
-            still = np.zeros_like(nearer)
-            goal = Goal(t, nearer, still, still)
-            if _on_line(state, goal, t):
-                return self._to_rest(t, state)
-            return self._joiner.fastest(t, state, goal)
         if self._command is not None:
             return self._follow_command(t, state, self._command)
         if not waypoints.times:
@@ -303,24 +256,6 @@ class RunningStream:
         meeting = self._joiner.fastest(t, state, goal)
         meeting.end = min(meeting.end, end)  # unless a message shows how it goes on
         return meeting
-
-    def _target(self, t: float, state: State) -> Array | None:
-        """Return where it is to go while the robot is behind, (n,); None: nowhere.
-
-        It is the next waypoint, or where a commanded velocity leads in ``delay``.
-        """
-        policy, waypoints = self._policy, self.waypoints
-        if self._command is not None:
-            if t >= self._heard + policy.extrapolation:
-                return None
-            rate = self.chart.local_rate(state.x, self._command, state.base)
-            where: Array = state.x + policy.delay * rate
-            return where
-        if not waypoints.times:
-            return None
-        k = min(waypoints.ahead(t), len(waypoints.times) - 1)
-        target: Array = self.chart.local(waypoints.values[k][None], state.base)[0]
-        return target
 
     def _follow_command(self, t: float, state: State, command: Array) -> Segment:
         """Return a piece that reaches or keeps a velocity in world axes."""

@@ -11,7 +11,6 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 from pydantic import AfterValidator
 
-from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import StreamError, TrajectoryError
 from hsp_control.declaration.part import value_fields
 from hsp_control.declaration.quantities import (
@@ -34,7 +33,6 @@ from hsp_control.trajectories.streams.bounds import (
     linear_bounds,
 )
 from hsp_control.trajectories.streams.chart import Chart, State
-from hsp_control.trajectories.streams.governor import Lead
 from hsp_control.trajectories.streams.listeners import check_address, is_address
 from hsp_control.trajectories.streams.mailbox import Mailbox
 from hsp_control.trajectories.streams.message import ORIENTATION, POSE, Space
@@ -188,8 +186,8 @@ class Streamed(Remembering, error=TrajectoryError):
 
         ``taken``: all valid ones; ``late``: of these, those that came too late to
         count; ``rejected``: invalid ones, and those that no motion can follow.
-        ``held_back`` is 1 while the reference waits for the robot. The
-        stream that a controller follows counts, ``controller.tasks[0].trajectory``.
+        The stream that a controller follows counts,
+        ``controller.tasks[0].trajectory``.
 
         Raises:
             StreamError: If it begins where a robot starts, and no controller follows
@@ -201,25 +199,7 @@ class Streamed(Remembering, error=TrajectoryError):
             "taken": running.taken,
             "late": running.waypoints.late,
             "rejected": self._mailbox.inbox.rejected + running.refused,
-            "held_back": float(running.held_back),
         }
-
-    def see(self, t: float, measure: Callable[[], tuple[Array, Array]]) -> None:
-        """Look at where the robot is, now and then; see ``lead``.
-
-        Args:
-            t: The time [s].
-            measure: Returns reference and actual value of the task that follows it.
-        """
-        running = self.running
-        if not running.looks(t):
-            return
-        reference, actual = measure()
-        if not self.space.rotational:  # in the coordinates of the stream
-            actual = running.at(t).x + actual - reference
-        elif len(actual) != self.space.width:
-            return  # the direction of one axis, which says too little
-        running.see(t, actual)
 
     @property
     def is_placed(self) -> bool:
@@ -297,7 +277,7 @@ class Streamed(Remembering, error=TrajectoryError):
             inf if self.stop_after is None else self.stop_after,
         )
         source = self._opened(space)
-        return RunningStream(chart, self._bounds(), policy, self._lead(), source, start)
+        return RunningStream(chart, self._bounds(), policy, source, start)
 
     def _opened(self, space: Space) -> Source:
         kept = not vars(self).get("_previews", False)
@@ -354,10 +334,6 @@ class Streamed(Remembering, error=TrajectoryError):
         """Return the bounds in the coordinates of the chart."""
         raise NotImplementedError
 
-    def _lead(self) -> Lead:
-        """Return how far the reference may be ahead of the robot."""
-        raise NotImplementedError
-
 
 class Stream(Streamed, Trajectory, type="stream"):
     """x(t) in Rⁿ that is streamed: the position of a point, or a posture.
@@ -378,9 +354,6 @@ class Stream(Streamed, Trajectory, type="stream"):
     """Bound on |x''|, one number or n [1/s²]."""
     jerk: PositiveNumbers = 200.0
     """Bound on |x'''|, one number or n [1/s³]."""
-    lead: Positive | None = 0.1
-    """How far the reference goes ahead of a robot that cannot follow, the norm of all
-    coordinates [m, or the task's unit]; None: any distance. See `Lead`."""
 
     @property
     def dimension(self) -> int:
@@ -412,9 +385,6 @@ class Stream(Streamed, Trajectory, type="stream"):
     def _bounds(self) -> MotionBounds:
         return linear_bounds(self.speed, self.acceleration, self.jerk, self.dimension)
 
-    def _lead(self) -> Lead:
-        return Lead(_or_endless(self.lead), inf, self.dimension)
-
 
 class Turning(Streamed):
     """A stream with a rotation."""
@@ -426,9 +396,6 @@ class Turning(Streamed):
     """Bound on |ω'| [rad/s²]."""
     angular_jerk: Positive = 1000.0
     """Bound on |ω''| [rad/s³]."""
-    angular_lead: Positive | None = 0.5
-    """How far the reference turns ahead of a robot that cannot follow [rad]; None: any
-    angle. See `Lead`."""
 
     def __post_init__(self) -> None:
         """Check the source and the bounds."""
@@ -477,9 +444,6 @@ class StreamOrientation(Turning, OrientationTrajectory, type="stream"):
     def _bounds(self) -> MotionBounds:
         return self._turning
 
-    def _lead(self) -> Lead:
-        return Lead(inf, _or_endless(self.angular_lead), 0)
-
 
 class StreamPose(Turning, PoseTrajectory, type="stream"):
     """M(t) that is streamed, as x, y, z and a quaternion, or as twists in world axes.
@@ -502,9 +466,6 @@ class StreamPose(Turning, PoseTrajectory, type="stream"):
     """Bound on |x''|, one number or three [m/s²]."""
     jerk: PositiveNumbers = 200.0
     """Bound on |x'''|, one number or three [m/s³]."""
-    lead: Positive | None = 0.1
-    """How far the reference goes ahead of a robot that cannot follow [m]; None: any
-    distance. See `Lead`."""
 
     @property
     def relative(self) -> bool:
@@ -549,13 +510,6 @@ class StreamPose(Turning, PoseTrajectory, type="stream"):
         moving = linear_bounds(self.speed, self.acceleration, self.jerk, 3)
         turning = self._turning
         return MotionBounds(*map(np.concatenate, zip(moving, turning, strict=True)))
-
-    def _lead(self) -> Lead:
-        return Lead(_or_endless(self.lead), _or_endless(self.angular_lead), 3)
-
-
-def _or_endless(number: float | None) -> float:
-    return inf if number is None else number
 
 
 def stream_for(followed: object, stream: Streamed) -> Any:

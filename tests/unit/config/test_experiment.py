@@ -103,7 +103,7 @@ def test_a_configuration_becomes_the_objects_it_names() -> None:
     (task,) = experiment.controller.tasks
     assert isinstance(task, FramePose)
     assert task.name == task.frame == "pen"
-    Kp, Kv, offset = experiment.controller.feedback("pen")
+    Kp, Kv, offset, *_ = experiment.controller.feedback("pen")
     np.testing.assert_allclose(np.diag(Kp), [64, 64, 64, 25, 25, 25])
     np.testing.assert_allclose(np.diag(Kv), [14.4] * 3 + [9.0] * 3)
     assert not offset.any()

@@ -151,7 +151,7 @@ def test_in_the_end_it_is_as_if_built_that_way(name: str, seed: int) -> None:
     line.efforts(changed, np.array([0.0, 1.0, SPAN + 1.0, SPAN + 3.0]))
     tasks = []
     for task in changed.tasks:
-        Kp, Kv, _ = changed.feedback(task.name)
+        Kp, Kv, *_ = changed.feedback(task.name)
         tasks.append(replace(task, gains=hsp.Gains(Kp, Kv)))  # type: ignore[call-arg]
     built = hsp.Controller(
         line.robot,

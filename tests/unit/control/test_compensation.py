@@ -337,7 +337,7 @@ def test_an_offset_enters_each_error_equation_exactly(task: Task) -> None:
         moved = robot.integrate(q, s * v + 0.5 * s * s * a)
         near = robot.state(0.3 + s, moved, v + s * a)
         rates.append(task.evaluate(near, feedback=feedback).error_rate)
-    Kp, Kv, offset = feedback
+    Kp, Kv, offset, *_ = feedback
     residual = (rates[0] - rates[1]) / (2 * h) + Kv @ e_dot + Kp @ e
     # Rounding 1e-16/h and the difference's own h², beside terms of 3 and more.
     np.testing.assert_allclose(residual, -offset, atol=1e-7)

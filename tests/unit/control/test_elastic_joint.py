@@ -103,7 +103,7 @@ def test_a_simulated_joint_obeys_the_loop_s_polynomial(
         made, [1.0], duration=0.6, control_period=h, log_period=h, plant=plant,
         compensation=parts,
     ).q[:, 0]  # fmt: skip
-    Kp, Kv, _ = made.feedback("posture")
+    Kp, Kv, *_ = made.feedback("posture")
     action = parts.integral_action
     Ki = np.zeros((1, 1)) if action is None else action.gains(made.tasks)["posture"]
     loop = LinearLoop(Kp, Kv, Ki, h, *delays, parts, joint=joint)

@@ -173,7 +173,7 @@ def test_the_linear_loop_is_the_chain_link_by_link(
     ).q[:, 0]  # fmt: skip
     action = parts.integral_action
     Ki = ZERO if action is None else action.gains(made.tasks)["posture"]
-    Kp, Kv, _ = made.feedback("posture")
+    Kp, Kv, *_ = made.feedback("posture")
     loop = LinearLoop(Kp, Kv, Ki, h, *delays, parts, 1.0 / heavy)
     coefficients = np.poly(loop.transition())
     n, begun = len(coefficients), 8

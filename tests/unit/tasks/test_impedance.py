@@ -180,7 +180,7 @@ def test_gains_at_a_state_are_those_of_the_step(case: Case) -> None:
     controller = Controller(robot, [task], limits=None)
     output = controller.compute(TIME, motion.q, motion.v)
     state = robot.state(TIME, motion.q, motion.v)
-    Kp, Kv, offset = task.feedback_at(state)
+    Kp, Kv, offset, *_ = task.feedback_at(state)
     used = controller.feedback("hand")
     np.testing.assert_allclose(used.Kp, Kp, rtol=1e-12)
     np.testing.assert_allclose(used.Kv, Kv, rtol=1e-12)
@@ -218,7 +218,7 @@ def test_modes_have_the_damping_ratio() -> None:
     task = FramePose(impedance=spring, name="hand")
     controller = Controller(robot, [task], limits=None)
     controller.compute(0.0, robot.home(), np.zeros(7))
-    Kp, Kv, _ = controller.feedback("hand")
+    Kp, Kv, *_ = controller.feedback("hand")
     eye, zero = np.eye(6), np.zeros((6, 6))
     roots = np.linalg.eigvals(np.block([[zero, eye], [-Kp, -Kv]]))
     np.testing.assert_allclose(-roots.real / np.abs(roots), 0.4, rtol=1e-6)
@@ -233,7 +233,7 @@ def test_through_a_singularity() -> None:
     largest = 0.0
     for bend in [*np.geomspace(1.0, 1e-12, 200), 0.0]:
         output = controller.compute(0.0, bent(robot, bend), v)
-        Kp, Kv, _ = controller.feedback("tip")
+        Kp, Kv, *_ = controller.feedback("tip")
         assert np.isfinite(output.tau).all()
         largest = max(largest, float(np.abs(Kv).max()))
     assert largest < 2e3
@@ -333,7 +333,7 @@ def test_a_change_counts_from_what_is_in_force() -> None:
     first = controller.tasks[0].feedback_at(state)
     for t, scale, ratio in ((0.5, 1.0, 1.0), (1.5, 2.0, 0.75), (2.5, 3.0, 0.5)):
         controller.compute(t, q, v)
-        Kp, Kv, _ = controller.feedback("hand")
+        Kp, Kv, *_ = controller.feedback("hand")
         np.testing.assert_allclose(Kp, scale * first.Kp, rtol=1e-9)
         np.testing.assert_allclose(Kv, ratio * np.sqrt(scale) * first.Kv, rtol=1e-9)
 
