@@ -45,7 +45,8 @@ class CompliantTask(SecondOrderTask):
     _: KW_ONLY
     impedance: Impedance | None = None
     """Stiffness and damping of the rows [N/m and N·s/m, or N·m/rad and N·m·s/rad],
-    instead of `gains`; none by default."""
+    instead of `gains`; none by default. Its spring has a largest error of its own, and
+    fades by itself where the hand cannot move: `largest_error` does not count."""
 
     def __post_init__(self) -> None:
         """Check that there are not both gains and an impedance.
@@ -87,7 +88,7 @@ class CompliantTask(SecondOrderTask):
         with within("impedance"):
             self.impedance.numbers(rows)
         zeros = np.zeros((2, rows, rows))
-        return Feedback(zeros[0], zeros[1], np.zeros(rows), self._largest())
+        return Feedback(zeros[0], zeros[1], np.zeros(rows))
 
     def in_force(self) -> InForce:
         """Return new arrays of the task's own feedback; see `Task.in_force`."""
