@@ -48,7 +48,10 @@ class ActiveStack:
         acceleration: The law's acceleration, shape (nv,).
         streamed: The streams that tasks follow, and what measures these tasks.
         term_samples: The weighted sample of each term of the field.
+        share: How much it counts in the mixture that was resolved last, in (0, 1].
     """
+
+    share = 1.0
 
     def __init__(
         self,
