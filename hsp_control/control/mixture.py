@@ -8,6 +8,7 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation import Actuation, Delivered
+from hsp_control.control.actuation.support import Support
 from hsp_control.control.gains_in_force import GainsInForce
 from hsp_control.control.planned_contact import PlannedContact
 from hsp_control.control.setup import PlannedTask, Setup, levels_of
@@ -27,12 +28,12 @@ them, which counts by the stack's `share`."""
 class Mixture:
     """Resolves the law for the contacts and tasks that count at a time.
 
-    A task that fades in or out has a weight between 0 and 1. With w1 ≥ w2 ≥ ... the
-    weights of such tasks, a step is
+    A task that fades in or out has a weight between 0 and 1, and so has a contact that
+    is almost lifted (`PlannedContact.share`). With w1 ≥ w2 ≥ ... these, a step is
 
         (1 - w1) d{} + (w1 - w2) d{1} + (w2 - w3) d{1, 2} + ...
 
-    with d{...} what the law for the tasks of weight 1 and those in the braces delivers
+    with d{...} what the law for what has weight 1 and what is in the braces delivers
     within the limits. It is continuous in the weights, whatever binds. It keeps the
     limits, because they are convex in the acceleration, the effort and the forces,
     which are affine in one another. The rows of the tasks in all sets are linear in the
@@ -106,17 +107,22 @@ class Mixture:
         Args:
             t: The time of the state [s].
         """
-        weights = {each.key: each.weight(t) for each in self._fading}
+        tasks = [(each.weight(t), each) for each in self._fading]
+        contacts = [(each.share(t), each) for each in self._setup.contacts]
         coming = sorted(
-            (key for key, w in weights.items() if 0.0 < w < 1.0),
-            key=lambda key: -weights[key],
+            (pair for pair in (*tasks, *contacts) if 0.0 < pair[0] < 1.0),
+            key=lambda pair: -pair[0],
         )
-        off = {key for key, w in weights.items() if w < 1.0}
-        shares = [1.0, *(weights[key] for key in coming), 0.0]
+        shares = [1.0, *(share for share, _ in coming), 0.0]
         outcome, self.damped = EXACT, ""
         self._parts = []
         for k, (share, following) in enumerate(pairwise(shares)):
-            self.active = active = self.stack_at(t, off - set(coming[:k]))
+            if share == following:
+                continue
+            on = {id(each) for _, each in coming[:k]}
+            bearing = [each for w, each in contacts if w >= 1.0 or id(each) in on]
+            off = {each.key for w, each in tasks if w < 1.0 and id(each) not in on}
+            self.active = active = self._stack(bearing, off)
             active.share = share - following
             self._parts.append(active)
             found = active.resolve(t)
@@ -139,7 +145,10 @@ class Mixture:
         single = len(self._parts) == len(sets) == 1
         shares: list[float] = []
         parts: list[Delivered] = []
-        arrays: tuple[list[Array], ...] = [], [], []  # efforts, accelerations, forces
+        efforts: list[Array] = []
+        accelerations: list[Array] = []
+        forces: list[Array] = []
+        whole = self._parts[-1].support
         for active in self._parts:
             a, offset = active.acceleration, None
             if modifier is not None:
@@ -152,13 +161,15 @@ class Mixture:
                     return one
                 shares.append(active.share * share)
                 parts.append(one)
-                for k, copies in enumerate(arrays):  # the next part overwrites them
-                    copies.append(np.array(one[k]))
-        tau, acceleration, forces = (_mean(shares, copies) for copies in arrays)
-        delivered = self._acceleration  # the same in all steps: others bind it
-        delivered[:] = acceleration
-        status = max(part[3] for part in parts)
-        return tau, delivered, forces, status, max(part[4] for part in parts)
+                # The next part overwrites them.
+                efforts.append(one[0].copy())
+                accelerations.append(one[1].copy())
+                forces.append(_placed(one[2], active.support, whole))
+        mixed = self._acceleration  # the same in all steps: others bind it
+        mixed[:] = _mean(shares, accelerations)
+        _, _, _, statuses, relaxations = zip(*parts, strict=True)
+        tau, force = _mean(shares, efforts), _mean(shares, forces)
+        return tau, mixed, force, max(statuses), max(relaxations)
 
     def _within_limits(
         self, active: ActiveStack, a: Array, offset: Array | None
@@ -222,3 +233,14 @@ def _mean(shares: Sequence[float], parts: Sequence[Array]) -> Array:
     """Return the weighted mean; not even by rounding does it leave their range."""
     x = np.array(parts)
     return np.asarray(np.clip(shares @ x, x.min(axis=0), x.max(axis=0)))
+
+
+def _placed(forces: Array, support: Support, whole: Support) -> Array:
+    """Return forces of some contacts at their places among those of all, as a copy."""
+    if support.contacts == whole.contacts:
+        return forces.copy()
+    placed = np.zeros((whole.size // 3, 3))
+    for contact, points in zip(support.contacts, support.points, strict=True):
+        place = whole.points[whole.contacts.index(contact)]
+        placed[place] = forces.reshape(-1, 3)[points]
+    return placed.ravel()

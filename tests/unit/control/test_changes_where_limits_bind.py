@@ -251,6 +251,58 @@ def test_efforts_and_forces_of_legs_are_continuous(seed: int) -> None:
     assert (support.cone @ out.forces >= -1e-9).all()  # friction, to rounding
 
 
+def lifted(controller: hsp.Controller, contact: str) -> None:
+    controller.at(START).ramp(0.1).contact(contact, bears=False)
+    controller.at(START + RAMP - 0.1).ramp(0.1).contact(contact, bears=True)
+
+
+@pytest.mark.parametrize("limited", [False, True])
+@given(seed=seeds)
+@many
+def test_a_contact_that_is_lifted_and_bears_again(limited: bool, seed: int) -> None:
+    """The motion that it stops is set free, and stopped, without a jump."""
+    case = Case("panda", seed)
+    tip = hsp.contacts.SlidingContact(
+        case.robot.end_effector, force=hsp.contacts.CommandedForce(20.0), name="tip"
+    )
+    limits = case.limits() if limited else None
+    controller = case.controller(case.other(), contacts=[tip], limits=limits)
+    lifted(controller, "tip")
+    case.binds = not limited
+    case.assert_continuous(controller)
+
+
+@given(seed=seeds)
+@many
+def test_a_foot_that_is_lifted_while_it_moves(seed: int) -> None:
+    """Also in the forces: they stay at their places among those of all contacts."""
+    pytest.importorskip("example_robot_data")
+    rng, robot = np.random.default_rng(seed), load("solo12")
+    feet = [name for name in robot.frame_names if name.endswith("_FOOT")]
+    away = np.r_[np.zeros(6), 0.1 * rng.standard_normal(12)]
+    controller = hsp.Controller(
+        robot,
+        [hsp.FramePose("base_link", name="trunk")],
+        hsp.TargetPosture(robot.integrate(robot.home(), away)),
+        contacts=[hsp.contacts.PointContact(foot) for foot in feet],
+        start=robot.home(),
+    )
+    lifted(controller, feet[seed % 4])
+    q, v = robot.home(), 0.2 * rng.standard_normal(robot.nv)
+    for edge in EVENTS:
+        for t in edge + np.linspace(-1e-6, 1e-6, 21):
+            before = controller.compute(t, q, v)
+            after = controller.compute(t + 1e-9, q, v)
+            np.testing.assert_allclose(after.tau, before.tau, rtol=0, atol=1e-6)
+    out = controller.compute(START + 0.02, q, v)
+    support, state = controller.active_stack.support, controller.state
+    np.testing.assert_allclose(
+        out.tau + support.map @ out.forces,
+        state.inverse_dynamics(out.acceleration),
+        atol=1e-7,
+    )
+
+
 @pytest.mark.parametrize("name", ROBOTS)
 @given(seed=seeds)
 @many
