@@ -47,7 +47,10 @@ class ActiveStack:
         acceleration: The law's acceleration, shape (nv,).
         streamed: Whether a task follows a stream.
         term_samples: The weighted sample of each term of the field.
+        share: How much it counts in the mixture that was resolved last, in (0, 1].
     """
+
+    share = 1.0
 
     def __init__(
         self,

@@ -8,12 +8,13 @@ import numpy as np
 
 from hsp_control.common.exceptions import ControllerError
 from hsp_control.constraints.contacts import CommandedForce
-from hsp_control.constraints.limits import Limits, LimitsOrNone
+from hsp_control.constraints.limits import Limits, LimitsOrNone, RobotLimits
 from hsp_control.control.change import Change
 from hsp_control.control.composition import check_tasks, checked_gain
 from hsp_control.control.contact_changes import ChangeContact, ChangeForce
 from hsp_control.control.evolution import ABSENT
 from hsp_control.control.field_changes import ChangeField, ChangeWeight, ExchangeField
+from hsp_control.control.planned_limits import PlannedLimits
 from hsp_control.control.setup import (
     Setup,
     planned_task,
@@ -239,15 +240,15 @@ class MoveObstacle(Change, type="obstacle"):
             replace(each, field=_exchanged(each.field, old, new))
             for each in setup.terms
         )
-        distances = tuple(
-            (_exchanged(each, old, new), count)
-            for each, count in setup.limits.distances
+        sets = tuple(
+            (limits and _elsewhere(limits, old, new), share)
+            for limits, share in setup.limits.sets
         )
         return replace(
             setup,
             start=setup.start._replace(scene=moved),
             terms=terms,
-            limits=replace(setup.limits, distances=distances),
+            limits=PlannedLimits(sets),
         )
 
 
@@ -265,13 +266,26 @@ def _exchanged(part: Holder, old: Obstacle, new: Obstacle) -> Holder:
     return replace(part, **changes) if changes else part  # type: ignore[type-var]
 
 
+def _elsewhere(limits: RobotLimits, old: Obstacle, new: Obstacle) -> RobotLimits:
+    """Return limits in which one obstacle is replaced by another one."""
+    if not limits.distances:
+        return limits
+    moved = tuple(_exchanged(each, old, new) for each in limits.distances)
+    return replace(limits, distances=moved)
+
+
 def _is(value: object, obstacle: Obstacle) -> bool:
     # Not `==` alone: values that hold arrays have no truth of being equal.
     return isinstance(value, Obstacle) and value == obstacle
 
 
 class ChangeLimits(Change, type="limits"):
-    """The limits change to other ones; each number goes there smoothly."""
+    """The limits change to other ones.
+
+    Meanwhile efforts are (1 - s) times those within the old limits plus s times those
+    within the new ones, s from 0 to 1 and C² in time. So no effort jumps where a limit
+    goes, or one comes that the robot violates.
+    """
 
     limits: LimitsOrNone
     """The new limits; none: the old ones go. Without a bandwidth they keep that of the
@@ -283,13 +297,12 @@ class ChangeLimits(Change, type="limits"):
         Raises:
             LimitError: If they do not fit the robot.
         """
-        robot = setup.start.state.robot
         with within("limits"):
-            new, old = self.limits, setup.limits.sets[-1]
+            new, old = self.limits, setup.limits.last
             if new is not None and new.bandwidth is None and old is not None:
                 new = replace(new, bandwidth=old.bandwidth)
             numbers = None if new is None else new.placed(setup.start)
-            limits = setup.limits.then(self.at, self.ramp, numbers, robot)
+            limits = setup.limits.then(self.at, self.ramp, numbers)
         return replace(setup, limits=limits)
 
 

@@ -14,7 +14,11 @@ from hsp_control.trajectories import Crossfade
 
 
 class ChangeContact(Change, type="contact"):
-    """A contact is lifted, or set down again; its force fades."""
+    """A contact is lifted, or set down again; its force fades.
+
+    While the force is less than a tenth, the motion that the contact stops is set free,
+    or stopped, in proportion.
+    """
 
     contact: str
     """Name of the contact."""

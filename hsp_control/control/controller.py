@@ -29,7 +29,7 @@ from hsp_control.control.declared import Declared
 from hsp_control.control.explanation import flow_of, raise_not_finite
 from hsp_control.control.gains_in_force import GainsInForce
 from hsp_control.control.held_gains import check_held
-from hsp_control.control.mixture import Mixture
+from hsp_control.control.mixture import AccelerationModifier, Mixture
 from hsp_control.control.output import ControlOutput, Diagnostics
 from hsp_control.control.read_only import read_only
 from hsp_control.control.time_line import TimeLine
@@ -47,13 +47,6 @@ from hsp_control.tasks.task import Feedback
 
 if TYPE_CHECKING:
     from hsp_control.control.free_step import FreeStep
-
-AccelerationModifier = Callable[
-    [RobotState, ActiveStack, Array], tuple[Array, Array | None]
-]
-"""How compensators act between the law and the limits: a function of (state, active
-stack, a). It returns the acceleration to deliver, shape (nv,), and an additional effort
-besides M a + N, shape (nv,), or None."""
 
 _MEMORY = 1.0
 """Changes that were complete this long ago are forgotten [s]; an integrator may ask for
@@ -142,7 +135,6 @@ class Controller:
         robot, given = self._declared.robot, self._declared.start
         self._lock = Lock()
         self._state = RobotState(robot)
-        self._modified = np.zeros(robot.nv)
         self._gains = GainsInForce(robot.nv)
         self._now, self._begun = -np.inf, False
         # While nothing changes: the stack, all calls of a step as one, and whether the
@@ -200,8 +192,8 @@ class Controller:
             self._actuation.remember(last_effort)
         self._begun = True
 
-    def _resolve(self) -> tuple[Array, str]:
-        """Return the law's acceleration for what counts now, and what is damped.
+    def _resolve(self) -> str:
+        """Resolve the law for what counts now; return what is damped.
 
         Raises:
             NonFiniteError: If it contains NaN or inf.
@@ -211,7 +203,7 @@ class Controller:
             active, _, _ = whole
             if active.resolve(t) is NOT_FINITE:
                 self._raise_not_finite()
-            return active.acceleration, active.damped
+            return active.damped
         if not self._begun:
             self._begin()
         self._now = max(self._now, t)
@@ -222,12 +214,11 @@ class Controller:
             self._gains.write(t)
             self._actuation.update_limits(t)
         mixture = self._mixture
-        a, outcome = mixture.resolve(t)
-        if outcome is NOT_FINITE:
+        if mixture.resolve(t) is NOT_FINITE:
             self._raise_not_finite()
         if mixture.steady:
             self._bind()
-        return a, mixture.damped
+        return mixture.damped
 
     def _bind(self) -> None:
         """Bind the move, the law and the check of its limits as one call."""
@@ -286,16 +277,13 @@ class Controller:
             ControllerError: If the state belongs to another robot.
         """
         with self._lock:
-            state, whole, offset = self._state, self._whole, None
+            state, whole, mixed = self._state, self._whole, None
             if whole is None or modifier is not None or q is None or v is None:
                 self._observe(t, q, v)
-                a, damped = self._resolve()
+                damped = self._resolve()
                 active = self.active_stack
-                if modifier is not None:
-                    self._modified[:], offset = modifier(state, active, a)
-                    a = self._modified
-                violated = self._actuation.violated(state, a, active.resolution.code)
-                direct = False
+                mixed = self._mixture.deliver(modifier)
+                violated, direct = 0, False
             else:
                 active, move, direct = whole
                 a, damped, violated = active.acceleration, "", 0
@@ -313,11 +301,12 @@ class Controller:
             elif violated % FLAGS:  # the call that found it has limited the step
                 tau, a, forces, status, relaxation = self._actuation.limited
             else:
-                tau, a, forces, status, relaxation = self._actuation.deliver(
-                    state, a, violated, active.resolution, active.support, offset
-                )
-                # The kernel of limited steps has looked at all efforts already.
-                if (status is RELAXED or offset is not None) and not isfinite(
+                if mixed is None:
+                    law, support = active.resolution, active.support
+                    mixed = self._actuation.deliver(state, a, violated, law, support)
+                tau, a, forces, status, relaxation = mixed
+                # The kernel of limited steps has looked at all other efforts already.
+                if (status is RELAXED or modifier is not None) and not isfinite(
                     tau @ tau
                 ):
                     self._raise_not_finite()

@@ -153,7 +153,7 @@ class Declared:
             tuple(fields),
             Evolution(gain),
             tuple(contacts),
-            PlannedLimits.of(limits, robot),
+            PlannedLimits.of(limits),
             len(tasks),
         )
 

@@ -1,13 +1,14 @@
-"""The law while tasks fade in and out: a mixture of the law for each set of tasks."""
+"""Steps while tasks and limits fade in and out: mixtures of what each set delivers."""
 
-from collections.abc import Collection, Sequence, Set
+from collections.abc import Callable, Collection, Sequence, Set
 from itertools import pairwise
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.active_stack import ActiveStack
-from hsp_control.control.actuation import Actuation
+from hsp_control.control.actuation import Actuation, Delivered
+from hsp_control.control.actuation.support import Support
 from hsp_control.control.gains_in_force import GainsInForce
 from hsp_control.control.planned_contact import PlannedContact
 from hsp_control.control.setup import PlannedTask, Setup, levels_of
@@ -15,12 +16,32 @@ from hsp_control.law import Outcome
 from hsp_control.law.outcome import DAMPED, EXACT
 from hsp_control.robot import RobotState
 
+AccelerationModifier = Callable[
+    [RobotState, ActiveStack, Array], tuple[Array, Array | None]
+]
+"""How compensators act between the law and the limits: a function of (state, active
+stack, a). It returns the acceleration to deliver, shape (nv,), and an additional effort
+besides M a + N, shape (nv,), or None. While tasks fade it is called for each set of
+them, which counts by the stack's `share`."""
+
 
 class Mixture:
     """Resolves the law for the contacts and tasks that count at a time.
 
+    A task that fades in or out has a weight between 0 and 1, and so has a contact that
+    is almost lifted (`PlannedContact.share`). With w1 ≥ w2 ≥ ... these, a step is
+
+        (1 - w1) d{} + (w1 - w2) d{1} + (w2 - w3) d{1, 2} + ...
+
+    with d{...} what the law for what has weight 1 and what is in the braces delivers
+    within the limits. It is continuous in the weights, whatever binds. It keeps the
+    limits, because they are convex in the acceleration, the effort and the forces,
+    which are affine in one another. The rows of the tasks in all sets are linear in the
+    acceleration, so that these tasks keep their exact error equation throughout where
+    no limit binds.
+
     Attributes:
-        active: The stack that was resolved last, with the fewest tasks of a mixture;
+        active: The stack that was resolved last, with the most tasks of a mixture;
             None before.
         damped: The tasks of the first level with a bounded inverse in the last
             `resolve`, by name; empty: none.
@@ -53,7 +74,9 @@ class Mixture:
         self._state, self._actuation = state, actuation
         self._gains, self._threshold = gains, threshold
         self._stacks: dict[tuple[frozenset[int], frozenset[int]], ActiveStack] = {}
-        self._sum = np.zeros(state.robot.nv)
+        nv = state.robot.nv
+        self._modified, self._acceleration = np.zeros(nv), np.zeros(nv)
+        self._parts: list[ActiveStack] = []
         self.damped = ""
         self.field = setup.field
         self.plan(setup, exchanged=False)
@@ -78,43 +101,83 @@ class Mixture:
         self.steady = setup.steady and setup.end == -np.inf
         self.active = None
 
-    def resolve(self, t: float) -> tuple[Array, Outcome]:
-        """Return the law's acceleration for the tasks that are active, and its outcome.
-
-        A task that fades in or out has a weight between 0 and 1. With w1 ≥ w2 ≥ ... the
-        weights of such tasks, the acceleration is
-
-            (1 - w1) a{} + (w1 - w2) a{1} + (w2 - w3) a{1, 2} + ...
-
-        with a{...} the law for the tasks of weight 1 and those in the braces. It is
-        continuous in the weights. The rows of the tasks in all sets are linear in a, so
-        that these tasks keep their exact error equation throughout.
+    def resolve(self, t: float) -> Outcome:
+        """Resolve the law for each set of tasks that counts; return the worst outcome.
 
         Args:
             t: The time of the state [s].
         """
-        weights = {each.key: each.weight(t) for each in self._fading}
+        tasks = [(each.weight(t), each) for each in self._fading]
+        contacts = [(each.share(t), each) for each in self._setup.contacts]
         coming = sorted(
-            (key for key, w in weights.items() if 0.0 < w < 1.0),
-            key=lambda key: -weights[key],
+            (pair for pair in (*tasks, *contacts) if 0.0 < pair[0] < 1.0),
+            key=lambda pair: -pair[0],
         )
-        off = {key for key, w in weights.items() if w < 1.0}
-        shares = [1.0, *(weights[key] for key in coming), 0.0]
-        mixed = self._sum
-        mixed[:] = 0.0
+        shares = [1.0, *(share for share, _ in coming), 0.0]
         outcome, self.damped = EXACT, ""
+        self._parts = []
         for k, (share, following) in enumerate(pairwise(shares)):
-            self.active = active = self.stack_at(t, off - set(coming[:k]))
+            if share == following:
+                continue
+            on = {id(each) for _, each in coming[:k]}
+            bearing = [each for w, each in contacts if w >= 1.0 or id(each) in on]
+            off = {each.key for w, each in tasks if w < 1.0 and id(each) not in on}
+            self.active = active = self._stack(bearing, off)
+            active.share = share - following
+            self._parts.append(active)
             found = active.resolve(t)
             if found > outcome:
                 outcome = found
                 self.damped = active.damped if found is DAMPED else ""
-            a = active.resolution.acceleration
-            if not coming:
-                break
-            mixed += (share - following) * a
-            a = mixed
-        return a, outcome
+        return outcome
+
+    def deliver(self, modifier: AccelerationModifier | None) -> Delivered:
+        """Return what is delivered of the law that was resolved last.
+
+        While one set of limits follows another, it is the mixture of the steps within
+        each of them.
+
+        Args:
+            modifier: Changes the law's acceleration before the limits are applied;
+                None: nothing does.
+        """
+        actuation, sets = self._actuation, self._actuation.sets
+        single = len(self._parts) == len(sets) == 1
+        shares: list[float] = []
+        parts: list[Delivered] = []
+        efforts: list[Array] = []
+        accelerations: list[Array] = []
+        forces: list[Array] = []
+        whole = self._parts[-1].support
+        for active in self._parts:
+            a, offset = active.acceleration, None
+            if modifier is not None:
+                self._modified[:], offset = modifier(self._state, active, a)
+                a = self._modified
+            for kept, share in sets:
+                actuation.enforce(kept)
+                one = self._within_limits(active, a, offset)
+                if single:
+                    return one
+                shares.append(active.share * share)
+                parts.append(one)
+                # The next part overwrites them.
+                efforts.append(one[0].copy())
+                accelerations.append(one[1].copy())
+                forces.append(_placed(one[2], active.support, whole))
+        mixed = self._acceleration  # the same in all steps: others bind it
+        mixed[:] = _mean(shares, accelerations)
+        _, _, _, statuses, relaxations = zip(*parts, strict=True)
+        tau, force = _mean(shares, efforts), _mean(shares, forces)
+        return tau, mixed, force, max(statuses), max(relaxations)
+
+    def _within_limits(
+        self, active: ActiveStack, a: Array, offset: Array | None
+    ) -> Delivered:
+        """Return what is delivered of one law, within the limits that are enforced."""
+        state, actuation, law = self._state, self._actuation, active.resolution
+        violated = actuation.violated(state, a, law.code)
+        return actuation.deliver(state, a, violated, law, active.support, offset)
 
     def prepare(self, stack: ActiveStack) -> None:
         """Compile what a step with a stack calls, now instead of in the step."""
@@ -164,3 +227,20 @@ class Mixture:
             actuation.prepare(self._state, stack.resolution, stack.support)
             self._stacks[key] = stack
         return self._stacks[key]
+
+
+def _mean(shares: Sequence[float], parts: Sequence[Array]) -> Array:
+    """Return the weighted mean; not even by rounding does it leave their range."""
+    x = np.array(parts)
+    return np.asarray(np.clip(shares @ x, x.min(axis=0), x.max(axis=0)))
+
+
+def _placed(forces: Array, support: Support, whole: Support) -> Array:
+    """Return forces of some contacts at their places among those of all, as a copy."""
+    if support.contacts == whole.contacts:
+        return forces.copy()
+    placed = np.zeros((whole.size // 3, 3))
+    for contact, points in zip(support.contacts, support.points, strict=True):
+        place = whole.points[whole.contacts.index(contact)]
+        placed[place] = forces.reshape(-1, 3)[points]
+    return placed.ravel()

@@ -67,6 +67,7 @@ def acceleration_bounds(
     limits: MotionLimits,
     error: Array,
     drift: Array,
+    steady: Array,
     a_lower: Array,
     a_upper: Array,
 ) -> None:
@@ -85,8 +86,9 @@ def acceleration_bounds(
         error: Largest error that the acceleration had of late, shape (nv,); the margin
             of the speed covers it and its growth, up to half the speed.
         drift: Mean error of late, shape (nv,); the barrier of the position makes up for
-            it where it leads beyond the limit, and that of the speed is wider by what
-            holds the robot against it.
+            it where it leads beyond the limit.
+        steady: What of it is still there, shape (nv,). What is commanded against a
+            steady force moves nothing: the barriers are wider by as much.
         a_lower: Written: lower bound on the acceleration, shape (nv,).
         a_upper: Written: upper bound on the acceleration, shape (nv,).
     """
@@ -101,16 +103,14 @@ def acceleration_bounds(
             high = bandwidth * bandwidth * (upper[i] - position) - damping
             # While it lasts, a limit would be passed by the drift over α².
             most = _SHIFT * bandwidth * bandwidth * (upper[i] - lower[i])
-            low += min(max(-drift[i], 0.0), most)
-            high -= min(max(drift[i], 0.0), most)
+            low += min(max(-drift[i], 0.0), most) - max(steady[i], 0.0)
+            high -= min(max(drift[i], 0.0), most) + min(steady[i], 0.0)
         speed = velocity[i] - _GROWTH * error[i] / (2.0 * bandwidth * _STEEPER)
         speed = max(speed, 0.5 * velocity[i])
         rising = _speed_barrier(speed - v[i], bandwidth, jerk[i])
         slowing = -_speed_barrier(speed + v[i], bandwidth, jerk[i])
-        # What is commanded against a steady force moves nothing. A force that ends
-        # leaves the robot with that acceleration until the mean has faded.
-        rising += max(-drift[i], 0.0)
-        slowing -= max(drift[i], 0.0)
+        rising -= min(steady[i], 0.0)
+        slowing -= max(steady[i], 0.0)
         if slowing > 0.0:
             slowing *= _STEEPER
             rising = max(rising, slowing)
@@ -146,6 +146,7 @@ def violated_limits(
     limits: MotionLimits,
     error: Array,
     drift: Array,
+    steady: Array,
     disturbance: Array,
     bounds: Bounds,
 ) -> int:
@@ -160,7 +161,7 @@ def violated_limits(
         0 for none, `MOTION`, `EFFORT`, or the sum of both.
     """
     acceleration_bounds(
-        q, v, where, limits, error, drift, bounds.a_lower, bounds.a_upper
+        q, v, where, limits, error, drift, steady, bounds.a_lower, bounds.a_upper
     )
     for i in range(a.shape[0]):
         most = 2.0 * limits.bandwidth[0] * limits.velocity[i]

@@ -14,7 +14,7 @@ Contacts and floating bases, and Limits.
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -24,6 +24,7 @@ from hsp_control.common.identity_cache import IdentityCache
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
 from hsp_control.common.step_plan import in_order
+from hsp_control.constraints.limits import RobotLimits
 from hsp_control.constraints.limits.acceleration_bounds import (
     EFFORT,
     MOTION,
@@ -60,14 +61,44 @@ motor; acceleration, shape (nv,); contact forces in the axes of each contact, sh
 m/s²]."""
 
 
+class Kept(NamedTuple):
+    """One set of limits, and what is made for it.
+
+    Attributes:
+        limits: The limits; None: there are none.
+        steps: The QP of each law.
+        box: Whether there are but bounds on accelerations and efforts.
+        rate: Whether the effort's rate is limited.
+    """
+
+    limits: RobotLimits | None
+    steps: WeakKeyDictionary[Resolution, LimitedStep]
+    box: bool
+    rate: bool
+
+    @classmethod
+    def of(cls, limits: RobotLimits | None) -> "Kept":
+        """Return what keeps a set of limits."""
+        if limits is None:
+            return cls(None, WeakKeyDictionary(), box=True, rate=False)
+        return cls(
+            limits,
+            WeakKeyDictionary(),
+            box=not limits.distances and limits.static_effort is None,
+            rate=bool(np.isfinite(limits.effort_rate).any()),
+        )
+
+
 class Actuation:
     """Computes efforts and contact forces for accelerations, within limits.
 
     Its only memory is of the last efforts, used where the effort rate or the speed is
-    limited: see `applied`.
+    limited: see `applied`. While one set of limits follows another it keeps the one
+    that was enforced last: see `Mixture.deliver`.
 
     Attributes:
-        limits: The limits in force, if any.
+        limits: The limits in force, if any; of several sets their mean.
+        sets: The sets of limits in force, each with its share.
         base: Indices of the degrees of freedom without a motor.
         delivered: The acceleration of the last step, shape (nv,).
         limited: What the last step delivers that was limited within a call of `checks`.
@@ -96,7 +127,6 @@ class Actuation:
         )
         self._effort = np.zeros(nv)
         self._found = np.zeros(2)  # what a check returned, and its flags
-        self._steps: WeakKeyDictionary[Resolution, LimitedStep] = WeakKeyDictionary()
         self._resolution: Resolution | None = None
         self._step: LimitedStep | None = None
         self.limited: Delivered
@@ -110,63 +140,70 @@ class Actuation:
         self._motion = MotionLimits(
             zeros(nv), zeros(nv), zeros(nv), zeros(nv), zeros(nv), zeros(1)
         )
-        self._checks = IdentityCache(self._compile_checks)
+        self._checks: dict[tuple[int, int, bool], Sequence[Callable[..., Any]]] = {}
         self._permits = IdentityCache(self._bind_permits)
         self._window: Callable[[], float] | None = None
+        self._rate_limited = False
+        self._kept = Kept.of(None)
         self._no_forces = np.zeros(0)
         self._no_support = Support((), robot, self._weight)
         self.plan(planned, -np.inf)
-        self._forget_effort()
 
     def plan(self, planned: PlannedLimits, t: float) -> None:
         """Keep other limits from now on; t is the present time [s]."""
         self._planned = planned
-        self.limits = planned.at(t, self._robot)
-        self._write_numbers()
-        self._steps.clear()
-        self._resolution = None
-        self._slacks = planned.slacks(t)
-        self._find_rate()
-        if self.limits is not None and self._window is None:
+        if not self._rate_limited:
+            self._sent[-1] = 0.0  # what was sent is not known
+        self._all = [(Kept.of(each), share) for each, share in planned.sets]
+        self._rate_limited = any(kept.rate for kept, _ in self._all)
+        self._checks.clear()
+        if self._window is None and any(kept.limits for kept, _ in self._all):
             self._window = bind(
                 effort_window,
                 *(self._sent, *self._efforts, self._tau_lower, self._tau_upper),
             )
-        self._only_box_limits = not (
-            self._floating
-            or planned.distances
-            or any(each.static_effort for each in planned.sets if each is not None)
-        )
+        self._count_sets(t)
 
     def is_direct(self, support: Support) -> bool:
         """Return whether M a + N is the effort wherever `violated` finds nothing."""
-        return self._only_box_limits and not support.size
+        return self._kept.box and not self._floating and not support.size
 
     def update_limits(self, t: float) -> None:
-        """Compute the limits in force at time t [s], if they change."""
-        if self._planned.numbers.constant:
-            return
+        """Find the limits in force at time t [s], if they change."""
+        if len(self._all) > 1:
+            self._count_sets(t)
+
+    def _count_sets(self, t: float) -> None:
+        """Find the sets of limits in force, and enforce the last of them."""
+        shares = [(kept, share.at(t)) for kept, share in self._all]
+        self.sets = [pair for pair in shares if pair[1] > 0.0]
         self.limits = self._planned.at(t, self._robot)
-        self._write_numbers()
-        self._slacks = self._planned.slacks(t)
-        self._find_rate()
+        self.enforce(self.sets[-1][0])
 
-    def _write_numbers(self) -> None:
-        """Copy the numbers to where the kernels read them."""
-        if self.limits is None:
+    def enforce(self, kept: Kept) -> None:
+        """Keep one of the sets of limits until another one is enforced."""
+        if kept is self._kept:
             return
-        self._efforts[0], self._efforts[1] = self.limits.effort, self.limits.effort_rate
-        for own, new in zip(self._motion, self.limits.motion, strict=True):
+        self._kept, limits = kept, kept.limits
+        self._resolution = None
+        if limits is None:
+            for lower, upper in (self._bounds[:2], self._bounds[2:]):
+                lower[:], upper[:] = -np.inf, np.inf
+            return
+        # To where the kernels read them.
+        self._efforts[0], self._efforts[1] = limits.effort, limits.effort_rate
+        for own, new in zip(self._motion, limits.motion, strict=True):
             own[:] = new
+        self._find_window()
 
-    def _find_rate(self) -> None:
-        """Find out whether the effort's rate is limited."""
-        limits = self.limits
-        self._rate_limited = limits is not None and bool(
-            np.isfinite(limits.effort_rate).any()
-        )
-        if not self._rate_limited:
-            self._forget_effort()
+    def _find_window(self) -> None:
+        """Write the range of the next effort."""
+        if self._kept.rate and self._sent[-1] > 0.0:
+            assert self._window is not None
+            self._window()
+        elif self._kept.limits is not None:
+            self._tau_lower[:] = -self._kept.limits.effort
+            self._tau_upper[:] = self._kept.limits.effort
 
     def support(self, contacts: Sequence[PlannedContact]) -> Support:
         """Return the forces that these contacts can exert; with no contacts, none."""
@@ -178,13 +215,17 @@ class Actuation:
         self, state: RobotState, resolution: Resolution, support: Support
     ) -> None:
         """Compile what a limited step calls, now instead of where a limit binds."""
-        limited = self.limits is not None or support.size
-        if limited and resolution not in self._steps:
-            step = self._limited_step(state, resolution, support, 0)
-            step.prepare(resolution.acceleration, state.effort)
-            self._limit_if_violated(state, resolution, support)
-        if self.limits is not None:
-            self._held.prepare(state.v, resolution.acceleration)
+        last = self._kept
+        for kept, _ in self._all:
+            self.enforce(kept)
+            limited = kept.limits is not None or support.size
+            if limited and resolution not in kept.steps:
+                step = self._limited_step(state, resolution, support, 0)
+                step.prepare(resolution.acceleration, state.effort)
+                self._limit_if_violated(state, resolution, support)
+            if kept.limits is not None:
+                self._held.prepare(state.v, resolution.acceleration)
+        self.enforce(last)
 
     def applied(self, state: RobotState, tau: Array, period: float) -> None:
         """Record the effort that is sent now, for the limits on effort rate and speed.
@@ -200,8 +241,7 @@ class Actuation:
         self._held.sent(state.t, state.v, self.delivered, period)
         if self._rate_limited:
             self._sent[:-1], self._sent[-1] = tau, period
-            assert self._window is not None
-            self._window()
+            self._find_window()
 
     def sending(self, state: RobotState, a: Array) -> list[Callable[[float], Any]]:
         """Return calls of the time that do what `applied` does of the effort M a + N.
@@ -226,23 +266,19 @@ class Actuation:
 
     def forget(self) -> None:
         """Forget the last efforts: the rate limit does not apply to the next one."""
-        self.period = 0.0
+        self.period = self._sent[-1] = 0.0
         self._held.forget()
-        self._forget_effort()
-
-    def _forget_effort(self) -> None:
-        if self.limits is not None:
-            self._tau_lower[:] = -self.limits.effort
-            self._tau_upper[:] = self.limits.effort
+        self._find_window()
 
     def memory(self) -> tuple[Array, ...]:
         """Return a copy of the memory of the last effort."""
-        return self._tau_lower.copy(), self._tau_upper.copy(), *self._held.memory()
+        return self._sent.copy(), *self._held.memory()
 
     def remember(self, memory: tuple[Array, ...]) -> None:
         """Set the memory that `memory` returned."""
-        self._tau_lower[:], self._tau_upper[:] = memory[:2]
-        self._held.remember(memory[2:])
+        self._sent[:] = memory[0]
+        self._held.remember(memory[1:])
+        self._find_window()
 
     def deliver(
         self,
@@ -321,7 +357,7 @@ class Actuation:
 
         It is None where a step may need more: forces, or barriers.
         """
-        if self.limits is None or not self.is_direct(support):
+        if self._kept.limits is None or not self.is_direct(support):
             return None
         step = self._step_of(state, resolution, support)
         return step.nearest_if(resolution.acceleration, state.effort, self._found)
@@ -331,8 +367,12 @@ class Actuation:
 
         See `checks` for arguments and result, which is without the law's code.
         """
+        # By identity: the calls keep these arrays alive.
+        key = id(a), id(code), self._kept.limits is None
+        if key not in self._checks:
+            self._checks[key] = self._compile_checks(state, a, code)
         value = 0.0
-        for call in self._checks.get(state, a, code, self.limits is None):
+        for call in self._checks[key]:
             value = call(state.t)
         return int(value) % CODES
 
@@ -341,12 +381,12 @@ class Actuation:
         return bind(within, tau, self._tau_lower, self._tau_upper)
 
     def _compile_checks(
-        self, state: RobotState, a: Array, code: Indices, _: bool = False
+        self, state: RobotState, a: Array, code: Indices
     ) -> list[Callable[[float], Any]]:
         """Return the calls of `checks` that solve nothing."""
         check = (
             bind(_unlimited, code, timed=True)
-            if self.limits is None
+            if self._kept.limits is None
             else bind(
                 _check,
                 state.q,
@@ -366,19 +406,14 @@ class Actuation:
 
     def _barriers(self, state: RobotState, support: Support) -> Barriers:
         """Return the rows A a ≥ lower for distances and static efforts, by kind."""
-        limits = self.limits
+        limits = self._kept.limits
         found: dict[str, tuple[Array, Array]] = {}
         if limits is None:
             return found
-        if self._slacks:
-            parts = [each.rows(state, limits.bandwidth) for each, _ in self._slacks]
-            slack = [
-                s
-                for (_, lower), (_, s) in zip(parts, self._slacks, strict=True)
-                for _ in lower
-            ]
+        if limits.distances:
+            parts = [each.rows(state, limits.bandwidth) for each in limits.distances]
             A, lower = (np.concatenate(each) for each in zip(*parts, strict=True))
-            found["distances"] = A, lower - np.array(slack)
+            found["distances"] = A, lower
         if limits.static_effort is not None:
             found["holding"] = limits.static_effort.rows(
                 state, limits.bandwidth, support.supporting_dofs
@@ -435,17 +470,18 @@ class Actuation:
         self, state: RobotState, resolution: Resolution, support: Support
     ) -> LimitedStep:
         """Return the QP of a stack of tasks, made now if there is none."""
-        found = self._steps.get(resolution)
+        found = self._kept.steps.get(resolution)
         return found or self._limited_step(state, resolution, support, 0)
 
     def _limited_step(
         self, state: RobotState, resolution: Resolution, support: Support, count: int
     ) -> LimitedStep:
         """Return the QP of a stack of tasks, with room for so many rows of barriers."""
-        motors = self._motors
-        some = np.isfinite(self._tau_lower) | np.isfinite(self._tau_upper)
-        some |= not self._planned.numbers.constant  # a limit that comes is still inf
-        self._steps[resolution] = LimitedStep(
+        motors, (limits, steps, *_) = self._motors, self._kept
+        some = np.zeros(self._robot.nv, dtype=bool)
+        if limits is not None:
+            some = np.isfinite(limits.effort) | np.isfinite(limits.effort_rate)
+        steps[resolution] = LimitedStep(
             state,
             resolution,
             support,
@@ -455,7 +491,7 @@ class Actuation:
             self._weight,
             1 << (count - 1).bit_length() if count else 0,
         )
-        return self._steps[resolution]
+        return steps[resolution]
 
 
 @kernel
@@ -484,9 +520,18 @@ def _check(
     returns, and the flags, to ``found``.
     """
     observe(v, held, t)
-    error, drift, disturbance = held.error, held.drift, held.disturbance
     flags = violated_limits(
-        q, v, a, tau, where, limits, error, drift, disturbance, bounds
+        q,
+        v,
+        a,
+        tau,
+        where,
+        limits,
+        held.error,
+        held.drift,
+        held.steady,
+        held.disturbance,
+        bounds,
     )
     found[0], found[1] = CODES * code[0] + FLAGS * flags, flags
     return float(found[0])

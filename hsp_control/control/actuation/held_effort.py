@@ -27,6 +27,7 @@ class Held(NamedTuple):
         stray: Differences from it, summed over about `_WINDOW`, shape (nv,).
         error: The largest error of late, shape (nv,).
         drift: The mean error of late, shape (nv,).
+        steady: What mean and present error have in common, shape (nv,).
         disturbance: Acceleration that something else causes, shape (nv,).
     """
 
@@ -35,6 +36,7 @@ class Held(NamedTuple):
     stray: Array
     error: Array
     drift: Array
+    steady: Array
     disturbance: Array
 
 
@@ -52,6 +54,8 @@ class HeldEffort:
     Attributes:
         error: The largest error of late, shape (nv,) [rad/s² or m/s²].
         drift: The mean error of late, shape (nv,) [rad/s² or m/s²].
+        steady: What the mean error and that of the last hundredth of a second have in
+            common, shape (nv,) [rad/s² or m/s²]: a force that has ended does not count.
         disturbance: Acceleration that something else than the effort is known to cause,
             shape (nv,) [rad/s² or m/s²].
     """
@@ -60,6 +64,7 @@ class HeldEffort:
         """Begin without an error."""
         self.error: Array = np.zeros(nv)
         self.drift: Array = np.zeros(nv)
+        self.steady: Array = np.zeros(nv)
         self.disturbance: Array = np.zeros(nv)
         self._expected, self._stray = np.zeros(nv), np.zeros(nv)
         self._timing = np.full(2, np.nan)
@@ -92,7 +97,7 @@ class HeldEffort:
     @property
     def memory_of_kernels(self) -> "Held":
         """What `observe` reads and writes."""
-        observed = self._stray, self.error, self.drift
+        observed = self._stray, self.error, self.drift, self.steady
         return Held(self._timing, self._expected, *observed, self.disturbance)
 
     def prepare(self, v: Array, a: Array) -> None:
@@ -102,13 +107,13 @@ class HeldEffort:
     def forget(self) -> None:
         """Begin anew."""
         self.error[:] = self.disturbance[:] = 0.0
-        self._stray[:] = self.drift[:] = 0.0
+        self._stray[:] = self.drift[:] = self.steady[:] = 0.0
         self._timing[:] = np.nan
 
     @property
     def _memories(self) -> tuple[Array, ...]:
         kept = self._stray, self._expected, self._timing
-        return (self.error, self.drift, self.disturbance, *kept)
+        return (self.error, self.drift, self.steady, self.disturbance, *kept)
 
     def memory(self) -> tuple[Array, ...]:
         """Return a copy of what it remembers."""
@@ -141,7 +146,7 @@ def observe(v: Array, held: Held, t: float) -> None:
         held: The memory; updated at the end of a period, once.
         t: Time [s].
     """
-    timing, expected, stray, error, drift, _ = held
+    timing, expected, stray, error, drift, steady, _ = held
     period = timing[1]
     if not abs(t - timing[0]) < 0.01 * period:
         return
@@ -152,8 +157,9 @@ def observe(v: Array, held: Held, t: float) -> None:
         gained = v[i] - expected[i]
         drift[i] = fading * drift[i] + (1.0 - fading) * gained / period
         stray[i] = (1.0 - fresh) * stray[i] + gained
-        present = abs(stray[i]) / max(period, _WINDOW)
-        error[i] = max(fading * error[i], present)
+        present = stray[i] / max(period, _WINDOW)
+        error[i] = max(fading * error[i], abs(present))
+        steady[i] = max(min(drift[i], present), 0.0) + min(max(drift[i], present), 0.0)
 
 
 @kernel

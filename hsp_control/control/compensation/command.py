@@ -281,6 +281,7 @@ class Command:
 
     def _law(self, t: float, q: Array, v: Array) -> ControlOutput:
         modifier = self._modify if self._changes_effort else None
+        self._friction = self._zero
         return self.controller.compute(t, q, v, modifier=modifier)
 
     def _modify(
@@ -292,9 +293,9 @@ class Command:
         if self._ramp is not None:
             a = self._ramp.blend(state, a)
         offset = self._zero
-        self._friction = self._zero
         if self._feed_forward is not None:
-            self._friction = offset = self._feed_forward.effort(state, active)
+            offset = self._feed_forward.effort(state, active)
+            self._friction = self._friction + active.share * offset
         if self._observer is not None:
             offset = offset - self._observer.cancelled
         return a, offset

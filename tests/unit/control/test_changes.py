@@ -374,6 +374,7 @@ def test_a_removal_of_what_is_gone_by_then_is_refused(panda: Trial) -> None:
 
 
 def test_a_contact_that_is_lifted_equals_one_whose_schedule_ends() -> None:
+    """But for the last tenth of its force, where its motion is set free already."""
     robot = hsp.Robot.load("solo12")
     feet = [name for name in robot.frame_names if name.endswith("_FOOT")]
     trunk = hsp.FramePose("base_link", name="trunk")
@@ -388,7 +389,7 @@ def test_a_contact_that_is_lifted_equals_one_whose_schedule_ends() -> None:
     changed = standing()
     changed.at(0.5).ramp(0.4).contact(feet[0], bears=False)
     scheduled = standing(schedule=hsp.trajectories.Schedule([(None, 0.9)], ramp=0.4))
-    for t in np.linspace(0.0, 1.2, 13):
+    for t in (*np.linspace(0.0, 0.8, 9), 1.0, 1.1, 1.2):
         np.testing.assert_allclose(
             changed.compute(t, robot.home(), np.zeros(robot.nv)).forces,
             scheduled.compute(t, robot.home(), np.zeros(robot.nv)).forces,

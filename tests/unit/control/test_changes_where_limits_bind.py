@@ -1,0 +1,361 @@
+"""Changes at states where limits bind: efforts are continuous in time, to 1e-6 N·m."""
+
+from collections.abc import Callable
+from functools import cache
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from places import THOROUGH
+
+import hsp_control as hsp
+from hsp_control.control.actuation.status import Status
+from hsp_control.control.compensation import (
+    Command,
+    Compensation,
+    FrictionFeedForward,
+)
+from hsp_control.trajectories import HoldOrientation, Schedule
+from hsp_control.trajectories.timing import smooth_step
+
+Array = NDArray[np.float64]
+
+ROBOTS = ["planar3r", "panda", "iiwa14", "ur5", "xarm7"]
+START, RAMP = 0.2, 0.3
+EVENTS = (START, START + 0.1, START + RAMP - 0.1, START + RAMP)
+"""When something begins or ends, of the changes below [s]."""
+FINEST = 1e-9
+"""To which the place of the largest change is bisected [s]."""
+
+many = settings(
+    max_examples=40 if THOROUGH else 4, deadline=None, derandomize=not THOROUGH
+)
+seeds = st.integers(0, 2**32 - 1)
+
+
+@cache
+def load(name: str) -> hsp.Robot:
+    if name in ("ur5", "xarm7"):
+        pytest.importorskip("example_robot_data")
+    return hsp.Robot.load(name)
+
+
+class Case:
+    """A hand that has to go far, with motors that can hardly hold the arm."""
+
+    def __init__(self, name: str, seed: int) -> None:
+        self.rng = rng = np.random.default_rng(seed)
+        self.robot = load(name)
+        self.q = self.robot.random_configuration(rng)
+        self.v = 0.5 * rng.standard_normal(self.robot.nv)
+        self.state = self.robot.state(0.0, self.q, self.v)
+        self.binds = False
+        self.axes = "xz" if self.robot.nv == 3 else "xyz"
+
+    def limits(self, **more: Any) -> hsp.Limits:
+        """Return limits of which some bind: efforts near those of gravity."""
+        held = np.abs(self.state.nonlinear_effects)
+        effort = (0.3 + self.rng.uniform(0.0, 1.0, self.robot.nv)) * held + 1.0
+        speed = np.abs(self.v) * self.rng.uniform(0.9, 3.0, self.robot.nv) + 0.1
+        return hsp.Limits(effort=effort, velocity=speed, position="none", **more)
+
+    def hand(self, **options: Any) -> hsp.FramePosition:
+        here = self.state.position(self.robot.end_effector)
+        away = 0.3 * self.rng.standard_normal(3)
+        point = (here + away)[[0, 2]] if self.axes == "xz" else here + away
+        return hsp.FramePosition(
+            self.robot.end_effector,
+            hsp.Hold(point),
+            axes=self.axes,
+            name="hand",
+            **options,
+        )
+
+    def other(self, **options: Any) -> hsp.Task:
+        """Return a task that the hand leaves some freedom, or none."""
+        options = {"name": "other", "priority": int(self.rng.integers(1, 3)), **options}
+        if self.robot.nv > 3 and self.rng.uniform() < 0.5:
+            turned = HoldOrientation(self.rng.standard_normal(3))
+            frame = self.robot.end_effector
+            return hsp.FrameOrientation(frame, turned, **options)
+        joint = str(self.rng.choice(list(self.robot.joints)))
+        return hsp.JointPosture(
+            self.robot.random_configuration(self.rng), joints=[joint], **options
+        )
+
+    def controller(self, *tasks: hsp.Task, **options: Any) -> hsp.Controller:
+        tasks = tasks or (self.hand(),)
+        options = {"limits": self.limits(), "start": self.q, **options}
+        return hsp.Controller(self.robot, tasks, hsp.TargetPosture("home"), **options)
+
+    def effort(self, controller: hsp.Controller, t: float) -> Array:
+        output = controller.compute(t, self.q, self.v)
+        self.binds = self.binds or output.status >= Status.LIMITED
+        return output.tau
+
+    def largest_jump(
+        self, controller: hsp.Controller, times: Array
+    ) -> tuple[float, float]:
+        """Return the largest change of an effort within 1e-9 s [N·m], and where [s].
+
+        What a constant rate explains is left out: the mean rate between two of the
+        times, ten times over.
+        """
+        tau = {t: self.effort(controller, t) for t in times}
+
+        def change(a: float, b: float) -> float:
+            for t in (a, b):
+                if t not in tau:
+                    tau[t] = self.effort(controller, t)
+            return float(np.abs(tau[b] - tau[a]).max())
+
+        worst = 0.0, times[0]
+        for a, b in pairwise(times):
+            smooth = 10.0 * change(a, b) / (b - a) * FINEST
+            while b - a > FINEST:
+                middle = 0.5 * (a + b)
+                first = change(a, middle) >= change(middle, b)
+                a, b = (a, middle) if first else (middle, b)
+            worst = max(worst, (change(a, b) - smooth, a))
+        return worst
+
+    def assert_continuous(self, controller: hsp.Controller, end: float = 0.6) -> None:
+        """Efforts are continuous from 0.1 s to the end."""
+        # A short time about begin and end, where little else changes.
+        near = [t + d for t in EVENTS for d in (-1e-5, 0.0, 1e-5)]
+        times = np.unique(np.r_[np.linspace(0.1, end, 26), near])
+        jump, t = self.largest_jump(controller, times)
+        assume(self.binds)
+        assert jump < 1e-6, f"{jump} N·m at {t} s"
+
+
+CHANGES: dict[str, Callable[[Case], hsp.Controller]] = {}
+
+
+def change(make: Callable[[Case], hsp.Controller]) -> Callable[[Case], hsp.Controller]:
+    CHANGES[make.__name__] = make
+    return make
+
+
+@change
+def a_task_is_added(case: Case) -> hsp.Controller:
+    controller = case.controller()
+    controller.at(START).ramp(RAMP).add(case.other())
+    return controller
+
+
+@change
+def a_task_is_removed(case: Case) -> hsp.Controller:
+    controller = case.controller(case.hand(), case.other())
+    controller.at(START).ramp(RAMP).remove("other")
+    return controller
+
+
+@change
+def a_task_has_a_schedule(case: Case) -> hsp.Controller:
+    schedule = Schedule([(START, START + RAMP)], ramp=0.1)
+    return case.controller(case.hand(), case.other(schedule=schedule))
+
+
+@change
+def several_fade_at_a_time(case: Case) -> hsp.Controller:
+    controller = case.controller(case.hand(), case.other())
+    controller.at(START).ramp(RAMP).remove("other").limits(case.limits())
+    controller.at(START + 0.1).ramp(0.1).add(case.other(name="third"))
+    return controller
+
+
+@change
+def limits_change(case: Case) -> hsp.Controller:
+    controller = case.controller()
+    controller.at(START).ramp(RAMP).limits(case.limits(acceleration=20.0))
+    return controller
+
+
+@change
+def limits_go(case: Case) -> hsp.Controller:
+    controller = case.controller()
+    controller.at(START).ramp(RAMP).limits(None)
+    return controller
+
+
+@change
+def limits_come(case: Case) -> hsp.Controller:
+    controller = case.controller(limits=None)
+    controller.at(START).ramp(RAMP).limits(case.limits())
+    return controller
+
+
+@change
+def limits_go_and_others_come(case: Case) -> hsp.Controller:
+    controller = case.controller()
+    controller.at(START).ramp(RAMP).limits(None)
+    controller.at(START + 0.1).ramp(RAMP).limits(case.limits())
+    return controller
+
+
+@change
+def a_bound_of_the_null_space_comes(case: Case) -> hsp.Controller:
+    controller = case.controller()
+    controller.at(START).ramp(RAMP).limits(case.limits(null_space_speed=1.0))
+    return controller
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("what", CHANGES)
+@given(seed=seeds)
+@many
+def test_efforts_are_continuous(what: str, name: str, seed: int) -> None:
+    case = Case(name, seed)
+    case.assert_continuous(CHANGES[what](case))
+
+
+@given(seed=seeds)
+@many
+def test_efforts_and_forces_of_legs_are_continuous(seed: int) -> None:
+    """On contacts, efforts are affine in acceleration and forces together."""
+    pytest.importorskip("example_robot_data")
+    rng, robot = np.random.default_rng(seed), load("solo12")
+    feet = [name for name in robot.frame_names if name.endswith("_FOOT")]
+    point = hsp.Hold(0.1 * rng.standard_normal(3), origin="start")
+    controller = hsp.Controller(
+        robot,
+        [hsp.FramePosition("base_link", point, name="trunk")],
+        contacts=[hsp.contacts.PointContact(foot) for foot in feet],
+        start=robot.home(),
+        limits=hsp.Limits(effort={"scale": 0.6}),
+    )
+    turned = HoldOrientation(0.5 * rng.standard_normal(3))
+    new = hsp.Limits(effort={"scale": 0.7})
+    task = hsp.FrameOrientation("base_link", turned, name="turned")
+    controller.at(START).ramp(RAMP).add(task).limits(new)
+    q, v = robot.home(), 0.1 * rng.standard_normal(robot.nv)
+    statuses = []
+    for edge in (START, START + RAMP):
+        for t in edge + np.linspace(-1e-6, 1e-6, 21):
+            before = controller.compute(t, q, v)
+            after = controller.compute(t + 1e-9, q, v)
+            statuses.append(before.status)
+            for old, now in ((before.tau, after.tau), (before.forces, after.forces)):
+                np.testing.assert_allclose(now, old, rtol=0, atol=1e-6)
+    assume(Status.LIMITED in statuses)
+    # What no motor drives is what the forces drive, in between as well.
+    out = controller.compute(START + 0.5 * RAMP, q, v)
+    support, state = controller.active_stack.support, controller.state
+    wanted = state.inverse_dynamics(out.acceleration)
+    np.testing.assert_allclose(out.tau + support.map @ out.forces, wanted, atol=1e-7)
+    assert (support.cone @ out.forces >= -1e-9).all()  # friction, to rounding
+
+
+def lifted(controller: hsp.Controller, contact: str) -> None:
+    controller.at(START).ramp(0.1).contact(contact, bears=False)
+    controller.at(START + RAMP - 0.1).ramp(0.1).contact(contact, bears=True)
+
+
+@pytest.mark.parametrize("limited", [False, True])
+@given(seed=seeds)
+@many
+def test_a_contact_that_is_lifted_and_bears_again(limited: bool, seed: int) -> None:
+    """The motion that it stops is set free, and stopped, without a jump."""
+    case = Case("panda", seed)
+    tip = hsp.contacts.SlidingContact(
+        case.robot.end_effector, force=hsp.contacts.CommandedForce(20.0), name="tip"
+    )
+    limits = case.limits() if limited else None
+    controller = case.controller(case.other(), contacts=[tip], limits=limits)
+    lifted(controller, "tip")
+    case.binds = not limited
+    case.assert_continuous(controller)
+
+
+@given(seed=seeds)
+@many
+def test_a_foot_that_is_lifted_while_it_moves(seed: int) -> None:
+    """Also in the forces: they stay at their places among those of all contacts."""
+    pytest.importorskip("example_robot_data")
+    rng, robot = np.random.default_rng(seed), load("solo12")
+    feet = [name for name in robot.frame_names if name.endswith("_FOOT")]
+    away = np.r_[np.zeros(6), 0.1 * rng.standard_normal(12)]
+    controller = hsp.Controller(
+        robot,
+        [hsp.FramePose("base_link", name="trunk")],
+        hsp.TargetPosture(robot.integrate(robot.home(), away)),
+        contacts=[hsp.contacts.PointContact(foot) for foot in feet],
+        start=robot.home(),
+    )
+    lifted(controller, feet[seed % 4])
+    q, v = robot.home(), 0.2 * rng.standard_normal(robot.nv)
+    for edge in EVENTS:
+        for t in edge + np.linspace(-1e-6, 1e-6, 21):
+            before = controller.compute(t, q, v)
+            after = controller.compute(t + 1e-9, q, v)
+            np.testing.assert_allclose(after.tau, before.tau, rtol=0, atol=1e-6)
+    out = controller.compute(START + 0.02, q, v)
+    support, state = controller.active_stack.support, controller.state
+    np.testing.assert_allclose(
+        out.tau + support.map @ out.forces,
+        state.inverse_dynamics(out.acceleration),
+        atol=1e-7,
+    )
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+@given(seed=seeds)
+@many
+def test_a_mixture_keeps_the_limits(name: str, seed: int) -> None:
+    """What each set of tasks delivers is within them, and so is what lies between."""
+    case = Case(name, seed)
+    controller = a_task_is_added(case)
+    for t in START + RAMP * case.rng.uniform(0.0, 1.0, 5):
+        out = controller.compute(t, case.q, case.v)
+        assume(out.status == Status.LIMITED)
+        limits, bounds = controller.limits, controller._actuation._bounds
+        assert limits is not None
+        assert (np.abs(out.tau) <= limits.effort).all()
+        assert (out.acceleration >= bounds.a_lower - 1e-6).all()
+        assert (out.acceleration <= bounds.a_upper + 1e-6).all()
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("ramp", [RAMP, 0.0])
+@given(seed=seeds)
+@many
+def test_limits_go_over_as_the_ramp_does(name: str, ramp: float, seed: int) -> None:
+    """At one state: (1 - s) times the effort within the old limits plus s times the one
+    without; a ramp of 0 s is a jump at its time."""
+    case = Case(name, seed)
+    limits = case.limits()
+    hand = case.hand()
+    controller, old = (case.controller(hand, limits=limits) for _ in range(2))
+    new = case.controller(hand, limits=None)
+    controller.at(START).ramp(ramp).limits(None)
+    before, after = (case.effort(each, 0.0) for each in (old, new))
+    assume(case.binds)
+    for t in (0.1, START, START + 0.1, START + 0.2, START + RAMP, 1.0):
+        s = smooth_step(t, START, ramp)[0] if ramp else float(t >= START)
+        expected = (1.0 - s) * before + s * after
+        found = case.effort(controller, t)
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+    assert controller.limits is None
+
+
+def test_what_opposes_friction_fades_with_the_tasks() -> None:
+    """It follows the velocity that each set of tasks desires."""
+    case = Case("panda", 0)
+    controller = a_task_is_added(case)
+    friction = FrictionFeedForward(coulomb=1.0, viscous=0.5)
+    command = Command(controller, Compensation(friction_feed_forward=friction))
+    columns = command.log_channels
+    times = START + np.array([-1e-9, 1e-9, RAMP - 1e-9, RAMP + 1e-9])
+    tau, sent = [], []
+    for t in times:
+        tau.append(command.effort(t, case.q, case.v, 1e-3).copy())
+        sent.append(np.array(columns()["friction.feed_forward"].value))
+    for found in (tau, sent):
+        np.testing.assert_allclose(found[0], found[1], atol=1e-6)
+        np.testing.assert_allclose(found[2], found[3], atol=1e-6)
+    assert np.abs(sent[0] - sent[2]).max() > 0.1
