@@ -97,7 +97,8 @@ class Controller:
             tasks: One task or more, with distinct names. Tasks of the same priority
                 form one level; see `Task.priority`.
             field: The field g that the self-motion follows; None: `Rest`, g = 0.
-            null_space_gain: K_N > 0 [1/s]: scalar, shape (nv,) or (nv, nv).
+            null_space_gain: K_N > 0 [1/s]: scalar, shape (nv,) or (nv, nv). Where the
+                metric changes with q, a multiple of the identity.
             metric: Joint-space metric; None: identity.
             singularity_threshold: Singular value of the stacked Jacobian (in the
                 metric) below which its inverse is bounded instead of exact. For
@@ -118,7 +119,7 @@ class Controller:
                 tasks of one level have more rows than the robot has dofs.
             ContactError: If a floating base has neither contacts nor ``base``, or a
                 fixed base has either.
-            GainError: If K_N does not make the null-space error decay.
+            GainError: If K_N might not make the null-space error decay.
             HspControlError: If a part does not fit the robot; the message contains its
                 key path.
         """

@@ -30,7 +30,7 @@ class NullSpaceSettings(Part, error=FieldError):
 
     gain: Gain = 10.0
     """Null-space gain K_N [1/s], the rate at which the null-space error decays: a
-    number, nv numbers, or a matrix."""
+    number, nv numbers, or a matrix; over a metric that changes with q, one number."""
     metric: Metric = IdentityMetric()
     """The joint-space metric W [-]."""
     fields: Annotated[Sequence[NullSpaceField], AfterValidator(_summable)] = ()
