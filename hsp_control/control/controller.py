@@ -357,7 +357,7 @@ class Controller:
                 f"the state is of another robot object ({t.robot.name}); "
                 f"this controller is for {self._declared.robot.name}"
             )
-        elif t is not self._state:
+        elif t is not self._state.seen and t is not self._state:
             self._state.update(t.t, t.q, t.v)
 
     def applied(self, tau: ArrayLike, period: float) -> None:
@@ -583,9 +583,10 @@ class Controller:
     def state(self) -> RobotState:
         """The state that the last effort was computed for; the next one overwrites it.
 
-        It may be updated and given to `compute`, which then copies nothing.
+        `update` moves it, and nothing else does: its t, q and v cannot be assigned or
+        written. Given to `compute` it is not copied.
         """
-        return self._state
+        return self._state.seen
 
     def feedback(self, task: str) -> Feedback:
         """Return a task's gains and offset in force; compensators write the offset.
