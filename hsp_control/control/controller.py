@@ -4,7 +4,6 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import replace
 from math import isfinite
-from threading import Lock
 from typing import TYPE_CHECKING, Any, NoReturn, overload
 
 import numpy as np
@@ -27,11 +26,13 @@ from hsp_control.control.changes import Change, Changes
 from hsp_control.control.composition import Base, priority_of
 from hsp_control.control.declared import Declared
 from hsp_control.control.explanation import flow_of, raise_not_finite
+from hsp_control.control.first_state import check_angles
 from hsp_control.control.gains_in_force import GainsInForce
 from hsp_control.control.held_gains import check_held
 from hsp_control.control.mixture import Mixture
 from hsp_control.control.output import ControlOutput, Diagnostics
 from hsp_control.control.read_only import read_only
+from hsp_control.control.step_lock import StepLock
 from hsp_control.control.time_line import TimeLine
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.start import Start
@@ -141,7 +142,7 @@ class Controller:
     def _allocate(self, changes: Sequence[Change]) -> None:
         """Set up what a copy has of its own, and compose the parts."""
         robot, given = self._declared.robot, self._declared.start
-        self._lock = Lock()
+        self._lock = StepLock(_HOLDERS)
         self._state = RobotState(robot)
         self._modified = np.zeros(robot.nv)
         self._gains = GainsInForce(robot.nv)
@@ -193,7 +194,12 @@ class Controller:
         return Start(here, self._setup.start.scene)
 
     def _begin(self) -> None:
-        """Place what is relative at the first state, unless a start was given."""
+        """Look at the first state, and place there what is relative, without a start.
+
+        Raises:
+            ConfigurationError: If an angle looks like degrees.
+        """
+        check_angles(self._declared.robot, self._state.q)
         if self._declared.start is None:
             here = self._here()._replace(scene=self._declared.scene)
             last_effort = self._actuation.memory()
@@ -283,10 +289,17 @@ class Controller:
             ShapeError: If q or v has the wrong shape.
             NonFiniteError: If t, q or v contains NaN or inf, or a task or the field
                 does; a non-finite effort is never returned.
-            ConfigurationError: If a quaternion or a (cos, sin) pair is not of norm 1.
-            ControllerError: If the state belongs to another robot.
+            ConfigurationError: If a quaternion or a (cos, sin) pair is not of norm 1,
+                or an angle of the first state (also after `restart`; later ones are
+                not looked at) is farther from the middle of its joint's range than
+                twice that range: it would be in degrees.
+            ControllerError: If the state belongs to another robot, or what a step
+                calls, such as a field, calls its own controller.
         """
-        with self._lock:
+        lock = self._lock
+        if not lock.acquire(False):
+            lock.wait()
+        try:
             state, whole, offset = self._state, self._whole, None
             if whole is None or modifier is not None or q is None or v is None:
                 self._observe(t, q, v)
@@ -337,6 +350,8 @@ class Controller:
             out.forces = forces.copy() if active.has_forces else forces
             out.damped, out.status, out.relaxation = damped, status, relaxation
             return out
+        finally:
+            lock.release()
 
     def _observe(
         self,
@@ -752,6 +767,13 @@ class Controller:
         self._gains.remember(saved["gains"])
         self._state.update(*saved["at"])
         self._actuation.remember(saved["last_effort"])
+
+
+_HOLDERS = frozenset(
+    getattr(Controller, name).__code__
+    for name in ("compute", "while_free", "restart", "prepare", "change", "stack")
+)
+"""The methods that hold the lock."""
 
 
 def _free_step(
