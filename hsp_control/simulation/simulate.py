@@ -14,6 +14,7 @@ from hsp_control.common.exceptions import (
 from hsp_control.control.compensation import Command, Compensation
 from hsp_control.control.compensation import check_rate as check_loop
 from hsp_control.control.controller import Controller
+from hsp_control.control.first_state import warn_of_jump
 from hsp_control.declaration import within
 from hsp_control.estimation import Estimator
 from hsp_control.geometry.scene import Scene
@@ -61,6 +62,9 @@ def simulate(
     meta: dict[str, Any] | None = None,
 ) -> Rollout:
     """Run the closed loop and return its rollout.
+
+    A robot that begins at rest with a jump of its effort is warned about; see
+    `hsp_control.control.first_state`.
 
     Args:
         controller: The controller.
@@ -160,6 +164,8 @@ def simulate(
     status, message = "completed", ""
     try:
         for row, (state, output, tau, own_channels) in enumerate(loop):
+            if row == 0:
+                warn_of_jump(robot, q, v, tau)
             plant_channels = plant.log_channels(state.t, state.q, state.v, tau)
             recorder.record(state, output, tau, {**own_channels, **plant_channels})
             if on_progress is not None:

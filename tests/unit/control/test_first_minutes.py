@@ -3,6 +3,8 @@
 import re
 import threading
 import time
+import warnings
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,9 +14,25 @@ from hypothesis import given
 from hypothesis import strategies as st
 from robot_cases import load
 
-from hsp_control import Controller, FunctionCost, TargetPosture, simulate
+from hsp_control import (
+    Circle,
+    Controller,
+    FramePose,
+    FunctionCost,
+    JointCentering,
+    TargetPosture,
+    simulate,
+)
+from hsp_control.cli.main import main
 from hsp_control.common.exceptions import ConfigurationError, ControllerError
-from hsp_control.control.first_state import FAR, NEAR, check_angles
+from hsp_control.control.first_state import (
+    FAR,
+    JUMP,
+    NEAR,
+    StartWarning,
+    check_angles,
+    warn_of_jump,
+)
 
 REST = np.zeros(7)
 
@@ -70,6 +88,85 @@ def test_joints_without_a_range_of_angles_are_exempt(name: str) -> None:
     assert exempt.any()
     away = np.where(exempt, 1000.0, 0.0)
     check_angles(robot, robot.integrate(robot.home(), away))
+
+
+# --- the first effort ---------------------------------------------------------------
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from(["panda", "iiwa14", "ur5"]))
+def test_a_jump_of_a_tenth_of_a_limit_is_warned_of(seed: int, name: str) -> None:
+    """Of the joint with the largest share, and nothing below; not if it moves."""
+    robot, rng = load(name), np.random.default_rng(seed)
+    q, rest = robot.random_configuration(rng), np.zeros(robot.nv)
+    limit = np.asarray(robot.model.effortLimit)
+    gravity = robot.inverse_dynamics(q, rest, rest)
+    jump = rng.uniform(-0.999, 0.999, robot.nv) * JUMP * limit
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warn_of_jump(robot, q, rest, gravity + jump)
+    j = int(rng.integers(robot.nv))
+    jump[j] = rng.choice([-1.0, 1.0]) * 1.001 * JUMP * limit[j]
+    with pytest.warns(StartWarning, match=f"joint '{robot.dof_names[j]}' is"):
+        warn_of_jump(robot, q, rest, gravity + jump)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warn_of_jump(robot, q, rest + 0.1, gravity + jump)
+
+
+def test_a_floating_base_is_not_looked_at() -> None:
+    robot = load("talos_arm_free_flyer")
+    rest = np.zeros(robot.nv)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warn_of_jump(robot, robot.home(), rest, rest + 1e6)
+
+
+FIRST_EFFORT = (
+    r"the first effort of joint 'panda_joint2' is 30\.2 N·m, but gravity asks for "
+    r"-3\.99 N·m: a jump of 39 % of its limit of 87 N·m; let tasks begin gently with "
+    r"blend=1\.0 \(YAML blend: 1\.0\), or start on the trajectory with its velocity$"
+)
+
+
+@pytest.mark.parametrize("period", [None, 0.001])
+def test_a_simulation_warns_of_its_first_effort(period: float | None) -> None:
+    circle = Circle(radius=0.1, angular_rate=2.0)
+    how: dict[str, Any] = {"duration": 0.01, "control_period": period}
+
+    def law(blend: float | None) -> Controller:
+        hand = FramePose("panda_tcp", circle, blend=blend)
+        return Controller(panda(), [hand], JointCentering())
+
+    with pytest.warns(StartWarning, match="^" + FIRST_EFFORT):
+        simulate(law(None), panda().home(), **how)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        simulate(law(1.0), panda().home(), **how)
+
+
+@pytest.mark.parametrize("command", ["check", "run"])
+def test_the_commands_warn_of_the_first_effort(
+    command: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = (
+        "robot: {name: panda}\n"
+        "tasks: {hand: {type: frame_pose, trajectory: {type: circle, radius: 0.1, "
+        "angular_rate: 2}}}\n"
+        "null_space: {fields: [{type: joint_centering}]}\n"
+        "simulation: {duration: 0.01, control_period: 0.001}\n"
+    )
+    Path("mine.yaml").write_text(text, encoding="utf-8")
+    assert main([command, "mine.yaml"]) == 0
+    (line,) = [
+        each for each in capsys.readouterr().err.splitlines() if "first effort" in each
+    ]
+    assert re.fullmatch("hsp: " + FIRST_EFFORT, line)
+    assert main([command, "mine.yaml", "--set", "tasks.hand.blend=1"]) == 0
+    assert "first effort" not in capsys.readouterr().err
 
 
 # --- one thread at a time -----------------------------------------------------------
