@@ -13,6 +13,7 @@ from hsp_control.cli.consoles import out
 from hsp_control.cli.loading import load
 from hsp_control.config import Experiment
 from hsp_control.control import ControlOutput, Diagnostics
+from hsp_control.control.first_state import warn_of_jump
 
 ROUNDING = 1e-9
 """A singular value below this share of the largest one is zero but for rounding."""
@@ -30,6 +31,8 @@ def check(options: argparse.Namespace) -> int:
         *start_advice(experiment, damped=output.damped),
     ]
     warn_of_rates(experiment)
+    if experiment.compensation.start_up_ramp is None:
+        warn_of_jump(experiment.robot, experiment.q0, experiment.v0, output.tau)
     if options.json:
         print(json.dumps(found | {"advice": advice}, indent=2, ensure_ascii=False))
         return 0

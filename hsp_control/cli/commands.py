@@ -22,7 +22,7 @@ from rich.table import Table
 from hsp_control.cli import check as checks
 from hsp_control.cli import robot_table
 from hsp_control.cli.consoles import errors as _errors
-from hsp_control.cli.consoles import message_of, renamed_keys_printed, working
+from hsp_control.cli.consoles import message_of, warnings_printed, working
 from hsp_control.cli.consoles import out as _out
 from hsp_control.cli.interrupts import DeferredInterrupt
 from hsp_control.cli.limit_rows import limit_rows
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from hsp_control.cli.screen import Screen
 
 
-@renamed_keys_printed()
+@warnings_printed()
 def run(options: argparse.Namespace) -> int:
     """Simulate, save the log and print a summary; rows computed so far are kept."""
     loaded = load_scenario(read(options))
@@ -161,7 +161,7 @@ def salvage(options: argparse.Namespace) -> int:
     return 0
 
 
-@renamed_keys_printed()
+@warnings_printed()
 def view(options: argparse.Namespace) -> int:
     """Show logs in the browser."""
     from hsp_control.cli.screen import show_logs
@@ -170,13 +170,13 @@ def view(options: argparse.Namespace) -> int:
     return 0
 
 
-@renamed_keys_printed()
+@warnings_printed()
 def check(options: argparse.Namespace) -> int:
     """Build all objects, evaluate the law once, and print a summary."""
     return checks.check(options)
 
 
-@renamed_keys_printed()
+@warnings_printed()
 def plot(options: argparse.Namespace) -> int:
     """Draw the figures of a log or of a sweep."""
     if options.log.suffix == ".parquet":
@@ -200,7 +200,7 @@ def plot(options: argparse.Namespace) -> int:
     return 0
 
 
-@renamed_keys_printed()
+@warnings_printed()
 def export(options: argparse.Namespace) -> int:
     """Write a log as a page or as films."""
     from hsp_control.cli import export as exports
@@ -208,7 +208,7 @@ def export(options: argparse.Namespace) -> int:
     return exports.export(options)
 
 
-@renamed_keys_printed()
+@warnings_printed()
 def play(options: argparse.Namespace) -> int:
     """Let a page steer a simulated robot in real time."""
     from hsp_control.cli import play as plays
@@ -216,7 +216,7 @@ def play(options: argparse.Namespace) -> int:
     return plays.play(options)
 
 
-@renamed_keys_printed()
+@warnings_printed()
 def sweep(options: argparse.Namespace) -> int:
     """Run a configuration many times."""
     from hsp_control.cli import sweep as sweeps
@@ -224,7 +224,7 @@ def sweep(options: argparse.Namespace) -> int:
     return sweeps.sweep(options)
 
 
-@renamed_keys_printed()
+@warnings_printed()
 def bench(options: argparse.Namespace) -> int:
     """Measure the latency of a real-time loop."""
     from hsp_control.cli import bench as benches
@@ -232,7 +232,7 @@ def bench(options: argparse.Namespace) -> int:
     return benches.bench(options)
 
 
-@renamed_keys_printed()
+@warnings_printed()
 def live(options: argparse.Namespace) -> int:
     """Control a simulated robot in another process in real time."""
     from hsp_control.cli import live as lives
@@ -240,7 +240,7 @@ def live(options: argparse.Namespace) -> int:
     return lives.live(options)
 
 
-@renamed_keys_printed()
+@warnings_printed()
 def franka_box(options: argparse.Namespace) -> int:
     """Be a Franka's control box, without a robot."""
     from hsp_control.cli import franka_box as boxes

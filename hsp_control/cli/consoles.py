@@ -11,6 +11,7 @@ from rich.markup import escape
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from hsp_control.config.renamed import RenamedKeyWarning
+from hsp_control.control.first_state import StartWarning
 
 _LONGEST = 1500
 
@@ -48,10 +49,12 @@ def working(what: str) -> Iterator[None]:
 
 
 @contextmanager
-def renamed_keys_printed() -> Iterator[None]:
-    """Print warnings about renamed keys as lines on standard error, each one once."""
+def warnings_printed() -> Iterator[None]:
+    """Print warnings of this package as lines on standard error, each one once."""
+    own = RenamedKeyWarning, StartWarning
     with warnings.catch_warnings():
-        warnings.simplefilter("always", RenamedKeyWarning)
+        for kind in own:
+            warnings.simplefilter("always", kind)
         show_other, printed = warnings.showwarning, set[str]()
 
         def show(
@@ -62,7 +65,7 @@ def renamed_keys_printed() -> Iterator[None]:
             file: TextIO | None = None,
             line: str | None = None,
         ) -> None:
-            if not issubclass(category, RenamedKeyWarning):
+            if not issubclass(category, own):
                 show_other(message, category, filename, lineno, file, line)
             elif str(message) not in printed:
                 printed.add(str(message))

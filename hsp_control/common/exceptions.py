@@ -72,7 +72,10 @@ class JointNotFoundError(HspControlError, LookupError):
 
 
 class ConfigurationError(HspControlError, ValueError):
-    """A vector q is no configuration: a quaternion or (cos, sin) pair has norm ≠ 1."""
+    """A vector q is no configuration: a quaternion or (cos, sin) pair has norm ≠ 1.
+
+    Also raised where a run begins with angles that look like degrees.
+    """
 
 
 class TrajectoryError(HspControlError, ValueError):

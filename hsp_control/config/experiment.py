@@ -32,7 +32,7 @@ from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.live.settings import LiveSettings
 from hsp_control.null_space.fields import NullSpaceField
 from hsp_control.null_space.fields.field import terms_of
-from hsp_control.null_space.metrics import IdentityMetric, Metric
+from hsp_control.null_space.metrics import Metric
 from hsp_control.plans import Plan
 from hsp_control.robot import Robot
 from hsp_control.robot.description.robot_description import RobotDescription
@@ -141,7 +141,7 @@ class Experiment:
         )
         null_space = {
             "gain": null_space_gain,
-            "metric": IdentityMetric() if metric is None else metric,
+            "metric": metric,
             "fields": terms,
             "singularity_threshold": singularity_threshold,
         }

@@ -199,7 +199,8 @@ class ChangeNullSpaceGain(Change, type="null_space_gain"):
     """The null-space gain K_N changes; V decays throughout."""
 
     gain: Gain
-    """The new gain [1/s]: a number, nv numbers, or a matrix."""
+    """The new gain [1/s]: a number, nv numbers, or a matrix; over a metric that changes
+    with q, one number."""
 
     def apply(self, setup: Setup) -> Setup:
         """Return the setup with the gain; see `Change.apply`."""

@@ -75,8 +75,11 @@ def priority_of(task: Task, robot: Robot) -> int:
 def checked_gain(gain: ArrayLike, robot: Robot, metric: Metric) -> Array:
     """Return K_N as a matrix, checked for V' = -e_NᵀW K_N e_N < 0.
 
-    If W is the mass matrix it changes with q: then K_N alone must be positive definite,
-    and decay at every q is proved only for multiples of the identity.
+    So W K_N + K_NᵀW must be positive definite. Where W is constant that is looked at.
+    Where W changes with q it must hold for every W(q): for multiples of the identity it
+    does, since then V' = -2 K_N V, and other gains are refused. A diagonal of positive
+    numbers is not enough: over the mass matrix some let e_N grow at some
+    configurations.
 
     Args:
         gain: K_N: a scalar, shape (nv,) or (nv, nv) [1/s].
@@ -84,14 +87,22 @@ def checked_gain(gain: ArrayLike, robot: Robot, metric: Metric) -> Array:
         metric: The metric W.
 
     Raises:
-        GainError: If K_N has another shape, or the null-space error would not decay.
+        GainError: If K_N has another shape, or the null-space error might not decay.
     """
     K_N = as_matrix(as_gain(gain, "null_space_gain"), robot.nv, "null_space_gain")
-    sample = MetricSample.allocate(robot.nv)
-    if metric.form != VARYING:
-        state = robot.state(0.0, robot.neutral(), np.zeros(robot.nv))
-        metric.evaluate(state, sample)
-    decay = sample.W @ K_N
+    if metric.form == VARYING:
+        if not np.array_equal(K_N, K_N[0, 0] * np.eye(robot.nv)):
+            raise GainError(
+                "null_space_gain is no multiple of the identity, and the metric "
+                f"({type(metric).__name__}) changes with the configuration: at some "
+                "configurations the null-space error could grow instead of decay; "
+                f"needs one number, for example {np.diag(K_N).min():g}, or a metric "
+                "that does not change"
+            )
+        return K_N
+    state = robot.state(0.0, robot.neutral(), np.zeros(robot.nv))
+    W = metric.evaluate(state, MetricSample.allocate(robot.nv)).W
+    decay = W @ K_N
     smallest = float(np.linalg.eigvalsh(0.5 * (decay + decay.T))[0])
     if smallest <= 0.0:
         raise GainError(

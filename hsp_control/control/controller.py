@@ -4,7 +4,6 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import replace
 from math import isfinite
-from threading import Lock
 from typing import TYPE_CHECKING, Any, NoReturn, overload
 
 import numpy as np
@@ -27,11 +26,13 @@ from hsp_control.control.changes import Change, Changes
 from hsp_control.control.composition import Base, priority_of
 from hsp_control.control.declared import Declared
 from hsp_control.control.explanation import flow_of, raise_not_finite
+from hsp_control.control.first_state import check_angles
 from hsp_control.control.gains_in_force import GainsInForce
 from hsp_control.control.held_gains import check_held
 from hsp_control.control.mixture import AccelerationModifier, Mixture
 from hsp_control.control.output import ControlOutput, Diagnostics
 from hsp_control.control.read_only import read_only
+from hsp_control.control.step_lock import StepLock
 from hsp_control.control.time_line import TimeLine
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.start import Start
@@ -90,8 +91,10 @@ class Controller:
             tasks: One task or more, with distinct names. Tasks of the same priority
                 form one level; see `Task.priority`.
             field: The field g that the self-motion follows; None: `Rest`, g = 0.
-            null_space_gain: K_N > 0 [1/s]: scalar, shape (nv,) or (nv, nv).
-            metric: Joint-space metric; None: identity.
+            null_space_gain: K_N > 0 [1/s]: scalar, shape (nv,) or (nv, nv). Where the
+                metric changes with q, a multiple of the identity.
+            metric: Joint-space metric; None: the identity, or the mass matrix if a task
+                has an impedance: then a push on the hand does not move the null space.
             singularity_threshold: Singular value of the stacked Jacobian (in the
                 metric) below which its inverse is bounded instead of exact. For
                 position tasks choose about 3 % of the arm's reach [m]. Near a
@@ -111,7 +114,7 @@ class Controller:
                 tasks of one level have more rows than the robot has dofs.
             ContactError: If a floating base has neither contacts nor ``base``, or a
                 fixed base has either.
-            GainError: If K_N does not make the null-space error decay.
+            GainError: If K_N might not make the null-space error decay.
             HspControlError: If a part does not fit the robot; the message contains its
                 key path.
         """
@@ -133,7 +136,7 @@ class Controller:
     def _allocate(self, changes: Sequence[Change]) -> None:
         """Set up what a copy has of its own, and compose the parts."""
         robot, given = self._declared.robot, self._declared.start
-        self._lock = Lock()
+        self._lock = StepLock(_HOLDERS)
         self._state = RobotState(robot)
         self._gains = GainsInForce(robot.nv)
         self._now, self._begun = -np.inf, False
@@ -184,7 +187,12 @@ class Controller:
         return Start(here, self._setup.start.scene)
 
     def _begin(self) -> None:
-        """Place what is relative at the first state, unless a start was given."""
+        """Look at the first state, and place there what is relative, without a start.
+
+        Raises:
+            ConfigurationError: If an angle looks like degrees.
+        """
+        check_angles(self._declared.robot, self._state.q)
         if self._declared.start is None:
             here = self._here()._replace(scene=self._declared.scene)
             last_effort = self._actuation.memory()
@@ -273,10 +281,17 @@ class Controller:
             ShapeError: If q or v has the wrong shape.
             NonFiniteError: If t, q or v contains NaN or inf, or a task or the field
                 does; a non-finite effort is never returned.
-            ConfigurationError: If a quaternion or a (cos, sin) pair is not of norm 1.
-            ControllerError: If the state belongs to another robot.
+            ConfigurationError: If a quaternion or a (cos, sin) pair is not of norm 1,
+                or an angle of the first state (also after `restart`; later ones are
+                not looked at) is farther from the middle of its joint's range than
+                twice that range: it would be in degrees.
+            ControllerError: If the state belongs to another robot, or what a step
+                calls, such as a field, calls its own controller.
         """
-        with self._lock:
+        lock = self._lock
+        if not lock.acquire(False):
+            lock.wait()
+        try:
             state, whole, mixed = self._state, self._whole, None
             if whole is None or modifier is not None or q is None or v is None:
                 self._observe(t, q, v)
@@ -325,6 +340,8 @@ class Controller:
             out.forces = forces.copy() if active.has_forces else forces
             out.damped, out.status, out.relaxation = damped, status, relaxation
             return out
+        finally:
+            lock.release()
 
     def _observe(
         self,
@@ -345,7 +362,7 @@ class Controller:
                 f"the state is of another robot object ({t.robot.name}); "
                 f"this controller is for {self._declared.robot.name}"
             )
-        elif t is not self._state:
+        elif t is not self._state.seen and t is not self._state:
             self._state.update(t.t, t.q, t.v)
 
     def applied(self, tau: ArrayLike, period: float) -> None:
@@ -566,9 +583,10 @@ class Controller:
     def state(self) -> RobotState:
         """The state that the last effort was computed for; the next one overwrites it.
 
-        It may be updated and given to `compute`, which then copies nothing.
+        `update` moves it, and nothing else does: its t, q and v cannot be assigned or
+        written. Given to `compute` it is not copied.
         """
-        return self._state
+        return self._state.seen
 
     def feedback(self, task: str) -> Feedback:
         """Return a task's gains and offset in force; compensators write the offset.
@@ -734,6 +752,13 @@ class Controller:
         self._gains.remember(saved["gains"])
         self._state.update(*saved["at"])
         self._actuation.remember(saved["last_effort"])
+
+
+_HOLDERS = frozenset(
+    getattr(Controller, name).__code__
+    for name in ("compute", "while_free", "restart", "prepare", "change", "stack")
+)
+"""The methods that hold the lock."""
 
 
 def _free_step(

@@ -28,9 +28,14 @@ from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields import NullSpaceField, Rest
 from hsp_control.null_space.fields.field import terms_of
-from hsp_control.null_space.metrics import IdentityMetric, Metric
+from hsp_control.null_space.metrics import (
+    IdentityMetric,
+    MassMatrixMetric,
+    Metric,
+)
 from hsp_control.robot import Robot
 from hsp_control.tasks import Task
+from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.gains import as_gain
 from hsp_control.trajectories.streams.stream import Streamed
 
@@ -87,9 +92,11 @@ class Declared:
                 f"singularity_threshold is {singularity_threshold}; must be positive"
             )
         field = Rest() if field is None else field
-        metric = IdentityMetric() if metric is None else metric
         for task in tasks:
             check_kind("tasks contains", task, Task)
+        if metric is None:
+            yields = any(impedance_of(task) is not None for task in tasks)
+            metric = MassMatrixMetric() if yields else IdentityMetric()
         for contact in contacts:
             check_kind("contacts contains", contact, Contact)
         check_kind("field is", field, NullSpaceField)

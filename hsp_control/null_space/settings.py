@@ -9,7 +9,7 @@ from hsp_control.common.exceptions import FieldError
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import Gain, Positive
 from hsp_control.null_space.fields import FieldSum, NullSpaceField
-from hsp_control.null_space.metrics import IdentityMetric, Metric
+from hsp_control.null_space.metrics import Metric
 
 
 def _summable(fields: Sequence[NullSpaceField]) -> tuple[NullSpaceField, ...]:
@@ -30,9 +30,10 @@ class NullSpaceSettings(Part, error=FieldError):
 
     gain: Gain = 10.0
     """Null-space gain K_N [1/s], the rate at which the null-space error decays: a
-    number, nv numbers, or a matrix."""
-    metric: Metric = IdentityMetric()
-    """The joint-space metric W [-]."""
+    number, nv numbers, or a matrix; over a metric that changes with q, one number."""
+    metric: Metric | None = None
+    """The joint-space metric W [-]; by default the identity, or the mass matrix if a
+    task has an impedance."""
     fields: Annotated[Sequence[NullSpaceField], AfterValidator(_summable)] = ()
     """Fields [rad/s or m/s]; their sum is used. Without fields, self-motion comes to
     rest."""

@@ -68,6 +68,8 @@ class RobotState:
         self.t = 0.0
         self.q: Array = robot.neutral()
         self.v: Array = np.zeros(robot.nv)
+        self._memory = self.q, self.v  # writable, also where `seen` binds calls
+        self._seen: RobotState | None = None
         self.data: pin.Data = robot.model.createData()
         self.effort: Array = self.data.tau
         self._compute_jacobians = bind_pinocchio(
@@ -129,7 +131,7 @@ class RobotState:
     def bind_move(self, calls: Sequence[Callable[[float], Any]] = ()) -> Move:
         """Return how `advance` moves this state, with calls of the time that follow."""
         first = self._compute_jacobians
-        memory = self.q, self.v, self._unit_blocks, self.stamp_array
+        memory = *self._memory, self._unit_blocks, self.stamp_array
         if isinstance(first, NativeCall):
             from hsp_control.robot.native_move import NativeMove
 
@@ -151,6 +153,15 @@ class RobotState:
         self.robot.check_tangent(v, "velocity v")
         raise NonFiniteError(f"t = {t!r}, q = {q!r}, v = {v!r}: their sum overflows")
 
+    @property
+    def seen(self) -> "RobotState":
+        """This state, as users may have it: t, q and v change only by `update`."""
+        if self._seen is None:
+            from hsp_control.robot.seen_state import SeenState  # it derives from this
+
+            self._seen = SeenState(self)
+        return self._seen
+
     def frame(self, name: str) -> FrameKinematics:
         """Return the placement, the Jacobian and the motion of a frame.
 
@@ -160,8 +171,9 @@ class RobotState:
         frame = self._frames.get(name)
         if frame is None:
             index = self.robot.frame_id(name)
+            _, v = self._memory
             frame = FrameKinematics(
-                self.robot.model, self.data, self.v, self.stamp_array, index
+                self.robot.model, self.data, v, self.stamp_array, index
             )
             self._frames[name] = frame
         frame.compute()
@@ -176,7 +188,7 @@ class RobotState:
         """The centre of mass, the angular momentum about it, and their Jacobians."""
         if self._centroidal is None:
             self._centroidal = CentroidalMotion(
-                self.robot.model, self.data, self.q, self.v, self.stamp_array
+                self.robot.model, self.data, *self._memory, self.stamp_array
             )
         self._centroidal.compute()
         return self._centroidal
@@ -225,7 +237,7 @@ class RobotState:
     def bind_inverse_dynamics(self, acceleration: Array) -> Callable[[], object]:
         """Return a call that writes `effort` for what this array (nv,) then holds."""
         return bind_pinocchio(
-            "rnea", self.robot.model, self.data, self.q, self.v, acceleration
+            "rnea", self.robot.model, self.data, *self._memory, acceleration
         )
 
     @property
@@ -241,7 +253,7 @@ class RobotState:
                 joint_placements(self.data),
                 matrix_view(self.data.J),
                 matrix_view(self.data.dJ),
-                self.v,
+                self._memory[1],
             )
         return self._world
 

@@ -11,8 +11,10 @@ from hsp_control.common.exceptions import (
     SimulationError,
     StreamError,
 )
-from hsp_control.control.compensation import Command, Compensation, check_impedances
+from hsp_control.control.compensation import Command, Compensation
+from hsp_control.control.compensation import check_rate as check_loop
 from hsp_control.control.controller import Controller
+from hsp_control.control.first_state import warn_of_jump
 from hsp_control.declaration import within
 from hsp_control.estimation import Estimator
 from hsp_control.geometry.scene import Scene
@@ -61,6 +63,9 @@ def simulate(
 ) -> Rollout:
     """Run the closed loop and return its rollout.
 
+    A robot that begins at rest with a jump of its effort is warned about; see
+    `hsp_control.control.first_state`.
+
     Args:
         controller: The controller.
         q0: Start configuration, shape (nq,).
@@ -81,8 +86,8 @@ def simulate(
         estimators: What completes each measurement, for the plan and the controller;
             they need a control period.
         scene: Obstacles to log; None: those of the controller.
-        check_rate: Whether impedances that the control period does not bear are
-            refused.
+        check_rate: Whether gains, impedances and fields with which the loop would be
+            unstable at its control period are refused.
         start_time: Time of the first row [s].
         on_progress: Called at every row with the fraction of the run that is done.
         on_row: Called with the recorder after every recorded row.
@@ -94,7 +99,8 @@ def simulate(
         stream does.
 
     Raises:
-        UnstableRateError: If the control period does not bear an impedance.
+        UnstableRateError: If the loop would be unstable at its control period, with
+            the plant's delays; with values that would not.
         SimulationError: If durations, periods and plant do not fit, or the motion
             diverged; its ``rollout`` then holds what was computed.
         HspControlError: If q0 or v0 is not a valid state of the robot, or the plant
@@ -134,7 +140,14 @@ def simulate(
         loop = continuous_loop(controller, plant, integrator, times, q, v)
     elif isinstance(plant, SampledPlant) and periods:
         if check_rate:
-            check_impedances(controller, q, log_period / periods, compensation)
+            check_loop(
+                controller,
+                q,
+                log_period / periods,
+                compensation,
+                effort_delay=plant.effort_delay,
+                sensor_delay=plant.sensor_delay,
+            )
         chain = ControlChain(Command(controller, compensation), plan, estimators)
         chain.begin(plant.inertial())
         running = chain.plan
@@ -151,6 +164,8 @@ def simulate(
     status, message = "completed", ""
     try:
         for row, (state, output, tau, own_channels) in enumerate(loop):
+            if row == 0:
+                warn_of_jump(robot, q, v, tau)
             plant_channels = plant.log_channels(state.t, state.q, state.v, tau)
             recorder.record(state, output, tau, {**own_channels, **plant_channels})
             if on_progress is not None:

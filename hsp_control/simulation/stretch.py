@@ -90,8 +90,8 @@ class Stretch:
         which[3], which[4] = k, min(periods, k + MOST)
         made = int(self._loop()) - k
         if made > 1:  # calls in Python read it
-            state = self._controller.state
-            state.t = start + (k + made - 1) * span / periods
+            state = vars(self._controller.state)  # q and v are there already
+            state["t"] = start + (k + made - 1) * span / periods
         return made
 
     def _bind(self, step: FreeStep) -> NativeCall:

@@ -8,6 +8,7 @@ import threading
 import warnings
 
 from hsp_control.config.renamed import RenamedKeyWarning
+from hsp_control.control.first_state import StartWarning
 from hsp_control.sweeps.running import run_task
 
 READY = "ready"
@@ -24,6 +25,7 @@ def main() -> None:
     warnings.simplefilter("ignore", RuntimeWarning)
     # The parent process has warned of these already.
     warnings.simplefilter("ignore", RenamedKeyWarning)
+    warnings.simplefilter("ignore", StartWarning)
     tasks: queue.SimpleQueue[str] = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(tasks,), daemon=True).start()
     print(READY, file=results, flush=True)

@@ -176,6 +176,7 @@ def test_a_configuration_makes_its_point(name: str) -> None:
     POINTS[name](experiment, ours, other)
 
 
+@pytest.mark.filterwarnings("error:the first effort of joint:UserWarning")
 @pytest.mark.parametrize("name", CONFIGURATIONS)
 def test_a_configuration_runs_as_it_is_written(name: str) -> None:
     rollout = load_experiment(name, "simulation.duration=0.1").run()

@@ -419,6 +419,7 @@ RUNS = [
     for robot in FRAMES
     for metric in METRICS
     for gain in ("scalar", "matrix")
+    if (metric, gain) != ("mass matrix", "matrix")  # refused
 ]
 every_run = pytest.mark.parametrize("run", RUNS, ids=str)
 
@@ -474,8 +475,7 @@ def test_proposition_2_the_null_space_error_decays_as_it_must(run: Run) -> None:
     """Scalar K_N: ‖e_N‖_W = ‖e_N(0)‖_W exp(-K_N t) to 1e-9 of itself, all along.
 
     Any K_N: V' = -e_NᵀW K_N e_N with V = ½ e_NᵀW e_N, by differences of eighth order.
-    They are good to 1e-10 of V(0), to 1e-8 where M couples a matrix gain with the
-    wrists, so that V has fast parts.
+    They are good to 1e-10 of V(0). And V falls from each row to the next.
     """
     rollout = self_motion(run)
     e_N, W = null_space_errors(run, rollout)
@@ -490,9 +490,8 @@ def test_proposition_2_the_null_space_error_decays_as_it_must(run: Run) -> None:
         np.testing.assert_allclose(np.sqrt(2.0 * V), expected, rtol=1e-9, atol=0)
     power = -np.einsum("ti,tij,tj->t", e_N, W @ run.K_N, e_N)
     found = differences(V, FIRST, LOG_PERIOD)
-    fast = run.metric == "mass matrix" and run.gain == "matrix"
-    atol = (3e-8 if fast else 1e-9) * V[0]
-    np.testing.assert_allclose(found, power[4:-4], rtol=0, atol=atol)
+    np.testing.assert_allclose(found, power[4:-4], rtol=0, atol=1e-9 * V[0])
+    assert (np.diff(V) < 0.0).all()
 
 
 @pytest.mark.parametrize("run", [r for r in RUNS if r.gain == "scalar"], ids=str)

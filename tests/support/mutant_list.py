@@ -806,8 +806,8 @@ MUTANTS = (
     Mutant(
         "stretch: the controller's time stays behind",
         SIMULATION + "stretch.py",
-        "state.t = start + (k + made - 1) * span / periods",
-        "state.t += 0.0",
+        'state["t"] = start + (k + made - 1) * span / periods',
+        'state["t"] += 0.0',
         OF_STRETCHES + "last_step",
     ),
     Mutant(

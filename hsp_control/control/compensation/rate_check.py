@@ -94,39 +94,6 @@ def check_rate(
     return found
 
 
-def check_impedances(
-    controller: Controller,
-    q: Array,
-    period: float,
-    compensation: Compensation | None = None,
-) -> None:
-    """Check that a period bears the impedances of a controller, and what they become.
-
-    Args:
-        controller: The controller.
-        q: Configuration at which they are looked at, shape (nq,).
-        period: The control period [s].
-        compensation: The compensators; None: none.
-
-    Raises:
-        UnstableRateError: If it does not; with what would be stable.
-    """
-    compliant = [task for task in controller.tasks if impedance_of(task) is not None]
-    if not compliant:
-        return
-    compensation = Compensation() if compensation is None else compensation
-    known = compensation.predictor
-    efforts, sensors = (0, 0) if known is None else (
-        known.effort_delay, known.sensor_delay
-    )  # fmt: skip
-    state = controller.robot.state(0.0, q, np.zeros(controller.robot.nv))
-    delays = efforts, sensors, compensation
-    for finding in _task_findings(controller, compliant, state, period, delays):
-        if finding is not None and finding.unstable:
-            with within(*finding.path):
-                raise UnstableRateError(finding.message)
-
-
 def rate_findings(
     controller: Controller,
     q: Array,
@@ -364,10 +331,12 @@ def _finding(
     radius, gain, h = loop.radius(), speed.rate, loop.period
     product = f"{speed.what} times the period is {gain * h:.3g}{extra}"
     if radius > 1.0 + _ROUNDING:
-        choices = _stabilising_changes(loop, speed, null_space)
+        good, stable = _stabilising_changes(loop, speed, rule, null_space)
         solution = (
-            f"use {' or '.join(choices)}"
-            if choices
+            f"use {' or '.join(good)}; the loop is stable with {' or '.join(stable)}"
+            if good
+            else f"use {' or '.join(stable)}"
+            if stable
             else "no control rate is stable: reduce the integral gain or the filter's "
             "delay"
         )
@@ -395,9 +364,14 @@ def _finding(
 def _stabilising_changes(
     loop: LinearLoop,
     speed: _Speed,
+    rule: float,
     null_space: tuple[Array, Array] | None,
-) -> list[str]:
-    """Return changes of single settings, each of which makes the loop stable."""
+) -> tuple[list[str], list[str]]:
+    """Return changes of single settings, each of which makes the loop stable.
+
+    Returns:
+        Those that also keep to the rule, and those that just make it stable.
+    """
 
     def gains(s: float) -> LinearLoop:
         if null_space is None:
@@ -405,10 +379,12 @@ def _stabilising_changes(
         K, A = null_space
         return replace(loop, kp=s * K @ A, kv=s * K + A)
 
-    own, choices = loop.compensation, []
-    least = 1e-3 / max(speed.rate * loop.period, 1.0)
+    own, h = loop.compensation, loop.period
+    good, choices = [], []
+    least = 1e-3 / max(speed.rate * h, 1.0)
     if (s := _largest(gains, least)) is not None:
         choices.append(speed.at_most(s * speed.rate))
+        good.append(speed.at_most(min(s * speed.rate, rule / h)))
     if null_space is not None and null_space[1].max() > 1e-3 * speed.rate:
         K, A = null_space
 
@@ -417,10 +393,10 @@ def _stabilising_changes(
 
         if (s := _largest(weights)) is not None:
             choices.append(f"fields of at most {rounded_down(s)} times these weights")
-    if (
-        s := _largest(lambda s: replace(loop, period=s * loop.period), least)
-    ) is not None:
-        choices.append(f"a control_period of at most {rounded_down(s * loop.period)} s")
+    if (s := _largest(lambda s: replace(loop, period=s * h), least)) is not None:
+        choices.append(f"a control_period of at most {rounded_down(s * h)} s")
+        shorter = rounded_down(min(s * h, rule / speed.rate))
+        good.append(f"a control_period of at most {shorter} s")
     if own.momentum_observer is not None and own.momentum_observer.cancel:
         running = own.momentum_observer
         rate = running.bandwidth
@@ -445,7 +421,7 @@ def _stabilising_changes(
             choices.append(
                 f"velocity_filter.cutoff of at least {filter_.cutoff / s * 1.01:.3g} Hz"
             )
-    return choices
+    return good, choices
 
 
 def _largest(

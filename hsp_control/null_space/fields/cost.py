@@ -158,7 +158,7 @@ class FunctionCost(Cost):
         Raises:
             FieldError: If the function does not return one finite number.
         """
-        value = self.function(state)
+        value = self.function(state.seen)
         try:
             number = float(value)
         except (TypeError, ValueError):
@@ -174,13 +174,13 @@ class FunctionCost(Cost):
         """Return ∇f from the given function, or by differences."""
         if self.gradient_function is None:
             return super().gradient(state)
-        return self.gradient_function(state)
+        return self.gradient_function(state.seen)
 
     def gradient_rate(self, state: RobotState) -> Array:
         """Return (∇f)' from the given function, or by differences along the flow."""
         if self.rate_function is None:
             return super().gradient_rate(state)
-        return self.rate_function(state)
+        return self.rate_function(state.seen)
 
 
 @kernel

@@ -75,10 +75,10 @@ class FunctionField(VectorField):
 
     def vector(self, state: RobotState) -> Array:
         """Return g."""
-        return self.function(state)
+        return self.function(state.seen)
 
     def rate(self, state: RobotState) -> Array:
         """Return g' from the given function, or by differences along the flow."""
         if self.rate_function is None:
             return super().rate(state)
-        return self.rate_function(state)
+        return self.rate_function(state.seen)

@@ -51,6 +51,8 @@ class ImperfectPlant(SampledPlant):
         self.plant = plant
         self.sensors, self.drives = tuple(sensors), tuple(drives)
         self.seed = seed
+        self.sensor_delay = sum(sensor.periods for sensor in sensors)
+        self.effort_delay = sum(drive.periods for drive in drives)
         self._measured = plant.robot.neutral(), np.zeros(plant.robot.nv)
         self._applied: Array | None = None
         self._begin(*self._measured)

@@ -21,7 +21,12 @@ class Plant:
 
     Attributes:
         robot: The robot that moves; its joints are those of the controller's model.
+        sensor_delay: Delay of the measurements [control periods].
+        effort_delay: Delay of the efforts [control periods].
     """
+
+    sensor_delay: int = 0
+    effort_delay: int = 0
 
     def __init__(self, robot: Robot) -> None:
         """Set the robot that moves."""

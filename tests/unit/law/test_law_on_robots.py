@@ -347,12 +347,11 @@ def test_lyapunov_function_decays_as_proved(name: str, kind: str, gain: str) -> 
     c = case(name)
     nv = c.robot.nv
     metric = METRICS[kind](nv)
+    if metric.form == VARYING and gain == "matrix":
+        pytest.skip("refused: see test_null_space_gain.py")
     state = c.robot.state(0.3, c.q, c.v)
     W = terms(c, state, metric).W
     K_N = 7.0 * np.eye(nv) if gain == "scalar" else matrix_gain(nv, W)
-    if metric.form == VARYING and gain == "matrix":
-        # Asked to be positive definite by itself; the identity holds for any.
-        K_N = 8.0 * positive(11, nv) + 4.0 * np.eye(nv)
     out = controller(c, metric, K_N).compute(state)
     a, e_N = out.acceleration.copy(), out.null_space_error.copy()
     elsewhere = RobotState(c.robot)

@@ -207,6 +207,7 @@ def test_divergence_keeps_the_rollout(
             planar_start(),
             rng.normal(size=3),
             duration=1.0,
+            check_rate=False,
             **options,
         )
     run = caught.value.rollout
@@ -232,6 +233,7 @@ def test_a_runaway_is_told_with_its_speed() -> None:
             np.ones(3),
             duration=1.0,
             control_period=0.01,
+            check_rate=False,
         )
 
 

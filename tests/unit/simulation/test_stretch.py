@@ -258,6 +258,7 @@ def test_a_motion_that_diverges_stops_the_same_way(
                 control_period=0.01,
                 log_period=log_period,
                 integrator=SemiImplicitEuler(0.01),
+                check_rate=False,
             )
         told.append(str(caught.value))
         rollout = caught.value.rollout

@@ -1,0 +1,78 @@
+"""What is looked at where a run begins, and not in its steps."""
+
+import warnings
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import ConfigurationError
+from hsp_control.robot import Robot
+
+FAR = 2.0
+"""An angle this many times its joint's range from the middle is no angle in rad."""
+NEAR = 1.0
+"""Nearer than this it is not degrees, however small the range [rad]."""
+JUMP = 0.1
+"""Of a joint's effort limit: by more than this the first effort should not jump."""
+
+
+class StartWarning(UserWarning):
+    """A robot at rest would begin to move with a jump of an effort."""
+
+
+def check_angles(robot: Robot, q: Array) -> None:
+    """Check that no angle is so far beyond its joint's range that it is in degrees.
+
+    Joints without limits, continuous ones and sliding ones are not looked at.
+
+    Args:
+        robot: The robot.
+        q: Configuration, shape (nq,).
+
+    Raises:
+        ConfigurationError: Names the joint, its angle and its range.
+    """
+    lower, upper = robot.position_limits()
+    angles = robot.joint_positions(q)
+    for name, unit, low, high, angle in zip(
+        robot.dof_names, robot.units, lower, upper, angles, strict=True
+    ):
+        away = abs(angle - 0.5 * (low + high)) if np.isfinite(high - low) else 0.0
+        if unit == "rad" and away > max(FAR * (high - low), NEAR):
+            raise ConfigurationError(
+                f"joint {name!r} is at {angle:.6g} rad, but its range is from {low:g} "
+                f"to {high:g} rad: degrees? Angles are in rad"
+            )
+
+
+def warn_of_jump(robot: Robot, q: Array, v: Array, tau: Array) -> None:
+    """Warn if the first effort is far from the one that held the robot until then.
+
+    A robot at rest is held against gravity, so from there the effort jumps. What made a
+    start in motion is not known, and it is not looked at: that of the paper's runs lies
+    on the trajectory, with its velocity. Nor is a floating base, which contacts hold,
+    nor a joint without an effort limit.
+
+    Args:
+        robot: The robot.
+        q: Configuration of the start, shape (nq,).
+        v: Velocity of the start, shape (nv,).
+        tau: The first effort, shape (nv,) [N·m or N].
+    """
+    if robot.unactuated or v.any():
+        return
+    gravity = robot.inverse_dynamics(q, v, np.zeros(robot.nv))
+    limit = np.where(robot.model.effortLimit > 0.0, robot.model.effortLimit, np.inf)
+    share = np.abs(tau - gravity) / limit
+    j = int(share.argmax())
+    if not share[j] > JUMP:
+        return
+    unit = "N·m" if robot.units[j] == "rad" else "N"
+    warnings.warn(
+        f"the first effort of joint {robot.dof_names[j]!r} is {tau[j]:.3g} {unit}, but "
+        f"gravity asks for {gravity[j]:.3g} {unit}: a jump of {100.0 * share[j]:.0f} % "
+        f"of its limit of {limit[j]:.3g} {unit}; let tasks begin gently with blend=1.0 "
+        "(YAML blend: 1.0), or start on the trajectory with its velocity",
+        StartWarning,
+        stacklevel=3,
+    )
