@@ -46,6 +46,8 @@ class ActiveStack:
         memory: The rows, the field and the law's results, in one block: see `Record`.
         acceleration: The law's acceleration, shape (nv,).
         streamed: Whether a task follows a stream.
+        bounds: The tasks with a largest error: the name, the first row, and
+            `Feedback.largest`.
         term_samples: The weighted sample of each term of the field.
         share: How much it counts in the mixture that was resolved last, in (0, 1].
     """
@@ -110,6 +112,7 @@ class ActiveStack:
         self.first_task_row = held + free
         tasks = [each for level in planned for each in level]
         self.task_rows = _places([each.task for each in tasks], self.first_task_row)
+        self.bounds: list[tuple[str, int, Array]] = []
         self._parts: list[tuple[Task | Contact, TaskSample]] = []
         plans: list[Callable[[], StepPlan]] = []
         row = 0
@@ -126,6 +129,7 @@ class ActiveStack:
             plans.append(partial(each.task.compile_in_force, state, in_force, sample))
             asked = self.resolution.problem.asked[row : row + each.task.rows]
             if len(in_force.feedback.largest):
+                self.bounds.append((each.task.name, row, in_force.feedback.largest))
                 plans.append(partial(_asked, in_force.feedback, sample, asked))
             row += each.task.rows
         self._plans = plans

@@ -34,6 +34,9 @@ from hsp_control.robot.description.sources import RobotSource, Root
 from hsp_control.robot.pinocchio_calls import bind_pinocchio
 from hsp_control.robot.state import RobotState
 
+_ARM_RATE, _LEG_RATE = 12.0, 100.0
+"""Maximum rate of an effort in maximum efforts [1/s]: with a fixed base, and of a robot
+whose contacts change."""
 _LIMB = 4
 """Fewest joints of an arm or a leg; heads and fingers have fewer."""
 
@@ -293,6 +296,19 @@ class Robot(ConfigurationSpace):
                 away = np.linalg.norm(frame.placement.translation)
                 longest = max(longest, lengths[frame.parentJoint] + away)
         return float(longest)
+
+    @property
+    def effort_rate(self) -> Array:
+        """Maximum rate of the efforts, shape (nv,) [N·m/s or N/s]; inf for none.
+
+        No URDF has one. It is 12 times the maximum effort each second, as a Panda's own
+        1000 N·m/s at 87 N·m; and 100 times where legs meet the ground.
+        """
+        effort = np.array(self.model.effortLimit)
+        unlimited = (effort <= 0.0) | (effort >= np.finfo(np.float32).max)
+        effort[unlimited] = np.inf
+        effort[list(self.unactuated)] = np.inf
+        return (_LEG_RATE if self.unactuated else _ARM_RATE) * effort
 
     @cached_property
     def largest_inertias(self) -> Array:
