@@ -6,7 +6,7 @@ error is rounding.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any, TypeVar
 
@@ -187,8 +187,9 @@ class Family:
     def build(
         self, robot: Robot, motion: Motion, error: float, gains: Gains, seed: int
     ) -> Task:
-        """Return the same, placed."""
-        return placed(self.make(robot, motion, error, gains, seed), robot)
+        """Return the same, placed, with feedback of the whole error."""
+        made: Any = self.make(robot, motion, error, gains, seed)
+        return placed(replace(made, largest_error="none"), robot)
 
     def coordinates(self, task: Any, motion: Motion) -> Callable[[float], Array]:
         """Return x(s), whose rate at s = 0 is J v."""
