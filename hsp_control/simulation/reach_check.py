@@ -90,7 +90,8 @@ def _leaves(
 ) -> OutOfReach | None:
     """Return when and by how much the target of a task is out of reach, if it is."""
     places = [(t, _target(task, t)) for t in np.linspace(0.0, duration, _TIMES)]
-    away, q = [], q0
+    away: list[float] = []
+    q = q0
     for k, (_, place) in enumerate(places):
         if k and place.isApprox(places[k - 1][1]):
             away.append(away[-1])
