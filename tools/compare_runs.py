@@ -52,7 +52,8 @@ def differences(kept: dict[str, Array], now: dict[str, Array]) -> list[str]:
             rows = off.reshape(len(off), -1).max(axis=1, initial=0.0)
             first = t[np.argmax(~(rows == 0.0))] if len(rows) == len(t) else np.nan
             lines.append(
-                f"{name}: from t = {first:g}, by at most {np.nanmax(rows, initial=0.0):.3g}"
+                f"{name}: from t = {first:g}, by at most "
+                f"{np.nanmax(rows, initial=0.0):.3g}"
             )
     return lines
 

@@ -20,6 +20,7 @@ from hsp_control.null_space.fields import FieldSample, FieldSum, NullSpaceField
 from hsp_control.null_space.metrics import Metric
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import Task, TaskSample
+from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.task import Feedback, InForce, write_asked
 from hsp_control.trajectories.streams.stream import Streamed
 
@@ -130,7 +131,10 @@ class ActiveStack:
             asked = self.resolution.problem.asked[row : row + each.task.rows]
             if len(in_force.feedback.largest):
                 self.bounds.append((each.task.name, row, in_force.feedback.largest))
-                plans.append(partial(_asked, in_force.feedback, sample, asked))
+                # The error of a spring is its load. And a robot that is about to fall
+                # needs its balance whatever it costs.
+                if not (impedance_of(each.task) or each.task.keeps_balance(robot)):
+                    plans.append(partial(_asked, in_force.feedback, sample, asked))
             row += each.task.rows
         self._plans = plans
         self.level_names = [

@@ -75,7 +75,7 @@ class Limits(Part, error=LimitError):
     numbers by joint, one number or nv. No URDF has it: the robot's own is 12 times its
     maximum effort each second, which for a Panda's shoulder is 1000 N·m/s; so no effort
     changes by more than 1.2 % of its maximum in a millisecond. With a floating base,
-    whose contacts change, it is 100 times."""
+    whose contacts change, it is 500 times."""
     velocity: Maximum = "robot"
     """Maximum speed [rad/s or m/s]: the robot's own, none, a factor, numbers by joint,
     one number or nv."""
