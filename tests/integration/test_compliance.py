@@ -44,11 +44,11 @@ def start() -> Array:
 
 
 def position_hand(**fields: Any) -> FramePosition:
-    return FramePosition("panda_tcp", name="hand", **fields)
+    return FramePosition("panda_tcp", name="hand", largest_error="none", **fields)
 
 
 def pose_hand(**fields: Any) -> FramePose:
-    return FramePose("panda_tcp", name="hand", **fields)
+    return FramePose("panda_tcp", name="hand", largest_error="none", **fields)
 
 
 def run(
