@@ -15,7 +15,7 @@ from hsp_control.control.actuation.support import Support
 from hsp_control.control.setup import PlannedTask
 from hsp_control.law import Outcome, Resolution
 from hsp_control.law.outcome import outcome_of
-from hsp_control.law.threshold import STIFFNESS
+from hsp_control.law.threshold import Following
 from hsp_control.null_space.fields import FieldSample, FieldSum, NullSpaceField
 from hsp_control.null_space.metrics import Metric
 from hsp_control.robot import Robot, RobotState
@@ -97,7 +97,7 @@ class ActiveStack:
             metric.form,
             gain,
             threshold,
-            STIFFNESS / robot.size if robot.size else np.inf,
+            Following.of(robot.size, on_legs=bool(robot.unactuated)),
         )
         self.rows = self.resolution.problem.task
         self.row_count = len(self.rows.error)

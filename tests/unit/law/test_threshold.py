@@ -10,8 +10,14 @@ from numpy.typing import NDArray
 from task_cases import FRAMES, load, unit
 
 from hsp_control import Controller, FramePosition, Gains, Hold, Robot
-from hsp_control.control import active_stack
-from hsp_control.law.threshold import MODEST, STIFFNESS, write_thresholds
+from hsp_control.law import threshold
+from hsp_control.law.threshold import (
+    MODEST,
+    NOT,
+    STIFFNESS,
+    Following,
+    write_thresholds,
+)
 from hsp_control.null_space.fields import Rest
 
 Array = NDArray[np.float64]
@@ -25,11 +31,11 @@ def test_it_bounds_what_the_feedback_asks_for_over_its_square(
 ) -> None:
     """‖f‖/ε² ≤ L + f_0/ε_0² for each level, and ε = ε_0 for all that is modest."""
     rng, L, least = np.random.default_rng(seed), 150.0, 0.03
-    modest = MODEST * STIFFNESS / L
+    modest = 1.3
     sizes = [3, 0, 2, 4]
     ends, thresholds = np.cumsum(sizes), np.zeros(4)
     asked = 10.0**size * rng.standard_normal(9)
-    largest = write_thresholds(asked, ends, least, L, thresholds)
+    largest = write_thresholds(asked, ends, least, Following(L, modest), thresholds)
     assert largest == thresholds.max()
     for f, epsilon in zip(np.split(asked, ends[:-1]), thresholds, strict=True):
         norm = np.linalg.norm(f)
@@ -37,7 +43,7 @@ def test_it_bounds_what_the_feedback_asks_for_over_its_square(
         assert epsilon >= least
         if norm <= modest + 0.99 * L * least**2:
             assert epsilon == least
-    write_thresholds(asked, ends, least, np.inf, thresholds)
+    write_thresholds(asked, ends, least, NOT, thresholds)
     assert (thresholds == least).all()
 
 
@@ -143,5 +149,5 @@ def test_it_would_be_steep_if_the_threshold_did_not_follow(
     target = 1e3 * np.array([np.cos(0.3), np.sin(0.3)])
     found, bound = slopes(robot, q, target)
     assert found > 0.1 * bound
-    monkeypatch.setattr(active_stack, "STIFFNESS", np.inf)
+    monkeypatch.setattr(threshold, "STIFFNESS", np.inf)
     assert slopes(robot, q, target).found > 5.0 * bound
