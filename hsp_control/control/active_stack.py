@@ -131,9 +131,8 @@ class ActiveStack:
             asked = self.resolution.problem.asked[row : row + each.task.rows]
             if len(in_force.feedback.largest):
                 self.bounds.append((each.task.name, row, in_force.feedback.largest))
-                # The error of a spring is its load. And a robot that is about to fall
-                # needs its balance whatever it costs.
-                if not (impedance_of(each.task) or each.task.keeps_balance(robot)):
+                # Who is about to fall needs the balance whatever it costs.
+                if not each.task.keeps_balance(robot):
                     plans.append(partial(_asked, in_force.feedback, sample, asked))
             row += each.task.rows
         self._plans = plans
@@ -230,6 +229,7 @@ def _jacobian(contacts: Sequence[Contact], state: RobotState) -> Array:
 
 
 def _asked(feedback: Feedback, sample: TaskSample, asked: Array) -> StepPlan:
-    """Return the step plan that writes what a task's feedback asks for."""
-    call = bind(write_asked, feedback, sample.error, sample.error_rate, asked)
+    """Return the step plan that writes what a task's feedback asks for at rest."""
+    rest = np.zeros_like(asked)  # what damps is not lost, however fast the robot moves
+    call = bind(write_asked, feedback, sample.error, rest, asked)
     return StepPlan(write=(call,))

@@ -64,7 +64,7 @@ class Problem:
         field: g and g'.
         metric: W, its Cholesky factor and W'; the identity until it is written.
         gain: K_N, shape (nv, nv) [1/s].
-        asked: Kv e' + Kp s(e), what the feedback asks for in the coordinates of e,
+        asked: Kp s(e), what the feedback asks for at rest in the coordinates of e,
             shape (m,); zero in rows without one, such as those of contacts.
     """
 

@@ -2,7 +2,7 @@
 
 A level asks for J a = d. Along a direction of the singular value s it gets d/s where s
 is above the threshold ε, and s (2 - s²/ε²) d/ε² below. The steepest of both is 2 d/ε²,
-at s = 0. Let f = Kv e' + Kp s(e) be what the feedback asks for, the part of d that
+at s = 0. Let f = Kp s(e) be what the feedback asks for at rest, the part of d that
 persists while a task cannot be met. With
 
     ε² = max(ε_0², (‖f‖ - f_0)/L)
@@ -58,7 +58,7 @@ def write_thresholds(
     """Write ε of each level, and return the largest.
 
     Args:
-        asked: f, what the feedback of the tasks asks for, level after level, (m,).
+        asked: f, what the feedback asks for at rest, level after level, shape (m,).
         ends: Where each level's rows end in the stack, shape (levels,).
         least: ε_0.
         following: L and f_0.

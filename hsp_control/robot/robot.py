@@ -301,14 +301,19 @@ class Robot(ConfigurationSpace):
     def effort_rate(self) -> Array:
         """Maximum rate of the efforts, shape (nv,) [N·m/s or N/s]; inf for none.
 
-        No URDF has one. It is 12 times the maximum effort each second, as a Panda's own
-        1000 N·m/s at 87 N·m; and 500 times where legs meet the ground.
+        No URDF has one. It is 12 times the largest maximum effort each second, for all
+        joints of the same unit, as a Panda's own 1000 N·m/s at 87 N·m: a light wrist
+        has to answer a push as quickly as a shoulder. It is 500 times where legs meet
+        the ground.
         """
         effort = np.array(self.model.effortLimit)
-        unlimited = (effort <= 0.0) | (effort >= np.finfo(np.float32).max)
-        effort[unlimited] = np.inf
+        effort[(effort <= 0.0) | (effort >= np.finfo(np.float32).max)] = np.inf
         effort[list(self.unactuated)] = np.inf
-        return (_LEG_RATE if self.unactuated else _ARM_RATE) * effort
+        rate = np.full(self.nv, np.inf)
+        for unit in set(self.units):
+            alike = np.isfinite(effort) & (np.array(self.units) == unit)
+            rate[alike] = effort[alike].max(initial=0.0)
+        return (_LEG_RATE if self.unactuated else _ARM_RATE) * rate
 
     @cached_property
     def largest_inertias(self) -> Array:

@@ -553,8 +553,8 @@ def add_feedback(
 
 
 @kernel
-def write_asked(feedback: Feedback, e: Array, e_dot: Array, out: Array) -> None:
-    """Write Kv e' + Kp s(e), what the feedback asks for, shape (m,)."""
+def write_asked(feedback: Feedback, e: Array, rest: Array, out: Array) -> None:
+    """Write Kp s(e), what the feedback asks for at rest, shape (m,); ``rest`` is 0."""
     for i in range(e.shape[0]):
         out[i] = -feedback.offset[i]
-    add_feedback(out, feedback, e, e_dot, out)
+    add_feedback(out, feedback, e, rest, out)
