@@ -5,7 +5,7 @@
 
 ``keep`` writes the logs as a reference, outside of the tree. ``with`` runs the
 configurations again and names each column that differs, from which time on and by how
-much at most, and the columns that only one of both has; it exits 1 if there are any.
+much at most, and those that are missing; it exits 1 if there are any.
 A difference is no error by itself: who changes digits says why.
 """
 
@@ -35,13 +35,16 @@ def columns_of(path: Path) -> dict[str, Array]:
 
 
 def differences(kept: dict[str, Array], now: dict[str, Array]) -> list[str]:
-    """Return a line for each column that is not the same, or that is missing."""
+    """Return a line for each column that is not the same, or that is missing.
+
+    Columns that are new are no difference.
+    """
     t, lines = kept["t"], []
-    for name in sorted(kept.keys() | now.keys()):
-        if name not in now or name not in kept:
-            lines.append(f"{name}: only in {'now' if name in now else 'the reference'}")
+    for name, old in sorted(kept.items()):
+        new = now.get(name)
+        if new is None:
+            lines.append(f"{name}: missing")
             continue
-        old, new = kept[name], now[name]
         if old.shape != new.shape:
             lines.append(f"{name}: shape {old.shape}, now {new.shape}")
         elif not np.array_equal(old, new, equal_nan=old.dtype.kind == "f"):
@@ -49,7 +52,8 @@ def differences(kept: dict[str, Array], now: dict[str, Array]) -> list[str]:
             rows = off.reshape(len(off), -1).max(axis=1, initial=0.0)
             first = t[np.argmax(~(rows == 0.0))] if len(rows) == len(t) else np.nan
             lines.append(
-                f"{name}: from t = {first:g}, by at most {np.nanmax(rows):.3g}"
+                f"{name}: from t = {first:g}, by at most "
+                f"{np.nanmax(rows, initial=0.0):.3g}"
             )
     return lines
 

@@ -12,8 +12,9 @@ from hsp_control.cli.advice import robot_advice, start_advice
 from hsp_control.cli.consoles import out
 from hsp_control.cli.loading import load
 from hsp_control.config import Experiment
-from hsp_control.control import ControlOutput, Diagnostics
+from hsp_control.control import Controller, ControlOutput, Diagnostics
 from hsp_control.control.first_state import warn_of_jump
+from hsp_control.simulation.reach_check import out_of_reach
 
 ROUNDING = 1e-9
 """A singular value below this share of the largest one is zero but for rounding."""
@@ -26,11 +27,14 @@ def check(options: argparse.Namespace) -> int:
         output = experiment.controller.compute(0.0, experiment.q0, experiment.v0)
         diagnostics = experiment.controller.diagnose()
     found = _checked(experiment, output, diagnostics)
+    least = diagnostics.singular_values.min(initial=np.inf)
+    singular = least < experiment.controller.singularity_threshold
     advice = [
         *robot_advice(experiment.robot),
-        *start_advice(experiment, damped=output.damped),
+        *start_advice(experiment, damped=output.damped if singular else ""),
     ]
     warn_of_rates(experiment)
+    warn_of_reach(experiment)
     if experiment.compensation.start_up_ramp is None:
         warn_of_jump(experiment.robot, experiment.q0, experiment.v0, output.tau)
     if options.json:
@@ -70,9 +74,18 @@ def _checked(
         "plant": experiment.plant.describe()["type"],
         "compensation": list(experiment.compensation.names),
         "limits": "none" if controller.limits is None else output.status.name.lower(),
+        "effort_rate": _rates(controller),
         "singular_values": list(map(float, values)),
         "largest_effort": float(np.abs(output.tau).max()),
     }
+
+
+def _rates(controller: Controller) -> list[float | None]:
+    """Return the bound on each effort's rate [N·m/s or N/s]; None: there is none."""
+    if controller.limits is None:
+        return [None] * controller.robot.nv
+    rates = controller.limits.effort_rate.tolist()
+    return [rate if rate < np.inf else None for rate in rates]
 
 
 def _check_table(found: dict[str, Any]) -> Table:
@@ -91,6 +104,11 @@ def _check_table(found: dict[str, Any]) -> Table:
     table.add_row("plant", found["plant"])
     table.add_row("compensation", ", ".join(found["compensation"]) or "none")
     table.add_row("limits", _LIMITS[found["limits"]])
+    rates = [rate for rate in found["effort_rate"] if rate is not None]
+    if rates:
+        low, high = (f"{1e-3 * each:.2g}" for each in (min(rates), max(rates)))
+        most = high if low == high else f"{low} to {high}"
+        table.add_row("change of an effort", f"at most {most} N·m or N in 1 ms")
     values = ", ".join(f"{value:.3g}" for value in found["singular_values"])
     table.add_row("singular values", f"{values} at the start")
     table.add_row("largest effort", f"{found['largest_effort']:.3g} at the start")
@@ -105,6 +123,17 @@ _LIMITS = {
     "relaxed": "contradict each other at the start",
 }
 """What the step's status says of the limits."""
+
+
+def warn_of_reach(experiment: Experiment) -> None:
+    """Print which targets cannot be reached, by how much and when."""
+    controller, duration = (
+        experiment.controller,
+        experiment.scenario.simulation.duration,
+    )
+    robot, q0 = experiment.robot, experiment.q0
+    for found in out_of_reach(robot, controller.tasks, q0, duration):
+        print(f"hsp: {found.message}", file=sys.stderr)
 
 
 def warn_of_rates(experiment: Experiment) -> None:

@@ -71,6 +71,7 @@ def _log_of(source: Path, folder: Path) -> Path:
 def _built(loaded: LoadedScenario) -> Experiment:
     experiment = Experiment.of(loaded)
     checks.warn_of_rates(experiment)
+    checks.warn_of_reach(experiment)
     return experiment
 
 
@@ -341,6 +342,12 @@ def _summary(rollout: Rollout) -> Table:
             continue
         rms, last = float(np.sqrt(np.mean(tracked**2))), tracked[-1]
         table.add_row(f"task {task}", f"|e| rms {rms:.3g}, at the end {last:.3g}")
+        away = rollout[f"task.{task}.bounded"]
+        if rows := int((away > 0.0).sum()):
+            text = f"{rows} rows: its target was too far to count in full"
+            if away[-1] > 0.0:
+                text += f", at the end {away[-1]:.3g} away"
+            table.add_row("", text)
     norm = rollout["null_space_norm"]
     table.add_row(
         "null space", f"|e_N| {norm[0]:.3g} at the start, {norm[-1]:.3g} at the end"

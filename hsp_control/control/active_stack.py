@@ -15,11 +15,12 @@ from hsp_control.control.actuation.support import Support
 from hsp_control.control.setup import PlannedTask
 from hsp_control.law import Outcome, Resolution
 from hsp_control.law.outcome import outcome_of
-from hsp_control.law.threshold import STIFFNESS
+from hsp_control.law.threshold import Following
 from hsp_control.null_space.fields import FieldSample, FieldSum, NullSpaceField
 from hsp_control.null_space.metrics import Metric
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import Task, TaskSample
+from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.task import Feedback, InForce, write_asked
 from hsp_control.trajectories.streams.stream import Streamed
 
@@ -46,6 +47,8 @@ class ActiveStack:
         memory: The rows, the field and the law's results, in one block: see `Record`.
         acceleration: The law's acceleration, shape (nv,).
         streamed: Whether a task follows a stream.
+        bounds: The tasks with a largest error: the name, the first row, and
+            `Feedback.largest`.
         term_samples: The weighted sample of each term of the field.
         share: How much it counts in the mixture that was resolved last, in (0, 1].
     """
@@ -94,7 +97,7 @@ class ActiveStack:
             metric.form,
             gain,
             threshold,
-            STIFFNESS / robot.size if robot.size else np.inf,
+            Following.of(robot.size, on_legs=bool(robot.unactuated)),
         )
         self.rows = self.resolution.problem.task
         self.row_count = len(self.rows.error)
@@ -110,6 +113,7 @@ class ActiveStack:
         self.first_task_row = held + free
         tasks = [each for level in planned for each in level]
         self.task_rows = _places([each.task for each in tasks], self.first_task_row)
+        self.bounds: list[tuple[str, int, Array]] = []
         self._parts: list[tuple[Task | Contact, TaskSample]] = []
         plans: list[Callable[[], StepPlan]] = []
         row = 0
@@ -126,7 +130,11 @@ class ActiveStack:
             plans.append(partial(each.task.compile_in_force, state, in_force, sample))
             asked = self.resolution.problem.asked[row : row + each.task.rows]
             if len(in_force.feedback.largest):
-                plans.append(partial(_asked, in_force.feedback, sample, asked))
+                self.bounds.append((each.task.name, row, in_force.feedback.largest))
+                # The error of a spring is its load. And a robot that is about to fall
+                # needs its balance whatever it costs.
+                if not (impedance_of(each.task) or each.task.keeps_balance(robot)):
+                    plans.append(partial(_asked, in_force.feedback, sample, asked))
             row += each.task.rows
         self._plans = plans
         self.level_names = [

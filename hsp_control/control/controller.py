@@ -335,7 +335,7 @@ class Controller:
             else:
                 out.tau[:] = tau
                 out._keep(active.memory)
-            out._rows = active.row_count
+            out._rows, out._bounds = active.row_count, active.bounds
             out._acceleration = None if a is active.acceleration else a.tobytes()
             out.forces = forces.copy() if active.has_forces else forces
             out.damped, out.status, out.relaxation = damped, status, relaxation

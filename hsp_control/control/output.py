@@ -1,5 +1,7 @@
 """What a controller returns: an effort, and everything that explains it."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from hsp_control.common.arrays import Array
@@ -8,6 +10,7 @@ from hsp_control.law import singular_values
 from hsp_control.law.problem import Record
 from hsp_control.null_space.fields import FieldSample
 from hsp_control.tasks import TaskSample
+from hsp_control.tasks.task import beyond_largest
 
 
 class ControlOutput:
@@ -32,6 +35,7 @@ class ControlOutput:
 
     __slots__ = (
         "_acceleration",
+        "_bounds",
         "_memory",
         "_rows",
         "_views",
@@ -49,6 +53,7 @@ class ControlOutput:
     relaxation: float
     # Bytes are made faster than arrays, and most are never looked at.
     _acceleration: bytes | None  # None: the law's own
+    _bounds: Sequence[tuple[str, int, Array]]  # see `ActiveStack.bounds`
     _memory: Array | bytes
     _rows: int
     _views: Record | None  # of the memory, once they were asked for
@@ -58,6 +63,20 @@ class ControlOutput:
         """The acceleration that the effort produces, shape (nv,)."""
         own = self._acceleration
         return self._record.acceleration if own is None else np.frombuffer(own)
+
+    @property
+    def bounded(self) -> dict[str, float]:
+        """How far a target is from what should be there, where it is too far to count.
+
+        By the name of each task whose error is longer than its `largest_error`: the
+        length of that part of the error [m or rad]. Empty, and so false, if none is.
+        """
+        error, found = self._record.task.error, {}
+        for task, row, largest in self._bounds:
+            away = beyond_largest(error[row:], largest)
+            if away > 0.0:
+                found[task] = away
+        return found
 
     @property
     def task(self) -> TaskSample:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 from xml.etree.ElementTree import Element
 
+import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.exceptions import ModelError
@@ -104,10 +105,21 @@ def _facts(robot: Robot, condition: float, dof: str) -> dict[str, str]:
     return {
         "robot": f"{robot.name}: nq = {robot.nq}, nv = {robot.nv}, {root}",
         "end effector": f"{robot.end_effector} (by default)",
+        "size": f"{robot.size:.3g} m, the longest chain from the first joint",
+        "effort rate": _rates(robot),
         "mass": f"{pin.computeTotalMass(robot.model):.4g} kg move",
         "mass matrix": f"condition number up to {condition:.2g}, by {dof}",
         "home": f"[{home}]",
     }
+
+
+def _rates(robot: Robot) -> str:
+    rates = robot.effort_rate[np.isfinite(robot.effort_rate)]
+    if not rates.size:
+        return "no effort limits, so none"
+    low, high = (f"{1e-3 * each:.2g}" for each in (rates.min(), rates.max()))
+    most = high if low == high else f"{low} to {high}"
+    return f"no effort changes by more than {most} N·m or N in 1 ms"
 
 
 def _of_file(xml: Element, source: RobotSource) -> Iterator[Finding]:

@@ -20,7 +20,7 @@ from hsp_control.law.law import acceleration, null_space_command
 from hsp_control.law.outcome import BEYOND_ANY_LEVEL, Outcome, outcome_of
 from hsp_control.law.problem import Problem
 from hsp_control.law.pseudo_inverse import weighted_pseudo_inverse, whiten
-from hsp_control.law.threshold import write_thresholds
+from hsp_control.law.threshold import NOT, Following, write_thresholds
 from hsp_control.null_space.fields import FieldSample
 from hsp_control.null_space.metrics import MetricSample
 from hsp_control.tasks import TaskSample
@@ -115,7 +115,7 @@ class Resolution:
         form: int,
         gain: Array,
         threshold: float,
-        steepest: float = np.inf,
+        following: Following = NOT,
     ) -> None:
         """Allocate.
 
@@ -126,14 +126,13 @@ class Resolution:
             gain: Null-space gain K_N, shape (nv, nv) [1/s].
             threshold: ε_0, the singular value of the whitened Jacobian below which its
                 inverse is always bounded.
-            steepest: L, see `threshold.py` [rad/s² for each unit of a singular value];
-                inf: the threshold does not follow the demand.
+            following: How the threshold follows what the feedback asks for.
         """
         m = sum(levels)
         self.problem = Problem(m, nv, gain)
         self.ends: Indices = np.cumsum([*levels] or [0], dtype=np.int64)
         self.form = form
-        self.threshold, self._steepest = threshold, steepest
+        self.threshold, self._following = threshold, following
         self.thresholds = np.full(len(self.ends), threshold)
         self.factors = Factors(np.zeros((m, nv)), np.zeros((m, m)))
         self._scratch = Scratch(
@@ -176,7 +175,7 @@ class Resolution:
         return bind(
             _resolve_at_once if alone else _resolve_levels,
             *(problem.task, problem.field, problem.metric, self.form),
-            *(v, problem.gain, self.threshold, self._steepest, controls),
+            *(v, problem.gain, self.threshold, self._following, controls),
             *(self.ends, problem.asked, self.thresholds),
             *(self._scratch, self.null_space_error, self.acceleration, self.code),
         )
@@ -225,7 +224,7 @@ def _resolve_at_once(
     v: Array,
     K_N: Array,
     threshold: float,
-    steepest: float,
+    following: Following,
     controls: bool,
     ends: Indices,
     asked: Array,
@@ -243,7 +242,7 @@ def _resolve_at_once(
     n = task.jacobian.shape[1]
     (Q, X), rows = scratch.factors, scratch.rows
     u = rows[6, :n]
-    largest = write_thresholds(asked, ends, threshold, steepest, thresholds)
+    largest = write_thresholds(asked, ends, threshold, following, thresholds)
     damped = int(
         weighted_pseudo_inverse(
             task.jacobian, metric.L, form, largest, scratch.wide, Q, X
@@ -267,7 +266,7 @@ def _resolve_levels(
     v: Array,
     K_N: Array,
     threshold: float,
-    steepest: float,
+    following: Following,
     controls: bool,
     ends: Indices,
     asked: Array,
@@ -291,7 +290,7 @@ def _resolve_levels(
             v,
             K_N,
             threshold,
-            steepest,
+            following,
             controls,
             ends,
             asked,
@@ -302,7 +301,7 @@ def _resolve_levels(
             code,
         )
     else:
-        write_thresholds(asked, ends, threshold, steepest, thresholds)
+        write_thresholds(asked, ends, threshold, following, thresholds)
     if damped > 0:
         levels = LevelScratch(
             scratch.inner, scratch.tall, scratch.square[2], scratch.square, scratch.rows

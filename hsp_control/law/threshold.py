@@ -12,21 +12,48 @@ whatever the target. A task that is tracked has f = 0 nearly, at any speed: for 
 law is exact down to ε_0. ``docs/law.md``, The edge, has the proposition.
 """
 
+from typing import NamedTuple, Self
+
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
 
-STIFFNESS, MODEST = 200.0, 1.0
+STIFFNESS = 200.0
 """L times the robot's size [1/s²]. A stretched elbow is then drawn to its singular
 posture by a spring of at most 2 L |∂s/∂q| ≤ 400 1/s² of its own inertia, 20 rad/s: slow
-beside periods of up to 10 ms, and damped by a null-space gain of 10 1/s. And f_0 over
-the robot's size [1/s²]: what a position 1 % of the size away asks for at 10 rad/s."""
+beside periods of up to 10 ms, and damped by a null-space gain of 10 1/s."""
+MODEST, MODEST_ON_LEGS = 1.0, 10.0
+"""f_0 over the robot's size [1/s²]: what a position 1 % of the size away asks for at
+10 rad/s; and with a floating base, whose feet ask for more where they land."""
+
+
+class Following(NamedTuple):
+    """How the threshold follows what is asked for.
+
+    Attributes:
+        steepest: L [rad/s² for each unit of a singular value]; inf: it does not follow.
+        modest: f_0 [m/s² or rad/s²].
+    """
+
+    steepest: float
+    modest: float
+
+    @classmethod
+    def of(cls, size: float, *, on_legs: bool) -> Self:
+        """Return it for a robot of a size [m]."""
+        if size == 0.0:
+            return cls(np.inf, 0.0)
+        return cls(STIFFNESS / size, size * (MODEST_ON_LEGS if on_legs else MODEST))
+
+
+NOT = Following(np.inf, 0.0)
+"""The threshold does not follow."""
 
 
 @kernel
 def write_thresholds(
-    asked: Array, ends: Indices, least: float, steepest: float, thresholds: Array
+    asked: Array, ends: Indices, least: float, following: Following, thresholds: Array
 ) -> float:
     """Write ε of each level, and return the largest.
 
@@ -34,15 +61,16 @@ def write_thresholds(
         asked: f, what the feedback of the tasks asks for, level after level, (m,).
         ends: Where each level's rows end in the stack, shape (levels,).
         least: ε_0.
-        steepest: L [rad/s² for each unit of a singular value].
+        following: L and f_0.
         thresholds: ε of each level, shape (levels,).
     """
+    steepest, modest = following
     largest, start = least, 0
     for level in range(ends.shape[0]):
         square = 0.0
         for k in range(start, ends[level]):
             square += asked[k] * asked[k]
-        beyond = max(np.sqrt(square) - MODEST * STIFFNESS / steepest, 0.0)
+        beyond = max(np.sqrt(square) - modest, 0.0)
         thresholds[level] = max(least, np.sqrt(beyond / steepest))
         largest = max(largest, thresholds[level])
         start = ends[level]

@@ -34,6 +34,9 @@ from hsp_control.robot.description.sources import RobotSource, Root
 from hsp_control.robot.pinocchio_calls import bind_pinocchio
 from hsp_control.robot.state import RobotState
 
+_ARM_RATE, _LEG_RATE = 12.0, 500.0
+"""Maximum rate of an effort in maximum efforts [1/s]: with a fixed base, and of a robot
+whose contacts change."""
 _LIMB = 4
 """Fewest joints of an arm or a leg; heads and fingers have fewer."""
 
@@ -294,18 +297,32 @@ class Robot(ConfigurationSpace):
                 longest = max(longest, lengths[frame.parentJoint] + away)
         return float(longest)
 
+    @property
+    def effort_rate(self) -> Array:
+        """Maximum rate of the efforts, shape (nv,) [N·m/s or N/s]; inf for none.
+
+        No URDF has one. It is 12 times the maximum effort each second, as a Panda's own
+        1000 N·m/s at 87 N·m; and 500 times where legs meet the ground.
+        """
+        effort = np.array(self.model.effortLimit)
+        unlimited = (effort <= 0.0) | (effort >= np.finfo(np.float32).max)
+        effort[unlimited] = np.inf
+        effort[list(self.unactuated)] = np.inf
+        return (_LEG_RATE if self.unactuated else _ARM_RATE) * effort
+
     @cached_property
     def largest_inertias(self) -> Array:
         """Largest M_ii in any posture, nearly, shape (nv,) [kg·m² or kg].
 
-        It is the largest of 64 postures, drawn once and for all.
+        It is the largest of home and 64 postures, drawn once and for all.
         """
         rng, largest = np.random.default_rng(0), np.zeros(self.nv)
-        for _ in range(64):
-            turned = rng.uniform(-np.pi, np.pi, self.nv)
-            q = pin.integrate(self.model, self.neutral(), turned)
+        q = self.home()
+        for _ in range(65):
             self._data.M[:] = 0.0
             largest = np.maximum(largest, np.diag(pin.crba(self.model, self._data, q)))
+            turned = rng.uniform(-np.pi, np.pi, self.nv)
+            q = pin.integrate(self.model, self.neutral(), turned)
         return largest
 
     # -- names ------------------------------------------------------------------------

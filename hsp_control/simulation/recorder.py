@@ -167,6 +167,7 @@ class Recorder:
         active = controller.active_stack
         self._copies.get(active, law).write(i)
         self._tasks.write_stiffness(i, active)
+        self._tasks.write_bounded(i, active, output)
         diagnostics = controller.diagnose()
         columns["field.value"][i] = diagnostics.field_value
         columns["null_space_norm"][i] = diagnostics.null_space_norm

@@ -8,6 +8,7 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.controller import Controller
+from hsp_control.control.output import ControlOutput
 from hsp_control.declaration.nested import parts_within
 from hsp_control.law.problem import Record
 from hsp_control.robot import RobotState
@@ -87,6 +88,7 @@ class TaskColumns:
         what = " and ".join(part.name for part in parts)
         column(f"{prefix}.error", (m,), unit, f"error e: {what}")
         column(f"{prefix}.error_rate", (m,), rate_unit, "error rate e'")
+        column(f"{prefix}.bounded", (), unit, "length of an error that counts for less")
         # To look for streams in every row would cost more than the row.
         self._streams[name] = tuple(_streams_of(task, name))
         for stream, _ in self._streams[name]:
@@ -109,6 +111,15 @@ class TaskColumns:
             for prefix, stream in self._streams[name]:
                 for what, value in stream.counts().items():
                     self._columns.arrays[f"{prefix}.{what}"][row] = value
+
+    def write_bounded(
+        self, row: int, active: ActiveStack, output: ControlOutput
+    ) -> None:
+        """Write how far the targets are that are too far to count in full."""
+        away = output.bounded
+        for task in active.task_rows:
+            column = self._columns.arrays[f"task.{self._names[task]}.bounded"]
+            column[row] = away.get(task, 0.0)
 
     def write_stiffness(self, row: int, active: ActiveStack) -> None:
         """Write the stiffness of the active tasks that have one."""

@@ -88,7 +88,7 @@ class CompliantTask(SecondOrderTask):
         with within("impedance"):
             self.impedance.numbers(rows)
         zeros = np.zeros((2, rows, rows))
-        return Feedback(zeros[0], zeros[1], np.zeros(rows))
+        return Feedback(zeros[0], zeros[1], np.zeros(rows), self._largest())
 
     def in_force(self) -> InForce:
         """Return new arrays of the task's own feedback; see `Task.in_force`."""

@@ -480,11 +480,30 @@ def largest_errors(
         several = isinstance(declared, tuple)
         found = [*declared] if several else [declared] * len(parts)
         if len(found) != len(parts):
-            names = ", ".join(f"{each.name} [{each.unit}]" for each in parts)
+            names = " and ".join(f"{each.name} [{each.unit}]" for each in parts)
             raise TaskError(
-                f"has {len(found)} numbers; the error has {len(parts)} parts: {names}"
+                f"has {len(found)} numbers; needs one for each part of the error: "
+                f"{names}"
             )
     return tuple(None if each is None else float(each) for each in found)
+
+
+def beyond_largest(e: Array, largest: Array) -> float:
+    """Return the length of the longest part of an error that is too long to count.
+
+    Args:
+        e: The error, shape (m,).
+        largest: See `Feedback`.
+
+    Returns:
+        Its length [m or rad]; 0 if no part is longer than its largest length.
+    """
+    found = 0.0
+    for first, end, longest in largest.tolist():
+        away = float(np.linalg.norm(e[int(first) : int(end)]))
+        if away > max(longest, found):
+            found = away
+    return found
 
 
 def default_name(frame: str) -> str:

@@ -26,7 +26,10 @@ from hsp_control.robot.integrators import Dop853, Rk4
 from hsp_control.simulation.plants import Push, RigidBody
 from hsp_control.tasks import Impedance
 
-pytestmark = pytest.mark.filterwarnings("error")
+pytestmark = [
+    pytest.mark.filterwarnings("error"),
+    pytest.mark.filterwarnings("ignore:the first effort"),
+]
 Array = NDArray[np.float64]
 
 PRECISE = Dop853(rtol=1e-11, atol=1e-11)
@@ -44,11 +47,11 @@ def start() -> Array:
 
 
 def position_hand(**fields: Any) -> FramePosition:
-    return FramePosition("panda_tcp", name="hand", **fields)
+    return FramePosition("panda_tcp", name="hand", largest_error="none", **fields)
 
 
 def pose_hand(**fields: Any) -> FramePose:
-    return FramePose("panda_tcp", name="hand", **fields)
+    return FramePose("panda_tcp", name="hand", largest_error="none", **fields)
 
 
 def run(

@@ -5,7 +5,7 @@ of its own, while a posture and the middle of its range draw on the null space. 
 are taken from the logged motion by plain Pinocchio.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Any
 
@@ -25,7 +25,6 @@ from hsp_control import (
     NullSpaceField,
     Robot,
     TargetPosture,
-    Task,
     simulate,
 )
 from hsp_control.cli import main, robot_table
@@ -160,7 +159,7 @@ def hold_and_centre(robot: Robot, kind: str) -> float:
 
     goal = kinematics.placement(robot.integrate(q0, off(0.1)))  # so it can be reached
     gains = Gains(natural_frequency=FREQUENCY)
-    task: Task
+    task: Any
     if kind == "position":
         letters = "".join("xyz"[i] for i in rows)
         target = Hold(goal.translation[rows])
@@ -177,6 +176,7 @@ def hold_and_centre(robot: Robot, kind: str) -> float:
     pull: NullSpaceField = TargetPosture(robot.integrate(q0, off(0.5)))
     if np.isfinite(robot.position_limits()[0]).any() and (high - low < 6.28).any():
         pull = pull + JointCentering(weights=reach**2)
+    task = replace(task, largest_error="none")
     controller = Controller(robot, [task], pull, null_space_gain=FREQUENCY, limits=None)
     rollout = simulate(
         controller, q0, off(0.3), duration=1.0, log_period=0.1, integrator=Rk4(STEP)

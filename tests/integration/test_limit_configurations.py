@@ -77,7 +77,6 @@ def test_strict_order() -> None:
     """With the least weight of the null space its giving way costs the hand nothing."""
     strict, _ = run(
         "panda_towards_limit",
-        "limits.null_space_weight=null",
         "simulation.duration=2.9",
     )
     assert strict["null_space_norm"][-1] > 1.0
@@ -98,7 +97,8 @@ def test_the_law_until_a_limit_is_met(name: str) -> None:
 def test_efforts_do_not_swing_where_a_target_jumps() -> None:
     """25 cm at once: the null space does not help for the last bit of a task.
 
-    Computed once, with its tiny cost, it changes an effort by 32 N·m in 2 ms.
+    If it cost no more than where there is no error, efforts would change by 32 N·m in
+    2 ms.
     """
     robot = hsp.Robot.load("panda")
     home, period = robot.home(), 0.002
@@ -117,4 +117,4 @@ def test_efforts_do_not_swing_where_a_target_jumps() -> None:
     assert (run["status"] == 2.0).sum() > 50
     assert np.abs(np.diff(run.tau, axis=0)).max() < 6.0
     error = np.linalg.norm(run["task.hand.error"], axis=1)
-    assert error[run.t > 0.36].max() < 0.02 * error[0]
+    assert error[run.t > 0.4].max() < 0.02 * error[0]

@@ -103,7 +103,7 @@ def gains() -> Gains:
 def controlled(robot: Robot, task: str, metric: Any) -> Controller:
     tasks = {
         "position": lambda: FramePosition(
-            "tip", Hold([0.1]), gains=gains(), axes="x", name="it"
+            "tip", Hold([0.1]), gains=gains(), axes="x", largest_error="none", name="it"
         ),
         "center of mass": lambda: CenterOfMass(
             Hold([0.05]), gains=gains(), axes="x", name="it"

@@ -43,6 +43,7 @@ def experiment(number: int, log_period: float = 0.01) -> Experiment:
     return load_experiment(
         CONFIGURATIONS[number],
         f"simulation.log_period={log_period}",
+        "tasks.tip.largest_error=none",
         "simulation.integrator.rtol=1.0e-12",
         "simulation.integrator.atol=1.0e-12",
     )

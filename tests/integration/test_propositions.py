@@ -5,7 +5,7 @@ columns that the controller wrote about itself.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -289,9 +289,8 @@ def tracked(which: str) -> tuple[Controller, Rollout]:
     start = plain(case.robot).placement(q0, FRAMES[case.robot])
     field = TargetPosture(robot.integrate(q0, np.full(robot.nv, 0.2)))
     metric = METRICS[case.metric][0](robot.nv)
-    controller = Controller(
-        robot, case.build(robot, start), field, metric=metric, limits=None
-    )
+    tasks = [replace(task, largest_error="none") for task in case.build(robot, start)]
+    controller = Controller(robot, tasks, field, metric=metric, limits=None)
     v0 = 0.3 * np.sin(2.0 + np.arange(robot.nv))
     rollout = simulate(
         controller, q0, v0, duration=1.0, log_period=LOG_PERIOD, integrator=PRECISE
@@ -441,7 +440,7 @@ def self_motion(run: Run) -> Rollout:
         task = FramePose(frame, pose, gains=gains)
     controller = Controller(
         robot,
-        [task],
+        [replace(task, largest_error="none")],
         moving(robot, run.robot),
         null_space_gain=run.K_N,
         metric=METRICS[run.metric][0](robot.nv),

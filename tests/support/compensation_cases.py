@@ -28,8 +28,9 @@ def circle(
     start = robot.state(0.0, robot.home(), np.zeros(robot.nv)).position("panda_tcp")
     center = start + np.array([away - 0.05, 0.0, 0.0])
     path = Circle(0.05, 2.0, center, axes=[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    gains = Gains(natural_frequency=frequency)
     return FramePosition(
-        "panda_tcp", path, gains=Gains(natural_frequency=frequency), name="hand"
+        "panda_tcp", path, gains=gains, largest_error="none", name="hand"
     )
 
 

@@ -51,11 +51,14 @@ def circle() -> Circle:
 
 
 def track(**options: Any) -> FramePosition:
+    """Return a task that is far from its path and uses the whole error."""
+    options = {"largest_error": "none", **options}
     return FramePosition(TCP, circle(), gains=GAINS, **options)
 
 
 def hold_orientation() -> FrameOrientation:
-    return FrameOrientation(TCP, HoldOrientation(np.eye(3)), gains=GAINS)
+    upright = HoldOrientation(np.eye(3))
+    return FrameOrientation(TCP, upright, gains=GAINS, largest_error="none")
 
 
 def states(count: int, seed: int = 0) -> list[tuple[float, Array, Array]]:

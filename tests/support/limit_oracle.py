@@ -42,95 +42,44 @@ def stacked(*rows: Rows) -> Rows:
     return Rows(*(np.concatenate(parts) for parts in zip(*rows, strict=True)))
 
 
-def level_directions(resolution: Resolution) -> list[Array]:
-    """Return orthonormal rows for each level in whitened coordinates, by SVD."""
-    J, L = resolution.problem.task.jacobian, resolution.problem.metric.L
-    whitened = np.linalg.solve(L, J.T).T
-    found = np.zeros((0, J.shape[1]))
-    levels, start = [], 0
-    for end in resolution.ends:
-        rest = whitened[start:end] - whitened[start:end] @ found.T @ found
-        _, sizes, V = np.linalg.svd(rest, full_matrices=False)
-        own = V[sizes > resolution.threshold]
-        levels.append(own)
-        found = np.vstack([found, own])
+def level_costs(resolution: Resolution, supported: bool, size: float) -> Array:
+    """Return ρ of each level, then of the null space, shape (levels + 1,).
+
+    What is below a level costs a fifth of the level's error over the robot's size, but
+    no more than a tenth and no less than priorities need. Contacts cost as much as the
+    level below them.
+    """
+    count = len(resolution.ends) - supported
+    least = 1e-6 if count <= 1 else 1e-8 ** (1.0 / count)
+    costs, start = [1.0], 0
+    for k, end in enumerate(resolution.ends):
+        error = np.linalg.norm(resolution.problem.task.error[start:end])
+        below = np.clip(0.2 * error / size, least, 0.1)
+        costs.append(costs[-1] * (1.0 if supported and k == 0 else below))
         start = end
-    return levels
+    return np.array(costs)
 
 
-def deviation_cost(
-    resolution: Resolution, supported: bool, weight: float | None = None
-) -> Array:
-    """Return H = L (Σ ρ_k N_kᵀN_k + ρ_N P) Lᵀ, shape (nv, nv)."""
-    L = resolution.problem.metric.L
-    found = level_directions(resolution)
-    levels = len(found) - supported
-    whole = weight or (1e-6 if levels <= 1 else 1e-8)
-    H = whole * np.eye(len(L))
-    for k, N in enumerate(found):
-        cost = whole ** (max(k - supported, 0) / max(levels, 1))
-        H += (cost - whole) * N.T @ N
-    return np.asarray(L @ H @ L.T)
+def deviation_cost(resolution: Resolution, supported: bool, size: float) -> Array:
+    """Return H, shape (nv, nv), also where levels share directions.
 
-
-def shared_cost(resolution: Resolution, weight: float = 1e-8) -> tuple[Array, Array]:
-    """Return H and P where levels share directions, shape (nv, nv) each.
-
-    log H = log weight Σ t_k (P_{k-1} - P_k), with P_k from the spectra of the levels.
+    log H = Σ log ρ_k (P_{k-1} - P_k), with P_k from the spectra of the levels.
     """
     J, L = resolution.problem.task.jacobian, resolution.problem.metric.L
-    whitened = np.linalg.solve(L, J.T).T
-    floor, n, levels = resolution.threshold**2, len(L), len(resolution.ends)
+    whitened, n = np.linalg.solve(L, J.T).T, len(L)
+    logs = np.log(level_costs(resolution, supported, size))
     P, T, start = np.eye(n), np.zeros((n, n)), 0
     for k, end in enumerate(resolution.ends):
-        B = whitened[start:end]
+        B, floor = whitened[start:end], resolution.thresholds[k] ** 2
         sizes, U = np.linalg.eigh(B @ P @ B.T)
         above = np.maximum(sizes, floor)
         inverse = np.where(sizes < floor, (2.0 - sizes / floor) / floor, 1.0 / above)
         own = P @ B.T @ (U * inverse) @ U.T @ B @ P
-        T += k / levels * own
+        T += logs[k] * own
         P = P - own
         start = end
-    steps, V = np.linalg.eigh(T + P)
-    H = (V * weight**steps) @ V.T
-    return L @ H @ L.T, np.linalg.solve(L.T, P @ L.T)
-
-
-def second_weight(
-    resolution: Resolution, supported: bool, H: Array, deviation: Array
-) -> float:
-    """Return the cost of the null space after a first optimum.
-
-    It is the first one's, or where the tasks miss by more a twentieth of what that
-    costs, divided by the square of the null space's motion.
-    """
-    n = len(resolution.problem.metric.L)
-    L, delta = resolution.problem.metric.L, deviation[:n]
-    N = np.vstack(level_directions(resolution))
-    left = L.T @ delta - N.T @ (N @ L.T @ delta)
-    moved = float(left @ left)
-    first = 1e-6 if len(resolution.ends) - supported <= 1 else 1e-8
-    missed = float(delta @ H[:n, :n] @ delta) - first * moved
-    return max(first, min(0.05 * missed / moved, 1.0)) if moved > 0.0 else first
-
-
-def with_null_space_cost(
-    H: Array, resolution: Resolution, old: float, new: float
-) -> Array:
-    """Return a cost of deviations with another cost of the null space."""
-    L = resolution.problem.metric.L
-    n = len(L)
-    N = np.vstack(level_directions(resolution))
-    changed = H.copy()
-    changed[:n, :n] += (new - old) * L @ (np.eye(n) - N.T @ N) @ L.T
-    return changed
-
-
-def null_space_projector(resolution: Resolution) -> Array:
-    """Return P = 1 - L⁻ᵀ Nᵀ N Lᵀ, shape (nv, nv)."""
-    L = resolution.problem.metric.L
-    N = np.vstack(level_directions(resolution))
-    return np.asarray(np.eye(len(L)) - np.linalg.solve(L.T, N.T @ N @ L.T))
+    steps, V = np.linalg.eigh(T + logs[-1] * P)
+    return np.asarray(L @ (V * np.exp(steps)) @ V.T @ L.T)
 
 
 class Step(NamedTuple):
@@ -151,7 +100,7 @@ def limited_step(
     support: Support,
     base: NDArray[np.int64],
     weight: float,
-    null_space_weight: float | None = None,
+    size: float,
 ) -> Step:
     """Return the QP of efforts within bounds, motion within bounds, and cones.
 
@@ -165,11 +114,11 @@ def limited_step(
         support: The active contacts, with forces of minimum norm.
         base: Degrees of freedom without a motor.
         weight: The robot's weight [N].
-        null_space_weight: Cost of null-space deviation.
+        size: The robot's size [m].
     """
     n, p = len(a), support.size
     H = np.zeros((n + p, n + p))
-    H[:n, :n] = deviation_cost(resolution, p > 0, null_space_weight)
+    H[:n, :n] = deviation_cost(resolution, p > 0, size)
     cost = _FORCE_COST / np.maximum(support.inverse_cost, 1e-6)
     H[range(n, n + p), range(n, n + p)] = cost
     f = np.zeros(n + p)

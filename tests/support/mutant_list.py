@@ -452,8 +452,15 @@ MUTANTS = (
     Mutant(
         "velocity limit ignored",
         LIMITS + "acceleration_bounds.py",
-        "rising = 2.0 * bandwidth * (speed - v[i])",
+        "rising = _speed_barrier(speed - v[i], bandwidth, jerk[i])",
         "rising = np.inf",
+        OF_LIMITS + "bounds_are_the_barriers",
+    ),
+    Mutant(
+        "velocity limit: the effort's rate ignored",
+        LIMITS + "acceleration_bounds.py",
+        "barrier = min(barrier, np.sqrt(jerk * gap))",
+        "pass",
         OF_LIMITS + "bounds_are_the_barriers",
     ),
     Mutant(
@@ -542,6 +549,20 @@ MUTANTS = (
         UNIT + "law/test_pseudo_inverse.py -k bound",
     ),
     Mutant(
+        "threshold does not follow the feedback",
+        LAW + "threshold.py",
+        "max(least, np.sqrt(beyond / steepest))",
+        "least",
+        UNIT + "law/test_threshold.py",
+    ),
+    Mutant(
+        "feedback of the whole error, however large",
+        TASKS + "task.py",
+        "if square > largest[part, 2] * largest[part, 2]:",
+        "if square < 0.0:",
+        UNIT + "tasks/test_largest_error.py",
+    ),
+    Mutant(
         "levels: a lower one disturbs a higher one",
         LAW + "hierarchy.py",
         "Q[i, j] -= total",
@@ -587,8 +608,8 @@ MUTANTS = (
     Mutant(
         "deviation: null space as dear as the task",
         ACTUATION + "deviation_cost.py",
-        "steps[-1] = 1.0",
-        "steps[-1] = 0.0",
+        "costs[0, last] = exponent",
+        "costs[0, last] = 0.0",
         OF_STEPS + "optimum",
     ),
     Mutant(
@@ -692,16 +713,9 @@ MUTANTS = (
     Mutant(
         "limits: the null space swings",
         CONTROL + "actuation/deviation_cost.py",
-        "_SHARE = 0.05",
-        "_SHARE = 0.0",
+        "_OF_ERROR, _MOST = 0.2, 0.1",
+        "_OF_ERROR, _MOST = 0.0, 0.1",
         "tests/integration/test_limit_configurations.py -k swing",
-    ),
-    Mutant(
-        "limits: a lost direction is all the task's",
-        CONTROL + "actuation/deviation_cost.py",
-        "share = lost * lost",
-        "share = 0.0",
-        UNIT + "control/test_deviation_cost.py -k projector",
     ),
     Mutant(
         "limits: no level below shares what is lost",
@@ -711,25 +725,18 @@ MUTANTS = (
         UNIT + "control/test_deviation_cost.py -k levels_share",
     ),
     Mutant(
-        "limits: levels have the null space's share",
-        ACTUATION + "deviation_cost.py",
-        "directions.share[count + r] = max(free, 0.0)",
-        "directions.share[count + r] = t",
-        UNIT + "control/test_deviation_cost.py -k levels_share",
-    ),
-    Mutant(
         "limits: rows of a spectrum as directions",
         ACTUATION + "deviation_cost.py",
         "return bool(found)",
         "return True",
-        UNIT + "control/test_deviation_cost.py -k projector",
+        UNIT + "control/test_deviation_cost.py -k levels_share",
     ),
     Mutant(
-        "decay rate: what turns e_N counts",
+        "limits: a damped level shares nothing",
         ACTUATION + "deviation_cost.py",
-        "both = 0.5 * (lowered + lowered.T)",
-        "both = lowered",
-        UNIT + "control/test_deviation_cost.py -k decay_rate",
+        "own * (free / own) ** (lost * lost)",
+        "own",
+        UNIT + "control/test_deviation_cost.py -k levels_share",
     ),
     Mutant(
         "free step: a law that is not finite is free",

@@ -6,7 +6,7 @@ error is rounding.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any, TypeVar
 
@@ -185,10 +185,17 @@ class Family:
         raise NotImplementedError
 
     def build(
-        self, robot: Robot, motion: Motion, error: float, gains: Gains, seed: int
+        self,
+        robot: Robot,
+        motion: Motion,
+        error: float,
+        gains: Gains,
+        seed: int,
+        largest: Any = "none",
     ) -> Task:
-        """Return the same, placed."""
-        return placed(self.make(robot, motion, error, gains, seed), robot)
+        """Return the same, placed, with feedback of the whole error by default."""
+        made: Any = self.make(robot, motion, error, gains, seed)
+        return placed(replace(made, largest_error=largest), robot)
 
     def coordinates(self, task: Any, motion: Motion) -> Callable[[float], Array]:
         """Return x(s), whose rate at s = 0 is J v."""

@@ -14,7 +14,6 @@ from hsp_control.constraints.limits.maximum import (
     Maximum,
     maximum,
     none_for_nothing,
-    own_limit,
 )
 from hsp_control.constraints.limits.minimum_distance import MinimumDistance
 from hsp_control.constraints.limits.numbers_by_joint import Positives, by_dof
@@ -39,9 +38,6 @@ from hsp_control.robot import Robot
 
 BANDWIDTH = 10.0
 """α of the barriers where nothing else is given [1/s]."""
-ARM_RATE, LEG_RATE = 12.0, 100.0
-"""Maximum rate of an effort where nothing else is given, in maximum efforts [1/s]: of a
-robot with a fixed base, and of one whose contacts change."""
 
 
 class Limits(Part, error=LimitError):
@@ -79,7 +75,7 @@ class Limits(Part, error=LimitError):
     numbers by joint, one number or nv. No URDF has it: the robot's own is 12 times its
     maximum effort each second, which for a Panda's shoulder is 1000 N·m/s; so no effort
     changes by more than 1.2 % of its maximum in a millisecond. With a floating base,
-    whose contacts change, it is 100 times."""
+    whose contacts change, it is 500 times."""
     velocity: Maximum = "robot"
     """Maximum speed [rad/s or m/s]: the robot's own, none, a factor, numbers by joint,
     one number or nv."""
@@ -134,9 +130,7 @@ class Limits(Part, error=LimitError):
                     f"does not support mimic joints; {robot.name} has some"
                 )
         with within("effort_rate"):
-            own = own_limit(robot.model.effortLimit, robot)
-            rate = LEG_RATE if robot.unactuated else ARM_RATE
-            effort_rate = maximum(self.effort_rate, rate * own, robot)
+            effort_rate = maximum(self.effort_rate, robot.effort_rate, robot)
         effort, share = read_only(effort), self.static_effort
         return RobotLimits(
             robot=robot,

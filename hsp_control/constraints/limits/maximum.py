@@ -98,16 +98,15 @@ def maximum(value: Maximum, own: Array, robot: Robot) -> Array:
         JointNotFoundError: If a joint does not exist.
     """
     if isinstance(value, Scaled | ByJoint):
-        return value.of(own_limit(own, robot), robot)
+        return value.of(_own_limit(own, robot), robot)
     if isinstance(value, str):
         if value == "none":
             return np.full(robot.nv, np.inf)
-        return own_limit(own, robot)
+        return _own_limit(own, robot)
     return by_dof(value, robot.nv)
 
 
-def own_limit(own: Array, robot: Robot) -> Array:
-    """Return a limit of the robot's model, shape (nv,); inf where there is none."""
+def _own_limit(own: Array, robot: Robot) -> Array:
     limit = np.array(own, dtype=float)
     limit[list(robot.unactuated)] = np.inf
     # URDFs have 0 or the largest float where there is no limit.

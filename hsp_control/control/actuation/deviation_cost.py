@@ -25,7 +25,7 @@ _ONE_LEVEL, _SEVERAL_LEVELS = 1e-6, 1e-8
 several. The smaller it is, the stricter the priorities; at 1e-6 an error of 1e-3 m/s²
 remains in the task (docs/limits.md)."""
 
-_OF_ERROR, _MOST = 0.2, 0.1
+_OF_ERROR, _MOST = 0.5, 0.1
 """How much more what is below a level costs for an error of the robot's size, relative
 to the level itself, and the most that it costs [-]."""
 
@@ -157,6 +157,8 @@ def _write_costs(directions: Directions) -> None:
             for r in range(start, ends[k]):
                 square += e[r] * e[r]
             below = _OF_ERROR * np.sqrt(square) / directions.size
+            if directions.first > 0:  # whoever stands keeps the balance at any cost
+                below = 0.0
             exponent += np.log(min(max(below, directions.least), _MOST))
         start = ends[k]
     if exponent == 0.0:  # nothing but contacts: the null space costs as little

@@ -91,6 +91,12 @@ def _activities(
             beyond |= (rollout[name] > 0.0).any(axis=1)
     words = "beyond a limit"
     yield Band(words, f"a joint is {words}", palette.MUTED, []), beyond
+    far = np.zeros(len(rollout), bool)
+    for task in rollout.meta["tasks"]:
+        if (name := f"task.{task}.bounded") in rollout:
+            far |= rollout[name] > 0.0
+    words = "too far to count in full"
+    yield Band("target far away", f"a target is {words}", palette.SERIES[2], []), far
     if "damped" in rollout:
         words = "bounded at a singularity"
         singular = Band(words, f"the law is {words}", palette.WARNING, [])

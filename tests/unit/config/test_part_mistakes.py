@@ -80,7 +80,8 @@ MISTAKES: list[tuple[dict[str, Any], str, str]] = [
     # keys
     (task(frme="a"), "ConfigError",
      "tasks.hand.frme: unknown key 'frme'; did you mean 'frame'? (allowed: type, "
-     "priority, schedule, gains, impedance, blend, frame, trajectory, axes)"),
+     "priority, schedule, gains, largest_error, impedance, blend, frame, trajectory, "
+     "axes)"),
     (task(name="x"), "ConfigError",
      "tasks.hand.name: unknown key 'name'; the key 'hand' is the name"),
     (task(trajectory={"type": "circle", "radus": 1, "angular_rate": 1}), "ConfigError",

@@ -80,12 +80,13 @@ def test_by_default_they_are_the_robots_own() -> None:
     np.testing.assert_array_equal(limits.guarded_lower, lower + 0.005)
     np.testing.assert_array_equal(limits.guarded_upper, upper - 0.005)
     np.testing.assert_array_equal(limits.guarded_velocity, 0.98 * limits.velocity)
-    assert np.isinf(limits.effort_rate).all()
+    np.testing.assert_array_equal(limits.effort_rate, 12.0 * limits.effort)
+    jerk = limits.effort_rate / robot.largest_inertias
+    np.testing.assert_array_equal(limits.motion.jerk, jerk)
     assert np.isinf(limits.acceleration).all()
     assert limits.bandwidth == 10.0
     assert limits.distances == ()
-    assert limits.static_effort is limits.null_space_speed is None
-    assert limits.null_space_weight is None
+    assert limits.static_effort is None
 
 
 def test_what_no_motor_moves_has_no_limit_of_its_own() -> None:
@@ -93,12 +94,17 @@ def test_what_no_motor_moves_has_no_limit_of_its_own() -> None:
     for each in (limits.effort, limits.velocity, -limits.lower, limits.upper):
         assert np.isinf(each[:6]).all()
         assert np.isfinite(each[6:]).any()
+    np.testing.assert_array_equal(limits.effort_rate, 100.0 * limits.effort)
 
 
 def test_none_is_no_limit() -> None:
-    limits = of(panda(), effort="none", velocity=None, position="none")
+    limits = of(
+        panda(), effort="none", effort_rate=None, velocity=None, position="none"
+    )
     for each in (limits.effort, limits.velocity, -limits.lower, limits.upper):
         assert (each == np.inf).all()
+    assert (limits.effort_rate == np.inf).all()
+    assert (limits.motion.jerk == np.inf).all()
 
 
 def test_a_joint_that_hardly_moves_has_a_small_margin() -> None:
@@ -122,8 +128,6 @@ def test_one_number_or_one_for_each() -> None:
         position=PositionRange(-1.0, numbers),
         position_margin=0.25,
         bandwidth=7.0,
-        null_space_speed=2.0,
-        null_space_weight=1e-3,
     )
     np.testing.assert_array_equal(limits.effort, np.full(7, 3.0))
     np.testing.assert_array_equal(limits.effort_rate, np.full(7, 1000.0))
@@ -134,9 +138,6 @@ def test_one_number_or_one_for_each() -> None:
     np.testing.assert_array_equal(limits.lower, np.full(7, -1.0))
     np.testing.assert_array_equal(limits.guarded_upper, numbers - 0.25)
     assert limits.motion.bandwidth == limits.bandwidth == 7.0
-    assert limits.null_space_weight == 1e-3
-    assert limits.null_space_speed is not None
-    np.testing.assert_array_equal(limits.null_space_speed, np.full(7, 2.0))
 
 
 def test_a_part_of_the_robots_own() -> None:
@@ -182,7 +183,7 @@ def test_a_range_without_limits_for_a_root() -> None:
 
 
 def test_numbers_cannot_be_changed() -> None:
-    limits = of(panda(), effort_rate=1.0, null_space_speed=1.0, static_effort=1.0)
+    limits = of(panda(), effort_rate=1.0, static_effort=1.0)
     arrays = [*vars(limits).values(), *limits.motion, limits.static_effort.effort]  # type: ignore[union-attr]
     arrays = [each for each in arrays if isinstance(each, np.ndarray)]
     assert len(arrays) == 12
@@ -244,13 +245,6 @@ def test_kernels_take_them() -> None:
         ),
         (panda, {"velocity": [1.0]}, LimitError, ("velocity",), "has 1 number"),
         (panda, {"acceleration": [1.0]}, LimitError, ("acceleration",), "needs one"),
-        (
-            panda,
-            {"null_space_speed": [1.0]},
-            LimitError,
-            ("null_space_speed",),
-            "needs one number or 7",
-        ),
         (
             panda,
             {"position": PositionRange([0.0], 1.0)},

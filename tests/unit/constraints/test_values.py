@@ -92,7 +92,7 @@ OTHERS: dict[type[Part], dict[str, Any]] = {
     CommandedForce: {"value": [3, [1, 0, 5.0], np.array([0, 0, 9, 0, 0, 1.0])]},
     Limits: {
         "effort": _MAXIMUM,
-        "effort_rate": _NUMBERS,
+        "effort_rate": _MAXIMUM,
         "velocity": _MAXIMUM,
         "acceleration": _NUMBERS,
         "position": [
@@ -105,8 +105,6 @@ OTHERS: dict[type[Part], dict[str, Any]] = {
         "distances": [[SelfDistance()], (ObstacleDistance(0.1), SelfDistance(0.0))],
         "bandwidth": 5,
         "static_effort": 1,
-        "null_space_speed": _NUMBERS,
-        "null_space_weight": 1e-3,
     },
     ObstacleDistance: {
         "minimum": 0.0,
@@ -275,7 +273,6 @@ def test_limits_as_yaml_says_them() -> None:
         "acceleration": [1, None],
         "position": {"lower": [-1, None], "upper": [1, 2]},
         "distances": [{"type": "self"}, {"type": "obstacles", "minimum": 0.1}],
-        "null_space_weight": None,
     }
     assert Limits(**data) == Limits(
         effort=Scaled({"a": 0.5}),
@@ -332,7 +329,7 @@ WRONG: dict[type[Part], dict[str, list[tuple[Any, str]]]] = {
     },
     Limits: {
         "effort": _WRONG_MAXIMUM,
-        "effort_rate": _WRONG_NUMBERS,
+        "effort_rate": _WRONG_MAXIMUM,
         "velocity": _WRONG_MAXIMUM,
         "acceleration": _WRONG_NUMBERS,
         "position": [
@@ -351,8 +348,6 @@ WRONG: dict[type[Part], dict[str, list[tuple[Any, str]]]] = {
         ],
         "bandwidth": [(0.0, "must be greater than 0"), (True, "is a boolean")],
         "static_effort": [(0.0, "must be greater than 0"), (1.01, "must be at most 1")],
-        "null_space_speed": _WRONG_NUMBERS,
-        "null_space_weight": [(0.0, "greater than 0"), (1.0, "must be less than 1")],
     },
     ObstacleDistance: {
         "minimum": [(-1.0, "-1.0 is negative; must be at least 0")],

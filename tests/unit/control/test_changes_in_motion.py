@@ -83,13 +83,16 @@ def hand() -> FramePosition:
     start = panda().state(0.0, panda().home(), np.zeros(7)).position("panda_tcp")
     center = start + np.array([0.0, 0.0, 0.05])
     path = Circle(0.05, 2.0, center, normal=[1.0, 0.0, 0.0])
-    return FramePosition("panda_tcp", path, gains=GAINS, name="hand")
+    return FramePosition(
+        "panda_tcp", path, gains=GAINS, largest_error="none", name="hand"
+    )
 
 
 TURNED = FrameOrientation(
     "panda_tcp",
     HoldOrientation([3.0, 0.2, 0.1]),
     gains=Gains(natural_frequency=5.0),
+    largest_error="none",
     name="turned",
     priority=2,
 )
@@ -339,7 +342,7 @@ def efforts(law: Controller, times: Array) -> Array:
 
 def still(*more: Task, **options: Any) -> Controller:
     """Return a controller whose effort changes with the state alone."""
-    task = FramePosition("panda_tcp", Hold([0.5, 0.1, 0.4]), gains=GAINS, name="hand")
+    task = replace(hand(), trajectory=Hold([0.5, 0.1, 0.4]))
     options = {"null_space_gain": K_N, **options}
     return Controller(
         panda(), [task, *more], JointCentering(), **({"limits": None} | options)

@@ -272,15 +272,12 @@ def test_the_desired_velocity_is_the_law_s_flow(levels: int) -> None:
     from hsp_control.control.compensation.friction_feed_forward import desired_velocity
 
     robot, rng = PANDA, np.random.default_rng(2)
-    turned = FrameOrientation(
-        "panda_tcp", HoldOrientation(np.eye(3)), gains=Gains(natural_frequency=5.0)
-    )
-    again = FramePosition(
-        "panda_tcp",
-        circle().trajectory,
-        gains=Gains(natural_frequency=5.0),
-        name="more",
-    )
+    own: dict[str, Any] = {
+        "gains": Gains(natural_frequency=5.0),
+        "largest_error": "none",
+    }
+    turned = FrameOrientation("panda_tcp", HoldOrientation(np.eye(3)), **own)
+    again = FramePosition("panda_tcp", circle().trajectory, name="more", **own)
     second, third = replace(turned, priority=2), replace(again, priority=3)
     tasks: list[Task] = {
         1: [circle(), turned],

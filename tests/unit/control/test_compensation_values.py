@@ -141,10 +141,12 @@ def on(**parts: Any) -> None:
 
 
 def test_two_guards_of_the_effort_rate_are_one_too_many() -> None:
-    made = controller(limits=Limits(effort_rate=500.0))
-    with pytest.raises(CompensationError, match=r"limits\.effort_rate keeps the rate"):
-        Command(made, Compensation(effort_rate=500.0))
-    Command(controller(limits=Limits()), Compensation(effort_rate=5.0))
+    for limits in (Limits(), Limits(effort_rate=500.0)):
+        made = controller(limits=limits)
+        with pytest.raises(CompensationError, match=r"limits\.effort_rate keeps the"):
+            Command(made, Compensation(effort_rate=500.0))
+    made = controller(limits=Limits(effort_rate="none"))
+    Command(made, Compensation(effort_rate=5.0))
 
 
 @pytest.mark.parametrize("name", ["momentum_observer", "predictor", "start_up_ramp"])

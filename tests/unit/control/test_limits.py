@@ -1,5 +1,6 @@
 """Limits: the step is the law's where none binds, and keeps them where one does."""
 
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -79,9 +80,14 @@ def test_bounds_are_the_barriers() -> None:
     q, v = robot.home(), np.full(7, 0.1)
     a_lower, a_upper = bounds(limits, q, v)
     lower, upper = robot.position_limits()
-    expected = np.minimum(64.0 * (upper - q) - 16.0 * v, 16.0 * (limits.velocity - v))
+
+    def towards(room: Array, gap: Array, v: Array) -> Array:
+        speed = np.minimum(16.0 * gap, np.sqrt(limits.motion.jerk * gap))
+        return np.minimum(64.0 * room - 16.0 * v, speed)
+
+    expected = towards(upper - q, limits.velocity - v, v)
     np.testing.assert_allclose(a_upper, expected, rtol=1e-14)
-    expected = np.maximum(-64.0 * (q - lower) - 16.0 * v, -16.0 * (limits.velocity + v))
+    expected = -towards(q - lower, limits.velocity + v, -v)
     np.testing.assert_allclose(a_lower, expected, rtol=1e-14)
 
 
@@ -114,6 +120,18 @@ def test_the_drift_is_made_up_for_where_it_leads_beyond_a_limit(
     np.testing.assert_allclose(a_lower + down, plain[0], rtol=0, atol=1e-11)
 
 
+@given(seeds, st.floats(-9.0, 9.0))
+def test_speeds_may_be_held_against_a_drift(seed: int, drift: float) -> None:
+    """The barrier of the speed is wider by what holds the robot against it."""
+    rng, limits = np.random.default_rng(seed), of(panda(), position=None)
+    v = limits.guarded_velocity * rng.uniform(-0.9, 0.9, 7)
+    q = panda().home()
+    plain, (a_lower, a_upper) = bounds(limits, q, v), bounds(limits, q, v, 0.0, drift)
+    up, down = max(-drift, 0.0), max(drift, 0.0)
+    np.testing.assert_allclose(a_upper - up, plain[1], rtol=0, atol=1e-11)
+    np.testing.assert_allclose(a_lower + down, plain[0], rtol=0, atol=1e-11)
+
+
 @pytest.mark.parametrize("drift", [-1e4, 1e4])
 def test_a_drift_moves_a_limit_by_a_tenth_of_the_range_at_most(drift: float) -> None:
     limits = of(panda(), velocity=None, bandwidth=8.0)
@@ -141,7 +159,7 @@ def test_too_fast_is_slowed_down_more_steeply() -> None:
 
 def test_the_margin_of_the_speed_covers_an_error_up_to_half_the_speed() -> None:
     """And a quarter more, since it may grow until the next period ends."""
-    limits = of(panda(), velocity=1.0, position=None, bandwidth=8.0)
+    limits = of(panda(), velocity=1.0, effort_rate=None, position=None, bandwidth=8.0)
     guarded, v = limits.guarded_velocity[0], np.full(7, 0.4)
     for error, speed in ((3.2, guarded - 0.0625), (1e3, 0.5 * guarded)):
         a_lower, a_upper = bounds(limits, panda().home(), v, error)
@@ -182,7 +200,7 @@ def test_without_an_active_limit_the_qp_gives_the_law(seed: int) -> None:
 def test_a_controller_keeps_the_robot_s_own_limits_unless_told_otherwise() -> None:
     """Also an effort that is asked for beside a singularity."""
     robot = panda()
-    far = FramePosition("panda_tcp", Hold([3.0, 0.0, 0.5]), name="hand")
+    far = FramePosition("panda_tcp", Hold([3.0, 0.0, 0.5]), largest_error="none")
     own = Controller(robot, [far])
     free = Controller(robot, [far], limits=None)
     most = robot.model.effortLimit
@@ -205,10 +223,12 @@ def test_null_space_gives_way_first_then_the_lower_task() -> None:
         name="posture",
         priority=2,
     )
-    tasks = [hand(), posture]
+    state = robot.state(0.3, q, v)
+    # Without an error: then what is below the hand costs least.
+    kept = Hold(state.position("panda_tcp").copy())
+    tasks = [replace(hand(), trajectory=kept), posture]
     field = 20.0 * JointCentering()
     free = Controller(robot, tasks, field, limits=None)
-    state = robot.state(0.3, q, v)
     wanted = free.compute(state)
     tau, a = wanted.tau.copy(), wanted.acceleration.copy()
     joint = int(np.abs(tau - state.nonlinear_effects).argmax())

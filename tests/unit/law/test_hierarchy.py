@@ -190,7 +190,7 @@ def conflicting(kind: str) -> Controller:
     )
     return Controller(
         robot,
-        [wrist, hand, rival],
+        [replace(task, largest_error="none") for task in (wrist, hand, rival)],
         2.0 * JointCentering(),
         null_space_gain=4.0,
         metric=metric_of(kind),
@@ -268,6 +268,7 @@ def test_propositions_hold_for_two_arms() -> None:
         FramePosition("right_gripper", Hold(right + 0.05), **second),
         FramePosition("left_gripper", Hold([0.3]), axes="x", name="rival", **second),
     ]
+    tasks = [replace(task, largest_error="none") for task in tasks]
     controller = Controller(
         robot, tasks, JointCentering(), null_space_gain=4.0, limits=None
     )

@@ -283,5 +283,6 @@ def test_a_motion_that_diverges_stops_the_same_way(
     ],
 )
 def test_what_is_not_native_is_made_alone(override: str, counted: Counted) -> None:
-    short("panda_obstacle", override, duration=0.05).run()
+    rate = "limits.effort_rate=none"
+    short("panda_obstacle", override, rate, duration=0.05).run()
     assert sum(counted.many) == 0

@@ -292,8 +292,9 @@ def panda_hand(**fields: Any) -> Controller:
     robot = hsp.Robot.load("panda")
     home = robot.home()
     at = robot.state(0.0, home, np.zeros(7)).position("panda_tcp").copy()
+    target = hsp.Hold(at + np.array([0.05, -0.03, 0.02]))
     hand = FramePosition(
-        "panda_tcp", hsp.Hold(at + np.array([0.05, -0.03, 0.02])), name="hand", **fields
+        "panda_tcp", target, largest_error="none", name="hand", **fields
     )
     return Controller(robot, [hand], limits=None)
 

@@ -135,6 +135,12 @@ ERRORS: dict[str, tuple[Callable[[], Any], type[HspControlError], str]] = {
         TaskError,
         r"^FramePosition: task name 'the hand': use letters, digits, '_' and '-'",
     ),
+    "parts of the largest error": (
+        lambda: placed(FramePose("panda_tcp", POSE, largest_error=[0.1] * 3), panda()),
+        TaskError,
+        r"^largest_error: has 3 numbers; the error has 2 parts: position \[m\], "
+        r"orientation \[rad\]$",
+    ),
     "no direction": (
         lambda: Pointing("panda_tcp", [0, 0, 0]),
         TaskError,

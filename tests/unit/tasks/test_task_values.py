@@ -77,7 +77,10 @@ _TASK: dict[str, Any] = {
     "schedule": Schedule([(1.0, None)]),
     "name": "mine",
 }
-_GAINS: dict[str, Any] = {"gains": Gains(natural_frequency=[1, 2, 3])}
+_GAINS: dict[str, Any] = {
+    "gains": Gains(natural_frequency=[1, 2, 3]),
+    "largest_error": [0.2, "none", None, [0.1, None], np.array([0.1, 0.3])],
+}
 _TRACKING: dict[str, Any] = {**_TASK, **_GAINS, "blend": 2}
 _SPRING: dict[str, Any] = {
     "impedance": [Impedance([100, 200, 300]), Impedance(50, damping=20)]
@@ -319,7 +322,13 @@ _WRONG_GAINS: Wrong = {
         (3.0, "gains: 3.0 is a decimal number; expected a mapping"),
         ({"kp": -1, "kv": 1}, "gains.kp: -1 is negative; must be greater than 0"),
         ({"Kp": 1}, "gains.Kp: unknown key 'Kp'; did you mean 'kp'"),
-    ]
+    ],
+    "largest_error": [
+        (0, "largest_error: 0 is too small; must be greater than 0"),
+        ([0.1, -1], "largest_error.1: -1 is negative; must be greater than 0"),
+        (np.inf, "largest_error: .inf is not a finite number"),
+        ("robt", "largest_error: 'robt' is text; expected 'robot', 'none', a number"),
+    ],
 }
 _WRONG_TRACKING: Wrong = {
     **_WRONG_TASK,

@@ -1,0 +1,153 @@
+"""The threshold follows the feedback: the law is not steep where tasks are lost."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from task_cases import FRAMES, load, unit
+
+from hsp_control import Controller, FramePosition, Gains, Hold, Robot
+from hsp_control.law import threshold
+from hsp_control.law.threshold import (
+    MODEST,
+    NOT,
+    STIFFNESS,
+    Following,
+    write_thresholds,
+)
+from hsp_control.null_space.fields import Rest
+
+Array = NDArray[np.float64]
+seeds = st.integers(0, 2**32 - 1)
+STEP = 1e-6  # of differences; the law bends within ε of 0.03 or more
+
+
+@given(seeds, st.floats(-3.0, 6.0))
+def test_it_bounds_what_the_feedback_asks_for_over_its_square(
+    seed: int, size: float
+) -> None:
+    """‖f‖/ε² ≤ L + f_0/ε_0² for each level, and ε = ε_0 for all that is modest."""
+    rng, L, least = np.random.default_rng(seed), 150.0, 0.03
+    modest = 1.3
+    sizes = [3, 0, 2, 4]
+    ends, thresholds = np.cumsum(sizes), np.zeros(4)
+    asked = 10.0**size * rng.standard_normal(9)
+    largest = write_thresholds(asked, ends, least, Following(L, modest), thresholds)
+    assert largest == thresholds.max()
+    for f, epsilon in zip(np.split(asked, ends[:-1]), thresholds, strict=True):
+        norm = np.linalg.norm(f)
+        assert norm <= (L + modest / least**2) * epsilon**2 * (1.0 + 1e-12)
+        assert epsilon >= least
+        if norm <= modest + 0.99 * L * least**2:
+            assert epsilon == least
+    write_thresholds(asked, ends, least, NOT, thresholds)
+    assert (thresholds == least).all()
+
+
+class Slopes(NamedTuple):
+    """How steep a law is in q, and how steep it may be: spectral norms."""
+
+    found: float
+    bound: float
+
+
+def near_singular(robot: Robot, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Return a random configuration near a singular one, and its lost direction."""
+    q, frame = robot.random_configuration(rng), FRAMES[robot.name]
+    if rng.random() < 0.3:  # stretched
+        q = robot.neutral()
+    for _ in range(12):
+        J, tensor = position_jacobian(robot, q, frame)
+        U, s, Vt = np.linalg.svd(J)
+        slope = np.einsum("i,kij,j->k", U[:, -1], tensor, Vt[len(s) - 1])
+        if s[-1] > 1e-9:
+            step = -s[-1] * slope / max(slope @ slope, 1e-6)
+            q = robot.integrate(q, step * min(1.0, 0.5 / np.linalg.norm(step)))
+    away = 10.0 ** rng.uniform(-5.0, -0.3) * unit(rng, robot.nv)
+    return robot.integrate(q, away), U[:, -1]
+
+
+def position_jacobian(robot: Robot, q: Array, frame: str) -> tuple[Array, Array]:
+    """Return J of a position and ∂J/∂q, shape (nv, m, nv)."""
+    m = 2 if robot.name == "planar3r" else 3
+
+    def J(step: Array) -> Array:
+        state = robot.state(0.0, robot.integrate(q, step), np.zeros(robot.nv))
+        return state.frame(frame).jacobian[:m].copy()
+
+    steps = STEP * np.eye(robot.nv)
+    return J(np.zeros(robot.nv)), np.array([J(d) - J(-d) for d in steps]) / (2.0 * STEP)
+
+
+def slopes(robot: Robot, q: Array, target: Array) -> Slopes:
+    """Return the slope of a(q) at rest, g = 0, and the bound of the proposition.
+
+    Then a = J#f, with J# = V φ(s) Uᵀ, φ = s (2 - s²/ε²)/ε² below ε, 1/s above. The
+    slope of φ is at most 2/ε²; so is, for an odd function of singular values, that of
+    J# for one of J in the norm of Frobenius. Where f changes there is in addition
+    max φ = 1.09/ε times its slope, and by dε²/df = 1/L, |∂φ/∂ε²| ≤ 0.77/ε³ another
+    0.77 ‖f‖/(L ε³):
+
+        ‖∂a/∂q‖ ≤ 2 ‖f‖/ε² ‖∂J/∂q‖ + (1.09 + 0.77 ‖f‖/(L ε²)) ‖∂f/∂q‖/ε
+
+    with ε as the law ought to have it; then ‖f‖/ε² ≤ L + f_0/ε_0², see above.
+    """
+    axes = "xyz"[: len(target)]
+    hand = FramePosition(
+        FRAMES[robot.name], Hold(target), axes=axes, gains=Gains(natural_frequency=10.0)
+    )
+    controller = Controller(robot, [hand], Rest(), limits=None)
+
+    def law(step: Array) -> tuple[Array, Array]:
+        at_rest = np.zeros(robot.nv)
+        out = controller.compute(0.0, robot.integrate(q, step), at_rest)
+        return out.acceleration.copy(), out.task.acceleration.copy()
+
+    L, modest = STIFFNESS / robot.size, MODEST * robot.size
+    least = controller.singularity_threshold
+    pairs = [(law(d), law(-d)) for d in STEP * np.eye(robot.nv)]
+    a, f = (
+        np.array([ahead[k] - behind[k] for ahead, behind in pairs]) / (2.0 * STEP)
+        for k in range(2)
+    )
+    norm = np.linalg.norm(law(np.zeros(robot.nv))[1])
+    square = max(least**2, (norm - modest) / L)
+    _, tensor = position_jacobian(robot, q, FRAMES[robot.name])
+    bends = np.linalg.norm(tensor.reshape(robot.nv, -1), 2)
+    smooth = (1.09 + 0.77 * norm / (L * square)) / np.sqrt(square)
+    bound = 2.0 * norm / square * bends + smooth * np.linalg.norm(f, 2)
+    return Slopes(float(np.linalg.norm(a, 2)), float(bound))
+
+
+def drawn(name: str, seed: int) -> Slopes:
+    """Return the slopes at a random state, with a target at up to 1 km."""
+    robot, rng = load(name), np.random.default_rng(seed)
+    q, lost = near_singular(robot, rng)
+    here = robot.state(0.0, q, np.zeros(robot.nv)).position(FRAMES[name])[: len(lost)]
+    along = lost if rng.random() < 0.5 else unit(rng, len(lost))
+    away = rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-3.0, 3.0)
+    return slopes(robot, q, here + away * along)
+
+
+@pytest.mark.parametrize("name", ["planar3r", "panda", "ur5"])
+@given(seeds)
+@settings(max_examples=25)
+def test_the_law_is_nowhere_steep(name: str, seed: int) -> None:
+    found, bound = drawn(name, seed)
+    assert found <= bound * (1.0 + 1e-5)
+
+
+def test_it_would_be_steep_if_the_threshold_did_not_follow(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """And the bound is near: stretched, it is met to a sixth."""
+    robot = load("planar3r")
+    q = robot.integrate(robot.neutral(), np.array([0.3, 1e-4, 1e-4]))
+    target = 1e3 * np.array([np.cos(0.3), np.sin(0.3)])
+    found, bound = slopes(robot, q, target)
+    assert found > 0.1 * bound
+    monkeypatch.setattr(threshold, "STIFFNESS", np.inf)
+    assert slopes(robot, q, target).found > 5.0 * bound
