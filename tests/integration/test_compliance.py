@@ -26,10 +26,6 @@ from hsp_control.robot.integrators import Dop853, Rk4
 from hsp_control.simulation.plants import Push, RigidBody
 from hsp_control.tasks import Impedance
 
-pytestmark = [
-    pytest.mark.filterwarnings("error"),
-    pytest.mark.filterwarnings("ignore:the first effort"),
-]
 Array = NDArray[np.float64]
 
 PRECISE = Dop853(rtol=1e-11, atol=1e-11)

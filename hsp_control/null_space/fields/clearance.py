@@ -45,7 +45,11 @@ class Clearance(Cost):
     influence: Positive
     """Distance at which the cost begins [m]."""
     proxy: Proxy = "capsules"
-    """Shapes that approximate the links [-]."""
+    """Shapes that approximate the links [-]. With capsules or spheres g' is exact, but
+    for meshes, clouds and height fields as obstacles: there, and with hulls or meshes
+    for links, the nearest features jump. Of random states g' was off by more than 1e-3
+    in 1 of 60 against meshes, 9 against clouds, 17 against height fields, and with
+    hulls in 10 to 33, at worst by 1.6 times itself."""
 
     @abstractmethod
     def _pairs(self, robot: Robot) -> Proximity:
