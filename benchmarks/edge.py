@@ -94,7 +94,7 @@ def count(runs: list[Run], counts: Callable[[Run], bool]) -> str:
 
 def digits(number: float) -> str:
     """Return a number with two digits, or without decimals."""
-    return f"{number:.0f}" if number >= 100.0 else f"{number:.2g}"
+    return f"{number:.0f}" if number >= 99.5 else f"{number:.2g}"
 
 
 def most(found: list[float]) -> str:
@@ -175,10 +175,9 @@ LONG: tuple[Column, ...] = (
         ),
     ),
     ("after [s]", lambda runs: both(values(of_kinds(runs, "step"), "settling"))),
-    ("diverges or fails", lambda runs: count(runs, lambda run: bool(run["end"]))),
     (
-        "steps without a solution",
-        lambda runs: f"{sum(run['unsolved'] for run in runs) or ''}",
+        "diverges or fails",
+        lambda runs: count(runs, lambda run: bool(run["end"] or run["unsolved"])),
     ),
 )
 """Columns of the table in docs/limits.md."""
@@ -194,29 +193,38 @@ def beyond(runs: list[Run]) -> list[float]:
     return [max(0.0, each) for each in values(runs, "beyond")]
 
 
-def header(first: tuple[str, ...], columns: tuple[Column, ...]) -> str:
+def header(first: tuple[str, ...], columns: tuple[Column, ...], *last: str) -> str:
     """Return the first two lines of a table."""
-    names = [*first, *(name for name, _ in columns)]
-    rules = ["---"] * len(first) + ["--:"] * len(columns)
+    names = [*first, *(name for name, _ in columns), *last]
+    rules = ["---"] * len(first) + ["--:"] * (len(columns) + len(last))
     return f"| {' | '.join(names)} |\n|{'|'.join(rules)}|\n"
 
 
 def short_row(name: str, runs: list[Run], robots: list[str]) -> str:
-    """Return a law's line: the first robot, and all of them in brackets."""
+    """Return a law's line: the first robot, and in brackets all that it steers."""
+    steered = [each for each in robots if steers(of_robots(runs, each))]
     cells = []
     for _, column in SHORT:
-        own = column([run for run in runs if run["robot"] == robots[0]])
-        everywhere = column(runs)
-        cells.append(f"{own} ({everywhere})" if len(robots) > 1 else own)
-    return f"| {name} | {' | '.join(cells)} |\n"
+        own = column(of_robots(runs, robots[0]))
+        cells.append(f"{own} ({column(of_robots(runs, *steered))})")
+    return f"| {name} | {' | '.join(cells)} | {len(steered)} of {len(robots)} |\n"
+
+
+def of_robots(runs: list[Run], *robots: str) -> list[Run]:
+    """Return the runs of some robots."""
+    return [run for run in runs if run["robot"] in robots]
+
+
+def steers(runs: list[Run]) -> bool:
+    """Return whether a law keeps an arm where it can be: no circle diverges."""
+    return not any(run["end"] for run in of_kinds(runs, "circle"))
 
 
 def long_rows(name: str, runs: list[Run], robots: list[str]) -> str:
     """Return a law's lines, one for each robot."""
     rows = ""
     for robot in robots:
-        own = [run for run in runs if run["robot"] == robot]
-        cells = [column(own) for _, column in LONG]
+        cells = [column(of_robots(runs, robot)) for _, column in LONG]
         rows += f"| {name} | {robot} | {' | '.join(cells)} |\n"
     return rows
 
@@ -238,7 +246,7 @@ def main() -> None:
     parser.add_argument("robots", nargs="*", default=list(ROBOTS))
     options = parser.parse_args()
     pythons = dict(each.split("=", 1) for each in options.python)
-    short = header(("law",), SHORT)
+    short = header(("law",), SHORT, "arms")
     long = header(("law", "arm"), LONG)
     left_out = []
     with tempfile.TemporaryDirectory() as folder:

@@ -1,8 +1,8 @@
-"""TSID: a hand task and a posture task; bounds of efforts, positions and speeds.
+"""TSID: a hand task and a posture task, with bounds of efforts and speeds.
 
-Weights and gains are those of its exercise ``ur5_reaching_conf.py``, with the whole
-efforts and speeds instead of 40 % of them. Where its QP has no solution, the effort
-stays as it was.
+Tasks, bounds, weights and gains are those of its exercise ``tsid_manipulator.py`` with
+``ur5_reaching_conf.py``, with the whole efforts and speeds instead of 40 % of them.
+Where its QP has no solution, the effort stays as it was.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
 HAND, POSTURE = 100.0, 1.0  # Kp, critically damped [1/s²]
 HAND_WEIGHT, POSTURE_WEIGHT = 1.0, 1e-3
-ACCELERATION = 500.0  # that its bounds on positions and speeds may use [rad/s²]
 
 
 def make(case: "Case", model: Any) -> "Compute":
@@ -41,10 +40,8 @@ def make(case: "Case", model: Any) -> "Compute":
     efforts = tsid.TaskActuationBounds("effort", peer)
     efforts.setBounds(-model.effortLimit, model.effortLimit)
     problem.addActuationTask(efforts, 1.0, 0, 0.0)
-    joints = tsid.TaskJointPosVelAccBounds("joints", peer, PERIOD, False)
-    joints.setPositionBounds(model.lowerPositionLimit, model.upperPositionLimit)
-    joints.setVelocityBounds(model.velocityLimit)
-    joints.setAccelerationBounds(np.full(nv, ACCELERATION))
+    joints = tsid.TaskJointBounds("joints", peer, PERIOD)
+    joints.setVelocityBounds(-model.velocityLimit, model.velocityLimit)
     problem.addMotionTask(joints, 1.0, 0, 0.0)
 
     solver = tsid.SolverHQuadProgFast("qp")
