@@ -342,7 +342,8 @@ def _summary(rollout: Rollout) -> Table:
             continue
         rms, last = float(np.sqrt(np.mean(tracked**2))), tracked[-1]
         table.add_row(f"task {task}", f"|e| rms {rms:.3g}, at the end {last:.3g}")
-        away = rollout[f"task.{task}.bounded"]
+        name = f"task.{task}.bounded"  # logs of earlier versions have none
+        away = rollout[name] if name in rollout else np.zeros(1)
         if rows := int((away > 0.0).sum()):
             text = f"{rows} rows: its target was too far to count in full"
             if away[-1] > 0.0:

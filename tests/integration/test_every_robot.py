@@ -35,7 +35,6 @@ from hsp_control.robot.description.sources import example_robots
 from hsp_control.robot.integrators import Rk4
 from hsp_control.trajectories import HoldPose
 
-pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]
 
 BUNDLED = list(bundled_robots())

@@ -26,7 +26,6 @@ from hsp_control.null_space.fields import EqualJointAngles
 from hsp_control.null_space.metrics import IdentityMetric, MetricSample
 from hsp_control.trajectories import Circle
 
-pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]
 
 CONFIGURATIONS = {int(name[6]): name for name in bundled_configs() if "paper/" in name}

@@ -16,7 +16,6 @@ from hsp_control.config import Experiment
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.simulation.log_series import joint_positions
 
-pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]
 
 DOCS = ROOT / "docs"

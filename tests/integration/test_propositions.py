@@ -50,7 +50,6 @@ from hsp_control.trajectories import (
     Spin,
 )
 
-pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]
 
 FRAMES = {"planar3r": "tip", "panda": "panda_tcp", "iiwa14": "iiwa_link_ee"}

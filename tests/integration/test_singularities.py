@@ -40,7 +40,6 @@ from hsp_control.trajectories import (
     MinimumJerk,
 )
 
-pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]
 
 DEFAULT = 0.03

@@ -103,8 +103,10 @@ def acceleration_bounds(
             high = bandwidth * bandwidth * (upper[i] - position) - damping
             # While it lasts, a limit would be passed by the drift over α².
             most = _SHIFT * bandwidth * bandwidth * (upper[i] - lower[i])
-            low += min(max(-drift[i], 0.0), most) - max(steady[i], 0.0)
-            high -= min(max(drift[i], 0.0), most) + min(steady[i], 0.0)
+            low += min(max(-drift[i], 0.0), most)
+            high -= min(max(drift[i], 0.0), most)
+            low -= max(steady[i], 0.0)
+            high -= min(steady[i], 0.0)
         speed = velocity[i] - _GROWTH * error[i] / (2.0 * bandwidth * _STEEPER)
         speed = max(speed, 0.5 * velocity[i])
         rising = _speed_barrier(speed - v[i], bandwidth, jerk[i])

@@ -25,7 +25,7 @@ _ONE_LEVEL, _SEVERAL_LEVELS = 1e-6, 1e-8
 several. The smaller it is, the stricter the priorities; at 1e-6 an error of 1e-3 m/s²
 remains in the task (docs/limits.md)."""
 
-_OF_ERROR, _MOST = 0.5, 0.1
+_OF_ERROR, _MOST = 0.2, 0.1
 """How much more what is below a level costs for an error of the robot's size, relative
 to the level itself, and the most that it costs [-]."""
 

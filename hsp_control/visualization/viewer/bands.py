@@ -92,7 +92,7 @@ def _activities(
     words = "beyond a limit"
     yield Band(words, f"a joint is {words}", palette.MUTED, []), beyond
     far = np.zeros(len(rollout), bool)
-    for task in rollout.meta["tasks"]:
+    for task in rollout.meta.get("tasks", ()):
         if (name := f"task.{task}.bounded") in rollout:
             far |= rollout[name] > 0.0
     words = "too far to count in full"

@@ -267,7 +267,6 @@ def test_orthonormalise_a_zero_row() -> None:
     close(Q[::2] @ Q[::2].T, np.eye(2), 1e-15)
 
 
-@pytest.mark.filterwarnings("error")
 def test_no_rows_are_orthonormal_also_in_plain_python() -> None:
     plain = getattr(orthonormalise_rows, "py_func", orthonormalise_rows)
     for each in (orthonormalise_rows, plain):

@@ -9,9 +9,6 @@ from scenario_document import GOOD, Scenario, read
 from hsp_control.common.exceptions import ConfigError
 from hsp_control.common.suggestions import did_you_mean, listing, nearest
 
-pytestmark = pytest.mark.filterwarnings("error")
-
-
 # --- names ---------------------------------------------------------------------------
 
 

@@ -9,9 +9,6 @@ from hsp_control.common.exceptions import ConfigError, FrameNotFoundError, Shape
 from hsp_control.config.document import Document
 from hsp_control.config.validation import validate
 
-pytestmark = pytest.mark.filterwarnings("error")
-
-
 # --- overrides -----------------------------------------------------------------------
 
 

@@ -10,9 +10,6 @@ from hsp_control.config.document import Document
 from hsp_control.config.validation import validate
 from hsp_control.config.yaml_reader import MAX_SIZE, MAX_VALUES
 
-pytestmark = pytest.mark.filterwarnings("error")
-
-
 # --- what is read --------------------------------------------------------------------
 
 

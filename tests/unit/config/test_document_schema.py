@@ -16,9 +16,6 @@ from pydantic import (
 from scenario_document import Circle, Line, Part, Positive, Trajectory, message
 from typing_extensions import TypeAliasType
 
-pytestmark = pytest.mark.filterwarnings("error")
-
-
 TASK = "robot: panda\ntasks:\n  hand:\n    frame: hand\n"
 """Four lines, after which a test adds a key to the task."""
 

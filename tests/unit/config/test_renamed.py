@@ -28,8 +28,6 @@ from hsp_control.trajectories import (
     OrientationPath,
 )
 
-pytestmark = pytest.mark.filterwarnings("error")
-
 OLD = """\
 robot: {name: panda}
 tasks:

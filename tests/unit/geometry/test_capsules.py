@@ -26,7 +26,6 @@ from hsp_control.trajectories import (
     Hold,
 )
 
-pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]
 
 

@@ -34,7 +34,6 @@ from hsp_control.trajectories import (
     HoldOrientation,
 )
 
-pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]
 
 

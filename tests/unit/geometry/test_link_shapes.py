@@ -38,8 +38,6 @@ from hsp_control.trajectories import (
     Hold,
 )
 
-pytestmark = pytest.mark.filterwarnings("error")
-
 
 @pytest.mark.parametrize("name", ["panda", "iiwa14", "ur5"])
 @pytest.mark.parametrize("proxy", ["meshes", "hulls"])

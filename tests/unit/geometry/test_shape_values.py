@@ -36,8 +36,6 @@ from hsp_control.geometry.shapes import (
 )
 from hsp_control.trajectories import Circle, Hold, HoldOrientation, Spin
 
-pytestmark = pytest.mark.filterwarnings("error")
-
 HERE, THERE = Hold([0.4, 0.3, 0.5]), Circle(0.2, 1.5, [0.5, 0.0, 0.5])
 TURNING = Spin([0.0, 0.6, 0.8], 1.0, rotation=(0.1, 0.2, 0.3))
 BALL = Obstacle("ball", Sphere(0.1), HERE)

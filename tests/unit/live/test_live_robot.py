@@ -226,7 +226,7 @@ def test_a_robot_never_rejects_an_effort_over_a_bad_line(
                 Rig.write(self, effort)
 
     robot = Bad(chosen, says=True, every=1)
-    quick = law(gains=Gains(natural_frequency=20.0))
+    quick = law(gains=Gains(natural_frequency=10.0))
     report = run_loop(quick, robot, duration=0.1, settings=chosen)
     assert report.ended == "completed", report.reason
     assert robot.robot.reason == "the loop has ended"

@@ -26,9 +26,6 @@ from hsp_control.trajectories import (
     UniformLine,
 )
 
-pytestmark = pytest.mark.filterwarnings("error")
-
-
 # --- the barrier ---------------------------------------------------------------------
 
 

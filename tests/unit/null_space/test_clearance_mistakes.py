@@ -36,9 +36,6 @@ from hsp_control.trajectories import (
     Hold,
 )
 
-pytestmark = pytest.mark.filterwarnings("error")
-
-
 BALL = Obstacle("ball", Sphere(0.1), Hold([0.5, 0.3, 0.5]))
 
 

@@ -44,7 +44,6 @@ from hsp_control.trajectories import (
     Trajectory,
 )
 
-pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]
 
 

@@ -48,9 +48,6 @@ from hsp_control.null_space.fields.weight import Product, sample_weight
 from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric
 from hsp_control.trajectories import Hold
 
-pytestmark = pytest.mark.filterwarnings("error")
-
-
 # --- members, one by one -------------------------------------------------------------
 
 

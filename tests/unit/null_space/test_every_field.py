@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from hsp_control.null_space import differences
 from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric
 
-pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]
 
 

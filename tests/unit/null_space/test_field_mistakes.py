@@ -45,7 +45,6 @@ from hsp_control.null_space.fields import (
 from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric, Metric
 from hsp_control.trajectories import Hold
 
-pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]
 
 

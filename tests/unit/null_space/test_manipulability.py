@@ -40,7 +40,6 @@ from hsp_control.null_space.fields.jacobian_cost import (
 from hsp_control.robot import ToolFrame
 from hsp_control.robot.description.sources import example_robots
 
-pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]
 WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 

@@ -18,7 +18,6 @@ from hsp_control.null_space.fields import (
     SelfClearance,
 )
 
-pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]
 
 

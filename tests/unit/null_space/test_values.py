@@ -34,7 +34,6 @@ from hsp_control.null_space.fields import FieldSum, Ramp
 from hsp_control.null_space.metrics import MassMatrixMetric, Metric, MetricSample
 from hsp_control.null_space.metrics.metric import VARYING
 
-pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]
 
 BALL = Obstacle("ball", shapes.Sphere(0.1), AIR)

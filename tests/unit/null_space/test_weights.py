@@ -54,7 +54,6 @@ from hsp_control.null_space.metrics import (
 from hsp_control.robot import Rk4
 from hsp_control.trajectories import Lissajous
 
-pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]
 METRICS: dict[str, Metric] = {
     "identity": IdentityMetric(),

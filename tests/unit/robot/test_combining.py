@@ -31,7 +31,6 @@ from hsp_control.robot.description.combining import Part, combine, placement
 from hsp_control.robot.description.sources import RobotSource
 from hsp_control.robot.integrators import Rk4
 
-pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]
 
 LEFT = placement([0.0, 0.3, 0.1], [0.0, 0.0, 0.0])

@@ -31,7 +31,6 @@ from hsp_control.robot.integrators import Dop853, Rk4
 from hsp_control.simulation.plants import RigidBodyPlant
 from hsp_control.trajectories import ComposedPose, Lissajous, Spin
 
-pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]
 
 

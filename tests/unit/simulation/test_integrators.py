@@ -29,7 +29,6 @@ from hsp_control.robot import integrators
 from hsp_control.robot.integrators import Dop853, Rk4, SemiImplicitEuler
 from hsp_control.robot.step_count import number_of_steps
 
-pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]
 
 

@@ -34,7 +34,6 @@ from hsp_control.null_space.metrics import MassMatrixMetric
 from hsp_control.robot.integrators import Rk4
 from hsp_control.trajectories import Hold, Lissajous
 
-pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]
 
 

@@ -19,7 +19,6 @@ from hsp_control.common.exceptions import (
 from hsp_control.null_space.fields import FunctionField
 from hsp_control.robot.integrators import Rk4, SemiImplicitEuler
 
-pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]
 
 

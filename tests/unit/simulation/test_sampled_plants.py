@@ -15,7 +15,6 @@ from hsp_control.control.log_channel import LogChannel
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants import IntegratedPlant, Plant, RigidBodyPlant
 
-pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]
 
 

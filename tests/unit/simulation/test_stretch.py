@@ -31,7 +31,6 @@ if not PLAIN:
     from hsp_control.simulation.stretch import MOST
 
 pytestmark = [
-    pytest.mark.filterwarnings("error"),
     pytest.mark.skipif(PLAIN, reason="plain Python has no native calls"),
 ]
 

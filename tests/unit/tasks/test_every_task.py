@@ -26,7 +26,6 @@ from task_cases import (
 from hsp_control import Gains, Pointing, Task
 from hsp_control.tasks import AngularMomentum, TaskSample
 
-pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]
 
 

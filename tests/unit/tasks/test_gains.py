@@ -11,8 +11,6 @@ from hypothesis import strategies as st
 from hsp_control import Controller, Gains, JointPosture, Robot
 from hsp_control.common.exceptions import GainError
 
-pytestmark = pytest.mark.filterwarnings("error")
-
 
 def test_gains_in_three_forms() -> None:
     for kp, kv in (

@@ -49,7 +49,6 @@ from hsp_control.null_space.metrics import (
 from hsp_control.tasks import Impedance, TaskSample
 from hsp_control.tasks.impedance_gains import Rotating, Scratch, impedance_gains
 
-pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]
 
 CASES = [

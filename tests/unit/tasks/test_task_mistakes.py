@@ -30,8 +30,6 @@ from hsp_control.common.exceptions import (
 from hsp_control.tasks import AngularMomentum, RelativePose
 from hsp_control.trajectories import CallableTrajectory, HoldOrientation, HoldPose
 
-pytestmark = pytest.mark.filterwarnings("error")
-
 
 def posture(**options: Any) -> JointPosture:
     return JointPosture("home", **options)
@@ -138,8 +136,8 @@ ERRORS: dict[str, tuple[Callable[[], Any], type[HspControlError], str]] = {
     "parts of the largest error": (
         lambda: placed(FramePose("panda_tcp", POSE, largest_error=[0.1] * 3), panda()),
         TaskError,
-        r"^largest_error: has 3 numbers; the error has 2 parts: position \[m\], "
-        r"orientation \[rad\]$",
+        r"^largest_error: has 3 numbers; needs one for each part of the error: "
+        r"position \[m\] and orientation \[rad\]$",
     ),
     "no direction": (
         lambda: Pointing("panda_tcp", [0, 0, 0]),

@@ -52,7 +52,6 @@ from hsp_control.trajectories import (
     UniformLine,
 )
 
-pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]
 
 TCP = "panda_tcp"

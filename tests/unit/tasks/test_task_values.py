@@ -49,8 +49,6 @@ from hsp_control.trajectories import (
     Spin,
 )
 
-pytestmark = pytest.mark.filterwarnings("error")
-
 NAMES: dict[str, Any] = {**vars(paths), **vars(tasks)}
 CLASSES = [
     each

@@ -64,7 +64,7 @@ from hsp_control.visualization.plots import (
 )
 from hsp_control.visualization.viewer.targets import read_targets
 
-pytestmark = [pytest.mark.filterwarnings("error"), pytest.mark.slow]
+pytestmark = pytest.mark.slow
 A = np.tril(np.ones((3, 3)))
 SHADOW = mpl.colors.to_rgba(palette.SHADOW)
 NAMES = ("uncontrolled", "rest", "obstacle", "space", "pose", "several", "posture")

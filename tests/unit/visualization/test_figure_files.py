@@ -22,7 +22,7 @@ from hsp_control.visualization.plots import (
     views,
 )
 
-pytestmark = [pytest.mark.filterwarnings("error"), pytest.mark.slow]
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")

@@ -8,9 +8,6 @@ import pytest
 
 from hsp_control.visualization import palette
 
-pytestmark = pytest.mark.filterwarnings("error")
-
-
 # Machado, Oliveira, Fernandes (2009), severity 1, on linear RGB.
 BLINDNESS = {
     "none": np.eye(3),

@@ -24,7 +24,7 @@ from hsp_control import (
 )
 from hsp_control.simulation import log_series
 
-pytestmark = [pytest.mark.filterwarnings("error"), pytest.mark.slow]
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
