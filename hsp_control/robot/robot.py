@@ -34,7 +34,7 @@ from hsp_control.robot.description.sources import RobotSource, Root
 from hsp_control.robot.pinocchio_calls import bind_pinocchio
 from hsp_control.robot.state import RobotState
 
-_ARM_RATE, _LEG_RATE = 12.0, 500.0
+_ARM_RATE, _LEG_RATE = 11.0, 500.0
 """Maximum rate of an effort in maximum efforts [1/s]: with a fixed base, and of a robot
 whose contacts change."""
 _LIMB = 4
@@ -301,8 +301,8 @@ class Robot(ConfigurationSpace):
     def effort_rate(self) -> Array:
         """Maximum rate of the efforts, shape (nv,) [N·m/s or N/s]; inf for none.
 
-        No URDF has one. It is 12 times the largest maximum effort each second, for all
-        joints of the same unit, as a Panda's own 1000 N·m/s at 87 N·m: a light wrist
+        No URDF has one. It is 11 times the largest maximum effort each second, for all
+        joints of the same unit, a little less than a Panda may at 87 N·m: a light wrist
         has to answer a push as quickly as a shoulder. It is 500 times where legs meet
         the ground.
         """

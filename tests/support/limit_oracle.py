@@ -1,6 +1,7 @@
 """The QP of a limited step, assembled with NumPy and solved by DAQP: an oracle.
 
-It shares no code with the kernels: the cost is a dense matrix, the contacts are rows.
+It shares no code with the kernels, but a constant: the cost is a dense matrix, the
+contacts are rows.
 """
 
 from typing import NamedTuple
@@ -9,6 +10,7 @@ import daqp
 import numpy as np
 from numpy.typing import NDArray
 
+from hsp_control.control.actuation.deviation_cost import _OF_ERROR
 from hsp_control.control.actuation.support import Support
 from hsp_control.law import Resolution
 
@@ -45,16 +47,17 @@ def stacked(*rows: Rows) -> Rows:
 def level_costs(resolution: Resolution, supported: bool, size: float) -> Array:
     """Return ρ of each level, then of the null space, shape (levels + 1,).
 
-    What is below a level costs a fifth of the level's error over the robot's size, but
-    no more than a tenth and no less than priorities need. Contacts cost as much as the
-    level below them.
+    What is below a level costs a part of the level's error over the robot's size, but
+    no more than a tenth and no less than priorities need; on contacts the least,
+    whatever the error. Contacts cost as much as the level below them.
     """
     count = len(resolution.ends) - supported
     least = 1e-6 if count <= 1 else 1e-8 ** (1.0 / count)
     costs, start = [1.0], 0
     for k, end in enumerate(resolution.ends):
         error = np.linalg.norm(resolution.problem.task.error[start:end])
-        below = np.clip(0.2 * error / size, least, 0.1)
+        below = 0.0 if supported else _OF_ERROR * error / size
+        below = np.clip(below, least, 0.1)
         costs.append(costs[-1] * (1.0 if supported and k == 0 else below))
         start = end
     return np.array(costs)

@@ -580,7 +580,7 @@ MUTANTS = (
     Mutant(
         "effort limit ignored",
         ACTUATION + "actuation.py",
-        "self._tau_upper[:] = self.limits.effort",
+        "self._tau_upper[:] = self._kept.limits.effort",
         "self._tau_upper[:] = np.inf",
         OF_LIMITS + "contradiction",
     ),
@@ -599,10 +599,10 @@ MUTANTS = (
         OF_STEPS + "distances_are_relaxed_less",
     ),
     Mutant(
-        "limits that come have no rows yet",
+        "limits that come are not prepared",
         ACTUATION + "actuation.py",
-        "some |= not self._planned.numbers.constant",
-        "some |= False",
+        "for kept, _ in self._all:",
+        "for kept, _ in self._all[:1]:",
         OF_STEPS + "nothing_is_compiled",
     ),
     Mutant(
@@ -713,9 +713,23 @@ MUTANTS = (
     Mutant(
         "limits: the null space swings",
         CONTROL + "actuation/deviation_cost.py",
-        "_OF_ERROR, _MOST = 0.2, 0.1",
-        "_OF_ERROR, _MOST = 0.0, 0.1",
+        "below = _OF_ERROR * np.sqrt(square) / directions.size",
+        "below = 0.0 * np.sqrt(square) / directions.size",
         "tests/integration/test_limit_configurations.py -k swing",
+    ),
+    Mutant(
+        "limits: on contacts an error loosens levels",
+        ACTUATION + "deviation_cost.py",
+        "if directions.first > 0:",
+        "if directions.first < 0:",
+        OF_STEPS + "optimum",
+    ),
+    Mutant(
+        "limits: no speed is held against a force",
+        LIMITS + "acceleration_bounds.py",
+        "rising -= min(steady[i], 0.0)",
+        "rising -= 0.0 * steady[i]",
+        OF_LIMITS + "held_against",
     ),
     Mutant(
         "limits: no level below shares what is lost",
@@ -786,7 +800,7 @@ MUTANTS = (
         "stretch: held efforts are not observed",
         ACTUATION + "actuation.py",
         "calls = [self._held.expect(state.v, a)]",
-        "calls = self._checks.get(state, a, self._held, True)[:0]",
+        "calls = [self._held.expect(state.v, a)][:0]",
         OF_STRETCHES + "limit_binds",
     ),
     Mutant(

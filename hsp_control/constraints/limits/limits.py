@@ -72,10 +72,10 @@ class Limits(Part, error=LimitError):
     number or nv."""
     effort_rate: Maximum = "robot"
     """Maximum rate of the effort [N·m/s or N/s]: the robot's own, none, a factor,
-    numbers by joint, one number or nv. No URDF has it: the robot's own is 12 times its
-    maximum effort each second, which for a Panda's shoulder is 1000 N·m/s; so no effort
-    changes by more than 1.2 % of its maximum in a millisecond. With a floating base,
-    whose contacts change, it is 500 times."""
+    numbers by joint, one number or nv. No URDF has it: the robot's own is 11 times the
+    largest of its maximum efforts each second: for a Panda 957 N·m/s, so no effort
+    changes by more than 0.96 N·m in a millisecond. With a floating base, whose contacts
+    change, it is 500 times."""
     velocity: Maximum = "robot"
     """Maximum speed [rad/s or m/s]: the robot's own, none, a factor, numbers by joint,
     one number or nv."""

@@ -481,8 +481,18 @@ def step_results() -> dict[str, list[float]]:
     frame = at.frame("panda_tcp")
     gains = Gains(25.0, 10.0)
     tasks = (
-        FramePosition("panda_tcp", Hold(frame.position + 0.1), gains=gains),
-        FrameOrientation("panda_tcp", HoldOrientation(frame.rotation), gains=gains),
+        FramePosition(
+            "panda_tcp",
+            Hold(frame.position + 0.1),
+            gains=gains,
+            largest_error="none",
+        ),
+        FrameOrientation(
+            "panda_tcp",
+            HoldOrientation(frame.rotation),
+            gains=gains,
+            largest_error="none",
+        ),
     )
     field = TargetPosture(home, weights=3.0)
     results = {}

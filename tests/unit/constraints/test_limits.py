@@ -80,7 +80,7 @@ def test_by_default_they_are_the_robots_own() -> None:
     np.testing.assert_array_equal(limits.guarded_lower, lower + 0.005)
     np.testing.assert_array_equal(limits.guarded_upper, upper - 0.005)
     np.testing.assert_array_equal(limits.guarded_velocity, 0.98 * limits.velocity)
-    np.testing.assert_array_equal(limits.effort_rate, 12.0 * limits.effort)
+    np.testing.assert_array_equal(limits.effort_rate, np.full(7, 11.0 * 87.0))
     jerk = limits.effort_rate / robot.largest_inertias
     np.testing.assert_array_equal(limits.motion.jerk, jerk)
     assert np.isinf(limits.acceleration).all()
@@ -94,7 +94,19 @@ def test_what_no_motor_moves_has_no_limit_of_its_own() -> None:
     for each in (limits.effort, limits.velocity, -limits.lower, limits.upper):
         assert np.isinf(each[:6]).all()
         assert np.isfinite(each[6:]).any()
-    np.testing.assert_array_equal(limits.effort_rate, 100.0 * limits.effort)
+    motors = np.isfinite(limits.effort)
+    largest = limits.effort[motors].max()
+    np.testing.assert_array_equal(limits.effort_rate[motors], 500.0 * largest)
+    assert np.isinf(limits.effort_rate[~motors]).all()
+
+
+def test_the_rate_of_efforts_is_one_for_all_joints_of_a_unit() -> None:
+    limits = of(fingers())
+    sliding = np.array(fingers().units) == "m"
+    assert 0 < sliding.sum() < fingers().nv
+    np.testing.assert_array_equal(limits.effort_rate[~sliding], 11.0 * 87.0)
+    largest = limits.effort[sliding].max()
+    np.testing.assert_array_equal(limits.effort_rate[sliding], 11.0 * largest)
 
 
 def test_none_is_no_limit() -> None:
@@ -198,8 +210,8 @@ def test_kernels_take_them() -> None:
     a_lower, a_upper = np.zeros((2, 7))
     q, v = robot.home(), np.full(7, 0.1)
     motion = of(robot, acceleration=3.0).motion
-    none = np.zeros(7)
-    acceleration_bounds(q, v, robot.dof_indices, motion, none, none, a_lower, a_upper)
+    observed = np.zeros((3, 7))
+    acceleration_bounds(q, v, robot.dof_indices, motion, *observed, a_lower, a_upper)
     assert (a_upper == 3.0).all()
     assert (a_lower >= -3.0).all()
 

@@ -122,8 +122,8 @@ def test_a_floating_base_is_not_looked_at() -> None:
 
 
 FIRST_EFFORT = (
-    r"the first effort of joint 'panda_joint2' is 30\.2 N·m, but gravity asks for "
-    r"-3\.99 N·m: a jump of 39 % of its limit of 87 N·m; let tasks begin gently with "
+    r"the first effort of joint 'panda_joint2' is 21 N·m, but gravity asks for "
+    r"-3\.99 N·m: a jump of 29 % of its limit of 87 N·m; let tasks begin gently with "
     r"blend=1\.0 \(YAML blend: 1\.0\), or start on the trajectory with its velocity$"
 )
 

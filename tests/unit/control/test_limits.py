@@ -65,10 +65,15 @@ def at_home(robot: Robot, *scene: Obstacle) -> Start:
 
 
 def bounds(
-    limits: RobotLimits, q: Array, v: Array, error: float = 0.0, drift: float = 0.0
+    limits: RobotLimits,
+    q: Array,
+    v: Array,
+    error: float = 0.0,
+    drift: float = 0.0,
+    steady: float = 0.0,
 ) -> tuple[Array, Array]:
     a_lower, a_upper = np.zeros(7), np.zeros(7)
-    observed = np.full(7, error), np.full(7, drift)
+    observed = np.full(7, error), np.full(7, drift), np.full(7, steady)
     where = limits.robot.dof_indices
     acceleration_bounds(q, v, where, limits.motion, *observed, a_lower, a_upper)
     return a_lower, a_upper
@@ -109,7 +114,10 @@ def test_position_bounds_are_the_barriers_of_both_limits(seed: int) -> None:
 def test_the_drift_is_made_up_for_where_it_leads_beyond_a_limit(
     seed: int, drift: float
 ) -> None:
-    """The acceleration with the drift keeps the barrier; no bound is ever wider."""
+    """The acceleration with the drift keeps the barrier.
+
+    What has ended makes no bound wider; what is still there does, on the other side.
+    """
     robot, rng = panda(), np.random.default_rng(seed)
     limits = of(robot, velocity=None)
     lower, upper = robot.position_limits()
@@ -118,16 +126,24 @@ def test_the_drift_is_made_up_for_where_it_leads_beyond_a_limit(
     up, down = max(drift, 0.0), min(drift, 0.0)
     np.testing.assert_allclose(a_upper + up, plain[1], rtol=0, atol=1e-11)
     np.testing.assert_allclose(a_lower + down, plain[0], rtol=0, atol=1e-11)
+    a_lower, a_upper = bounds(limits, q, v, 0.0, drift, drift)
+    np.testing.assert_allclose(a_upper + drift, plain[1], rtol=0, atol=1e-11)
+    np.testing.assert_allclose(a_lower + drift, plain[0], rtol=0, atol=1e-11)
 
 
 @given(seeds, st.floats(-9.0, 9.0))
-def test_speeds_may_be_held_against_a_drift(seed: int, drift: float) -> None:
-    """The barrier of the speed is wider by what holds the robot against it."""
+def test_speeds_may_be_held_against_a_steady_force(seed: int, steady: float) -> None:
+    """The barrier of the speed is wider by what holds the robot against it.
+
+    A drift that has ended changes nothing.
+    """
     rng, limits = np.random.default_rng(seed), of(panda(), position=None)
     v = limits.guarded_velocity * rng.uniform(-0.9, 0.9, 7)
     q = panda().home()
-    plain, (a_lower, a_upper) = bounds(limits, q, v), bounds(limits, q, v, 0.0, drift)
-    up, down = max(-drift, 0.0), max(drift, 0.0)
+    plain = bounds(limits, q, v)
+    np.testing.assert_array_equal(bounds(limits, q, v, 0.0, steady), plain)
+    a_lower, a_upper = bounds(limits, q, v, 0.0, steady, steady)
+    up, down = max(-steady, 0.0), max(steady, 0.0)
     np.testing.assert_allclose(a_upper - up, plain[1], rtol=0, atol=1e-11)
     np.testing.assert_allclose(a_lower + down, plain[0], rtol=0, atol=1e-11)
 
@@ -368,15 +384,21 @@ def test_the_error_of_the_acceleration_is_what_is_observed() -> None:
     # The mean over 0.1 s, of an error that has lasted as long.
     mean = [3.0 * (1.0 - np.exp(-1.0)), 0.0]
     np.testing.assert_allclose(held.drift, mean, rtol=1e-9, atol=1e-9)
+    np.testing.assert_array_equal(held.steady, held.drift)
     held.sent(0.1, v, a, 0.02)  # a longer period counts alone
     held.observe(0.12, v + 0.02 * (a - 8.0))
     np.testing.assert_allclose(held.error, [8.0, 8.0], rtol=1e-9)
-    memory, drift = held.memory(), held.drift.copy()
+    # The first one's mean still has the old sign: nothing of it is there any more.
+    assert held.drift[0] > 0.0
+    np.testing.assert_array_equal(held.steady, [0.0, held.drift[1]])
+    memory, drift, steady = held.memory(), held.drift.copy(), held.steady.copy()
     held.forget()
     assert not held.error.any()
     assert not held.drift.any()
+    assert not held.steady.any()
     held.remember(memory)
     np.testing.assert_array_equal(held.drift, drift)
+    np.testing.assert_array_equal(held.steady, steady)
     np.testing.assert_allclose(held.error, [8.0, 8.0], rtol=1e-9)
 
 
