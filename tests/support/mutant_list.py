@@ -599,11 +599,11 @@ MUTANTS = (
         OF_STEPS + "distances_are_relaxed_less",
     ),
     Mutant(
-        "limits that come are not prepared",
+        "limits on efforts have no rows",
         ACTUATION + "actuation.py",
-        "for kept, _ in self._all:",
-        "for kept, _ in self._all[:1]:",
-        OF_STEPS + "nothing_is_compiled",
+        "some = np.isfinite(limits.effort) | np.isfinite(limits.effort_rate)",
+        "some = np.isnan(limits.effort)",
+        OF_STEPS + "optimum",
     ),
     Mutant(
         "deviation: null space as dear as the task",
@@ -801,7 +801,7 @@ MUTANTS = (
         ACTUATION + "actuation.py",
         "calls = [self._held.expect(state.v, a)]",
         "calls = [self._held.expect(state.v, a)][:0]",
-        OF_STRETCHES + "limit_binds",
+        OF_STRETCHES + "teaches",
     ),
     Mutant(
         "stretch: states between rows are not seen",
