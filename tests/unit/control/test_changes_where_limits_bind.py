@@ -1,4 +1,4 @@
-"""Changes at states where limits bind: efforts are continuous in time, to some 1e-6 N·m."""
+"""Changes at states where limits bind: efforts are continuous, to some 1e-6 N·m."""
 
 from collections.abc import Callable
 from functools import cache
