@@ -437,7 +437,7 @@ class SecondOrderTask(Task):
         """Return the task with its largest errors in numbers; see `Task.checked`.
 
         Raises:
-            TaskError: If there are as many of them as the error has no parts.
+            TaskError: If there is neither one number nor one for each part.
         """
         with within("largest_error"):
             largest = largest_errors(self.largest_error, self.error_parts, robot)
