@@ -20,6 +20,7 @@ from hsp_control.null_space.fields import FieldSample, FieldSum, NullSpaceField
 from hsp_control.null_space.metrics import Metric
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import Task, TaskSample
+from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.task import Feedback, InForce, write_asked
 from hsp_control.trajectories.streams.stream import Streamed
 
@@ -127,7 +128,10 @@ class ActiveStack:
             self._parts.append((each.task, sample))
             in_force = feedback[each.key]
             plans.append(partial(each.task.compile_in_force, state, in_force, sample))
-            asked = self.resolution.problem.asked[row : row + each.task.rows]
+            here = slice(row, row + each.task.rows)
+            asked = self.resolution.problem.asked[here]
+            spring = impedance_of(each.task) is not None
+            self.resolution.problem.springs[here] = spring
             if len(in_force.feedback.largest):
                 self.bounds.append((each.task.name, row, in_force.feedback.largest))
                 # Who is about to fall needs the balance whatever it costs.

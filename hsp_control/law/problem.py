@@ -66,6 +66,8 @@ class Problem:
         gain: K_N, shape (nv, nv) [1/s].
         asked: Kp s(e), what the feedback asks for at rest in the coordinates of e,
             shape (m,); zero in rows without one, such as those of contacts.
+        springs: Whether a row is that of a spring, shape (m,). The law itself treats
+            all rows alike; where limits bind, a spring yields as a body would.
     """
 
     def __init__(self, rows: int, nv: int, gain: Array) -> None:
@@ -82,3 +84,4 @@ class Problem:
         self.metric = MetricSample.allocate(nv)
         self.gain = gain
         self.asked = np.zeros(rows)
+        self.springs = np.zeros(rows, dtype=np.bool_)

@@ -49,7 +49,8 @@ def level_costs(resolution: Resolution, supported: bool, size: float) -> Array:
 
     What is below a level costs a part of the level's error over the robot's size, but
     no more than a tenth and no less than priorities need; on contacts the least,
-    whatever the error. Contacts cost as much as the level below them.
+    whatever the error. Contacts cost as much as the level below them, and so do springs
+    where there are none.
     """
     count = len(resolution.ends) - supported
     least = 1e-6 if count <= 1 else 1e-8 ** (1.0 / count)
@@ -58,7 +59,9 @@ def level_costs(resolution: Resolution, supported: bool, size: float) -> Array:
         error = np.linalg.norm(resolution.problem.task.error[start:end])
         below = 0.0 if supported else _OF_ERROR * error / size
         below = np.clip(below, least, 0.1)
-        costs.append(costs[-1] * (1.0 if supported and k == 0 else below))
+        springs = resolution.problem.springs[start:end].all() and not supported
+        equal = springs or (supported and k == 0)
+        costs.append(costs[-1] * (1.0 if equal else below))
         start = end
     return np.array(costs)
 

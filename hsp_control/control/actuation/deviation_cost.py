@@ -47,6 +47,11 @@ class Directions(NamedTuple):
     the null space as far as limits permit for the last bit of it, from one bound of the
     efforts to the other between two periods.
 
+    Springs do not come first: what is below a level of springs costs as much as it
+    does. Over the mass matrix, their metric, the deviation is then what Gauss's
+    principle of least constraint gives: joints that limits hold get the reaction of
+    mechanical stops, which does no work, and a spring feeds no oscillation.
+
     With P_k what the law leaves to the levels below k, P_0 = 1, a level has the share
     P_{k-1} - P_k of all motions, and the null space what remains, P_K. Their costs are
     ρ_k = ρ_N^t_k, t_1 = 0 to t_N = 1, and that of all is
@@ -63,6 +68,7 @@ class Directions(NamedTuple):
         form: The metric's form.
         ends: Where each level's rows end in the stack.
         error: Error e of all tasks, shape (m,).
+        springs: Whether a row is that of a spring, shape (m,).
         size: The robot's size [m].
         first: The first level that may deviate: 1 below contacts, else 0.
         least: Least cost of a level relative to the one above it.
@@ -87,6 +93,7 @@ class Directions(NamedTuple):
     form: int
     ends: Indices
     error: Array
+    springs: Array
     size: float
     first: int
     least: float
@@ -125,6 +132,7 @@ class Directions(NamedTuple):
             resolution.form,
             resolution.ends,
             resolution.problem.task.error,
+            resolution.problem.springs,
             size,
             int(supported),
             whole ** (1.0 / max(levels, 1)),
@@ -148,25 +156,27 @@ class Directions(NamedTuple):
 def _write_costs(directions: Directions) -> None:
     """Write t and 1/√ρ of each level and of the null space."""
     ends, costs, e = directions.ends, directions.costs, directions.error
-    last = costs.shape[1] - 1
+    last, standing = costs.shape[1] - 1, directions.first > 0
     start, exponent = 0, 0.0
     for k in range(last):
         costs[0, k] = exponent
-        if k >= directions.first:
-            square = 0.0
-            for r in range(start, ends[k]):
-                square += e[r] * e[r]
-            below = _OF_ERROR * np.sqrt(square) / directions.size
-            if directions.first > 0:  # whoever stands keeps the balance at any cost
-                below = 0.0
+        square, springs = 0.0, True
+        for r in range(start, ends[k]):
+            square += e[r] * e[r]
+            springs = springs and directions.springs[r]
+        below = _OF_ERROR * np.sqrt(square) / directions.size
+        if standing:  # whoever stands keeps the balance at any cost
+            below = 0.0
+        if k >= directions.first and (standing or not springs):
             exponent += np.log(min(max(below, directions.least), _MOST))
         start = ends[k]
-    if exponent == 0.0:  # nothing but contacts: the null space costs as little
+    if last <= directions.first:  # nothing but contacts: the null space is cheap
         exponent = np.log(directions.least)
     costs[0, last] = exponent
     for k in range(last + 1):
         costs[1, k] = np.exp(-0.5 * costs[0, k])
-        costs[0, k] /= exponent
+        if exponent < 0.0:
+            costs[0, k] /= exponent
 
 
 @kernel
