@@ -551,7 +551,7 @@ def test_a_warning_is_read(page: Any) -> None:
         message=words,
         level="warning",
     )
-    status = page.locator(".play-status")
+    status = page.locator(".play-status.message")
     assert status.inner_text() == words
     assert "warning" in status.get_attribute("class")
     assert page.locator(".play-bar .rate").inner_text().startswith("0.50 ×")
