@@ -36,6 +36,7 @@ from hsp_control.robot import Robot
 from hsp_control.robot.description.sources import example_robots
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.recorder import Recorder
+from hsp_control.simulation.unreached import FAR, OUT, unreached
 
 if TYPE_CHECKING:
     from hsp_control.cli.screen import Screen
@@ -334,7 +335,9 @@ def _summary(rollout: Rollout) -> Table:
     table.add_row(
         "run", f"{len(rollout)} rows to t = {rollout.t[-1]:g} s, {rollout.status}"
     )
-    for task in rollout.meta["tasks"]:
+    tasks = rollout.meta["tasks"]
+    away = {each.task: each for each in unreached(rollout.columns, tasks)}
+    for task in tasks:
         error = np.linalg.norm(rollout[f"task.{task}.error"], axis=1)
         tracked = error[np.isfinite(error)]  # a task may be off for a while
         if not len(tracked):
@@ -342,13 +345,12 @@ def _summary(rollout: Rollout) -> Table:
             continue
         rms, last = float(np.sqrt(np.mean(tracked**2))), tracked[-1]
         table.add_row(f"task {task}", f"|e| rms {rms:.3g}, at the end {last:.3g}")
-        name = f"task.{task}.bounded"  # logs of earlier versions have none
-        away = rollout[name] if name in rollout else np.zeros(1)
-        if rows := int((away > 0.0).sum()):
-            text = f"{rows} rows: its target was too far to count in full"
-            if away[-1] > 0.0:
-                text += f", at the end {away[-1]:.3g} away"
-            table.add_row("", text)
+        for words, rows in ((FAR, away[task].far), (OUT, away[task].out > 0.0)):
+            if count := int(rows.sum()):
+                text = f"{count} rows: {words}"
+                if words == OUT and rows[-1]:
+                    text += f", {away[task].length(-1)} at the end"
+                table.add_row("", text)
     norm = rollout["null_space_norm"]
     table.add_row(
         "null space", f"|e_N| {norm[0]:.3g} at the start, {norm[-1]:.3g} at the end"

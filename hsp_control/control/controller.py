@@ -26,7 +26,7 @@ from hsp_control.control.changes import Change, Changes
 from hsp_control.control.composition import Base, priority_of
 from hsp_control.control.declared import Declared
 from hsp_control.control.explanation import flow_of, raise_not_finite
-from hsp_control.control.first_state import check_angles
+from hsp_control.control.first_state import check_angles, warn_of_jump
 from hsp_control.control.gains_in_force import GainsInForce
 from hsp_control.control.held_gains import check_held
 from hsp_control.control.mixture import AccelerationModifier, Mixture
@@ -370,7 +370,8 @@ class Controller:
 
         It counts for the limit on the effort's rate, and for the margin of speed
         limits, which covers what the robot does while the effort is held. Without
-        limits it has no effect.
+        limits it has no effect. The first one, also after `restart`, is warned of
+        (`StartWarning`) where a robot at rest would jump; see `first_state`.
 
         Args:
             tau: Effort, shape (nv,) [N·m or N].
@@ -393,6 +394,8 @@ class Controller:
             raise NonFiniteError(f"period is {period}; needs a finite number")
         if not period > 0.0:
             raise ControllerError(f"period is {period} s; must be positive")
+        if not self._actuation.period:
+            warn_of_jump(self._declared.robot, self._state.q, self._state.v, tau)
         self._actuation.applied(self._state, tau, period)
         if self._gains.stiffening:
             self._gains.wait(self.active_stack, self._state.t, period)

@@ -16,6 +16,10 @@ JUMP = 0.1
 """Of a joint's effort limit: by more than this the first effort should not jump."""
 
 
+REST = 0.05
+"""A robot whose joints are all slower rests, but for noise [rad/s or m/s]."""
+
+
 class StartWarning(UserWarning):
     """A robot at rest would begin to move with a jump of an effort."""
 
@@ -59,9 +63,10 @@ def warn_of_jump(robot: Robot, q: Array, v: Array, tau: Array) -> None:
         v: Velocity of the start, shape (nv,).
         tau: The first effort, shape (nv,) [N·m or N].
     """
-    if robot.unactuated or v.any():
+    if robot.unactuated or (np.abs(v) > REST).any():
         return
-    gravity = robot.inverse_dynamics(q, v, np.zeros(robot.nv))
+    rest = np.zeros(robot.nv)
+    gravity = robot.inverse_dynamics(q, rest, rest)
     limit = np.where(robot.model.effortLimit > 0.0, robot.model.effortLimit, np.inf)
     share = np.abs(tau - gravity) / limit
     j = int(share.argmax())

@@ -15,6 +15,7 @@ from hsp_control.null_space.fields.weight import sample_weight
 from hsp_control.play.handles import Handles
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.log_distances import distance_label
+from hsp_control.simulation.unreached import unreached
 from hsp_control.visualization.palette import SERIES
 from hsp_control.visualization.viewer import Viewer
 from hsp_control.visualization.viewer.appearance import CHALK, INK
@@ -147,6 +148,8 @@ class Picture:
         """Draw the scene anew: the session has begun anew."""
         session, viewer = self._session, self._viewer
         self._sent = 0
+        self._moved: dict[str, float] = {}
+        self._away = ""
         self._meta = session.meta
         self._field, self._acting = session.controller.field, self._acting_terms()
         motion = self._motion()
@@ -195,7 +198,7 @@ class Picture:
     def frame(self, *, running: bool, rate: float) -> list[Command]:
         """Return the commands of a picture; see `draw`."""
         session, handles = self._session, self._session.handles
-        changed = list(self._changed_field())
+        changed, samples = list(self._changed_field()), list(self._samples())
         tracks = [
             {
                 "path": track.path,
@@ -213,11 +216,11 @@ class Picture:
             play_command(
                 "play_state", "state", t=session.t, running=running, rate=rate,
                 message=text, level="warning" if handles.warning or session.over
-                else "info",
+                else "info", away=self._away,
             ),
             play_command("play_values", "values", values=handles.settings),
             self._force(),
-            *self._samples(),
+            *samples,
         ]  # fmt: skip
 
     def _acting_terms(self) -> tuple[NullSpaceField, ...]:
@@ -305,6 +308,8 @@ class Picture:
         if recorder.count <= self._sent:
             return
         rows, self._sent = recorder.rows(self._sent), recorder.count
+        away = unreached(rows, self._meta["tasks"], self._moved)
+        self._away = "\n".join(filter(None, (task.words(-1) for task in away)))
         times = rows["t"]
         self._batch += 1
         values = np.column_stack(

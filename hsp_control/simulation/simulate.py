@@ -164,7 +164,7 @@ def simulate(
     status, message = "completed", ""
     try:
         for row, (state, output, tau, own_channels) in enumerate(loop):
-            if row == 0:
+            if row == 0 and not periods:  # else `applied` has told
                 warn_of_jump(robot, q, v, tau)
             plant_channels = plant.log_channels(state.t, state.q, state.v, tau)
             recorder.record(state, output, tau, {**own_channels, **plant_channels})

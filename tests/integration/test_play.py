@@ -394,6 +394,36 @@ def test_the_picture_follows_what_is_dragged(session: Session) -> None:
     assert recorder.paths("/influence")
 
 
+def test_a_target_out_of_reach_is_said_and_by_how_much(still: Session) -> None:
+    """Half a metre too high; within reach again nothing is said."""
+    recorder = Recorder()
+    picture = Picture(still, Viewer(still.experiment.robot, transport=recorder))
+
+    def said() -> str:
+        picture.draw(running=True, rate=1.0)
+        state = recorder.command("/play", "state")
+        assert state is not None
+        return str(state["away"])
+
+    wanted = pose_of(still)
+    assert said() == ""
+    wanted[2] += 1.0
+    still.take({"do": "move", "target": "hand", "pose": wanted.tolist()})
+    told = []
+    for _ in range(130):
+        go(still, 0.03)
+        told.append(said())
+    away = np.linalg.norm(still.rollout()["task.hand.error"][-1, :3])
+    assert list(dict.fromkeys(told)) == [
+        "",
+        "hand: target far away",
+        f"hand: target out of reach, {away:.2f} m",
+    ]
+    still.take({"do": "resume", "target": "hand"})
+    go(still, 3.0)
+    assert said() == ""
+
+
 def test_the_loop_does_what_the_page_says_about_time(session: Session) -> None:
     viewer = Viewer(session.experiment.robot, transport=Recorder())
     said: list[list[dict[str, Any]]] = [

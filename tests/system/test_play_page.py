@@ -551,10 +551,29 @@ def test_a_warning_is_read(page: Any) -> None:
         message=words,
         level="warning",
     )
-    status = page.locator(".play-status")
+    status = page.locator(".play-status.message")
     assert status.inner_text() == words
     assert "warning" in status.get_attribute("class")
     assert page.locator(".play-bar .rate").inner_text().startswith("0.50 ×")
+
+
+def test_a_target_out_of_reach_is_read_beside_a_message(page: Any) -> None:
+    state = {"t": 2.0, "running": True, "rate": 1.0, "level": "info"}
+    words = ["hand: target out of reach, 0.31 m", "elbow: target far away"]
+    tell(page, "play_state", message="saved", away="\n".join(words), **state)
+    away, status = (
+        page.locator(f".play-status.{name}") for name in ("away", "message")
+    )
+    assert away.inner_text().split("\n") == words
+    upper, lower = away.bounding_box(), status.bounding_box()
+    assert upper["y"] + upper["height"] < lower["y"]
+    page.keyboard.press("p")  # also while presenting, when the bar has gone
+    page.wait_for_selector("body.presenting.resting", state="attached")
+    until(page, "getComputedStyle(document.querySelector('.message')).opacity === '0'")
+    assert away.is_visible()
+    page.keyboard.press("p")
+    tell(page, "play_state", message="", away="", **state)
+    assert away.is_hidden()
 
 
 def test_it_fits_a_phone(chromium: Any, viewer: Viewer) -> None:

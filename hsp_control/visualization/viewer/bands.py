@@ -12,11 +12,14 @@ from hsp_control.null_space.fields import Clearance, NullSpaceField, SelfClearan
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.limit_excess import POSITION, VELOCITY
 from hsp_control.simulation.term_columns import logged_terms
+from hsp_control.simulation.unreached import FAR, OUT, Unreached, unreached
 from hsp_control.visualization import palette
 from hsp_control.visualization.viewer.controller_analysis import from_the_start
 
 CLOSED_SHARE = 1 / 200
 """Gaps up to this share of the whole run are closed: nobody would see them."""
+_SAME = 0.9
+"""Distances of which the smallest is this share of the largest are told as one."""
 _LIMITED = 2  # the log's status from which on a limit changes the motion
 
 
@@ -91,12 +94,10 @@ def _activities(
             beyond |= (rollout[name] > 0.0).any(axis=1)
     words = "beyond a limit"
     yield Band(words, f"a joint is {words}", palette.MUTED, []), beyond
-    far = np.zeros(len(rollout), bool)
-    for task in rollout.meta.get("tasks", ()):
-        if (name := f"task.{task}.bounded") in rollout:
-            far |= rollout[name] > 0.0
-    words = "too far to count in full"
-    yield Band("target far away", f"a target is {words}", palette.SERIES[2], []), far
+    for task in unreached(rollout.columns, rollout.meta.get("tasks", {})):
+        name = f"{task.task}: {FAR}"
+        yield Band(name, name, palette.SERIES[2], []), task.far
+        yield _out_of_reach(task), task.out > 0.0
     if "damped" in rollout:
         words = "bounded at a singularity"
         singular = Band(words, f"the law is {words}", palette.WARNING, [])
@@ -113,6 +114,14 @@ def _activities(
     yield Band(words, f"a link is {words}", palette.OBSTACLE, []), obstacle
     words = "links near each other"
     yield Band(words, words, palette.SERIES[4], []), itself
+
+
+def _out_of_reach(task: Unreached) -> Band:
+    """Return the band of a target out of reach; it tells the largest distance."""
+    name, away = f"{task.task}: {OUT}", task.out[task.out > 0.0]
+    varies = away.min(initial=np.inf) < _SAME * away.max(initial=0.0)
+    length = ("up to " if varies else "") + task.length(int(task.out.argmax()))
+    return Band(name, f"{name}, {length}", palette.SERIES[0], [])
 
 
 def _fields(controller: Controller | None) -> dict[str, NullSpaceField]:

@@ -3,6 +3,7 @@
 import _thread
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -113,6 +114,23 @@ def test_what_a_run_lacks_is_null_and_not_nan(
     text = capsys.readouterr().out
     assert "NaN" not in text
     assert json.loads(text)["tracking.tip.rms"] is None
+
+
+def test_the_summary_tells_of_a_target_out_of_reach(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A planar arm of 3 m, and a target in 4 m."""
+    config = tmp_path / "far.yaml"
+    config.write_text(
+        "robot: {name: planar3r}\n"
+        "start: {joints: {joint1: 0.1, joint2: 0.4, joint3: 0.4}}\n"
+        "tasks: {tip: {type: frame_position, axes: xy, trajectory: "
+        "{type: hold, point: [4, 0]}}}\n"
+        "simulation: {duration: 4, control_period: 0.002}\n"
+    )
+    assert main(["run", str(config), "--out", str(tmp_path), "--no-view"]) == 0
+    told = capsys.readouterr().out
+    assert re.search(r"\d+ rows: target out of reach, 1\.\d\d m at the end", told)
 
 
 @pytest.mark.slow

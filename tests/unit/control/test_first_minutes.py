@@ -33,6 +33,7 @@ from hsp_control.control.first_state import (
     check_angles,
     warn_of_jump,
 )
+from hsp_control.control.first_state import REST as REST_SPEED
 
 REST = np.zeros(7)
 
@@ -137,11 +138,33 @@ def test_a_simulation_warns_of_its_first_effort(period: float | None) -> None:
         hand = FramePose("panda_tcp", circle, blend=blend)
         return Controller(panda(), [hand], JointCentering())
 
-    with pytest.warns(StartWarning, match="^" + FIRST_EFFORT):
+    with pytest.warns(StartWarning, match="^" + FIRST_EFFORT) as said:
         simulate(law(None), panda().home(), **how)
+    assert len(said) == 1
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         simulate(law(1.0), panda().home(), **how)
+
+
+def test_a_loop_of_ones_own_is_told_once_when_it_sends() -> None:
+    """What is only computed moves nothing; a restart is another start."""
+    circle = Circle(radius=0.1, angular_rate=2.0)
+    hand = FramePose("panda_tcp", circle)
+    law = Controller(panda(), [hand], JointCentering(), limits=None)
+    noise = np.full(7, 0.9 * REST_SPEED)
+
+    def send(v: np.ndarray) -> None:
+        law.applied(law.compute(0.0, panda().home(), v).tau, 0.001)
+
+    for _ in range(2):
+        with pytest.warns(StartWarning, match="^the first effort of joint") as said:
+            send(noise)
+        assert [each.filename for each in said] == [__file__]
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            send(noise)
+            law.restart()
+            law.compute(0.0, panda().home(), REST)
 
 
 @pytest.mark.parametrize("command", ["check", "run"])

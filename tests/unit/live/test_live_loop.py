@@ -1,6 +1,7 @@
 """The live loop's logic: robots in this process, clocks that nobody waits for."""
 
 import re
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -37,6 +38,7 @@ from hsp_control.common.exceptions import HardwareError, HspControlError, LiveEr
 from hsp_control.constraints.limits import PositionRange
 from hsp_control.control.changes import Changes
 from hsp_control.control.compensation import Command
+from hsp_control.control.first_state import StartWarning
 from hsp_control.live import (
     Hardware,
     LiveSettings,
@@ -140,6 +142,19 @@ def test_the_controller_receives_the_applied_effort() -> None:
     np.testing.assert_allclose(applied[0], sent[0] + gravity(start()), atol=1e-9)
     # And the rate binds at first: the law wants to start at once.
     assert np.abs(sent[0]).max() == pytest.approx(50.0 * PERIOD)
+
+
+def test_a_first_effort_that_jumps_is_warned_of_before_it_is_sent() -> None:
+    rig, sent = Rig(), []
+
+    def show(*_: Any, **__: Any) -> None:
+        sent.append(len(rig.sent))
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", StartWarning)
+        warnings.showwarning = show
+        run_loop(law(gains=Gains(natural_frequency=20.0)), rig, duration=0.01)
+    assert sent[0] == 0
 
 
 def test_a_stream_that_falls_silent_stops_the_robot_safely() -> None:

@@ -79,6 +79,31 @@ def test_bands_are_the_logs_columns(obstacle: tuple[Experiment, Rollout]) -> Non
     assert [band.name for band in bands_of(run, None)] == ["limit active"]
 
 
+def test_a_target_out_of_reach_is_told_with_its_distance(
+    obstacle: tuple[Experiment, Rollout],
+) -> None:
+    """Once it has rested for 0.3 s; before, it is far away."""
+    _, run = obstacle
+    error, n = np.zeros_like(run["task.hand.error"]), len(run)
+    error[:, 0] = 0.31
+    away = {
+        "damped": np.ones(n),
+        "task.hand.error": error,
+        "task.hand.error_rate": np.zeros_like(error),
+        "task.hand.bounded": np.full(n, 0.31),
+    }
+    far, out, _ = bands_of(altered(run, **away), None)
+    assert (far.name, far.caption) == ("hand: target far away",) * 2
+    assert out.name == "hand: target out of reach"
+    assert out.caption == "hand: target out of reach, 0.31 m"
+    ((start, there),), ((also, end),) = far.spans, out.spans
+    assert (start, end) == (run.t[0], run.t[-1])
+    assert there == also == pytest.approx(0.3, abs=0.011)
+    error[40:, 0] = 0.2
+    _, out, _ = bands_of(altered(run, **away), None)
+    assert out.caption == "hand: target out of reach, up to 0.31 m"
+
+
 def test_chattering_is_one_band(obstacle: tuple[Experiment, Rollout]) -> None:
     _, run = obstacle
     damped = np.arange(len(run)) % 2.0

@@ -52,7 +52,7 @@ class Play {
     this.mine = true;
     this.holdKey = null;
     this.taken = false;
-    this.state = {t: 0, running: true, rate: 1, message: "", level: "info"};
+    this.state = {t: 0, running: true, rate: 1, message: "", level: "info", away: ""};
     this.setup = this.selected = this.force = this.pull = null;
   }
 
@@ -291,8 +291,8 @@ const play = new Play(viewer);
 Object.assign(commandHandlers, {
   play_setup(command) { play.setUp(command); },
   play_targets(command) { if (play.ready) play.showTargets(command); },
-  play_state({t, running, rate, message, level}) {
-    play.showState({t, running, rate, message, level});
+  play_state({t, running, rate, message, level, away}) {
+    play.showState({t, running, rate, message, level, away});
   },
   play_values({values}) { if (play.ready) play.panel.setValues(values); },
   play_force(command) { play.force = command.visible ? command : null; },

@@ -1,5 +1,5 @@
-// The bar below the scene: pause, step, reset, save, the time and the rate; above it the
-// status line, or who steers the robot.
+// The bar below the scene: pause, step, reset, save, the time and the rate; above it which
+// targets are out of reach, the status line, and who steers the robot.
 "use strict";
 
 class PlayBar {
@@ -24,7 +24,8 @@ class PlayBar {
         <svg viewBox="0 0 24 24" aria-hidden="true"><path fill-rule="evenodd"
           d="${PlayBar.ICONS[name] ?? PlayBar.ICONS.pause}"/></svg></button>`;
     this.box.innerHTML = `
-      <div class="play-status" role="status" hidden></div>
+      <div class="play-status away" role="status" hidden></div>
+      <div class="play-status message" role="status" hidden></div>
       <div class="play-watching" hidden><span></span>
         <button type="button">Take over</button></div>
       <div class="play-bar" role="toolbar" aria-label="Simulation">
@@ -38,8 +39,8 @@ class PlayBar {
     parent.append(this.box);
     presentation.addButton(this.box.querySelector(".play-bar"));
     const part = (selector) => this.box.querySelector(selector);
-    [this.status, this.watching, this.clock, this.rate, this.toggle, this.panel] =
-      [".play-status", ".play-watching", ".clock", ".rate", ".toggle", ".panel"].map(part);
+    [this.away, this.status, this.watching, this.clock, this.rate, this.toggle, this.panel] =
+      [".away", ".message", ".play-watching", ".clock", ".rate", ".toggle", ".panel"].map(part);
     this.row = part(".play-bar");
     this.acting = ["toggle", "step", "reset", "save", "stop"].map((name) => part(`.${name}`));
     this.toggle.onclick = () => play.toggle();
@@ -52,7 +53,7 @@ class PlayBar {
     });
   }
 
-  showState({t, running, rate, message, level}) {
+  showState({t, running, rate, message, level, away}) {
     this.clock.textContent = `${t.toFixed(2)} s`;
     this.rate.innerHTML = running
       ? `${Number(rate).toFixed(2)} ×<span> real time</span>`
@@ -63,9 +64,14 @@ class PlayBar {
       this.toggle.title = `${label} (space)`;
       this.toggle.querySelector("path").setAttribute("d", PlayBar.ICONS[running ? "pause" : "go"]);
     }
-    this.status.hidden = !message;
-    if (this.status.textContent !== (message ?? "")) this.status.textContent = message ?? "";
+    PlayBar.say(this.status, message);
+    PlayBar.say(this.away, away);
     this.status.classList.toggle("warning", level === "warning");
+  }
+
+  static say(line, text) {
+    line.hidden = !text;
+    if (line.textContent !== (text ?? "")) line.textContent = text ?? "";
   }
 
   showDrive(mine, taken) {

@@ -1,0 +1,98 @@
+"""Which rows of a log tell that a target is far away, or out of reach."""
+
+from typing import Any
+
+import numpy as np
+
+from hsp_control.simulation.unreached import (
+    REACHED,
+    RESTING,
+    STAYS,
+    Unreached,
+    unreached,
+)
+
+HAND = {
+    "hand": {"error": [["position", "m", "m/s", 3], ["orientation", "rad", "rad/s", 3]]}
+}
+T = np.linspace(0.0, 1.0, 101)
+STAY = round(STAYS / 0.01)
+
+
+def log(**changes: Any) -> dict[str, Any]:
+    """Rows in which a hand rests 0.31 m from its target, damped."""
+    error = np.tile([0.31, 0.0, 0.0, 0.0, 0.2, 0.0], (len(T), 1))
+    return {
+        "t": T,
+        "damped": np.ones(len(T)),
+        "status": np.zeros(len(T)),
+        "task.hand.error": error,
+        "task.hand.error_rate": np.zeros((len(T), 6)),
+        "task.hand.bounded": np.zeros(len(T)),
+    } | {name.replace("__", "."): value for name, value in changes.items()}
+
+
+def found(columns: dict[str, Any]) -> Unreached:
+    (only,) = unreached(columns, HAND)
+    return only
+
+
+def test_an_error_that_stays_is_out_of_reach() -> None:
+    """From when it has rested so long: a step begins at rest, too."""
+    task = found(log())
+    assert not task.out[:STAY].any()
+    assert (task.out[STAY + 1 :] == 0.31).all()
+    assert task.words(0) == ""
+    assert task.words(-1) == "hand: target out of reach, 0.31 m"
+
+
+def test_a_limit_is_a_reason_and_friction_is_none() -> None:
+    exact = log(damped=np.zeros(len(T)))
+    assert not found(exact).out.any()
+    limited = log(damped=np.zeros(len(T)), status=np.full(len(T), 2.0))
+    assert found(limited).out.any()
+
+
+def test_what_moves_is_on_its_way() -> None:
+    rate = np.full((len(T), 6), RESTING * 0.31)
+    bounded = np.where(T > 0.5, 0.4, 0.0)
+    far = found(log(task__hand__error_rate=rate, task__hand__bounded=bounded))
+    assert not far.out.any()
+    assert far.words(0) == ""
+    assert far.words(-1) == "hand: target far away"
+    pushed = np.zeros((len(T), 6))
+    pushed[50] = 1.0  # it has to rest again
+    out = found(log(task__hand__error_rate=pushed)).out
+    assert out[49] == out[-1] == 0.31
+    assert not out[50 : 50 + STAY].any()
+
+
+def test_far_away_and_out_of_reach_are_not_both_said() -> None:
+    task = found(log(task__hand__bounded=np.full(len(T), 0.31)))
+    assert not (task.far & (task.out > 0.0)).any()
+    assert (task.far | (task.out > 0.0)).all()
+
+
+def test_an_orientation_alone_is_told_in_its_unit() -> None:
+    error = np.zeros((len(T), 6))
+    error[:, 4], error[:, 0] = 0.2, 0.9 * REACHED
+    task = found(log(task__hand__error=error))
+    assert task.words(-1) == "hand: target out of reach, 0.20 rad"
+
+
+def test_rows_in_parts_tell_the_same() -> None:
+    moved: dict[str, float] = {}
+    columns = log()
+    for k in range(0, len(T), 10):
+        rows = {name: values[k : k + 10] for name, values in columns.items()}
+        (task,) = unreached(rows, HAND, moved)
+    assert task.words(-1) == "hand: target out of reach, 0.31 m"
+    assert moved == {"hand position": 0.0, "hand orientation": 0.0}
+
+
+def test_a_task_that_is_off_and_an_old_log_say_nothing() -> None:
+    columns = log(task__hand__error=np.full((len(T), 6), np.nan))
+    for name in ("damped", "status", "task.hand.bounded"):
+        del columns[name]
+    assert found(columns).words(-1) == ""
+    assert list(unreached({"t": T}, HAND)) == []
