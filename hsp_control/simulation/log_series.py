@@ -2,13 +2,13 @@
 
 import re
 from collections.abc import Sequence
+from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.simulation import Rollout
-from hsp_control.simulation.log_meta import drawn_columns
 
 _EFFORT_UNITS = {"rad": "N·m", "m": "N"}
 
@@ -77,7 +77,10 @@ def drawn_parts(rollout: Rollout, name: str) -> dict[str, slice]:
     ``direction``, a unit vector.
     """
     about = rollout.meta["tasks"][name]
-    return drawn_columns(about.get("drawn", ()), about.get("axes"))
+    drawn, axes = about.get("drawn", ()), about.get("axes")
+    widths = {"position": len(axes or "xyz"), "orientation": 4, "direction": 3}
+    ends = list(accumulate((widths[part] for part in drawn), initial=0))
+    return {part: slice(*ends[k : k + 2]) for k, part in enumerate(drawn)}
 
 
 def task_path(rollout: Rollout, name: str) -> TaskPath | None:
