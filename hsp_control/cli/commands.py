@@ -210,14 +210,6 @@ def sweep(options: argparse.Namespace) -> int:
 
 
 @warnings_printed()
-def bench(options: argparse.Namespace) -> int:
-    """Measure the latency of a real-time loop."""
-    from hsp_control.cli import bench as benches
-
-    return benches.bench(options)
-
-
-@warnings_printed()
 def live(options: argparse.Namespace) -> int:
     """Control a simulated robot in another process in real time."""
     from hsp_control.cli import live as lives
