@@ -135,15 +135,12 @@ def joint_positions(rollout: Rollout, *, absolute: bool = True) -> tuple[Array, 
 
 def position_units(rollout: Rollout) -> list[str]:
     """Return the unit of each dof's position: ``rad`` or ``m``."""
-    about = rollout.meta["robot"]
-    units, count = list(map(str, about["units"])), len(about["dofs"])
-    # A log from elsewhere may contradict itself.
-    return units if len(units) == count else [", ".join(dict.fromkeys(units))] * count
+    return list(map(str, rollout.meta["robot"]["units"]))
 
 
 def position_unit(rollout: Rollout) -> str:
     """Return the unit of all joints' positions: ``rad``, ``m`` or ``rad, m``."""
-    return ", ".join(dict.fromkeys(map(str, rollout.meta["robot"]["units"])))
+    return ", ".join(dict.fromkeys(position_units(rollout)))
 
 
 def null_space_unit(rollout: Rollout) -> str:
