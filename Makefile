@@ -131,9 +131,6 @@ links: $(STAMP) ## ask every other site that the documents link to (needs a netw
 figures: $(STAMP) ## draw the documents' figures anew, into docs/figures
 	@$(BIN)/python docs/make_figures.py
 
-screenshots: $(STAMP) ## photograph the page of every configuration, into out/screenshots
-	@HSP_THOROUGH=1 $(BIN)/python -m pytest tests/system/test_browser.py -k picture
-
 animations: $(STAMP) ## film the README's animations anew, into docs/figures (needs Chromium)
 	@$(BIN)/python docs/make_animations.py
 	@$(BIN)/python docs/make_play_picture.py
@@ -161,7 +158,7 @@ clean: ## remove caches, builds and the demo's output; .venv stays
 	@rm -rf build dist machine_code docs/_build docs/_static/replays docs/reference/generated out/demo .coverage .*_cache .hypothesis
 	@find hsp_control tests -name __pycache__ -prune -exec rm -rf {} +
 
-.PHONY: help docs links figures screenshots animations notebooks demo quick sims test thorough lint coverage fuzz mutants wheel wheel-test release format constraints clean
+.PHONY: help docs links figures animations notebooks demo quick sims test thorough lint coverage fuzz mutants wheel wheel-test release format constraints clean
 
 # ------------------------------------------------------------------- the environment
 

@@ -67,8 +67,8 @@ def draw(seed: int) -> tuple[hsp.Controller, RobotLimits, Array]:
 
     Limits: 70 to 100 % of the arm's efforts, 20 to 50 % of its speeds, 1000 N·m/s, its
     joint ranges. Task: a circle of 20 cm radius at 1 to 6 rad/s, up to a metre from the
-    start of the hand: mostly beyond the limits, often out of reach. With odd seeds the
-    limits `null_space_speed` (2 rad/s) and `static_effort` are on, too.
+    start of the hand: mostly beyond the limits, often out of reach. With odd seeds
+    `static_effort` is on, too.
     """
     robot, rng = panda(), np.random.default_rng(seed)
     lower, upper = robot.position_limits()
@@ -78,7 +78,6 @@ def draw(seed: int) -> tuple[hsp.Controller, RobotLimits, Array]:
         effort=own.effort * rng.uniform(0.7, 1.0),
         effort_rate=1000.0,
         velocity=own.velocity * rng.uniform(0.2, 0.5),
-        null_space_speed=2.0 if seed % 2 else None,
         static_effort=1.0 if seed % 2 else None,
     )
     start = robot.state(0.0, q0, np.zeros(7)).position("panda_tcp")

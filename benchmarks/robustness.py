@@ -131,14 +131,10 @@ COLUMNS: dict[str, Callable[[Row], Compensation | None]] = {
     "predictor": lambda row: _when(
         {"effort_delay": row.delay} if row.delay else None, "predictor"
     ),
-    "rate limit": lambda row: _when(
-        1000.0 if row.noisy or row == ROWS[0] else None, "effort_rate"
-    ),
     "all": lambda row: {
         "velocity_filter": {"cutoff": 50.0},
         "momentum_observer": {"bandwidth": 20.0},
         "integral_action": {"rate": 5.0},
-        "effort_rate": 1000.0,
         "start_up_ramp": {"duration": 1.0},
         **(_when(row.friction, "friction_feed_forward") or {}),
         **(
@@ -189,6 +185,7 @@ def experiment(job: Job, folder: Path) -> dict[str, Any]:
     config["simulation"]["control_period"] = 1.0 / row.frequency
     config["simulation"]["log_period"] = 1.0 / row.frequency
     config["compensation"] = compensation
+    config["limits"] = {"effort_rate": "none"}
     return config
 
 

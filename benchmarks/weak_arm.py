@@ -1,10 +1,10 @@
-"""Talos with a weak arm: which tasks deviate, with and without each limit.
+"""Talos with a weak arm: which tasks deviate, with and without `static_effort`.
 
     .venv/bin/python benchmarks/weak_arm.py
 
-configs/whole_body/talos_weak_arm.yaml on MuJoCo and on ideal contacts, with two limits
-of the null space, with one and with none of them. Writes a table into
-docs/whole_body.md and draws docs/figures/weak_arm.png; ``--draw`` only draws.
+configs/whole_body/talos_weak_arm.yaml on MuJoCo and on ideal contacts, and without
+`static_effort`. Writes a table into docs/whole_body.md and draws
+docs/figures/weak_arm.png; ``--draw`` only draws.
 """
 
 import argparse
@@ -25,15 +25,12 @@ NAME = "whole_body/talos_weak_arm"
 IDEAL = (
     "plant={type: rigid_contacts, contacts: {left_sole_link: {}, right_sole_link: {}}}"
 )
-NO_POSTURE, NO_SPEED = "limits.static_effort=null", "limits.null_space_speed=null"
+WITH, WITHOUT = "`static_effort`, MuJoCo", "without it, MuJoCo"
 RUNS = {
-    "both limits, MuJoCo": (),
-    "both limits, ideal contacts": (IDEAL,),
-    "`static_effort` alone, MuJoCo": (NO_SPEED,),
-    "`null_space_speed` alone, MuJoCo": (NO_POSTURE,),
-    "neither, MuJoCo": (NO_POSTURE, NO_SPEED),
+    WITH: (),
+    "`static_effort`, ideal contacts": (IDEAL,),
+    WITHOUT: ("limits.static_effort=null",),
 }
-BOTH, NEITHER = "both limits, MuJoCo", "neither, MuJoCo"
 
 
 class RunData(NamedTuple):
@@ -121,7 +118,7 @@ def figure(found: dict[str, RunData]) -> Figure:
     efforts, hand, mass, speed, status = drawn.subplots(
         5, 1, sharex=True, height_ratios=(1.0, 1.0, 1.0, 1.0, 0.18)
     )
-    shown = found[BOTH]
+    shown = found[WITH]
     dashes = ("-", "--", ":")
     for color, dash, joint in zip(SERIES, dashes, (1, 3, 4), strict=False):
         efforts.plot(
@@ -135,10 +132,10 @@ def figure(found: dict[str, RunData]) -> Figure:
     efforts.axhline(100, color=INK, lw=1.0, label="limit")
     efforts.set_ylabel("effort\n[% of limit]")
     efforts.set_ylim(0.0, 108.0)
-    efforts.set_title("(a)  Efforts of the weak arm, with both limits")
-    hand.set_title("(b)  With both limits of the null space, and with neither")
-    named = {BOTH: "both limits", NEITHER: "neither"}
-    for color, dash, label in zip(SERIES, dashes, (BOTH, NEITHER), strict=False):
+    efforts.set_title("(a)  Efforts of the weak arm, with static_effort")
+    hand.set_title("(b)  With static_effort, and without")
+    named = {WITH: "with static_effort", WITHOUT: "without"}
+    for color, dash, label in zip(SERIES, dashes, (WITH, WITHOUT), strict=False):
         data = found[label]
         style = {"color": color, "ls": dash, "lw": 1.6, "label": named[label]}
         hand.semilogy(data.t, data.hand + 1e-3, **style)
@@ -166,7 +163,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--draw", action="store_true", help="only draw the figure")
     drawn_only = parser.parse_args().draw
-    chosen = [BOTH, NEITHER] if drawn_only else [*RUNS]
+    chosen = [WITH, WITHOUT] if drawn_only else [*RUNS]
     with ProcessPoolExecutor(2) as pool:
         runs = pool.map(run_all, [RUNS[name] for name in chosen])
         found = dict(zip(chosen, runs, strict=True))

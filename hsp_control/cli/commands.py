@@ -147,22 +147,6 @@ def _saved_elsewhere(rollout: Rollout, log: Path, error: LogError) -> Path:
     return elsewhere
 
 
-def salvage(options: argparse.Namespace) -> int:
-    """Recover the complete rows of a truncated log, and print what is lost."""
-    rollout = Rollout.salvage(options.log)
-    stem = options.log.name.removesuffix(".npz").removesuffix(".cut")
-    out = options.out or options.log.with_name(f"{stem}-salvaged.npz")
-    log = rollout.save(out)
-    lost = rollout.meta.get("lost", [])
-    _out.print(
-        f"{len(rollout)} rows of {len(rollout.columns)} columns are complete, "
-        + (f"lost: {', '.join(lost)}" if lost else "nothing is lost"),
-        markup=False,
-    )
-    _out.print(f"Log: {log}", markup=False)
-    return 0
-
-
 @warnings_printed()
 def view(options: argparse.Namespace) -> int:
     """Show logs in the browser."""
@@ -224,14 +208,6 @@ def sweep(options: argparse.Namespace) -> int:
     from hsp_control.cli import sweep as sweeps
 
     return sweeps.sweep(options)
-
-
-@warnings_printed()
-def bench(options: argparse.Namespace) -> int:
-    """Measure the latency of a real-time loop."""
-    from hsp_control.cli import bench as benches
-
-    return benches.bench(options)
 
 
 @warnings_printed()

@@ -10,7 +10,6 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-from hsp_control.config.renamed import RenamedKeyWarning
 from hsp_control.control.first_state import StartWarning
 
 _LONGEST = 1500
@@ -51,10 +50,8 @@ def working(what: str) -> Iterator[None]:
 @contextmanager
 def warnings_printed() -> Iterator[None]:
     """Print warnings of this package as lines on standard error, each one once."""
-    own = RenamedKeyWarning, StartWarning
     with warnings.catch_warnings():
-        for kind in own:
-            warnings.simplefilter("always", kind)
+        warnings.simplefilter("always", StartWarning)
         show_other, printed = warnings.showwarning, set[str]()
 
         def show(
@@ -65,7 +62,7 @@ def warnings_printed() -> Iterator[None]:
             file: TextIO | None = None,
             line: str | None = None,
         ) -> None:
-            if not issubclass(category, own):
+            if not issubclass(category, StartWarning):
                 show_other(message, category, filename, lineno, file, line)
             elif str(message) not in printed:
                 printed.add(str(message))

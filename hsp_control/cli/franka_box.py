@@ -12,7 +12,7 @@ from hsp_control.config import Experiment, load_experiment
 from hsp_control.franka_box import Arm, Box, Server
 from hsp_control.franka_wire.layouts import PERIOD, PORT, VERSION
 from hsp_control.live import OperatorRequests
-from hsp_control.live.latency import real_time_priority
+from hsp_control.live.real_time import real_time_priority
 from hsp_control.live.simulated_robot import sampled
 from hsp_control.live.stop_signals import stop_signals
 from hsp_control.robot import Robot

@@ -6,11 +6,10 @@ import logging
 import textwrap
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 from hsp_control.cli.consoles import out, working
 from hsp_control.cli.loading import robot_access
-from hsp_control.common.exceptions import ExportError, ModelError
+from hsp_control.common.exceptions import ModelError
 from hsp_control.inspection import Inspection
 from hsp_control.inspection import inspect as inspect_robot
 from hsp_control.robot import RobotDescription
@@ -36,10 +35,6 @@ def inspect(options: argparse.Namespace) -> int:
         file = write_repaired(source, options.fix)
         if not options.json:
             out.print(f"Written with projected inertias: {file}", markup=False)
-    if options.html is not None:
-        file = _write_page(inspection, options.html)
-        if not options.json:
-            out.print(f"Page: {file}", markup=False)
     return 0 if inspection.loads else 2
 
 
@@ -63,26 +58,6 @@ def report(inspection: Inspection) -> Iterator[str]:
         for severity in ("error", "warning", "note")
     }
     yield ", ".join(f"{n} {s}{'s' * (n != 1)}" for s, n in counts.items())
-
-
-def _write_page(inspection: Inspection, path: Path) -> Path:
-    """Write a page with the robot at home, and beside it what is odd.
-
-    Raises:
-        ExportError: If the robot does not load, or the page cannot be written.
-    """
-    from hsp_control.visualization.viewer.export.still import Note, export_still
-
-    if inspection.robot is None:
-        raise ExportError(f"{path}: there is no picture of a robot that does not load")
-    facts = [f"{k}: {text}" for k, text in inspection.facts.items() if k != "file"]
-    notes = [
-        Note(f"{severity}: {check}", [f"{f.element}: {f.message}" for f in found], cure)
-        for (severity, check, cure), found in inspection.groups().items()
-    ]
-    notes = notes or [Note("nothing is odd", [], "")]
-    with _no_warnings():
-        return export_still(inspection.robot, path, [*notes, Note("robot", facts, "")])
 
 
 @contextmanager

@@ -9,7 +9,7 @@ from hsp_control.cli.options.command_line import command_line
 from hsp_control.cli.startup import INTERRUPTED, end_quietly, is_command
 from hsp_control.common.exceptions import HspControlError
 
-_OWN_INTERRUPTS = {"bench", "export", "play", "sweep", "view"}
+_OWN_INTERRUPTS = {"export", "play", "sweep", "view"}
 """Commands that must close processes and pages, or save rows, at Ctrl-C."""
 _PACKAGES = {"libgomp.so.1": "libgomp1 (Debian, Ubuntu) or libgomp (Fedora)"}
 """What has a library that the wheels of our dependencies expect."""

@@ -10,7 +10,6 @@ from typing import Any
 from hsp_control.common.exceptions import ConfigError, HspControlError
 from hsp_control.common.suggestions import nearest
 from hsp_control.config.overrides import assign
-from hsp_control.config.renamed import current_keys, rename_keys
 from hsp_control.config.syntax import YamlError
 from hsp_control.config.yaml_reader import MAX_SIZE, Mark, read_yaml
 from hsp_control.declaration.keys import KeyPath, split_assignment
@@ -27,7 +26,6 @@ class Document:
 
     A key path is a tuple: ``("tasks", 0, "frame")`` for what the user writes as
     ``tasks.0.frame``. All errors have the form ``file:line: key.path: what is wrong``.
-    Keys that were renamed have their new names (see `hsp_control.config.renamed`).
 
     Attributes:
         name: The file's path as it was given, for messages.
@@ -44,16 +42,12 @@ class Document:
             data: The plain data.
             marks: The place of each key path in the text; empty if there is no text.
             name: The file's path, for messages.
-
-        Raises:
-            ConfigError: If a renamed key is given with its old and its new name.
         """
         self.name = name
         self.access = ANYWHERE
         self.packages: frozenset[str] | None = None
         self._data = deepcopy(data)
         self._origins: dict[KeyPath, Mark | str] = dict(marks)
-        rename_keys(self._data, self._origins, self.location)
 
     @classmethod
     def read(cls, path: str | PathLike[str]) -> "Document":
@@ -139,13 +133,12 @@ class Document:
             ConfigError: If the key path leads nowhere.
         """
         try:
-            path = assign(self._data, current_keys(keys, origin, self._data), value)
+            path = assign(self._data, keys, value)
         except ValueError as error:
             raise located(origin, str(error)) from None
         for inside in [key for key in self._origins if key[: len(path)] == path]:
             del self._origins[inside]
         self._origins[path] = origin
-        rename_keys(self._data, self._origins, self.location)  # keys inside the value
         return path
 
     def __contains__(self, path: KeyPath) -> bool:

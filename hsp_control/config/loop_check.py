@@ -11,7 +11,7 @@ from hsp_control.robot import Robot
 def check_compensation(
     document: Document, scenario: Scenario, controller: Controller
 ) -> None:
-    """Check the compensation against the robot, its tasks and its limits.
+    """Check the compensation against the robot, its tasks and contacts.
 
     Raises:
         ConfigError: If the configuration has no control period.
@@ -26,9 +26,7 @@ def check_compensation(
             "[s], for example to 0.001",
         )
     with document.at("compensation"):
-        compensation.check(
-            controller.robot, controller.tasks, controller.limits, controller.contacts
-        )
+        compensation.check(controller.robot, controller.tasks, controller.contacts)
 
 
 def check_rates(

@@ -16,7 +16,7 @@ from hsp_control.franka_box.connection import Connection, ConnectionEnd, break_o
 from hsp_control.franka_box.motion import Motion
 from hsp_control.franka_box.requests import Requests
 from hsp_control.franka_wire.layouts import PERIOD, PORT, MoveStatus
-from hsp_control.live.latency import no_garbage_collection
+from hsp_control.live.real_time import no_garbage_collection
 
 DEADLINE = 300e-6
 """How long a client may take for a command [s]: "approx. < 300 µs for your own control

@@ -31,13 +31,11 @@ class Inspection:
     Attributes:
         source: Where the robot comes from.
         findings: What is odd, errors first.
-        robot: The robot; None if it does not load.
         facts: What can be said about it in general: names and texts.
     """
 
     source: RobotSource
     findings: tuple[Finding, ...]
-    robot: Robot | None
     facts: Mapping[str, str]
 
     @property
@@ -80,7 +78,7 @@ def inspect(source: RobotSource, description: RobotDescription) -> Inspection:
     if not findings:
         findings = list(_of_file(xml, source))
     facts = {"file": str(source.urdf)}
-    robot, errors = None, [f for f in findings if f.severity == "error"]
+    errors = [f for f in findings if f.severity == "error"]
     if all(error.check == "inertia" for error in errors):
         if errors:
             description = replace(description, project_inertias=True)
@@ -96,7 +94,7 @@ def inspect(source: RobotSource, description: RobotDescription) -> Inspection:
             )
     order = ("error", "warning", "note")
     findings.sort(key=lambda finding: order.index(finding.severity))
-    return Inspection(source, tuple(findings), robot, facts)
+    return Inspection(source, tuple(findings), facts)
 
 
 def _facts(robot: Robot, condition: float, dof: str) -> dict[str, str]:

@@ -1,12 +1,35 @@
 """Response times, deadline misses and skipped states of a live loop."""
 
+from typing import NamedTuple, Self
+
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.live.latency import Quantiles
 
 CAPACITY = 600_000
 """Number of periods whose times are stored, the latest ones: ten minutes at 1 kHz."""
+
+
+class Quantiles(NamedTuple):
+    """Quantiles of a distribution of times [s].
+
+    Attributes:
+        median: 50 % quantile.
+        p99: 99 % quantile.
+        p999: 99.9 % quantile.
+        worst: Maximum.
+    """
+
+    median: float
+    p99: float
+    p999: float
+    worst: float
+
+    @classmethod
+    def of(cls, times: Array) -> Self:
+        """Return the quantiles of times [s], shape (N,); each is one of the times."""
+        found = np.quantile(times, [0.5, 0.99, 0.999, 1.0], method="higher")
+        return cls(*map(float, found))
 
 
 class Deadlines:

@@ -17,10 +17,10 @@ from hsp_control.live.bearing_feet import BearingFeet
 from hsp_control.live.effort_limiter import EffortLimiter
 from hsp_control.live.effort_source import EffortSource, as_effort_source
 from hsp_control.live.hardware import Hardware
-from hsp_control.live.latency import no_garbage_collection, real_time_priority
 from hsp_control.live.live_log import LoopLog
 from hsp_control.live.one_run import OneRun
 from hsp_control.live.operator_requests import OperatorRequests
+from hsp_control.live.real_time import no_garbage_collection, real_time_priority
 from hsp_control.live.rehearsal import rehearse
 from hsp_control.live.report import LoopReport
 from hsp_control.live.safe_stop import SafeStop

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from time import monotonic, sleep
 
 from hsp_control.common.arrays import Array
-from hsp_control.live.latency import no_garbage_collection
 from hsp_control.live.link import Link
 from hsp_control.live.packets import Kind
+from hsp_control.live.real_time import no_garbage_collection
 from hsp_control.live.safe_stop import Phase
 from hsp_control.live.sensor_layout import SensorLayout
 from hsp_control.live.simulated_robot import SimulatedRobot

@@ -29,13 +29,9 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LogError
-from hsp_control.simulation.log_file import MAX_COLUMNS, MAX_SIZE, shortened
 
 MAGIC = b"hsp_control journal 1\n"
 KILLED = "the journal has no end: its writer was killed"
-
-_PADDED = 16
-"""Columns that come later are padded: how many times as large as the file all are."""
 
 FRAME = struct.Struct("<cII")
 HEADING, ROW, END = b"H", b"R", b"E"
@@ -140,16 +136,11 @@ def is_journal(path: Path) -> bool:
 def read_journal(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
     """Return the columns and the meta data of a journal, up to an incomplete frame.
 
-    Where a column was added later or was narrower, earlier rows hold NaN. The file may
-    be untrusted: its size bounds the memory that is used.
+    Where a column was added later or was narrower, earlier rows hold NaN.
 
     Raises:
-        LogError: If the first heading is incomplete, a heading or a row is malformed,
-            or the columns would be too large.
+        LogError: If the first heading is incomplete.
     """
-    size = path.stat().st_size
-    if size > MAX_SIZE:
-        raise LogError(f"{path}: the journal is larger than {MAX_SIZE / 1e9:g} GB")
     meta: dict[str, Any] = {}
     parts: list[_Part] = []
     end: dict[str, Any] = {"status": "interrupted", "message": KILLED}
@@ -157,38 +148,19 @@ def read_journal(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
         if kind == HEADING:
             heading = json.loads(payload)
             meta = heading["meta"]
-            parts.append((_shapes(path, heading["columns"]), []))
+            columns = heading["columns"]
+            parts.append(({name: tuple(shape) for name, shape in columns.items()}, []))
         elif kind == ROW and parts:
-            shapes, rows = parts[-1]
-            if len(payload) != 8 * sum(map(math.prod, shapes.values())):
-                raise LogError(f"{path}: a row of the journal does not fit its heading")
-            rows.append(np.frombuffer(payload, "<f8"))
+            parts[-1][1].append(np.frombuffer(payload, "<f8"))
         elif kind == END:
             end = json.loads(payload)
     if not parts:
         raise LogError(f"{path}: the journal ends before its first heading")
-    return _joined(path, parts, min(_PADDED * size, MAX_SIZE)), {**meta, **end}
+    return _joined(parts), {**meta, **end}
 
 
 _Part = tuple[dict[str, tuple[int, ...]], list[Array]]
 """The shapes of a heading's columns, and its rows."""
-
-
-def _shapes(path: Path, columns: Any) -> dict[str, tuple[int, ...]]:
-    """Return the shapes of an untrusted heading.
-
-    Raises:
-        LogError: If they are not shapes, or too many.
-    """
-    if not isinstance(columns, dict) or len(columns) > MAX_COLUMNS:
-        raise LogError(f"{path}: a heading has no columns, or too many")
-    for name, shape in columns.items():
-        sizes = shape if isinstance(shape, list) else [None]
-        if not all(type(n) is int and 0 <= n <= MAX_SIZE for n in sizes):
-            raise LogError(
-                f"{path}: the column {shortened(name)} has the shape {shortened(shape)}"
-            )
-    return {name: tuple(shape) for name, shape in columns.items()}
 
 
 def _frames(data: bytes) -> Iterator[tuple[bytes, bytes]]:
@@ -210,26 +182,13 @@ def frame_at(data: bytes, at: int) -> tuple[bytes, bytes] | None:
     return kind, payload
 
 
-def _joined(path: Path, parts: list[_Part], largest: int) -> dict[str, Array]:
-    """Return the columns of all parts.
-
-    Raises:
-        LogError: If a column changes its number of dimensions, or the columns would
-            have more bytes than ``largest``.
-    """
+def _joined(parts: list[_Part]) -> dict[str, Array]:
+    """Return the columns of all parts."""
     count = sum(len(rows) for _, rows in parts)
     final: dict[str, tuple[int, ...]] = {}
     for shapes, _ in [part for part in parts if part[1]] or parts[:1]:
         for name, shape in shapes.items():
-            before = final.get(name, shape)
-            if len(before) != len(shape):
-                raise LogError(f"{path}: the column {shortened(name)} changes its form")
-            final[name] = tuple(map(max, before, shape))
-    if 8 * count * sum(map(math.prod, final.values())) > largest:
-        raise LogError(
-            f"{path}: the columns of the journal would need more than "
-            f"{largest / 1e6:.3g} MB"
-        )
+            final[name] = tuple(map(max, final.get(name, shape), shape))
     columns = {name: np.full((count, *shape), np.nan) for name, shape in final.items()}
     begin = 0
     for shapes, rows in parts:

@@ -6,7 +6,9 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
-from hsp_control.simulation.log_file import MAX_SIZE
+
+MAX_SIZE = 2_000_000_000
+"""Most bytes of all columns: an hour at 1 kHz with 70 numbers per row."""
 
 
 class LogColumns:

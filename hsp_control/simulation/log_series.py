@@ -2,13 +2,13 @@
 
 import re
 from collections.abc import Sequence
+from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.simulation import Rollout
-from hsp_control.simulation.log_meta import drawn_columns
 
 _EFFORT_UNITS = {"rad": "N·m", "m": "N"}
 
@@ -77,7 +77,10 @@ def drawn_parts(rollout: Rollout, name: str) -> dict[str, slice]:
     ``direction``, a unit vector.
     """
     about = rollout.meta["tasks"][name]
-    return drawn_columns(about.get("drawn", ()), about.get("axes"))
+    drawn, axes = about.get("drawn", ()), about.get("axes")
+    widths = {"position": len(axes or "xyz"), "orientation": 4, "direction": 3}
+    ends = list(accumulate((widths[part] for part in drawn), initial=0))
+    return {part: slice(*ends[k : k + 2]) for k, part in enumerate(drawn)}
 
 
 def task_path(rollout: Rollout, name: str) -> TaskPath | None:
@@ -132,15 +135,12 @@ def joint_positions(rollout: Rollout, *, absolute: bool = True) -> tuple[Array, 
 
 def position_units(rollout: Rollout) -> list[str]:
     """Return the unit of each dof's position: ``rad`` or ``m``."""
-    about = rollout.meta["robot"]
-    units, count = list(map(str, about["units"])), len(about["dofs"])
-    # A log from elsewhere may contradict itself.
-    return units if len(units) == count else [", ".join(dict.fromkeys(units))] * count
+    return list(map(str, rollout.meta["robot"]["units"]))
 
 
 def position_unit(rollout: Rollout) -> str:
     """Return the unit of all joints' positions: ``rad``, ``m`` or ``rad, m``."""
-    return ", ".join(dict.fromkeys(map(str, rollout.meta["robot"]["units"])))
+    return ", ".join(dict.fromkeys(position_units(rollout)))
 
 
 def null_space_unit(rollout: Rollout) -> str:

@@ -1,8 +1,9 @@
 """The rollout of a run: named columns with their descriptions, and its file."""
 
-import errno
 import json
+import math
 import zipfile
+import zlib
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -15,23 +16,19 @@ from hsp_control.common.exceptions import LogError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.robot import Robot, RobotState
 from hsp_control.simulation.journal import is_journal, read_journal
-from hsp_control.simulation.log_file import (
-    MAX_SIZE,
-    read_arrays,
-    shortened,
-    write_arrays,
-)
-from hsp_control.simulation.log_meta import (
-    drawable_rows,
-    find_fault,
-    renamed_entries,
-)
-from hsp_control.simulation.salvage import read_complete_entries
 
 FORMAT = "hsp_control rollout 1"
-_DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-_MAX_NAME = 1000  # characters; a name in a zip archive has at most 65535 bytes
 _REQUIRED = ("t", "q", "v", "tau")
+_MAX_DRAWN, _MAX_VALUE = 1e12, 1e100
+"""Largest values of drawn and of other columns in a journal.
+
+The axes of a plot cannot resolve larger ones. A motion that diverges ends long before.
+"""
+_UNREADABLE = (
+    OSError, ValueError, EOFError, KeyError, NotImplementedError,
+    zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
+"""What a file raises that is cut, spoilt or something else."""
 
 
 class Rollout:
@@ -119,8 +116,7 @@ class Rollout:
         """Write one ``.npz`` without pickles, which NumPy can read by itself.
 
         It is written to a temporary file and then renamed, so that ``path`` is never an
-        incomplete file. If the disk is full, the part that fits is kept beside it for
-        `salvage`, provided that it has the motion; the message names that file.
+        incomplete file.
 
         Returns:
             The path.
@@ -130,22 +126,18 @@ class Rollout:
         """
         path = Path(path)
         part = path.with_name(f".{path.name}.part")
-        if any(len(name) > _MAX_NAME for name in self.columns):
-            raise LogError(
-                f"{path}: cannot write the log: a column's name has more than "
-                f"{_MAX_NAME} characters"
-            )
-        meta = np.array(json.dumps(self.meta, ensure_ascii=False))
+        arrays: dict[str, Any] = {
+            "meta": np.array(json.dumps(self.meta, ensure_ascii=False)), **self.columns
+        }  # fmt: skip
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             with part.open("wb") as file:
-                write_arrays(file, {"meta": meta, **self.columns})
+                np.savez_compressed(file, allow_pickle=False, **arrays)
             part.replace(path)
         except OSError as error:
-            kept = _keep_part(part, path) if error.errno in _DISK_FULL else ""
             _remove(part)
             reason = error.strerror or str(error)
-            raise LogError(f"{path}: cannot write the log: {reason}{kept}") from error
+            raise LogError(f"{path}: cannot write the log: {reason}") from error
         except BaseException:  # also a second Ctrl-C: leave no temporary file
             _remove(part)
             raise
@@ -155,11 +147,10 @@ class Rollout:
     def load(cls, path: str | Path) -> Self:
         """Read a log: an ``.npz``, or a `journal` with all its complete rows.
 
-        The file may be untrusted: nothing in it is ever executed.
+        No pickle is opened, so that nothing in the file is ever executed.
 
         Raises:
-            LogError: If the file is missing, truncated, too large, not a log of this
-                package, or inconsistent.
+            LogError: If the file is missing, truncated, or not a log of this version.
         """
         path = Path(path)
         try:
@@ -168,9 +159,8 @@ class Rollout:
                 complete_columns(columns, [])  # one absurd turn would spoil all later
                 columns, meta = without_absurd_rows(columns, meta)
                 complete_columns(columns, meta["robot"]["continuous"])
-                columns["meta"] = np.array(json.dumps(meta, ensure_ascii=False))
             else:
-                columns = read_arrays(path)
+                columns, meta = _read_npz(path)
         except LogError:
             raise
         except FileNotFoundError:
@@ -178,79 +168,57 @@ class Rollout:
             raise LogError(
                 f"{path}: no such file{did_you_mean(path.name, near)}"
             ) from None
-        except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile) as error:
+        except _UNREADABLE as error:
             reason = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise LogError(
                 f"{path}: not a complete .npz log (truncated, or another file): "
                 f"{reason}"
-                f"{_salvageable(path)}"
             ) from error
-        except Exception as error:  # zlib.error, struct.error, NotImplementedError...
+        if meta.get("format") != FORMAT:
             raise LogError(
-                f"{path}: not a complete .npz log: {type(error).__name__}: {error}"
-            ) from error
-        return cls(*_checked(path, columns))
-
-    @classmethod
-    def salvage(cls, path: str | Path) -> Self:
-        """Read the complete entries of a truncated log; ``meta["lost"]`` has the rest.
-
-        Raises:
-            LogError: If the meta data or the motion (t, q, v, tau) is incomplete, or
-                the complete entries are not a log.
-        """
-        path = Path(path)
-        try:
-            columns, cut_entry = read_complete_entries(path)
-        except OSError as error:
-            reason = error.strerror or str(error)
-            raise LogError(f"{path}: cannot be read: {reason}") from error
-        described = _described(columns)
-        lost = [name for name in described if name not in columns]
-        missing = [name for name in ("meta", *_REQUIRED) if name not in columns]
-        if missing:
-            where = f": it is truncated in {cut_entry!r}" if cut_entry else ""
-            raise LogError(
-                f"{path}: nothing to salvage{where}; {missing[0]!r} is incomplete"
+                f"{path}: its format is {meta.get('format')!r}; this version reads "
+                f"{FORMAT!r}"
             )
-        return cls(*_checked(path, columns, lost))
+        if "status" not in meta or "dofs" not in meta.get("robot", {}):
+            raise LogError(
+                f"{path}: a log of another version: its entry 'meta' lacks the "
+                "status, or the robot's dofs"
+            )
+        for name in (*_REQUIRED, *meta.get("columns", ())):
+            if name not in columns:
+                raise LogError(f"{path}: the log lacks the column {name!r}")
+        if {column.shape[:1] for column in columns.values()} != {columns["t"].shape}:
+            raise LogError(f"{path}: the log's columns differ in length")
+        return cls(columns, meta)
 
 
-def _keep_part(part: Path, path: Path) -> str:
-    """Keep an incomplete log if it has the motion; return a note with its name."""
-    kept = path.with_suffix(".cut.npz")
+def _read_npz(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
+    """Return the columns and the meta data of an ``.npz``.
+
+    Raises:
+        LogError: If it has no meta data.
+    """
+    with path.open("rb") as file:
+        if not zipfile.is_zipfile(file):
+            raise zipfile.BadZipFile("no archive")
+        file.seek(0)
+        with np.load(file, allow_pickle=False) as archive:
+            columns = {name: archive[name] for name in archive.files}
     try:
-        columns, _ = read_complete_entries(part)
-        if {"meta", *_REQUIRED} <= set(columns):
-            part.replace(kept)
-            return f"; the part that fits is in {kept}: hsp salvage {kept}"
-    except OSError:
-        pass
-    return ""
+        meta = json.loads(columns.pop("meta").item())
+    except (KeyError, TypeError, ValueError):
+        meta = None
+    if not isinstance(meta, dict):
+        raise LogError(
+            f"{path}: not a log of hsp_control: it has no text entry 'meta' with a "
+            f"JSON object (it has {listing(columns)})"
+        )
+    return {name: np.asarray(c, dtype=float) for name, c in columns.items()}, meta
 
 
 def _remove(part: Path) -> None:
     with suppress(OSError):  # its folder may not exist
         part.unlink(missing_ok=True)
-
-
-def _salvageable(path: Path) -> str:
-    """Return a hint for a truncated log that can be salvaged, "" for any other."""
-    try:
-        columns, _ = read_complete_entries(path)
-    except OSError:
-        return ""
-    complete = {"meta", *_REQUIRED} <= set(columns)
-    return f"; its motion is complete: hsp salvage {path}" if complete else ""
-
-
-def _described(columns: dict[str, Array]) -> list[str]:
-    """Return the names of the columns in the entry 'meta', [] if it is not readable."""
-    try:
-        described = json.loads(str(columns["meta"]))["columns"]
-    except (KeyError, TypeError, ValueError, RecursionError):
-        return []
-    return list(described) if isinstance(described, dict) else []
 
 
 def complete_columns(columns: Mapping[str, Array], continuous: Sequence[int]) -> None:
@@ -278,11 +246,13 @@ def without_absurd_rows(
 ) -> tuple[dict[str, Array], dict[str, Any]]:
     """Return the columns without rows that cannot be drawn; the message counts them.
 
+    A row that a loop wrote of an absurd state must not make its journal useless.
+
     Args:
         columns: The columns by name, N rows each.
         meta: The meta data.
     """
-    kept = drawable_rows(columns)
+    kept = _drawable_rows(columns)
     if kept.all():
         return columns, meta
     count, first = int((kept == 0).sum()), columns["t"][int(kept.argmin())]
@@ -292,47 +262,22 @@ def without_absurd_rows(
     return {name: column[kept] for name, column in columns.items()}, meta
 
 
-def _checked(
-    path: Path, columns: dict[str, Array], lost: Sequence[str] = ()
-) -> tuple[dict[str, Array], dict[str, Any]]:
-    """Return the columns and the meta data of an untrusted log.
+def _drawable_rows(columns: dict[str, Array]) -> Array:
+    """Return which rows have numbers that can be drawn, shape (N,), booleans."""
+    drawable = np.ones(len(columns["t"]), dtype=bool)
+    for name, column in columns.items():
+        size = np.abs(column.reshape(len(column), math.prod(column.shape[1:])))
+        if _is_drawn(name):
+            drawable &= (size <= _MAX_DRAWN).all(axis=1)  # neither is NaN
+        else:
+            drawable &= ~((size > _MAX_VALUE) & np.isfinite(size)).any(axis=1)
+    return drawable
 
-    Every log passes here, however it was read.
 
-    Raises:
-        LogError: If it is not a log of this package, or inconsistent.
-    """
-    if "meta" not in columns or columns["meta"].dtype.kind != "U":
-        raise LogError(
-            f"{path}: not a log of hsp_control: it has no text entry 'meta' "
-            f"(it has {listing(columns)})"
-        )
-    try:
-        meta = json.loads(str(columns.pop("meta")))
-    except (json.JSONDecodeError, RecursionError) as error:
-        raise LogError(f"{path}: its entry 'meta' is not JSON: {error}") from error
-    if not isinstance(meta, dict) or meta.get("format") != FORMAT:
-        found = meta.get("format") if isinstance(meta, dict) else meta
-        raise LogError(
-            f"{path}: its format is {shortened(found)}; this version reads {FORMAT!r}"
-        )
-    meta = renamed_entries(meta)
-    if lost:
-        kept = {n: d for n, d in meta["columns"].items() if n not in lost}
-        meta = {**meta, "columns": kept, "lost": list(lost)}
-        if isinstance(obstacles := meta.get("obstacles"), dict):
-            seen = {k: v for k, v in obstacles.items() if f"obstacle.{k}" not in lost}
-            meta["obstacles"] = seen
-    described = meta.get("columns")
-    wanted = [*_REQUIRED, *(described if isinstance(described, dict) else ())]
-    missing = [name for name in wanted if name not in columns]
-    if missing:
-        raise LogError(f"{path}: the log lacks the column {shortened(missing[0])}")
-    rows = {name: np.shape(column)[:1] for name, column in columns.items()}
-    if any(length != rows["t"] for length in rows.values()):
-        raise LogError(f"{path}: the log's columns differ in length")
-    if 8 * sum(column.size for column in columns.values()) > MAX_SIZE:
-        raise LogError(f"{path}: larger than {MAX_SIZE / 1e9:g} GB in memory")
-    if reason := find_fault(meta, columns):
-        raise LogError(f"{path}: {reason}")
-    return {name: np.asarray(c, dtype=float) for name, c in columns.items()}, meta
+def _is_drawn(name: str) -> bool:
+    """Return whether a column is drawn in space, or over time as the motion is."""
+    return (
+        name in {*_REQUIRED, "joint_positions", "skeleton"}
+        or name.startswith("obstacle.")
+        or (name.startswith("task.") and name.endswith((".reference", ".actual")))
+    )

@@ -36,7 +36,7 @@ from hsp_control.simulation.recorder import Recorder
 from hsp_control.simulation.rollout import Rollout
 
 MAX_ROWS = 10_000_000
-"""Most rows of a log; see also `log_file.MAX_SIZE`."""
+"""Most rows of a log; see also `log_columns.MAX_SIZE`."""
 MAX_STEPS = 1e9
 """Most control periods, or integrator steps, of a run: at 50 µs each, 14 hours."""
 

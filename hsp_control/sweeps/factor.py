@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from hsp_control.common.exceptions import SweepError
-from hsp_control.config.renamed import current_keys
 from hsp_control.declaration.keys import split_assignment, written
 from hsp_control.sweeps.distributions import Choices, Distribution
 from hsp_control.sweeps.spelling import values
@@ -89,7 +88,6 @@ def _factor(key: str, spec: Any) -> Factor:
         rest = key
     if rest:
         raise SweepError(f"--over {key}: is not a key path such as null_space.gain")
-    keys = current_keys(keys, f"--over {key}")
     try:
         return Factor(tuple(keys), _distribution(spec))
     except SweepError as error:

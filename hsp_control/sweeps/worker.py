@@ -7,7 +7,6 @@ import sys
 import threading
 import warnings
 
-from hsp_control.config.renamed import RenamedKeyWarning
 from hsp_control.control.first_state import StartWarning
 from hsp_control.sweeps.running import run_task
 
@@ -23,8 +22,7 @@ def main() -> None:
     os.dup2(2, 1)
     # A run that diverges overflows; its row contains that.
     warnings.simplefilter("ignore", RuntimeWarning)
-    # The parent process has warned of these already.
-    warnings.simplefilter("ignore", RenamedKeyWarning)
+    # The parent process has warned of this already.
     warnings.simplefilter("ignore", StartWarning)
     tasks: queue.SimpleQueue[str] = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(tasks,), daemon=True).start()

@@ -19,7 +19,7 @@ from campaigns.results import keep, kept
 from hsp_control.common.resources import bundled_robots
 
 STEPS, OTHER_STEPS = 1_000_000, 20_000
-CASES = {"yaml": 10_000, "urdf": 1_000, "logs": 1_000}
+CASES = {"yaml": 10_000, "urdf": 1_000}
 SEED = 1989
 
 

@@ -12,7 +12,6 @@ from hsp_control.common.resources import bundled_configs
 KINDS = {
     "yaml": "campaigns.yaml_case:case",
     "urdf": "campaigns.urdf_case:case",
-    "logs": "campaigns.log_case:case",
 }
 TIMEOUT = 60.0
 """A case that is not over after this is a hang [s]; loaded machines are slow."""

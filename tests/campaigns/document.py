@@ -59,7 +59,7 @@ def _files(found: dict[str, dict[str, Any]]) -> str:
         "crashes | hangs | slowest [s] |",
         "|---|--:|--:|--:|--:|--:|--:|--:|--:|",
     ]
-    names = {"yaml": "configurations", "urdf": "URDFs and meshes", "logs": "logs"}
+    names = {"yaml": "configurations", "urdf": "URDFs and meshes"}
     for kind, name in names.items():
         c = found.get(f"files-{kind}")
         if c is not None:
@@ -75,7 +75,6 @@ def _faults(found: dict[str, dict[str, Any]]) -> str:
     rows = ["| fault | cases | result | wrong |", "|---|--:|---|--:|"]
     names = {
         "full_disk": "a disk that fills while a log is saved over another",
-        "cut_log": "a log cut at a random byte",
         "interrupts": "Ctrl-C at a random moment",
     }
     for stage, name in names.items():

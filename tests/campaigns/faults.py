@@ -1,4 +1,4 @@
-"""Disks that fill, logs that are cut, Ctrl-C: what was computed before is readable."""
+"""Disks that fill, and Ctrl-C: what was computed before is readable."""
 
 import os
 import resource
@@ -8,7 +8,6 @@ import sys
 import tempfile
 import time
 import warnings
-import zipfile
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,8 +22,7 @@ from hsp_control.common.exceptions import LogError
 from hsp_control.simulation import Rollout
 
 CONFIG = "paper/4_moving_obstacle"
-SAVES, CUTS, INTERRUPTS = 500, 2000, 200
-MOTION = {"meta", "t", "q", "v", "tau"}
+SAVES, INTERRUPTS = 500, 200
 
 
 @dataclass
@@ -62,17 +60,6 @@ def same(one: Rollout, other: Rollout) -> bool:
     )
 
 
-def whole_before(data: bytes, folder: Path) -> list[tuple[str, int]]:
-    """Return each entry of a log's file and where it ends."""
-    file = folder / "order.npz"
-    file.write_bytes(data)
-    with zipfile.ZipFile(file) as archive:
-        entries = sorted(archive.infolist(), key=lambda entry: entry.header_offset)
-        starts = [entry.header_offset for entry in entries[1:]] + [archive.start_dir]
-    names = [entry.filename.removesuffix(".npy") for entry in entries]
-    return list(zip(names, starts, strict=True))
-
-
 # ------------------------------------------------------------------ disks that fill
 
 
@@ -102,19 +89,10 @@ def full_disk(rollout: Rollout, size: int, random: Random, folder: Path) -> Faul
         problem = f"said {said!r}"
     elif not same(Rollout.load(path), before) or len(Rollout.load(path)) != 2:
         problem = "the older log was damaged"
-    kept = folder / "log.cut.npz"
-    outcome = "nothing of the new log fits"
-    if kept.exists():
-        outcome = "the new log's motion is salvaged"
-        salvaged = Rollout.salvage(kept)
-        if not same(salvaged, rollout) or len(salvaged) != len(rollout):
-            problem = "salvaged another log"
-        if "hsp salvage" not in said:
-            problem = f"does not say where it is: {said}"
-    left = {"log.npz", "message", "log.cut.npz"}
+    left = {"log.npz", "message"}
     if {file.name for file in folder.iterdir()} - left:
         problem = f"left behind: {list(folder.iterdir())}"
-    found.add(outcome, problem)
+    found.add("the older log is whole", problem)
     return found
 
 
@@ -133,38 +111,6 @@ def _save_and_leave(rollout: Rollout, path: Path, room: int, message: Path) -> N
             text = f"raised {error!r}"
         file.write(text)
     os._exit(0)
-
-
-# --------------------------------------------------------------------- cut logs
-
-
-def cut_log(
-    rollout: Rollout, data: bytes, ends: list[tuple[str, int]], end: int, folder: Path
-) -> Faults:
-    """Cut a log at a byte, and salvage it: each entry before the cut must be there."""
-    found, path = Faults(), folder / "cut.npz"
-    path.write_bytes(data[:end])
-    whole = {name for name, stop in ends if stop <= end}
-    try:
-        salvaged = Rollout.salvage(path)
-    except LogError as error:
-        lost = "refused though the motion is whole" if whole >= MOTION else ""
-        found.add("cut before the motion's end", lost and f"{lost}: {error}")
-    else:
-        problem = ""
-        if {*salvaged.columns, "meta"} != whole:
-            problem = f"at {end}: {whole ^ {*salvaged.columns, 'meta'}}"
-        elif not same(salvaged, rollout):
-            problem = f"at {end}: other numbers"
-        found.add("salvaged", problem)
-    try:
-        Rollout.load(path)
-    except LogError:
-        pass
-    else:
-        if end < len(data):
-            found.wrong.append(f"loaded as if whole, cut at {end} of {len(data)}")
-    return found
 
 
 # ------------------------------------------------------------------------- Ctrl-C
@@ -226,17 +172,16 @@ def interrupted(random: Random, folder: Path, log: Path, longest: float) -> Faul
 
 
 def short_run(seconds: float = 1.0) -> Rollout:
-    """Return a run to save, cut and plot."""
+    """Return a run to save and plot."""
     return hsp.load_experiment(CONFIG, f"simulation.duration={seconds}").run()
 
 
 def campaign(progress: Progress, seed: int, share: float) -> bool:
-    """Fill disks, cut logs, press Ctrl-C."""
+    """Fill disks, press Ctrl-C."""
     rollout, good = short_run(), True
     with tempfile.TemporaryDirectory() as name:
         log = rollout.save(Path(name) / "whole.npz")
-        data = log.read_bytes()
-        ends = whole_before(data, Path(name))
+        size = log.stat().st_size
         start = time.monotonic()
         command = ["run", CONFIG, "--out", name, "--set", "simulation.duration=1"]
         subprocess.run(
@@ -246,11 +191,7 @@ def campaign(progress: Progress, seed: int, share: float) -> bool:
         )
         longest = 1.5 * (time.monotonic() - start)
         stages = {
-            "full_disk": (SAVES, lambda r, f: full_disk(rollout, len(data), r, f)),
-            "cut_log": (
-                CUTS,
-                lambda r, f: cut_log(rollout, data, ends, r.randrange(len(data)), f),
-            ),
+            "full_disk": (SAVES, lambda r, f: full_disk(rollout, size, r, f)),
             "interrupts": (INTERRUPTS, lambda r, f: interrupted(r, f, log, longest)),
         }
         for stage, (full, try_once) in stages.items():

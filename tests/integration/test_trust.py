@@ -1,15 +1,11 @@
 """Files of strangers: nothing runs, nothing outside is read, sizes are bounded."""
 
-import io
 import os
-import zipfile
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from campaigns.mutate_log import Touch, packed
 from campaigns.mutate_urdf import ARM, EXTERNAL, LAUGHS
 from campaigns.mutate_yaml import TAGS
 from campaigns.urdf_case import DAE, OBJ, STL
@@ -33,7 +29,7 @@ from hsp_control.robot.description.xml_files import (
     check_no_document_type,
     parse_xml,
 )
-from hsp_control.simulation import Rollout, log_file
+from hsp_control.simulation import Rollout
 from hsp_control.visualization.plots.figures import diagnostics_figure
 from hsp_control.visualization.viewer.mesh_files import collada_object
 
@@ -84,11 +80,15 @@ def test_no_code_runs_from_yaml(tag: str, tmp_path: Path) -> None:
 
 def test_no_pickle_is_opened(tmp_path: Path) -> None:
     """The canary works: NumPy told to unpickle touches it."""
+
+    class Touch:
+        def __reduce__(self) -> tuple[Any, ...]:
+            return (open, (str(canary), "w"))
+
     canary, path = tmp_path / "canary", tmp_path / "log.npz"
-    path.write_bytes(packed({"t": np.array([Touch(str(canary))], dtype=object)}))
-    for read in (Rollout.load, Rollout.salvage):
-        with pytest.raises(LogError):
-            read(path)
+    np.savez(path, t=np.array([Touch()], dtype=object))
+    with pytest.raises(LogError, match=r"not a complete \.npz log"):
+        Rollout.load(path)
     assert not canary.exists()
     with np.load(path, allow_pickle=True) as archive:
         archive["t"].item().close()
@@ -341,121 +341,9 @@ def test_a_log_too_large_is_refused_before_it_is_computed(
         experiment.run()
 
 
-def archive(**entries: bytes) -> bytes:
-    file = io.BytesIO()
-    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as packed_file:
-        for name, content in entries.items():
-            packed_file.writestr(f"{name}.npy", content)
-    return file.getvalue()
-
-
-def header(shape: tuple[int, ...], descr: str = "<f8") -> bytes:
-    file = io.BytesIO()
-    described: dict[str, Any] = {"descr": descr, "fortran_order": False, "shape": shape}
-    np.lib.format.write_array_header_1_0(file, described)
-    return file.getvalue()
-
-
-BOMBS: dict[str, tuple[Callable[[], bytes], str]] = {
-    "a shape without its bytes": (
-        lambda: archive(t=header((10**12,)) + bytes(80)), "contradicts its shape"
-    ),
-    "a negative shape": (lambda: archive(t=header((-1, -10))), "contradicts its sh"),
-    "structured": (lambda: archive(t=header((1,), "<M8[s]") + bytes(8)), "neither num"),
-    "too much in all": (lambda: archive(t=bytes(3000)), "it unpacks to .* GB; at most"),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("which", BOMBS)
-def test_logs_that_lie_about_their_size(
-    which: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    make, message = BOMBS[which]
-    if which == "too much in all":
-        monkeypatch.setattr(log_file, "MAX_SIZE", 2000)
-    path = tmp_path / "log.npz"
-    path.write_bytes(make())
-    with pytest.raises(LogError, match=message):
-        Rollout.load(path)
-
-
 @pytest.fixture(scope="module")
 def run() -> Rollout:
     return load_experiment("paper/4_moving_obstacle", "simulation.duration=0.05").run()
-
-
-CONTRADICTIONS: dict[str, tuple[Callable[[Rollout], None], str]] = {
-    "nan": (lambda run: run.q.fill(np.nan), "'q' contains NaN or inf"),
-    "backwards": (lambda run: run.t.__imul__(-1.0), "its time decreases"),
-    "far": (lambda run: run.q.fill(1e15), "'q' contains 1e.15, which is too large"),
-    "width": (
-        lambda run: run.columns.update(tau=run.tau[:, :2]),
-        r"'tau' has rows of shape \(2,\); the entry 'meta' needs \(3,\)",
-    ),
-    "dofs": (
-        lambda run: run.meta["robot"].update(dofs=["a"]), "has 1 dofs, its column 'v'"
-    ),
-    "tree": (
-        lambda run: run.meta["robot"].update(skeleton_parents=[3, 2, 1, 0]),
-        "is listed before its parent",
-    ),
-    "type": (lambda run: run.meta.update(tasks=[1]), "is wrong at 'tasks'"),
-    "no unit quaternion": (
-        lambda run: run["obstacle.disk.quaternion"].fill(0.0), "not of unit norm"
-    ),
-    "metric": (
-        lambda run: run.meta.update(metric_matrix=np.diag([1.0, -1, 1]).tolist()),
-        "metric_matrix is not symmetric positive definite",
-    ),
-    "no status": (lambda run: run.meta.pop("status"), "lacks 'status'"),
-    "no robot": (lambda run: run.meta.pop("robot"), "lacks 'robot'"),
-    "no name": (lambda run: run.meta["robot"].pop("name"), "lacks 'robot.name'"),
-    "no units": (lambda run: run.meta["robot"].pop("units"), "lacks 'robot.units'"),
-    "no tree": (
-        lambda run: run.meta["robot"].update(skeleton_parents=None),
-        "is wrong at 'robot.skeleton_parents'",
-    ),
-    "no skeleton": (
-        lambda run: run.columns.update(skeleton=run["skeleton"][:, :0]),
-        "its column 'skeleton' has rows without numbers",
-    ),
-    "no axes": (
-        lambda run: run.meta["tasks"]["tip"].pop("axes"),
-        r"'task.tip.reference' has rows of shape \(2,\); the entry 'meta' needs \(3,\)",
-    ),
-    "shape": (
-        lambda run: run.meta["obstacles"]["disk"].update(parameters={}),
-        r"its obstacle 'disk' has wrong parameters: sphere: needs radius; got {}",
-    ),
-    "size": (
-        lambda run: run.meta["obstacles"]["disk"]["parameters"].update(radius=[1]),
-        r"'disk' has wrong parameters: sphere: needs radius; got {'radius': \[1\]}",
-    ),
-    "file": (
-        lambda run: run.meta["obstacles"]["disk"].update(
-            shape="Mesh", parameters={"file": 3}
-        ),
-        "has wrong parameters: mesh: needs file, scale, convex; got {'file': 3}",
-    ),
-    "no size": (
-        lambda run: run.meta["obstacles"]["disk"].update(shape="Egg", radius=None),
-        "its obstacle 'disk' has neither a known shape nor a radius",
-    ),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("which", CONTRADICTIONS)
-def test_logs_that_contradict_themselves(
-    which: str, run: Rollout, tmp_path: Path
-) -> None:
-    change, message = CONTRADICTIONS[which]
-    path = run.save(tmp_path / "log.npz")
-    log = Rollout.load(path)
-    change(log)
-    log.save(path)
-    with pytest.raises(LogError, match=message):
-        Rollout.load(path)
-    assert main(["plot", str(path)]) == 2
 
 
 def test_logs_that_say_little_are_drawn(run: Rollout, tmp_path: Path) -> None:
@@ -470,19 +358,3 @@ def test_logs_that_say_little_are_drawn(run: Rollout, tmp_path: Path) -> None:
     assert main(["export", str(path), "--html", str(tmp_path / "page.html")]) == 0
     (axes, *_) = diagnostics_figure(Rollout.load(path)).axes
     assert [line.get_label() for line in axes.lines] == ["the log has no task"]
-
-
-def test_what_is_lost_of_a_log_with_wrong_meta(run: Rollout, tmp_path: Path) -> None:
-    log = Rollout(run.columns, {**run.meta, "obstacles": []})
-    path = log.save(tmp_path / "log.npz")
-    path.write_bytes(path.read_bytes()[:-3000])
-    with pytest.raises(LogError, match="is wrong at 'obstacles'"):
-        Rollout.salvage(path)
-
-
-def test_meta_nested_without_end(run: Rollout, tmp_path: Path) -> None:
-    arrays = {"meta": np.array("[" * 100_000), **run.columns}
-    path = tmp_path / "log.npz"
-    path.write_bytes(packed(arrays))
-    with pytest.raises(LogError, match="its entry 'meta' is not JSON"):
-        Rollout.load(path)

@@ -49,7 +49,6 @@ EVERYTHING: dict[str, Any] = {
     "momentum_observer": MomentumObserver(50.0, clip=20.0),
     "friction_feed_forward": FrictionFeedForward(0.1, 0.1),
     "integral_action": IntegralAction(5.0),
-    "effort_rate": 1000.0,
     "start_up_ramp": StartUpRamp(0.1),
 }
 ALL = Compensation(**EVERYTHING)

@@ -873,13 +873,6 @@ MUTANTS = (
         "if len(payload) < length:",
         UNIT + "simulation/test_journal.py -k changed_byte",
     ),
-    Mutant(
-        "salvage: checksum ignored",
-        SIMULATION + "salvage.py",
-        "if len(packed) != entry.size or zlib.crc32(packed) != entry.checksum:",
-        "if len(packed) != entry.size:",
-        UNIT + "simulation/test_log.py -k salvage",
-    ),
     # ------------------------------------------------------------------------ live
     Mutant(
         "packets: checksum ignored",

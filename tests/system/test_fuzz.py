@@ -13,7 +13,6 @@ from campaigns.soak import PROCESS_GROWTH, PYTHON_GROWTH, soak
 from campaigns.worker import Worker
 from places import THOROUGH
 
-from hsp_control.common.exceptions import LogError
 from hsp_control.common.resources import bundled_robots
 from hsp_control.simulation import Rollout
 
@@ -34,7 +33,7 @@ def test_random_states(robot: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "cases"), [("yaml", 30 if THOROUGH else 12), ("urdf", 5), ("logs", 5)]
+    ("kind", "cases"), [("yaml", 30 if THOROUGH else 12), ("urdf", 5)]
 )
 def test_mutated_files(kind: str, cases: int) -> None:
     count = count_cases(KINDS[kind], SEED, cases)
@@ -86,43 +85,11 @@ def sample(count: int, once: Callable[[Random, Path], faults.Faults]) -> set[str
 
 def test_a_disk_that_fills(run: Rollout, log: Path) -> None:
     size = log.stat().st_size
-    outcomes = sample(30, lambda r, f: faults.full_disk(run, size, r, f))
-    assert len(outcomes) == 2
-
-
-def test_a_log_cut_anywhere(run: Rollout, log: Path, tmp_path: Path) -> None:
-    data = log.read_bytes()
-    ends = faults.whole_before(data, tmp_path)
-    outcomes = sample(
-        150, lambda r, f: faults.cut_log(run, data, ends, r.randrange(len(data)), f)
-    )
-    assert len(outcomes) == 2
+    sample(30, lambda r, f: faults.full_disk(run, size, r, f))
 
 
 def test_ctrl_c_at_any_moment(log: Path) -> None:
     sample(3, lambda r, f: faults.interrupted(r, f, log, 6.0))
-
-
-def test_salvage_names_what_is_lost(
-    log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    from hsp_control.cli import main
-
-    data, cut = log.read_bytes(), tmp_path / "run.cut.npz"
-    cut.write_bytes(data[: 2 * len(data) // 3])
-    with pytest.raises(LogError, match="its motion is complete: hsp salvage"):
-        Rollout.load(cut)
-    assert main(["salvage", str(cut)]) == 0
-    printed = capsys.readouterr().out
-    salvaged = Rollout.load(tmp_path / "run-salvaged.npz")
-    assert salvaged.meta["lost"]
-    assert f"lost: {', '.join(salvaged.meta['lost'])}" in printed
-    assert set(salvaged.columns) | set(salvaged.meta["lost"]) == set(
-        Rollout.load(log).columns
-    )
-    cut.write_bytes(data[:100])
-    assert main(["salvage", str(cut)]) == 2
-    assert "nothing to salvage: it is truncated in 'meta'" in capsys.readouterr().err
 
 
 def test_a_run_that_cannot_be_saved_is_saved_elsewhere(

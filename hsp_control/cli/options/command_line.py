@@ -3,7 +3,6 @@
 import argparse
 from pathlib import Path
 
-from hsp_control.cli.options.bench import add_bench
 from hsp_control.cli.options.export import add_export
 from hsp_control.cli.options.franka_box import add_box_options
 from hsp_control.cli.options.franka_model import add_model_options
@@ -111,17 +110,8 @@ def command_line() -> argparse.ArgumentParser:
         help="draw joint angles, not absolute ones, where the robot has both",
     )
 
-    salvage = _command(
-        commands, "salvage", "recover the complete rows of a truncated log"
-    )
-    salvage.add_argument("log", type=Path, metavar="LOG", help="a truncated log")
-    salvage.add_argument(
-        "--out", type=Path, metavar="FILE", help="default: LOG's name, -salvaged.npz"
-    )
-
     add_export(_command(commands, "export", "write logs as a page, or one as a film"))
     add_sweep(_command(commands, "sweep", "run a configuration many times"))
-    add_bench(_command(commands, "bench", "measure a control loop on this machine"))
     add_live(_command(commands, "live", "control a simulated robot in another process"))
 
     box = _command(

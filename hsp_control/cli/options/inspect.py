@@ -22,11 +22,5 @@ def add_inspect(inspect: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="write a URDF whose inertias are the nearest that a body can have",
     )
-    inspect.add_argument(
-        "--html",
-        type=Path,
-        metavar="FILE",
-        help="write a page: a picture of the robot, and beside it what is odd",
-    )
     inspect.add_argument("--json", action="store_true", help="print JSON")
     add_strict(inspect)

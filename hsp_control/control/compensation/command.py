@@ -1,7 +1,7 @@
 """The chain from a measurement to an effort: the law and its compensators.
 
     measurement → velocity filter → predictor → law → start-up ramp
-                → friction and disturbance offset → limits → effort rate → effort
+                → friction and disturbance offset → limits → effort
 
 The friction feed-forward and the observer's estimate r are an offset of the effort of
 the model, M a + N + friction - r; the controller's limits hold for the sum. The two do
@@ -20,7 +20,6 @@ from hsp_control.common.arrays import Array
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation.status import Status
 from hsp_control.control.compensation.compensation import Compensation
-from hsp_control.control.compensation.effort_rate import EffortRateClip
 from hsp_control.control.compensation.force_feedback import RunningForceFeedback
 from hsp_control.control.compensation.friction_feed_forward import FrictionFeedForward
 from hsp_control.control.compensation.integral_action import RunningIntegral
@@ -62,13 +61,13 @@ class Command:
         """Set the controller and its compensation, if any.
 
         Raises:
-            CompensationError: If a compensator does not fit the robot, tasks or limits.
+            CompensationError: If a compensator does not fit the robot, tasks, contacts.
             GainError: If errors would not decay with the integral action.
         """
         self.controller = controller
         self.compensation = Compensation() if compensation is None else compensation
         own, robot = self.compensation, controller.robot
-        own.check(robot, controller.tasks, controller.limits, controller.contacts)
+        own.check(robot, controller.tasks, controller.contacts)
         self.state = controller.state
         self._measured = self.state if own.predictor is None else RobotState(robot)
         self._tau, self._zero = np.zeros(robot.nv), np.zeros(robot.nv)
@@ -102,9 +101,6 @@ class Command:
         self._force_feedback: RunningForceFeedback | None = None
         if own.force_feedback is not None:
             self._force_feedback = own.force_feedback.begin(self.controller)
-        self._clip: EffortRateClip | None = None
-        if own.effort_rate is not None:
-            self._clip = EffortRateClip(robot, own.effort_rate)
         self._ramp: RunningRamp | None = None  # begins at the first state
         self._predictor: RunningPredictor | None = None
         self._period = 0.0
@@ -154,12 +150,11 @@ class Command:
             self._shown = self.state.q.copy(), self.state.v.copy()
         tau = self._tau
         tau[:] = output.tau
-        clipped = self._clip is not None and self._clip.apply(tau, last)
         self.controller.applied(tau, period)
         if self._integral is not None:
-            self._integrate(self._integral, output, period, clipped)
+            self._integrate(self._integral, output, period)
         if self._force_feedback is not None:
-            hindered = output.status >= Status.LIMITED or clipped
+            hindered = output.status >= Status.LIMITED
             self._force_feedback.advance(self.state.t, period, output.forces, hindered)
         if self._observer is not None or own.predictor is not None:
             self._pressing = self._expected(output)
@@ -315,13 +310,12 @@ class Command:
         integral: RunningIntegral,
         output: ControlOutput,
         period: float,
-        clipped: bool,
     ) -> None:
         """Integrate the errors of the fully active tasks over this period."""
         t, controller = self.state.t, self.controller
         starting = self._ramp is not None and self._ramp.weight(t) < 1.0
         limited = output.status >= Status.LIMITED
-        saturated = bool(output.damped) or limited or clipped or starting
+        saturated = bool(output.damped) or limited or starting
         errors: dict[str, Array | None] = {}
         for name, rows in controller.task_rows.items():
             if controller.weight_of(name, t) >= 1.0:

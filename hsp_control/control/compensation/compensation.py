@@ -4,12 +4,8 @@ from collections.abc import Sequence
 from dataclasses import KW_ONLY
 from typing import Literal
 
-import numpy as np
-
 from hsp_control.common.exceptions import CompensationError
 from hsp_control.constraints.contacts import Contact
-from hsp_control.constraints.limits import RobotLimits
-from hsp_control.constraints.limits.numbers_by_joint import Positives, by_dof
 from hsp_control.control.compensation.force_feedback import ForceFeedback
 from hsp_control.control.compensation.friction_feed_forward import FrictionFeedForward
 from hsp_control.control.compensation.integral_action import IntegralAction
@@ -45,9 +41,6 @@ class Compensation(Part, error=CompensationError):
     """Removes constant task errors by integral feedback."""
     force_feedback: ForceFeedback | None = None
     """Lets the commanded forces of contacts be those that are felt."""
-    effort_rate: Positives | None = None
-    """Maximum rate of the effort that is sent [N·m/s or N/s], one number or nv; for
-    controllers without `limits.effort_rate`, which deviate in the null space first."""
     start_up_ramp: StartUpRamp | None = None
     """Changes the effort smoothly from holding still to the law."""
 
@@ -67,10 +60,9 @@ class Compensation(Part, error=CompensationError):
         self,
         robot: Robot,
         tasks: Sequence[Task],
-        limits: RobotLimits | None = None,
         contacts: Sequence[Contact] = (),
     ) -> None:
-        """Check that the compensators fit a robot, its tasks, limits and contacts.
+        """Check that the compensators fit a robot, its tasks and contacts.
 
         Raises:
             CompensationError: Names the compensator, the setting, and what it must be.
@@ -91,14 +83,6 @@ class Compensation(Part, error=CompensationError):
         if self.integral_action is not None:
             with within("integral_action"):
                 self.integral_action.check(tasks)
-        if self.effort_rate is not None:
-            with within("effort_rate"):
-                by_dof(self.effort_rate, robot.nv, error=CompensationError)
-                if limits is not None and np.isfinite(limits.effort_rate).any():
-                    raise CompensationError(
-                        "limits.effort_rate keeps the rate already, and deviates in "
-                        "the null space first; remove one of the two"
-                    )
 
     def _check_forces(self, contacts: Sequence[Contact]) -> None:
         """Check that there are forces to feed back, and that none is cancelled."""

@@ -23,8 +23,7 @@ class IntegralAction(Part, error=CompensationError):
     """Removes the steady-state errors of tasks; it has no effect in the null space.
 
     Anti-windup: while the law is not delivered exactly (a limit binds, a singularity
-    bounds the law, the effort rate is clipped, the start-up ramp is active), the
-    integral may only decrease.
+    bounds the law, the start-up ramp is active), the integral may only decrease.
 
     A robot heavier than its model performs only a part β of the acceleration that the
     law requires: e'' + β (Kv e' + Kp e + Ki ∫e) = d. Its error grows if β < Ki/(Kv Kp)

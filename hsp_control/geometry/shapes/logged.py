@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from typing import Any
 
-from hsp_control.common.exceptions import SceneError
 from hsp_control.declaration.part import value_fields
 from hsp_control.declaration.quantities import plain
 from hsp_control.geometry.shapes.shape import Shape
@@ -22,18 +21,13 @@ def shape_from_log(kind: str, parameters: Mapping[str, Any]) -> Shape | None:
         parameters: Its fields.
 
     Raises:
-        SceneError: If the parameters are not those of this kind, or invalid.
+        SceneError: If the parameters are not those of this kind.
     """
     assert Shape.family is not None
     members = {each.__name__: each for each in Shape.family.members.values()}
     shape_class = members.get(kind)
     if shape_class is None:
         return None
-    try:
-        shape = shape_class(**parameters)
-    except SceneError:
-        needed = ", ".join(f.name for f in value_fields(shape_class)) or "nothing"
-        found = f"{dict(parameters)!r}"[:60]
-        raise SceneError(f"{kind.lower()}: needs {needed}; got {found}") from None
+    shape = shape_class(**parameters)
     assert isinstance(shape, Shape)
     return shape

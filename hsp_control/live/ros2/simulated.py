@@ -8,7 +8,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HardwareError
-from hsp_control.live.latency import no_garbage_collection
+from hsp_control.live.real_time import no_garbage_collection
 from hsp_control.live.ros2.hardware import JOINT_STATES
 from hsp_control.live.ros2.joints import Joints
 from hsp_control.live.safe_stop import Phase

@@ -11,7 +11,6 @@ from .frames import draw_frames as draw_frames
 from .frames import draw_superimposed as draw_superimposed
 from .joints import draw_efforts as draw_efforts
 from .joints import draw_joint_positions as draw_joint_positions
-from .latency import latency_figure as latency_figure
 from .null_space import draw_distances as draw_distances
 from .null_space import draw_field_terms as draw_field_terms
 from .null_space import draw_field_value as draw_field_value

@@ -7,7 +7,6 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import HspControlError
 from hsp_control.geometry.shapes import Shape, shape_from_log
 from hsp_control.simulation.plants.mujoco.solids import Solid
 from hsp_control.visualization.viewer.appearance import SOLID
@@ -18,9 +17,6 @@ from hsp_control.visualization.viewer.motion import Motion
 from hsp_control.visualization.viewer.obstacle_drawing import enclosing_corners
 from hsp_control.visualization.viewer.obstacle_shapes import obstacle
 from hsp_control.visualization.viewer.scene_path import path_element
-
-_MOST = 300
-"""Solids that are drawn; more are no scene, but a damaged log."""
 
 
 class _Drawn(NamedTuple):
@@ -95,29 +91,18 @@ class SolidLayer:
 
 
 def solids_of(meta: Mapping[str, Any]) -> list[Solid]:
-    """Return the solids of a log's plant; what is not one is left out.
+    """Return the solids of a log's plant.
 
     Args:
-        meta: The meta data of a log, which may be untrusted.
+        meta: The meta data of a log.
     """
-    plant = meta.get("plant")
-    listed = plant.get("solids") if isinstance(plant, dict) else None
-    found: list[Solid] = []
-    for entry in listed if isinstance(listed, list) else []:
-        try:
-            given = {key: entry[key] for key in _FIELDS if key in entry}
-            shape = dict(given["shape"])
-            if (kind := str(shape.pop("type"))) not in _KINDS:
-                continue  # a mesh would name a file
-            given["shape"] = shape_from_log(kind, shape)
-            solid = Solid(**given)
-        except (HspControlError, TypeError, ValueError, KeyError, AttributeError):
-            continue
-        if sum(each.copies for each in (*found, solid)) > _MOST:
-            break
-        found.append(solid)
+    found = []
+    for entry in (meta.get("plant") or {}).get("solids", ()):
+        given = {key: entry[key] for key in _FIELDS if key in entry}
+        shape = dict(given["shape"])
+        given["shape"] = shape_from_log(shape.pop("type"), shape)
+        found.append(Solid(**given))
     return found
 
 
-_KINDS = ("Box", "Sphere", "Cylinder", "Capsule")
 _FIELDS = ("name", "shape", "position", "rotation", "mass", "copies", "spacing")

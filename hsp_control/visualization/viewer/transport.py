@@ -15,8 +15,8 @@ class Transport(Protocol):
         """The page's address; None where there is no page."""
 
     @property
-    def scene(self) -> LatestCommands | None:
-        """The commands that build the scene; None if they are not kept."""
+    def scene(self) -> LatestCommands:
+        """The commands that build the scene."""
 
     def send(self, commands: Iterable[Command]) -> None:
         """Send commands, to be shown together.

@@ -29,7 +29,6 @@ from hsp_control.visualization.viewer.commands import (
     set_time,
 )
 from hsp_control.visualization.viewer.comparison import ComparedRun, Comparison
-from hsp_control.visualization.viewer.meshcat_transport import MeshcatTransport
 from hsp_control.visualization.viewer.motion import motion_of
 from hsp_control.visualization.viewer.obstacle_drawing import ObstacleDrawing
 from hsp_control.visualization.viewer.robot_drawing import RobotDrawing
@@ -69,7 +68,6 @@ class Viewer:
         open_browser: bool = False,
         transport: Transport | None = None,
         port: int | None = None,
-        meshcat: Any = None,
         **view: Any,
     ) -> None:
         """Show the robot at its home posture.
@@ -80,16 +78,13 @@ class Viewer:
             transport: A `Recorder`, to store the commands and show nothing; None: a new
                 server on the loopback address.
             port: The server's port; None: the first free one from 7000.
-            meshcat: A `meshcat.Visualizer`, or the address of its server, such as
-                ``tcp://127.0.0.1:6000``: the scene is put there, beside what others
-                have drawn, and no server is started; see `MeshcatTransport`.
             view: Fields of `ViewSettings`, the keys of a configuration's ``view``:
                 ``camera`` and ``target`` [m], ``background``,
                 ``show={"ellipsoid": True}``, ...
 
         Raises:
             ViewerError: If a view has no such field, a value is not valid, Meshcat is
-                not installed, the server cannot start, or Meshcat's does not answer.
+                not installed, or the server cannot start.
         """
         self.robot = robot
         self.view = ViewSettings(**view)
@@ -98,8 +93,6 @@ class Viewer:
         self._obstacles: ObstacleDrawing | None = None
         self._others: list[str] = []
         self._plotted = False
-        if meshcat is not None:
-            transport = MeshcatTransport(meshcat)
         self.transport = Server(port) if transport is None else transport
         try:
             # Its meshes last: they appear where they belong, in their light.
@@ -280,17 +273,15 @@ class Viewer:
     def _repr_html_(self) -> str:
         """Return the HTML for a notebook: what is shown now, which needs no server.
 
-        The page of another Meshcat server is shown in a frame; so is this one's, with
-        the reason, where a robot's meshes cannot be read.
+        The live page is shown in a frame, with the reason, where a robot's meshes
+        cannot be read.
         """
         from hsp_control.visualization.viewer.export import InlineView  # imports us
 
-        reason = ""
-        if self.transport.scene is not None:
-            try:
-                return InlineView(self.transport.scene, url=self.url)._repr_html_()
-            except ExportError as error:
-                reason = f"<p>Only while the program runs: {escape(str(error))}</p>"
+        try:
+            return InlineView(self.transport.scene, url=self.url)._repr_html_()
+        except ExportError as error:
+            reason = f"<p>Only while the program runs: {escape(str(error))}</p>"
         if self.url is None:
             return reason
         return (

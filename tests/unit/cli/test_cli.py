@@ -39,6 +39,17 @@ def test_run_leaves_a_log_that_numpy_alone_reads(
     assert meta["columns"]["tau"]["unit"] == "N·m"
 
 
+def test_run_tells_its_speed_and_its_memory(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["run", MOVING, "--out", str(tmp_path), *SHORT]) == 0
+    printed = capsys.readouterr().out
+    assert "times real time (0.1 s in " in printed
+    with np.load(tmp_path / "4_moving_obstacle.npz") as log:
+        size = sum(log[name][0].nbytes for name in log.files if name != "meta")
+    assert f"log            {size} bytes per row" in printed
+
+
 def test_run_tells_a_program_what_it_did(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -91,7 +91,7 @@ EVERYTHING: dict[str, Any] = {
         "panda_hand": {"shape": {"type": "sphere", "radius": 0.01}}}},
     "compensation": {
         "predictor": {}, "momentum_observer": {"clip": [1, None]},
-        "friction_feed_forward": "urdf", "effort_rate": [1, 2],
+        "friction_feed_forward": "urdf",
         "integral_action": {"ki": {"hand": [[9, 0], [0, 9]]}, "tasks": ["hand"]}},
     "simulation": {"control_period": 0.001},
 }  # fmt: skip

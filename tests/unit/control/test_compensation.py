@@ -560,17 +560,6 @@ def test_the_law_is_of_the_time_at_which_its_effort_acts(
         assert np.abs(other).max() > 1e-3  # a period more or less would be seen
 
 
-def test_what_goes_out_changes_no_faster_than_allowed() -> None:
-    rate = np.linspace(20.0, 80.0, 7)
-    free, cut = run(controller()), run(
-        controller(), Compensation(effort_rate=rate)
-    )  # fmt: skip
-    steps = np.abs(np.diff(free.tau, axis=0)) / H
-    assert (steps > rate).any()
-    assert (np.abs(np.diff(cut.tau, axis=0)) / H <= rate * (1.0 + 1e-9)).all()
-    np.testing.assert_array_equal(free.tau[0], cut.tau[0])
-
-
 @pytest.mark.parametrize("frequency", [0.0, 10.0])
 def test_the_ramp_leads_from_gravity_to_the_law(frequency: float) -> None:
     made = controller()

@@ -11,7 +11,7 @@ import pytest
 from compensation_cases import ALL, EVERYTHING, PANDA, Q0, H, circle, controller
 from numpy.typing import NDArray
 
-from hsp_control import Limits, Robot
+from hsp_control import Robot
 from hsp_control.common.exceptions import CompensationError, ImmutableError
 from hsp_control.control.compensation import (
     Command,
@@ -54,8 +54,8 @@ def test_one_compensation_serves_many_commands_at_once() -> None:
 def test_compensators_are_values() -> None:
     ki = {"hand": [400.0, 800.0, 1200.0]}
     action = IntegralAction(2.0, ki=ki, tasks=["hand"], limit=8.0)
-    own = replace(ALL, integral_action=action, effort_rate=[1.0, np.inf])
-    same = replace(ALL, integral_action=replace(action), effort_rate=(1, None))
+    own = replace(ALL, integral_action=action)
+    same = replace(ALL, integral_action=replace(action))
     assert own == same != ALL
     assert hash(own) == hash(same)
     assert pickle.loads(pickle.dumps(own)) == own
@@ -111,11 +111,6 @@ def walker() -> Robot:
             lambda: on(friction_feed_forward=FrictionFeedForward([1.0])),
             r"^friction_feed_forward.coulomb: has shape \(1,\); needs one number",
         ),
-        (
-            lambda: on(effort_rate=[1.0, 2.0]),
-            "^effort_rate: has 2 numbers; needs one number or 7",
-        ),
-        (lambda: on(effort_rate="fast"), "effort_rate: 'fast' is text; expected a num"),
         (lambda: MomentumObserver(clip=[-1.0] * 7), r"clip.0: -1.0 is .* greater th"),
         (
             lambda: on(momentum_observer=MomentumObserver(clip=[1.0] * 6)),
@@ -140,15 +135,6 @@ def on(**parts: Any) -> None:
     Compensation(**parts).check(PANDA, [circle()])
 
 
-def test_two_guards_of_the_effort_rate_are_one_too_many() -> None:
-    for limits in (Limits(), Limits(effort_rate=500.0)):
-        made = controller(limits=limits)
-        with pytest.raises(CompensationError, match=r"limits\.effort_rate keeps the"):
-            Command(made, Compensation(effort_rate=500.0))
-    made = controller(limits=Limits(effort_rate="none"))
-    Command(made, Compensation(effort_rate=5.0))
-
-
 @pytest.mark.parametrize("name", ["momentum_observer", "predictor", "start_up_ramp"])
 def test_a_robot_that_may_fall_cannot_have_some(name: str) -> None:
     robot = walker()
@@ -159,5 +145,4 @@ def test_a_robot_that_may_fall_cannot_have_some(name: str) -> None:
     Compensation(
         velocity_filter=VelocityFilter(50.0),
         friction_feed_forward=FrictionFeedForward(0.1),
-        effort_rate=1000.0,
     ).check(robot, [])

@@ -234,21 +234,6 @@ def test_logs_describe_shapes(shape: Shape) -> None:
     assert shape_from_log(type(shape).__name__, about) == shape
 
 
-@pytest.mark.parametrize(
-    ("kind", "about", "message"),
-    [
-        ("Sphere", {}, "sphere: needs radius; got {}"),
-        ("Sphere", {"radius": [1]}, "sphere: needs radius; got {'radius': [1]}"),
-        ("Mesh", {"file": 3}, "mesh: needs file, scale, convex; got {'file': 3}"),
-        ("HalfSpace", {"a": 1}, "halfspace: needs nothing; got {'a': 1}"),
-    ],
-)
-def test_logs_with_wrong_shapes(kind: str, about: Any, message: str) -> None:
-    with pytest.raises(SceneError) as caught:
-        shape_from_log(kind, about)
-    assert str(caught.value) == message
-
-
 @pytest.mark.parametrize("kind", ["", "Torus", "sphere", "Shape", "Obstacle"])
 def test_logs_with_unknown_shapes(kind: str) -> None:
     assert shape_from_log(kind, {}) is None

@@ -1,16 +1,12 @@
 """Each finding names what is odd, with its value and a cure that helps."""
 
-import base64
-import gzip
 import json
-import re
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 import pytest
-import umsgpack
 from numpy.typing import NDArray
 from odd_robots import FACES, OCTAHEDRON, write_stl
 from robot_texts import ARM, INERTIA, joint, link, robot_xml
@@ -214,29 +210,6 @@ def test_fix_writes_a_robot_without_findings(
     assert main(["inspect", str(fixed)]) == 0
     assert main(["inspect", str(path), "--fix", str(path)]) == 2
     assert "is the robot's own file; give another" in capsys.readouterr().err
-
-
-def test_page_has_the_robot_and_its_findings(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path, page = tmp_path / "arm.urdf", tmp_path / "arm.html"
-    path.write_text(ARM.replace(INERTIA, INERTIA.replace('izz="0.1"', 'izz="0.5"'), 1))
-    assert main(["inspect", str(path), "--html", str(page)]) == 0
-    assert f"Page: {page}" in capsys.readouterr().out
-    text = page.read_text()
-    block = re.search(r'id="content">([^<]*)<', text)
-    assert block is not None
-    content = umsgpack.unpackb(gzip.decompress(base64.b64decode(block[1])))
-    headings = [note["heading"] for note in content["notes"]]
-    assert headings[0] == "warning: inertia"
-    assert headings[-1] == "robot"
-    assert "link 'upper'" in content["notes"][0]["items"][0]
-    assert str(tmp_path) not in str(content)  # a page is for others, too
-    drawn = {command.get("path", "") for command in content["commands"]}
-    assert any(name.startswith("/robot/") for name in drawn)
-    path.write_text(ARM.replace(INERTIA, ""))
-    assert main(["inspect", str(path), "--html", str(page)]) == 2
-    assert "no picture of a robot that does not load" in capsys.readouterr().err
 
 
 def test_mistakes_of_the_command(

@@ -274,7 +274,7 @@ def test_a_motion_that_diverges_stops_the_same_way(
 @pytest.mark.parametrize(
     "override",
     [
-        "compensation.effort_rate=2000",
+        "compensation.velocity_filter={cutoff: 100}",
         "plant={type: rigid_body, sensors: {velocity_noise: 0.01}}",
         "plant={type: rigid_body, pushes: [{frame: panda_link4, force: [1, 0, 0], "
         "start: 0, duration: 1}]}",
@@ -282,6 +282,5 @@ def test_a_motion_that_diverges_stops_the_same_way(
     ],
 )
 def test_what_is_not_native_is_made_alone(override: str, counted: Counted) -> None:
-    rate = "limits.effort_rate=none"
-    short("panda_obstacle", override, rate, duration=0.05).run()
+    short("panda_obstacle", override, duration=0.05).run()
     assert sum(counted.many) == 0

