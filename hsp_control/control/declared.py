@@ -96,7 +96,8 @@ class Declared:
             check_kind("tasks contains", task, Task)
         if metric is None:
             yields = any(impedance_of(task) is not None for task in tasks)
-            metric = MassMatrixMetric() if yields else IdentityMetric()
+            own = MassMatrixMetric(inertia="robot")
+            metric = own if yields else IdentityMetric()
         for contact in contacts:
             check_kind("contacts contains", contact, Contact)
         check_kind("field is", field, NullSpaceField)

@@ -330,6 +330,14 @@ class Robot(ConfigurationSpace):
             q = pin.integrate(self.model, self.neutral(), turned)
         return largest
 
+    @cached_property
+    def typical_inertia(self) -> float:
+        """Geometric mean of the joints' largest inertias [kg·m²], nearly."""
+        joints = np.setdiff1d(np.arange(self.nv), self.unactuated)
+        inertias = self.largest_inertias[joints]
+        inertias = inertias[inertias > 0.0]
+        return float(np.exp(np.log(inertias).mean())) if inertias.size else 1.0
+
     # -- names ------------------------------------------------------------------------
 
     def frame_id(self, name: str) -> int:

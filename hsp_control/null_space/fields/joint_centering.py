@@ -22,6 +22,8 @@ class JointCentering(CompiledCost, type="joint_centering"):
 
     Joints without limits, continuous joints and a floating root do not count. After
     Liégeois (1977), equation (11), scaled such that (q_i - m_i)/r_i is ±1 at a limit.
+    Half a range of less than 1 rad or 1 m counts as that: else a finger that opens by
+    4 cm would be drawn back at 2500 1/s, faster than any control period can follow.
     """
 
     _: KW_ONLY
@@ -49,7 +51,8 @@ class JointCentering(CompiledCost, type="joint_centering"):
         limited, (lower, upper) = limited_joints(robot), robot.position_limits()
         dofs = limited[:, 0]
         low, high = lower[dofs], upper[dofs]
-        stiffness = per_dof(self.weights, robot.nv)[dofs] / (0.5 * (high - low)) ** 2
+        half = np.maximum(0.5 * (high - low), 1.0)
+        stiffness = per_dof(self.weights, robot.nv)[dofs] / half**2
         return bind(
             _centering,
             state.q,

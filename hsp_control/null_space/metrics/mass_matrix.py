@@ -1,6 +1,7 @@
 """The kinetic-energy metric, of Khatib's dynamically consistent inverse."""
 
-from typing import ClassVar
+from dataclasses import KW_ONLY, replace
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 
@@ -10,19 +11,33 @@ from hsp_control.common.kernels import kernel
 from hsp_control.common.linalg import cholesky
 from hsp_control.common.native import bind
 from hsp_control.common.step_plan import StepPlan
+from hsp_control.declaration.quantities import Positive
+from hsp_control.geometry.start import Start
 from hsp_control.null_space.metrics.metric import VARYING, Metric, MetricSample
 from hsp_control.robot import RobotState
 
 
 class MassMatrixMetric(Metric, type="mass_matrix"):
-    """W = M(q), W' = C + Cᵀ: the kinetic energy is ½ vᵀWv.
+    """W = M(q)/m, W' = (C + Cᵀ)/m: the kinetic energy is ½ m vᵀWv.
 
     Null-space efforts do not accelerate the task (dynamically consistent). M is badly
     conditioned on real robots (condition number 4e2 on a Panda, 1e5 on a humanoid):
     light joints, such as wrists, then do most of the task's motion.
     """
 
+    _: KW_ONLY
+    inertia: Positive | Literal["robot"] = 1.0
+    """m [kg·m²]: J# and the projector are the same whatever it is; joints of this
+    inertia descend a cost as fast as with the identity, lighter ones faster. ``robot``:
+    the geometric mean of its joints'."""
+
     form: ClassVar[int] = VARYING
+
+    def placed(self, start: Start) -> Self:
+        """Return the metric with the robot's own inertia in numbers."""
+        if self.inertia != "robot":
+            return self
+        return replace(self, inertia=start.state.robot.typical_inertia)
 
     def compile(self, state: RobotState, out: MetricSample) -> StepPlan:
         """Return the step plan that does what `evaluate` does; see `Metric.compile`.
@@ -34,28 +49,36 @@ class MassMatrixMetric(Metric, type="mass_matrix"):
             return super().compile(state, out)
         matrices = state.mass_matrix, state.coriolis_matrix
         update = state.compute_mass_matrix, state.compute_coriolis_matrix
-        return StepPlan((), (*update, bind(_write, *matrices, *out)))
+        unit = self._unit(state)
+        return StepPlan((), (*update, bind(_write, *matrices, unit, *out)))
+
+    def _unit(self, state: RobotState) -> float:
+        robot = state.robot
+        return robot.typical_inertia if self.inertia == "robot" else self.inertia
 
     def evaluate(self, state: RobotState, out: MetricSample) -> MetricSample:
-        """Write W = M, L and W' = M'; see `Metric.evaluate`.
+        """Write W = M/m, L and W' = M'/m; see `Metric.evaluate`.
 
         Raises:
             MetricError: If M is singular.
         """
-        out.W[:] = state.mass_matrix
+        unit = self._unit(state)
+        out.W[:] = state.mass_matrix / unit
         if not cholesky(out.W, out.L):
             raise MetricError(f"the mass matrix is singular at q = {state.q.tolist()}")
-        out.W_dot[:] = state.mass_matrix_rate
+        out.W_dot[:] = state.mass_matrix_rate / unit
         return out
 
 
 @kernel
-def _write(M: Array, C: Array, W: Array, L: Array, W_dot: Array) -> None:
-    """Write W = M, its factor L and W' = C + Cᵀ; L is NaN if M is singular."""
+def _write(
+    M: Array, C: Array, unit: float, W: Array, L: Array, W_dot: Array
+) -> None:
+    """Write W = M/m, its factor L and W' = (C + Cᵀ)/m; L is NaN if M is singular."""
     n = M.shape[0]
     for i in range(n):
         for j in range(n):
-            W[i, j] = M[i, j]
-            W_dot[i, j] = C[i, j] + C[j, i]
+            W[i, j] = M[i, j] / unit
+            W_dot[i, j] = (C[i, j] + C[j, i]) / unit
     if not cholesky(W, L):
         L[0, 0] = np.nan
