@@ -158,12 +158,14 @@ def _cylinder(size: Array, x: Array, n: Array, H: Array) -> float:
     r = sqrt(x[0] * x[0] + x[1] * x[1])
     side, end = r - size[0], abs(x[2]) - size[2]
     up = 1.0 if x[2] > 0.0 else -1.0
-    # (c, s) is the radial unit vector; on the axis any direction is right.
-    c, s = (x[0] / r, x[1] / r) if r > 0.0 else (1.0, 0.0)
+    # (c, s) is the radial unit vector. On the axis any direction is right, and none
+    # turns: there 1/r would be infinite.
+    on_axis = r < _COINCIDENT
+    c, s = (1.0, 0.0) if on_axis else (x[0] / r, x[1] / r)
     if side <= 0.0 and end <= 0.0:  # inside: to the nearer of side and end
         if side > end:
             n[0], n[1] = c, s
-            distance, curvature = side, 1.0 / r
+            distance, curvature = side, 0.0 if on_axis else 1.0 / r
         else:
             n[2] = up
             return float(end)

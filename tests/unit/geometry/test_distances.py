@@ -19,6 +19,7 @@ from hsp_control.geometry import LinkShape, Proximity, link_shapes
 from hsp_control.geometry.shapes import (
     Box,
     Capsule,
+    Cylinder,
     HalfSpace,
     HeightField,
     Mesh,
@@ -200,6 +201,33 @@ def test_two_links_of_one_robot_push_each_other() -> None:
                 either.gradient(state, np.array([2.0])), 2.0 * expected, atol=1e-12
             )
             assert not either.gradient(state, np.zeros(1)).any()
+
+
+SOLIDS: dict[str, Shape] = {
+    "ball": Sphere(0.1),
+    "box": Box([0.1, 0.1, 0.1]),
+    "capsule": Capsule(radius=0.05, length=0.2),
+    "cylinder": Cylinder(radius=0.05, length=0.2),
+    "hull": PointCloud(
+        0.1 * np.array([[-1.0, -1, -1], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    ),
+}
+
+
+@pytest.mark.parametrize("shape", SOLIDS)
+@pytest.mark.parametrize("offset", [0.0, 1e-200, 1e-13, 1e-9])
+def test_nothing_is_nan_where_a_normal_has_no_direction(
+    shape: str, offset: float
+) -> None:
+    """The obstacle's centre is in the origin of a link, or hardly beside it."""
+    robot, rng = load("panda"), np.random.default_rng(0)
+    state = robot.state(0.0, robot.random_configuration(rng), rng.standard_normal(7))
+    for link in range(1, 8):
+        center = state.frame(f"panda_link{link}").position + offset
+        field = ObstacleClearance([Obstacle("it", SOLIDS[shape], Hold(center))])
+        values = robot.state(state.t, state.q, state.v)
+        assert np.isfinite(field.gradient(values)).all()
+        assert np.isfinite(field.gradient_rate(values)).all()
 
 
 def test_a_pair_that_is_named_twice_counts_once() -> None:
