@@ -4,7 +4,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.arrays import Array, Flags, Indices
 from hsp_control.common.kernels import kernel
 from hsp_control.common.linalg import (
     add_rows,
@@ -93,7 +93,7 @@ class Directions(NamedTuple):
     form: int
     ends: Indices
     error: Array
-    springs: Array
+    springs: Flags
     size: float
     first: int
     least: float

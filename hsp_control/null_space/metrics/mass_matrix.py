@@ -71,9 +71,7 @@ class MassMatrixMetric(Metric, type="mass_matrix"):
 
 
 @kernel
-def _write(
-    M: Array, C: Array, unit: float, W: Array, L: Array, W_dot: Array
-) -> None:
+def _write(M: Array, C: Array, unit: float, W: Array, L: Array, W_dot: Array) -> None:
     """Write W = M/m, its factor L and W' = (C + Cᵀ)/m; L is NaN if M is singular."""
     n = M.shape[0]
     for i in range(n):

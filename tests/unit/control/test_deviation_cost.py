@@ -18,6 +18,7 @@ from hsp_control import (
     FramePosition,
     Gains,
     Hold,
+    Impedance,
     JointCentering,
     JointPosture,
     Limits,
@@ -46,6 +47,7 @@ from hsp_control.robot.integrators import Rk4
 Array = NDArray[np.float64]
 seeds = st.integers(0, 2**32 - 1)
 NOWHERE = np.zeros(0, dtype=np.int64)
+FAR = [0.8, 0.6, 0.9]
 compiled = pytest.mark.skipif(PLAIN, reason="many steps")
 
 
@@ -114,6 +116,48 @@ def test_levels_share_directions_as_the_law_does(
     resolution = controller.active_stack.resolution
     H = limit_oracle.deviation_cost(resolution, False, robot.size)
     np.testing.assert_allclose(inverse_cost(resolution) @ H, np.eye(7), atol=1e-5)
+
+
+def on_springs(limits: Limits | None, *below: FramePosition) -> Controller:
+    spring = FramePosition("panda_tcp", Hold(FAR), impedance=Impedance(400.0))
+    metric = MassMatrixMetric()
+    return Controller(
+        panda(), [spring, *below], JointCentering(), metric=metric, limits=limits
+    )
+
+
+@given(seeds)
+@settings(max_examples=20)
+def test_springs_yield_as_a_body_with_stops(seed: int) -> None:
+    """Only joints at a bound get a reaction, and it leads away from the bound."""
+    rng, robot = np.random.default_rng(seed), panda()
+    q = robot.home() + 0.2 * rng.standard_normal(7)
+    state = robot.state(0.0, q, 0.5 * rng.standard_normal(7))
+    wanted = on_springs(None).compute(state).acceleration
+    bounds = Limits(acceleration=2.0, effort="none", effort_rate="none")
+    got = on_springs(bounds).compute(state).acceleration
+    reaction = state.mass_matrix @ (got - wanted)
+    at_bound = np.abs(got) > 2.0 - 1e-9
+    assert at_bound.any()
+    np.testing.assert_allclose(reaction[~at_bound], 0.0, atol=1e-8)
+    assert (reaction[at_bound] * got[at_bound] <= 1e-8).all()
+
+
+@given(seeds)
+@settings(max_examples=10)
+def test_a_level_below_springs_costs_as_much_as_they_do(seed: int) -> None:
+    rng, robot = np.random.default_rng(seed), panda()
+    elbow = FramePosition("panda_link4", Hold([0.1, 0.2, 0.5]), priority=2)
+    for below in ([], [elbow]):
+        controller = on_springs(Limits(), *below)
+        q = robot.random_configuration(rng)
+        controller.compute(0.0, q, rng.standard_normal(7))
+        resolution = controller.active_stack.resolution
+        H = limit_oracle.deviation_cost(resolution, False, robot.size)
+        np.testing.assert_allclose(inverse_cost(resolution) @ H, np.eye(7), atol=1e-5)
+        if not below:
+            W = resolution.problem.metric.W
+            np.testing.assert_allclose(H, W, rtol=0, atol=1e-10)
 
 
 def straight_elbow(limits: Limits | None) -> Controller:

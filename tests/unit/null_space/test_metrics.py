@@ -35,6 +35,25 @@ def test_mass_matrix_metric() -> None:
     np.testing.assert_allclose(sample.L @ sample.L.T, sample.W, rtol=0, atol=1e-15)
 
 
+def test_the_mass_matrix_over_the_robots_own_inertia() -> None:
+    """P is that of M itself; a cost's descent is as much quicker as the inertia says."""
+    robot, rng = load("panda"), np.random.default_rng(32)
+    state = robot.state(0.0, robot.random_configuration(rng), rng.standard_normal(7))
+    metric = MassMatrixMetric(inertia="robot").placed(Start(state, Scene()))
+    inertia = robot.typical_inertia
+    assert metric.inertia == inertia == pytest.approx(0.325, abs=1e-3)
+    assert metric.inertia**7 == pytest.approx(robot.largest_inertias.prod())
+    scaled = metric.evaluate(state, MetricSample.allocate(7))
+    compiled = MetricSample.allocate(7)
+    for call in metric.compile(state, compiled).write:
+        call()
+    plain = MassMatrixMetric().evaluate(state, MetricSample.allocate(7))
+    for part, same, whole in zip(scaled, compiled, plain, strict=True):
+        np.testing.assert_allclose(part, same, rtol=1e-14, atol=1e-16)
+        factor = np.sqrt(inertia) if part is scaled.L else inertia
+        np.testing.assert_allclose(part * factor, whole, rtol=1e-13, atol=1e-15)
+
+
 def test_natural_gradient_descends_where_the_plain_one_need_not() -> None:
     """f' = -‖P W⁻¹∇f‖²_W along v = P g for g = -W⁻¹∇f; with g = -∇f it may rise."""
     robot = load("panda")
