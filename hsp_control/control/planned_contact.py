@@ -8,7 +8,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.constraints.contacts import Contact
 from hsp_control.control.evolution import PRESENT, Evolution
 
-_HELD = 0.1
+HELD = 0.1
 """A contact whose weight is this or more is kept at rest. With 1, a foot would move
 while it bears; with 0, its motion would be set free, or stopped, with a jump."""
 
@@ -46,11 +46,11 @@ class PlannedContact:
     def share(self, t: float) -> float:
         """Return how much it is kept at rest at time t [s], in [0, 1].
 
-        It is 1 - (1 - x)³ with x the weight over `_HELD`: C² in time, as the weight.
+        It is 1 - (1 - x)³ with x the weight over `HELD`: C² in time, as the weight.
         """
         if not self.active(t):
             return 0.0
-        x = min(self.weight(t) / _HELD, 1.0)
+        x = min(self.weight(t) / HELD, 1.0)
         return x * (3.0 - x * (3.0 - x))
 
     def edge(self, t: float) -> float:
