@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from places import THOROUGH
 
 import hsp_control as hsp
+from hsp_control.control.actuation import actuation
 from hsp_control.control.actuation.status import Status
 from hsp_control.control.compensation import (
     Command,
@@ -267,6 +268,8 @@ def test_a_contact_that_is_lifted_and_bears_again(limited: bool, seed: int) -> N
     case.assert_continuous(controller)
 
 
+ABOUT = np.append(np.linspace(-1e-6, 1e-6, 20), -0.5 * FINEST)
+"""Where to look about an edge; the last 1e-9 s contain it [s]."""
 HANDED = (START, START + RAMP)
 """When a task moves what a contact keeps at rest before and afterwards [s]."""
 
@@ -324,11 +327,10 @@ def test_a_foot_with_a_schedule(seed: int) -> None:
     """A task moves it while it is lifted; it begins where the contact ends."""
     contact, task = handed_over()
     controller, q, v = standing(seed, contact=contact, task=task)
-    for edge in HANDED:
-        for t in edge + np.linspace(-1e-6, 1e-6, 21):
-            before = controller.compute(t, q, v).tau
-            after = controller.compute(t + 1e-9, q, v).tau
-            np.testing.assert_allclose(after, before, rtol=0, atol=1e-6)
+    for t in np.add.outer(HANDED, ABOUT).ravel():
+        before = controller.compute(t, q, v).tau
+        after = controller.compute(t + FINEST, q, v).tau
+        np.testing.assert_allclose(after, before, rtol=0, atol=1e-6)
 
 
 @given(seed=seeds)
@@ -343,8 +345,8 @@ def test_a_foot_that_a_plan_switches(seed: int) -> None:
         return controller.compute(t, q, v).tau
 
     foot.unload(START, 0.1)
-    for t in START + 0.1 + np.linspace(-1e-6, 1e-6, 21):
-        np.testing.assert_allclose(effort(t + 1e-9), effort(t), rtol=0, atol=1e-6)
+    for t in START + 0.1 + ABOUT:
+        np.testing.assert_allclose(effort(t + FINEST), effort(t), rtol=0, atol=1e-6)
     t = START + 0.2
     for begins in (t, t + 0.01, t + 0.02):  # the last two: while it bears already
         before = effort(begins - 1e-9)
@@ -388,6 +390,21 @@ def test_a_foot_that_is_lifted_while_it_moves(seed: int) -> None:
         state.inverse_dynamics(out.acceleration),
         atol=1e-7,
     )
+
+
+@pytest.mark.parametrize("what", ["limits_change", "limits_go", "limits_come"])
+def test_a_change_of_limits_is_compiled_when_it_is_made(
+    what: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No step makes a QP, of whatever set of limits."""
+    case = Case("panda", 0)
+    controller = CHANGES[what](case)
+    case.effort(controller, 0.0)
+    controller.at(START + RAMP).limits(case.limits())
+    monkeypatch.setattr(actuation, "LimitedStep", None)
+    for t in (START, START + 0.5 * RAMP, START + 1.5 * RAMP):
+        case.effort(controller, t)
+    assert case.binds
 
 
 @pytest.mark.parametrize("name", ROBOTS)
