@@ -18,7 +18,7 @@ JUMP = 0.1
 
 
 class StartWarning(UserWarning):
-    """A robot would begin with a jump of an effort, or with efforts that are too slow."""
+    """A robot would begin with a jump of an effort, or with efforts too slow."""
 
 
 def check_angles(robot: Robot, q: Array) -> None:
