@@ -13,7 +13,7 @@ from hsp_control.cli.consoles import out
 from hsp_control.cli.loading import load
 from hsp_control.config import Experiment
 from hsp_control.control import Controller, ControlOutput, Diagnostics
-from hsp_control.control.first_state import warn_of_jump
+from hsp_control.control.first_state import warn_of_jump, warn_of_slow_efforts
 from hsp_control.simulation.reach_check import out_of_reach
 
 ROUNDING = 1e-9
@@ -35,6 +35,8 @@ def check(options: argparse.Namespace) -> int:
     ]
     warn_of_rates(experiment)
     warn_of_reach(experiment)
+    controller = experiment.controller
+    warn_of_slow_efforts(experiment.robot, experiment.q0, controller.limits)
     if experiment.compensation.start_up_ramp is None:
         warn_of_jump(experiment.robot, experiment.q0, experiment.v0, output.tau)
     if options.json:

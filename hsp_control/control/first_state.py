@@ -6,6 +6,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ConfigurationError
+from hsp_control.constraints.limits import RobotLimits
 from hsp_control.robot import Robot
 
 FAR = 2.0
@@ -21,7 +22,7 @@ REST = 0.05
 
 
 class StartWarning(UserWarning):
-    """A robot at rest would begin to move with a jump of an effort."""
+    """A robot would begin with a jump of an effort, or with efforts too slow."""
 
 
 def check_angles(robot: Robot, q: Array) -> None:
@@ -81,3 +82,37 @@ def warn_of_jump(robot: Robot, q: Array, v: Array, tau: Array) -> None:
         StartWarning,
         stacklevel=3,
     )
+
+
+def warn_of_slow_efforts(robot: Robot, q: Array, limits: RobotLimits | None) -> None:
+    """Warn if gravity may change a joint's effort faster than its rate permits.
+
+    A joint alone, that turns at its speed limit from where the robot starts, feels a
+    sine of gravity. A floating base is not looked at.
+
+    Args:
+        robot: The robot.
+        q: Configuration of the start, shape (nq,).
+        limits: The limits; None: there are none.
+    """
+    if limits is None or robot.unactuated:
+        return
+    rest, turn = np.zeros(robot.nv), 0.5 * np.pi * np.eye(robot.nv)
+    here = robot.inverse_dynamics(q, rest, rest)
+    worst, found = 1.0, ""
+    for i, (name, unit) in enumerate(zip(robot.dof_names, robot.units, strict=True)):
+        rate, speed = limits.effort_rate[i], limits.velocity[i]
+        if unit != "rad" or not np.isfinite(rate + speed):
+            continue
+        there = robot.inverse_dynamics(robot.integrate(q, turn[i]), rest, rest)
+        needed = speed * float(np.hypot(here[i], there[i]))
+        if needed > worst * rate:
+            worst = needed / rate
+            found = (
+                f"the effort of joint {name!r} may change by {rate:.3g} N·m/s, but "
+                f"gravity by {needed:.3g} N·m/s at its speed limit of {speed:.3g} "
+                "rad/s: the robot may fall, and pass its limits; give more "
+                "limits.effort_rate, or less limits.velocity"
+            )
+    if found:
+        warnings.warn(found, StartWarning, stacklevel=3)

@@ -29,7 +29,8 @@ class Mixture:
     """Resolves the law for the contacts and tasks that count at a time.
 
     A task that fades in or out has a weight between 0 and 1, and so has a contact that
-    is almost lifted (`PlannedContact.share`). With w1 ≥ w2 ≥ ... these, a step is
+    is almost lifted (`PlannedContact.share`), or else the task that takes its place
+    (`PlannedTask.weight_beyond`). With w1 ≥ w2 ≥ ... these, a step is
 
         (1 - w1) d{} + (w1 - w2) d{1} + (w2 - w3) d{1, 2} + ...
 
@@ -113,6 +114,11 @@ class Mixture:
             (pair for pair in (*tasks, *contacts) if 0.0 < pair[0] < 1.0),
             key=lambda pair: -pair[0],
         )
+        edges = {
+            id(each): each.edge(t)
+            for share, each in contacts
+            if share < 1.0 and each.active(t)  # also at the time when it begins
+        }
         shares = [1.0, *(share for share, _ in coming), 0.0]
         outcome, self.damped = EXACT, ""
         self._parts = []
@@ -121,7 +127,12 @@ class Mixture:
                 continue
             on = {id(each) for _, each in coming[:k]}
             bearing = [each for w, each in contacts if w >= 1.0 or id(each) in on]
-            off = {each.key for w, each in tasks if w < 1.0 and id(each) not in on}
+            lifted = [edge for key, edge in edges.items() if key not in on]
+            off = {
+                each.key
+                for _, each in tasks
+                if each.weight_beyond(t, lifted) < 1.0 and id(each) not in on
+            }
             self.active = active = self._stack(bearing, off)
             active.share = share - following
             self._parts.append(active)

@@ -8,8 +8,8 @@ from hsp_control.common.arrays import Array
 from hsp_control.constraints.contacts import Contact
 from hsp_control.control.evolution import PRESENT, Evolution
 
-_HELD = 0.1
-"""A contact whose presence is this or more is kept at rest. With 1, a foot would move
+HELD = 0.1
+"""A contact whose weight is this or more is kept at rest. With 1, a foot would move
 while it bears; with 0, its motion would be set free, or stopped, with a jump."""
 
 
@@ -46,13 +46,14 @@ class PlannedContact:
     def share(self, t: float) -> float:
         """Return how much it is kept at rest at time t [s], in [0, 1].
 
-        It is 1 - (1 - x)³ with x the presence over `_HELD`: C² in time, as the
-        presence. A schedule keeps it at rest to its end: there a plan lets a task begin
-        that moves the foot, and without both the leg would go astray.
+        It is 1 - (1 - x)³ with x the weight over `HELD`: C² in time, as the weight.
         """
         if not self.active(t):
             return 0.0
-        if self.presence == PRESENT:
-            return 1.0
-        x = min(self.presence.at(t) / _HELD, 1.0)
+        x = min(self.weight(t) / HELD, 1.0)
         return x * (3.0 - x * (3.0 - x))
+
+    def edge(self, t: float) -> float:
+        """Return when its schedule, near t, lifts it, or lifted it last [s]."""
+        schedule = self.contact.schedule
+        return t if schedule is None else schedule.edge(t)

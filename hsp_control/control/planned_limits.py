@@ -48,59 +48,46 @@ class PlannedLimits:
         before = [(each, share.then(start, ramp, 0.0)) for each, share in self.sets]
         return PlannedLimits((*before, (limits, ABSENT.then(start, ramp, 1.0))))
 
-    def at(self, t: float, robot: Robot) -> RobotLimits | None:
-        """Return the limits that the mixture keeps at time t [s]: the mean numbers.
-
-        The bounds on efforts and accelerations are linear in them. Distances are those
-        of all sets that count.
-        """
-        counting = [(each, share.at(t)) for each, share in self.sets]
-        counting = [pair for pair in counting if pair[1] > 0.0]
-        if len(counting) == 1:
-            return counting[0][0]
-        return _mean([(each or _none(robot), share) for each, share in counting])
-
     def settled(self, t: float) -> "PlannedLimits":
         """Return the limits for times from t on: complete changes are folded."""
         folded = [(each, share.settled(t)) for each, share in self.sets]
         return PlannedLimits(tuple(pair for pair in folded if pair[1] != ABSENT))
 
 
-def _mean(sets: Sequence[tuple[RobotLimits, float]]) -> RobotLimits:
-    """Return the weighted mean of the numbers; inf where any of them is."""
-    last, _ = sets[-1]
+def mean_of(
+    sets: Sequence[tuple[RobotLimits | None, float]], robot: Robot
+) -> RobotLimits | None:
+    """Return the limits that a mixture keeps: the weighted mean of the numbers.
 
-    def mean(numbers: Sequence[Array]) -> Array:
-        parts = [share * each for (_, share), each in zip(sets, numbers, strict=True)]
-        return np.asarray(np.sum(parts, axis=0))
+    The bounds on efforts and accelerations are linear in them. Where one of them is
+    inf, so is the mean. Distances are those of all sets.
 
-    def of(name: str) -> Array:
-        return mean([getattr(each, name) for each, _ in sets])
-
-    return RobotLimits(
-        robot=last.robot,
-        effort=of("effort"),
-        effort_rate=of("effort_rate"),
-        velocity=of("velocity"),
-        lower=of("lower"),
-        upper=of("upper"),
-        motion=MotionLimits(*map(mean, zip(*(a.motion for a, _ in sets), strict=True))),
-        distances=tuple(one for each, _ in sets for one in each.distances),
-    )
-
-
-def _none(robot: Robot) -> RobotLimits:
-    """Return limits that bound nothing."""
-    endless = np.full(robot.nv, np.inf)
-    motion = MotionLimits(
-        -endless, endless, endless, endless, endless, np.array([10.0])
-    )
+    Args:
+        sets: Each set of limits, None for none, with its share.
+        robot: The robot.
+    """
+    if len(sets) == 1:
+        return sets[0][0]
+    numbers = np.sum([w * _numbers(each, robot.nv) for each, w in sets], axis=0)
+    numbers.flags.writeable = False
+    effort, rate, velocity, lower, upper, *motion = numbers[:-1].reshape(-1, robot.nv)
     return RobotLimits(
         robot=robot,
-        effort=endless,
-        effort_rate=endless,
-        velocity=endless,
-        lower=-endless,
-        upper=endless,
-        motion=motion,
+        effort=effort,
+        effort_rate=rate,
+        velocity=velocity,
+        lower=lower,
+        upper=upper,
+        motion=MotionLimits._make((*motion, numbers[-1:])),
+        distances=tuple(one for each, _ in sets if each for one in each.distances),
     )
+
+
+def _numbers(limits: RobotLimits | None, nv: int) -> Array:
+    """Return all numbers of limits in a row; None has numbers that bound nothing."""
+    if limits is None:
+        signs = 1.0, 1.0, 1.0, -1.0, 1.0, -1.0, 1.0, 1.0, 1.0, 1.0
+        return np.append(np.repeat(np.inf * np.array(signs), nv), 10.0)
+    x = limits
+    rows = x.effort, x.effort_rate, x.velocity, x.lower, x.upper, *x.motion
+    return np.asarray(np.concatenate(rows))

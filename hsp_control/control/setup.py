@@ -43,6 +43,24 @@ class PlannedTask:
         schedule = self.task.schedule
         return present if schedule is None else present * schedule.weight(t)
 
+    def weight_beyond(self, t: float, edges: Sequence[float]) -> float:
+        """Return how much it counts at time t where some contacts are lifted.
+
+        A task without a ramp that begins where a contact ends moves what the contact
+        kept at rest. So it counts before, in proportion as the contact does not; and so
+        does one that ends where a contact begins.
+
+        Args:
+            t: The time [s].
+            edges: When the contacts are lifted, shortly before or after t [s].
+        """
+        now, schedule = self.weight(t), self.task.schedule
+        if schedule is None or schedule.ramp or 0.0 < now < 1.0:
+            return now
+        present = self.presence.at(t)
+        there = (present * schedule.weight(edge) for edge in edges)
+        return next((each for each in there if each != now), now)
+
     @property
     def always(self) -> bool:
         """Whether it counts fully at all times."""

@@ -102,7 +102,7 @@ class RunningCrawl(RunningQuadruped):
         """Move the centre of mass above the feet that will bear."""
         stance, swing = self.gait.stance, self.gait.swing
         self._mode, self._since = "four", t
-        self._foot.contact.throw(False, t + (1.0 - FADE) * stance, FADE * stance)
+        self._foot.unload(t + (1.0 - FADE) * stance, FADE * stance)
         others = [foot for foot in self._feet if foot is not self._foot]
         places = np.array([self._state.position(foot.frame)[:2] for foot in others])
         center = places.mean(axis=0)

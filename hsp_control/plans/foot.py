@@ -8,7 +8,8 @@ from hsp_control.constraints.contacts import SurfaceContact
 from hsp_control.control.controller import Controller
 from hsp_control.plans.footsteps import Footstep, near
 from hsp_control.plans.polygon import convex_hull
-from hsp_control.plans.swing import turned
+from hsp_control.plans.swing import Swing, turned
+from hsp_control.plans.switched import Switched
 from hsp_control.robot import RobotState
 from hsp_control.trajectories import ComposedPose
 from hsp_control.trajectories.fed import Fed, FedOrientation
@@ -18,7 +19,7 @@ FLATNESS = 0.05
 """Largest angle between a sole and the ground at the start [rad]."""
 
 
-class Foot:
+class Foot(Switched):
     """A foot with a flat sole.
 
     A `Footstep` of it is where the middle of its sole stands, and the yaw of its frame.
@@ -27,8 +28,7 @@ class Foot:
         name: The name of its contact and of its task.
         frame: Its frame.
         normal: The normal of the ground, shape (3,) [-].
-        contact: Switches the contact.
-        task: Switches the task that moves it.
+        swing: What its references follow until it rests; None: where it is.
         position: The reference of the frame's origin.
         orientation: The reference of its orientation.
         place: Where it stands, or stood last.
@@ -74,8 +74,8 @@ class Foot:
         Raises:
             PlanError: If its sole is not flat on the ground.
         """
-        self.contact.reset()
-        self.task.reset()
+        self.reset()
+        self.swing: Swing | None = None
         here = state.frame(self.frame)
         corners = here.position + self._points @ here.rotation.T
         spread = np.ptp(corners @ self.normal)
@@ -105,11 +105,21 @@ class Foot:
         """How wide the sole is [m]."""
         return float(np.ptp(self._corners[:, 1]))
 
+    def follow(self, state: RobotState) -> None:
+        """Write its references: its swing, or where it is."""
+        t, here = state.t, state.frame(self.frame)
+        if self.rests(t):
+            self.swing = None
+        if self.swing is None:
+            self.position.write(t, here.position)
+            self.orientation.write(t, here.rotation)
+        else:
+            self.position.write(t, *self.swing.position(t))
+            self.orientation.write(t, *self.swing.orientation(t))
+
     def stand(self, state: RobotState) -> None:
-        """Take where the foot is for where it stands; its references rest there."""
+        """Take where the foot is for where it stands."""
         here = state.frame(self.frame)
-        self.position.write(state.t, here.position)
-        self.orientation.write(state.t, here.rotation)
         yaw = float(np.arctan2(here.rotation[1, 0], here.rotation[0, 0]))
         self._last_yaw = near(yaw, self._last_yaw)  # several turns may have been made
         x, y = map(float, here.position[:2])

@@ -19,6 +19,7 @@ from hsp_control.plans.plan import RunningPlan
 from hsp_control.plans.quadruped import QuadrupedPlan
 from hsp_control.plans.quintic import at_rest, to_rest
 from hsp_control.plans.swing import Swing, turned
+from hsp_control.plans.switched import Switched
 from hsp_control.robot import RobotState
 from hsp_control.trajectories.fed import Fed, FedOrientation
 from hsp_control.trajectories.switch import Switch
@@ -36,17 +37,16 @@ _PRESS = 0.002
 _UP = np.array([0.0, 0.0, 1.0])
 
 
-class PointFoot:
+class PointFoot(Switched):
     """A foot that touches the ground in a point.
 
     Attributes:
         name: The name of its contact and of its task.
         frame: Its frame.
         normal: The normal of the ground, shape (3,) [-].
-        contact: Switches the contact.
-        task: Switches the task that moves it.
         position: The reference of its frame's origin.
         swing: Its motion while it swings; None while it bears.
+        followed: What its reference follows until it rests; None: where it is.
         height: The height of its frame where it stands, or stood last [m].
         offset: Where it stands beside the middle of the feet at the start, in axes of
             the trunk, shape (2,) [m].
@@ -77,15 +77,24 @@ class PointFoot:
         self.contact, self.task = contact.schedule, task.schedule
         self.position = task.followed
         self.swing: Swing | None = None
+        self.followed: Swing | None = None
 
     def start(self, state: RobotState, middle: Footstep) -> None:
         """Stand where the robot is; ``middle`` is below its centre of mass."""
-        self.contact.reset()
-        self.task.reset()
-        self.swing = None
+        self.reset()
+        self.swing = self.followed = None
         here = state.position(self.frame)
         self.height = float(here[2])
         self.offset: Array = middle.local(here)
+
+    def follow(self, state: RobotState) -> None:
+        """Write its reference: its swing, or where it is."""
+        t, swing = state.t, self.followed
+        if swing is None or self.rests(t):
+            self.followed = None
+            self.position.write(t, state.position(self.frame))
+        else:
+            self.position.write(t, *swing.position(t))
 
     def speed(self, velocity: Velocity) -> float:
         """Return how fast the body moves above the foot at a velocity [m/s]."""
@@ -279,8 +288,7 @@ class RunningQuadruped(RunningPlan):
         rotation = turned(self._yaw - self._first_yaw, self._rotation)
         self._trunk.write(t, rotation, self._velocity.turn * _UP)
         for foot in self._feet:
-            if foot.swing is not None:
-                foot.position.write(t, *foot.swing.position(t))
+            foot.follow(state)
         self._last = t
 
     def _feel(self, measured: Measurement) -> None:
@@ -330,10 +338,9 @@ class RunningQuadruped(RunningPlan):
 
     def _lift_off(self, foot: PointFoot, t: float) -> None:
         """Let a foot swing that bears no more, for the time being upwards."""
-        foot.contact.throw(False, t)
-        foot.task.throw(True, t)
+        foot.lift(t)
         here = self._state.position(foot.frame)
-        foot.swing = Swing(
+        foot.swing = foot.followed = Swing(
             t,
             self.gait.swing,
             here,
@@ -357,12 +364,9 @@ class RunningQuadruped(RunningPlan):
             felt = swing.share(t) > EARLY and force > self._touch
             lands = felt or t > swing.end + LATE
         if lands:
-            foot.contact.throw(True, t, 0.5 * self.gait.stance)
-            foot.task.throw(False, t)
+            foot.bear(t, 0.5 * self.gait.stance)
             foot.swing = None
-            here = self._state.position(foot.frame)
-            foot.position.write(t, here)  # its reference rests
-            foot.height = float(here[2])
+            foot.height = float(self._state.position(foot.frame)[2])
             # The trunk follows the ground.
             target = [self._ground() + self._above]
             self._rise = to_rest(self._rise.sample(t), target, t, RISE)

@@ -33,8 +33,8 @@ class SensedContact(Part, error=PlanError):
 
     It begins when it is pressed with ``force``, or is at ``height``, or both if both
     are given; then its force rises. It ends when it is pressed with less than
-    ``release`` for ``patience``, because the ground is gone, or when it is not wanted
-    any more: then its force fades first.
+    ``release`` for ``patience``, because the ground is gone, and fades as long again;
+    or when it is not wanted any more, and fades over ``ramp``.
     """
 
     yaml_key: ClassVar[str | None] = "name"

@@ -11,6 +11,7 @@ from hsp_control.control.controller import Controller
 from hsp_control.control.log_channel import LogChannel
 from hsp_control.control.measurement import Measurement
 from hsp_control.plans.plan import RunningPlan
+from hsp_control.plans.switched import Switched
 from hsp_control.robot import RobotState
 from hsp_control.trajectories.switch import Switch
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from hsp_control.plans.sensed import Sensed, SensedContact
 
 
-class FeltContact:
+class FeltContact(Switched):
     """A contact in one run: whether it bears, and what is felt.
 
     Attributes:
@@ -53,17 +54,16 @@ class FeltContact:
             )
         self.frame: str = contact.frame
         self._normal: Array = contact.axes[:, 2]
-        self._contact = contact.schedule
-        self._task = None if task is None else task.schedule
+        self.contact = contact.schedule
+        switch = None if task is None else task.schedule
+        self.task = switch if isinstance(switch, Switch) else None
         self._wanted = rule.schedule()
         self.force, self.height, self.estimated = np.nan, np.nan, False
         self.events = 0
 
     def start(self) -> None:
         """Return to the start, before anything is felt."""
-        self._contact.reset()
-        if isinstance(self._task, Switch):
-            self._task.reset()
+        self.reset()
         self._pressed = -np.inf  # nothing was felt yet
         self._leaving = False
         self.events = 0
@@ -71,7 +71,7 @@ class FeltContact:
     @property
     def bears(self) -> bool:
         """Whether it is switched on."""
-        return self._contact.is_on
+        return self.contact.is_on
 
     def update(self, t: float, state: RobotState, measured: Measurement) -> None:
         """Feel, and switch.
@@ -91,16 +91,15 @@ class FeltContact:
         self.height = float(self._normal @ state.position(self.frame))
         wanted = self._wanted.active(t)
         if not self.bears:
-            if not self._contact.active(t) and self._leaving:
-                self._let_go(t)  # its force has faded
+            if not self.contact.active(t) and self._leaving:
+                self._leaving = False  # its force has faded
+                self.events += 1
             if wanted and self._is_felt():
                 self._bear(t)
         elif not wanted:
-            self._leaving = True
-            self._contact.throw(False, t, rule.ramp)
+            self._leave(t, rule.ramp)
         elif self._is_lost(t):
-            self._contact.throw(False, t)
-            self._let_go(t)
+            self._leave(t, rule.patience)
 
     def _is_felt(self) -> bool:
         rule = self._rule
@@ -115,16 +114,12 @@ class FeltContact:
 
     def _bear(self, t: float) -> None:
         self._pressed, self._leaving = t, False
-        self._contact.throw(True, t, self._rule.ramp)
-        if isinstance(self._task, Switch):
-            self._task.throw(False, t)
+        self.bear(t, self._rule.ramp)
         self.events += 1
 
-    def _let_go(self, t: float) -> None:
-        self._leaving = False
-        if isinstance(self._task, Switch):
-            self._task.throw(True, t)
-        self.events += 1
+    def _leave(self, t: float, ramp: float) -> None:
+        self._leaving = True
+        self.unload(t, ramp)
 
 
 class RunningSensed(RunningPlan):

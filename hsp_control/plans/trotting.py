@@ -128,7 +128,7 @@ class RunningTrot(RunningQuadruped):
     def _unload(self, t: float) -> None:
         """Let the force of the next pair fade while all feet bear."""
         for foot in self._pair:
-            foot.contact.throw(False, t, self.gait.stance)
+            foot.unload(t, self.gait.stance)
 
     def _place(self, t: float) -> None:
         """Let the feet that swing go to where the body will be."""

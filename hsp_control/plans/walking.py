@@ -249,12 +249,12 @@ class RunningWalk(RunningPlan):
         middle = self._middle()
         self._mode = "double"
         self._plan(t, [Phase(ready, middle, middle)], shift, middle)
-        self._feet[self._side].contact.throw(False, t + ready, shift)
+        self._feet[self._side].unload(t + ready, shift)
 
     def _hold(self, t: float) -> None:
         """Keep both feet on the ground, and bring the mass back between them."""
         foot = self._feet[self._side]
-        foot.contact.throw(True, t, LANDING * self.walk.double_support)
+        foot.bear(t, LANDING * self.walk.double_support)
         self._now, self._held = Velocity(0.0, 0.0, 0.0), True
         self._stand(t)
         self._hull = self._soles(_HELD)
@@ -283,12 +283,11 @@ class RunningWalk(RunningPlan):
     def _lift_off(self, t: float) -> None:
         """Let the foot swing that bears no more."""
         foot, walk = self._feet[self._side], self.walk
-        foot.contact.throw(False, t)
-        foot.task.throw(True, t)
+        foot.lift(t)
         self._mode = "single"
         self._hull = self._feet[-self._side].corners(walk.margin)
         here = self._state.frame(foot.frame)
-        self._swing = Swing(
+        self._swing = foot.swing = Swing(
             t,
             walk.swing,
             here.position,
@@ -317,9 +316,7 @@ class RunningWalk(RunningPlan):
     def _land(self, t: float) -> None:
         """Let the foot bear, and plan what follows from where it stands."""
         foot, walk = self._feet[self._side], self.walk
-        foot.contact.throw(False, t)
-        foot.contact.throw(True, t, LANDING * walk.double_support)
-        foot.task.throw(False, t)
+        foot.bear(t, LANDING * walk.double_support)
         foot.stand(self._state)
         self._legs.lands(self._state, self._side, self._feet[-self._side].place.yaw)
         self._legs.lifts(self._state, -self._side, foot.place.yaw)
@@ -333,7 +330,7 @@ class RunningWalk(RunningPlan):
         # From where the feet push now: a push has moved that within the sole.
         self._plan(t, [], walk.double_support, self._point)
         if any(self._swings):
-            self._feet[self._side].contact.throw(False, t, self._phases[0].duration)
+            self._feet[self._side].unload(t, self._phases[0].duration)
 
     def _plan(self, t: float, before: list[Phase], shift: float, point: Array) -> None:
         """Plan the steps to come, from a phase on two feet on, until it stands.
@@ -453,10 +450,8 @@ class RunningWalk(RunningPlan):
             yaw.velocity * up,
             yaw.acceleration * up,
         )
-        if self._swing is not None:
-            foot = self._feet[self._side]
-            foot.position.write(t, *self._swing.position(t))
-            foot.orientation.write(t, *self._swing.orientation(t))
+        for foot in self._feet.values():
+            foot.follow(self._state)
 
     @property
     def _beside(self) -> Array:

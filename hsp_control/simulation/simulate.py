@@ -14,7 +14,7 @@ from hsp_control.common.exceptions import (
 from hsp_control.control.compensation import Command, Compensation
 from hsp_control.control.compensation import check_rate as check_loop
 from hsp_control.control.controller import Controller
-from hsp_control.control.first_state import warn_of_jump
+from hsp_control.control.first_state import warn_of_jump, warn_of_slow_efforts
 from hsp_control.declaration import within
 from hsp_control.estimation import Estimator
 from hsp_control.geometry.scene import Scene
@@ -166,6 +166,8 @@ def simulate(
         for row, (state, output, tau, own_channels) in enumerate(loop):
             if row == 0 and not periods:  # else `applied` has told
                 warn_of_jump(robot, q, v, tau)
+                if periods:  # else efforts are continuous, and have no rate
+                    warn_of_slow_efforts(robot, q, controller.limits)
             plant_channels = plant.log_channels(state.t, state.q, state.v, tau)
             recorder.record(state, output, tau, {**own_channels, **plant_channels})
             if on_progress is not None:

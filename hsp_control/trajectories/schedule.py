@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from functools import cached_property
+from math import inf, nextafter
 from typing import Annotated
 
 import numpy as np
@@ -97,6 +98,17 @@ class Schedule(Part, error=ScheduleError):
     def active(self, t: float) -> bool:
         """Return whether t [s] is in an interval: start ≤ t < end."""
         return any(start <= t < end for start, end in self.windows)
+
+    def edge(self, t: float) -> float:
+        """Return when it is not active, just before or after the interval about t [s].
+
+        It is the nearer one of the two.
+        """
+        for start, end in self.windows:
+            if start <= t < end:
+                before = nextafter(start, -inf)
+                return before if t - start < end - t else end
+        return t
 
     def weight(self, t: float) -> float:
         """Return w(t), t in s; with a ramp it is C² in t."""

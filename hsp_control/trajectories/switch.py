@@ -1,5 +1,7 @@
 """A schedule that somebody throws while the robot moves."""
 
+from math import inf, nextafter
+
 import numpy as np
 
 from hsp_control.common.arrays import Array
@@ -56,6 +58,11 @@ class Switch(Written, Schedule):
         """Return whether it counts at time t [s]."""
         start, ramp, _, target = map(float, self.memory)
         return target > 0.0 or t < start + ramp
+
+    def edge(self, t: float) -> float:
+        """Return when it is not active, just before or after the last throw [s]."""
+        start, ramp, _, target = map(float, self.memory)
+        return nextafter(start, -inf) if target > 0.0 else start + ramp
 
     def weight(self, t: float) -> float:
         """Return w(t), t in s; in a ramp it is C² in t."""

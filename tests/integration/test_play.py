@@ -1,5 +1,6 @@
 """A session that is played with, without a page: what is said becomes motion."""
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -206,6 +207,7 @@ BAD: list[dict[str, Any]] = [
     {"do": "move", "target": "hand", "pose": [0.4, 0.0, 0.4]},
     {"do": "move", "target": "hand", "pose": [0.4, 0.0, 0.4, 0.0, 0.0, 0.0, 0.0]},
     {"do": "move", "target": "hand", "pose": [1e9, 0.0, 0.4, 0.0, 0.0, 0.0, 1.0]},
+    {"do": "move", "target": "hand", "pose": [math.nan] * 7},
     {"do": "move", "target": "hand", "pose": ["a"] * 7},
     {"do": "move", "target": "hand"},
     {"do": "obstacle", "name": "ball", "position": [1.0, 2.0]},
@@ -213,6 +215,13 @@ BAD: list[dict[str, Any]] = [
     {"do": "pull", "path": "/robot/nothing", "point": [0, 0, 0], "to": [0, 0, 0]},
     {"do": "pull", "path": "/obstacles/ball", "point": [0, 0, 0], "to": [0, 0, 0]},
     {"do": "pull", "path": "/robot/panda_joint4", "point": [0, 0, 0], "to": [0, 0]},
+    {
+        "do": "pull",
+        "path": "/robot/panda_joint4",
+        "point": [0, 0, 0],
+        "to": [1e6, 0, 0],
+    },
+    {"do": "set", "id": "null_space_gain", "value": math.nan},
     {"do": "set", "id": "null_space_gain", "value": True},
     {"do": "set", "id": "null_space_gain", "value": "fast"},
     {"do": "set", "id": "field", "value": 1.0},

@@ -51,6 +51,7 @@ OF_LEVELS = UNIT + "law/test_hierarchy.py -k "
 OF_CONTACTS = UNIT + "constraints/test_contacts.py -k "
 OF_LIMITS = UNIT + "control/test_limits.py -k "
 OF_STEPS = UNIT + "control/test_limited_step.py -k "
+OF_FADING = UNIT + "control/test_changes_where_limits_bind.py -k "
 OF_QP = UNIT + "control/test_dual_active_set.py -k "
 OF_COMPENSATION = UNIT + "control/test_compensation.py -k "
 OF_STRETCHES = UNIT + "simulation/test_stretch.py -k "
@@ -604,6 +605,27 @@ MUTANTS = (
         "some = np.isfinite(limits.effort) | np.isfinite(limits.effort_rate)",
         "some = np.isnan(limits.effort)",
         OF_STEPS + "optimum",
+    ),
+    Mutant(
+        "changes: one set of limits is compiled",
+        ACTUATION + "actuation.py",
+        "for kept, _ in self._all:",
+        "for kept, _ in self._all[:1]:",
+        OF_FADING + "compiled",
+    ),
+    Mutant(
+        "contact with a schedule ends with a jump",
+        CONTROL + "planned_contact.py",
+        "x = min(self.weight(t) / HELD, 1.0)",
+        "x = min(self.presence.at(t) / HELD, 1.0)",
+        OF_FADING + "schedule",
+    ),
+    Mutant(
+        "task begins with a jump at a contact's end",
+        CONTROL + "setup.py",
+        "if each != now), now)",
+        "if each != now and each < 0.0), now)",
+        OF_FADING + "plan",
     ),
     Mutant(
         "deviation: null space as dear as the task",

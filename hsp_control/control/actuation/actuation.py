@@ -43,7 +43,7 @@ from hsp_control.control.actuation.limited_step import Barriers, LimitedStep
 from hsp_control.control.actuation.status import EXACT, LIMITED, Status
 from hsp_control.control.actuation.support import Support
 from hsp_control.control.planned_contact import PlannedContact
-from hsp_control.control.planned_limits import PlannedLimits
+from hsp_control.control.planned_limits import PlannedLimits, mean_of
 from hsp_control.law import Resolution
 from hsp_control.robot import Robot, RobotState
 
@@ -97,7 +97,6 @@ class Actuation:
     that was enforced last: see `Mixture.deliver`.
 
     Attributes:
-        limits: The limits in force, if any; of several sets their mean.
         sets: The sets of limits in force, each with its share.
         base: Indices of the degrees of freedom without a motor.
         delivered: The acceleration of the last step, shape (nv,).
@@ -151,7 +150,6 @@ class Actuation:
 
     def plan(self, planned: PlannedLimits, t: float) -> None:
         """Keep other limits from now on; t is the present time [s]."""
-        self._planned = planned
         if not self._rate_limited:
             self._sent[-1] = 0.0  # what was sent is not known
         self._all = [(Kept.of(each), share) for each, share in planned.sets]
@@ -168,6 +166,15 @@ class Actuation:
         """Return whether M a + N is the effort wherever `violated` finds nothing."""
         return self._kept.box and not self._floating and not support.size
 
+    @property
+    def limits(self) -> RobotLimits | None:
+        """The limits in force, if any; of several sets their mean."""
+        return mean_of([(kept.limits, share) for kept, share in self.sets], self._robot)
+
+    @property
+    def _limits_anything(self) -> bool:
+        return any(kept.limits is not None for kept, _ in self.sets)
+
     def update_limits(self, t: float) -> None:
         """Find the limits in force at time t [s], if they change."""
         if len(self._all) > 1:
@@ -177,7 +184,6 @@ class Actuation:
         """Find the sets of limits in force, and enforce the last of them."""
         shares = [(kept, share.at(t)) for kept, share in self._all]
         self.sets = [pair for pair in shares if pair[1] > 0.0]
-        self.limits = self._planned.at(t, self._robot)
         self.enforce(self.sets[-1][0])
 
     def enforce(self, kept: Kept) -> None:
@@ -236,7 +242,7 @@ class Actuation:
             period: Time until the next effort [s].
         """
         self.period = period
-        if self.limits is None:
+        if not self._limits_anything:
             return
         self._held.sent(state.t, state.v, self.delivered, period)
         if self._rate_limited:
@@ -252,7 +258,7 @@ class Actuation:
             state: The robot's state, with its effort; the calls read it each time.
             a: The acceleration, shape (nv,); this array, too.
         """
-        if self.limits is None:
+        if not self._limits_anything:
             return []
         calls = [self._held.expect(state.v, a)]
         if self._rate_limited:

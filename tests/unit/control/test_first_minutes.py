@@ -20,6 +20,7 @@ from hsp_control import (
     FramePose,
     FunctionCost,
     JointCentering,
+    Limits,
     TargetPosture,
     simulate,
 )
@@ -32,6 +33,7 @@ from hsp_control.control.first_state import (
     StartWarning,
     check_angles,
     warn_of_jump,
+    warn_of_slow_efforts,
 )
 from hsp_control.control.first_state import REST as REST_SPEED
 
@@ -190,6 +192,55 @@ def test_the_commands_warn_of_the_first_effort(
     assert re.fullmatch("hsp: " + FIRST_EFFORT, line)
     assert main([command, "mine.yaml", "--set", "tasks.hand.blend=1"]) == 0
     assert "first effort" not in capsys.readouterr().err
+
+
+# --- efforts that are slower than gravity -------------------------------------------
+
+SLOW = (
+    r"the effort of joint 'panda_joint2' may change by 10 N·m/s, but gravity by "
+    r"70\.6 N·m/s at its speed limit of 2\.17 rad/s: the robot may fall, and pass its "
+    r"limits; give more limits\.effort_rate, or less limits\.velocity$"
+)
+
+
+def test_a_simulation_warns_of_efforts_slower_than_gravity() -> None:
+    home = panda().home()
+    how: dict[str, Any] = {"duration": 0.01, "control_period": 0.001}
+
+    def law(limits: Limits | None) -> Controller:
+        return Controller(panda(), [FramePose("panda_tcp")], limits=limits, start=home)
+
+    with pytest.warns(StartWarning, match="^" + SLOW):
+        simulate(law(Limits(effort_rate=10.0)), home, **how)
+    for enough in (None, Limits(), Limits(effort_rate=10.0, velocity=0.05)):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            simulate(law(enough), home, **how)
+    with warnings.catch_warnings():  # without a period efforts have no rate
+        warnings.simplefilter("error")
+        simulate(law(Limits(effort_rate=10.0)), home, duration=0.01)
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+def test_what_gravity_may_need_is_what_it_changes_by(seed: int) -> None:
+    """The fastest change along a turn of each joint alone; it is a sine."""
+    robot = panda()
+    rng = np.random.default_rng(seed)
+    q, rest, needed = robot.random_configuration(rng), np.zeros(7), np.zeros(7)
+    angles = np.linspace(0.0, 2.0 * np.pi, 721)
+    for i in range(7):
+        turned = [robot.integrate(q, a * np.eye(7)[i]) for a in angles]
+        tau = [robot.inverse_dynamics(each, rest, rest)[i] for each in turned]
+        needed[i] = np.abs(np.diff(tau)).max() / angles[1]
+    limits = Limits(velocity=1.0, effort_rate=1.001 * needed.max())
+    placed = Controller(robot, [track()], limits=limits, start=robot.home()).limits
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warn_of_slow_efforts(robot, q, placed)
+    limits = Limits(velocity=1.0, effort_rate=0.999 * needed.max())
+    placed = Controller(robot, [track()], limits=limits, start=robot.home()).limits
+    with pytest.warns(StartWarning):
+        warn_of_slow_efforts(robot, q, placed)
 
 
 # --- one thread at a time -----------------------------------------------------------

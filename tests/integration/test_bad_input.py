@@ -1,0 +1,201 @@
+"""Targets, bounds and messages that make no sense: a message, or no jump."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hsp_control as hsp
+from hsp_control.cli.main import main
+from hsp_control.common.exceptions import HspControlError, SimulationError, StreamError
+from hsp_control.control.first_state import StartWarning
+from hsp_control.trajectories import CallableTrajectory
+
+NAN, FAR = math.nan, 1e6
+HAND = "panda_tcp"
+ROBOT = hsp.Robot.load("panda")
+HOME = ROBOT.home()
+
+
+def controller(reference: Any, **options: Any) -> hsp.Controller:
+    blend = None if isinstance(reference, hsp.Stream) else 0.5
+    hand = hsp.FramePosition(HAND, reference, name="hand", blend=blend)
+    return hsp.Controller(ROBOT, [hand], start=HOME, **options)
+
+
+def run(law: hsp.Controller, duration: float = 0.3) -> hsp.Rollout:
+    return hsp.simulate(
+        law, HOME, duration=duration, control_period=1e-3, log_period=1e-3
+    )
+
+
+def here() -> hsp.Hold:
+    return hsp.Hold([0.0, 0.0, 0.0], origin="start")
+
+
+def assert_no_jump(law: hsp.Controller) -> None:
+    """Efforts are within their limits, and change by no more than their rate."""
+    limits = law.limits
+    assert limits is not None
+    tau = run(law).tau
+    assert np.isfinite(tau).all()
+    assert (np.abs(tau) <= limits.effort + 1e-9).all()
+    assert (np.abs(np.diff(tau, axis=0)) <= 1e-3 * limits.effort_rate + 1e-9).all()
+
+
+def step(t: float, value: float) -> np.ndarray[Any, np.dtype[np.float64]]:
+    away = value if t > 0.1 else 0.4
+    return np.array([away, 0.0, 0.5])
+
+
+# --- numbers that are none ----------------------------------------------------------
+
+BOUNDS = ("effort", "effort_rate", "velocity", "acceleration", "bandwidth")
+NONE = [(0, "0 is too small"), (-1, "-1 is negative"), (NAN, ".nan is not a fin")]
+
+
+@pytest.mark.parametrize(("value", "why"), NONE)
+@pytest.mark.parametrize("name", BOUNDS)
+def test_a_bound_that_is_none_is_refused(name: str, value: float, why: str) -> None:
+    options: dict[str, Any] = {name: value}
+    with pytest.raises(HspControlError, match=f"^Limits: {name}: {why}"):
+        hsp.Limits(**options)
+    with pytest.raises(HspControlError, match=f"^FramePosition: largest_error: {why}"):
+        hsp.FramePosition(HAND, here(), largest_error=value)
+
+
+@pytest.mark.parametrize("value", [NAN, math.inf])
+def test_a_target_that_is_none_is_refused(value: float) -> None:
+    why = r"\.(nan|inf) is not a finite number$"
+    with pytest.raises(HspControlError, match=r"^Hold: point\.0: " + why):
+        hsp.Hold([value, 0.0, 0.0])
+    posture = [value, *HOME[1:]]
+    with pytest.raises(HspControlError, match=r"^JointPosture: reference\.0: " + why):
+        hsp.JointPosture(posture)
+    with pytest.raises(HspControlError, match=r"^TargetPosture: target\.0: " + why):
+        hsp.TargetPosture(posture)
+    law = controller(hsp.Stream())
+    stream: Any = law.tasks[0].followed
+    law.compute(0.0, HOME, np.zeros(7))
+    for send in (
+        lambda: stream.send([value, 0.0, 0.5]),
+        lambda: stream.send([0.4, 0.0, 0.5], velocity=[value, 0.0, 0.0]),
+        lambda: stream.send([0.4, 0.0, 0.5], t=value),
+        lambda: stream.send_chunk([[value, 0.0, 0.5], [0.4, 0.0, 0.5]], [0.1, 0.2]),
+    ):
+        with pytest.raises(StreamError, match=r"nan|inf"):
+            send()
+    assert_no_jump(law)
+
+
+def test_a_function_that_returns_nan_stops_the_run() -> None:
+    law = controller(CallableTrajectory(lambda t: step(t, NAN), dimension=3))
+    with pytest.raises(SimulationError, match="must be finite; function") as caught:
+        run(law)
+    rollout = caught.value.rollout
+    assert rollout is not None
+    assert np.isfinite(rollout.tau).all()
+    assert rollout.t[-1] > 0.05
+
+
+YAML = """\
+robot: {name: panda}
+tasks:
+  hand: {type: frame_position, frame: panda_tcp, trajectory: {type: hold, point: POINT}}
+limits: LIMITS
+simulation: {duration: 0.01, control_period: 0.001}
+"""
+
+
+def written(folder: Path, point: str = "[0.4, 0, 0.5]", limits: str = "{}") -> str:
+    path = folder / "mine.yaml"
+    text = YAML.replace("POINT", point).replace("LIMITS", limits)
+    path.write_text(text, encoding="utf-8")
+    return str(path)
+
+
+@pytest.mark.parametrize("command", ["check", "run"])
+@pytest.mark.parametrize(
+    ("parts", "message"),
+    [
+        ({"point": "[.nan, 0, 0.5]"}, "point.0: .nan is not a finite number"),
+        ({"limits": "{effort: 0}"}, "limits.effort: 0 is too small; must be greater"),
+        ({"limits": "{velocity: -1}"}, "limits.velocity: -1 is negative; must be"),
+        ({"limits": "{effort_rate: .nan}"}, "limits.effort_rate: .nan is not a finite"),
+    ],
+    ids=str,
+)
+def test_the_commands_refuse_them_in_one_message(
+    command: str,
+    parts: dict[str, str],
+    message: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main([command, written(tmp_path, **parts)]) != 0
+    error = capsys.readouterr().err
+    assert message in error
+    assert "Traceback" not in error
+
+
+# --- numbers that no robot can follow -----------------------------------------------
+
+
+def to_reference(law: hsp.Controller, reference: Any) -> hsp.Controller:
+    law.at(0.1).ramp(0.1).reference("hand", reference)
+    return law
+
+
+def sent(*values: Any) -> hsp.Controller:
+    law = controller(hsp.Stream())
+    stream: Any = law.tasks[0].followed
+    law.compute(0.0, HOME, np.zeros(7))
+    if len(values) == 1:
+        stream.send(values[0])
+    else:
+        stream.send_chunk(list(values), 0.1 * np.arange(1, 1 + len(values)))
+    return law
+
+
+AWAY: dict[str, Callable[[], hsp.Controller]] = {
+    "target": lambda: controller(hsp.Hold([FAR, 0.0, 0.5])),
+    "function": lambda: controller(
+        CallableTrajectory(lambda t: step(t, FAR), dimension=3)
+    ),
+    "change": lambda: to_reference(controller(here()), hsp.Hold([FAR, 0.0, 0.5])),
+    "posture": lambda: hsp.Controller(
+        ROBOT, [hsp.JointPosture([FAR, *HOME[1:]])], start=HOME
+    ),
+    "message": lambda: sent([FAR, 0.0, 0.5]),
+    "chunk": lambda: sent([FAR, 0.0, 0.5], [0.4, 0.0, 0.5]),
+    "field": lambda: hsp.Controller(
+        ROBOT,
+        [hsp.FramePosition(HAND, here())],
+        hsp.TargetPosture([FAR, *HOME[1:]]),
+        start=HOME,
+    ),
+    "effort": lambda: controller(here(), limits=hsp.Limits(effort=1e-9)),
+    "velocity": lambda: controller(here(), limits=hsp.Limits(velocity=1e-9)),
+}
+
+
+@pytest.mark.parametrize("what", AWAY)
+@pytest.mark.filterwarnings("ignore::hsp_control.control.first_state.StartWarning")
+def test_what_no_robot_can_follow_makes_no_effort_jump(what: str) -> None:
+    assert_no_jump(AWAY[what]())
+
+
+def test_a_rate_that_gravity_outruns_is_warned_of_and_kept(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    message = r"may change by 1 N·m/s, but gravity by 70\.6 N·m/s at its speed limit"
+    law = controller(here(), limits=hsp.Limits(effort_rate=1.0))
+    with pytest.warns(StartWarning, match=message):
+        assert_no_jump(law)
+    for command in ("check", "run"):
+        path = written(tmp_path, limits="{effort_rate: 1}")
+        assert main([command, path]) == 0
+        assert "gravity by 70.6 N·m/s" in capsys.readouterr().err
