@@ -16,9 +16,9 @@ from hsp_control.common.arrays import Array
 from hsp_control.geometry import Scene
 from hsp_control.geometry.shapes import Sphere
 from hsp_control.geometry.start import Start
+from hsp_control.law import IDENTITY
 from hsp_control.null_space.fields import FieldSample, ObstacleClearance
 from hsp_control.null_space.metrics import IdentityMetric, MetricSample
-from hsp_control.null_space.metrics.metric import IDENTITY
 from hsp_control.trajectories import Blend, ComposedPose, HoldOrientation, PoseSample
 
 FRAME = "panda_tcp"

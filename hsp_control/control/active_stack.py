@@ -13,13 +13,13 @@ from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.contacts.unactuated import UnactuatedRows, unactuated_count
 from hsp_control.control.actuation.support import Support
 from hsp_control.control.setup import PlannedTask
-from hsp_control.law import Outcome, Resolution
+from hsp_control.law import FieldSample, Outcome, Resolution, TaskSample
 from hsp_control.law.outcome import outcome_of
 from hsp_control.law.threshold import Following
-from hsp_control.null_space.fields import FieldSample, FieldSum, NullSpaceField
+from hsp_control.null_space.fields import FieldSum, NullSpaceField
 from hsp_control.null_space.metrics import Metric
 from hsp_control.robot import Robot, RobotState
-from hsp_control.tasks import Task, TaskSample
+from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.task import Feedback, InForce, write_asked
 from hsp_control.trajectories.streams.stream import Streamed

@@ -10,8 +10,8 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ContactError, ControllerError, GainError
 from hsp_control.constraints.contacts import Contact
 from hsp_control.declaration import within
-from hsp_control.null_space.metrics import Metric, MetricSample
-from hsp_control.null_space.metrics.metric import VARYING
+from hsp_control.law import VARYING, MetricSample
+from hsp_control.null_space.metrics import Metric
 from hsp_control.robot import Robot
 from hsp_control.tasks import Task
 from hsp_control.tasks.gains import as_gain, as_matrix

@@ -7,10 +7,9 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import NonFiniteError
 from hsp_control.control.active_stack import ActiveStack
-from hsp_control.law import Resolution
+from hsp_control.law import CONSTANT, Resolution
 from hsp_control.null_space.fields import NullSpaceField
 from hsp_control.null_space.metrics import Metric
-from hsp_control.null_space.metrics.metric import CONSTANT
 from hsp_control.robot import RobotState
 
 

@@ -6,10 +6,8 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.actuation.status import Status
-from hsp_control.law import singular_values
+from hsp_control.law import FieldSample, TaskSample, singular_values
 from hsp_control.law.problem import Record
-from hsp_control.null_space.fields import FieldSample
-from hsp_control.tasks import TaskSample
 from hsp_control.tasks.task import beyond_largest
 
 

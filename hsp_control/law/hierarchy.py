@@ -30,10 +30,7 @@ from hsp_control.common.linalg import (
     solve_lower,
     solve_lower_transposed,
 )
-from hsp_control.null_space.fields import FieldSample
-from hsp_control.null_space.metrics import MetricSample
-from hsp_control.null_space.metrics.metric import VARYING
-from hsp_control.tasks import TaskSample
+from hsp_control.law.samples import VARYING, FieldSample, MetricSample, TaskSample
 
 
 class LevelScratch(NamedTuple):

@@ -17,10 +17,14 @@ from hsp_control.law.pseudo_inverse import (
     apply_pseudo_inverse,
     apply_pseudo_inverse_transpose,
 )
-from hsp_control.null_space.fields import FieldSample
-from hsp_control.null_space.metrics import MetricSample
-from hsp_control.null_space.metrics.metric import IDENTITY, VARYING, raise_covector
-from hsp_control.tasks import TaskSample
+from hsp_control.law.samples import (
+    IDENTITY,
+    VARYING,
+    FieldSample,
+    MetricSample,
+    TaskSample,
+    raise_covector,
+)
 
 
 @kernel

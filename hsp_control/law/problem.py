@@ -5,9 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.null_space.fields import FieldSample
-from hsp_control.null_space.metrics import MetricSample
-from hsp_control.tasks import TaskSample
+from hsp_control.law.samples import FieldSample, MetricSample, TaskSample
 
 
 class Record(NamedTuple):

@@ -14,7 +14,7 @@ from hsp_control.common.linalg import (
     solve_lower,
     solve_lower_transposed,
 )
-from hsp_control.null_space.metrics.metric import IDENTITY
+from hsp_control.law.samples import IDENTITY
 
 
 @kernel

@@ -20,10 +20,8 @@ from hsp_control.law.law import acceleration, null_space_command
 from hsp_control.law.outcome import BEYOND_ANY_LEVEL, Outcome, outcome_of
 from hsp_control.law.problem import Problem
 from hsp_control.law.pseudo_inverse import weighted_pseudo_inverse, whiten
+from hsp_control.law.samples import FieldSample, MetricSample, TaskSample
 from hsp_control.law.threshold import NOT, Following, write_thresholds
-from hsp_control.null_space.fields import FieldSample
-from hsp_control.null_space.metrics import MetricSample
-from hsp_control.tasks import TaskSample
 
 
 class Resolved(NamedTuple):

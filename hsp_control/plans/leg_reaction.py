@@ -29,7 +29,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.controller import Controller
-from hsp_control.null_space.metrics.metric import MetricSample
+from hsp_control.law import MetricSample
 from hsp_control.plans.footsteps import Footstep
 from hsp_control.plans.pendulum import GRAVITY
 from hsp_control.plans.swing import Swing

@@ -1,5 +1,7 @@
 """Tasks: the motions that the robot tracks, each with its linear error equation."""
 
+from hsp_control.law import TaskSample as TaskSample
+
 from .angular_momentum import AngularMomentum as AngularMomentum
 from .center_of_mass import CenterOfMass as CenterOfMass
 from .frame_orientation import FrameOrientation as FrameOrientation
@@ -11,4 +13,3 @@ from .joint_posture import JointPosture as JointPosture
 from .pointing import Pointing as Pointing
 from .relative_pose import RelativePose as RelativePose
 from .task import Task as Task
-from .task import TaskSample as TaskSample

@@ -8,9 +8,10 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.declaration.quantities import Positive
 from hsp_control.geometry.start import Start
+from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.placing import place_point
-from hsp_control.tasks.task import ErrorPart, Feedback, Task, TaskSample
+from hsp_control.tasks.task import ErrorPart, Feedback, Task
 from hsp_control.trajectories import Hold, Trajectory
 
 

@@ -4,7 +4,8 @@ import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
-from hsp_control.tasks.task import Feedback, TaskSample, add_feedback
+from hsp_control.law import TaskSample
+from hsp_control.tasks.task import Feedback, add_feedback
 from hsp_control.trajectories import TrajectorySample
 
 

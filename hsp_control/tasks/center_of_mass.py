@@ -8,11 +8,12 @@ from hsp_control.common.native import bind
 from hsp_control.common.step_plan import StepPlan
 from hsp_control.declaration.quantities import Axes
 from hsp_control.geometry.start import Start
+from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.axes import axis_indices, track_axes
 from hsp_control.tasks.frame_task import TrackingTask
 from hsp_control.tasks.placing import place_point
-from hsp_control.tasks.task import ErrorPart, Feedback, TaskSample
+from hsp_control.tasks.task import ErrorPart, Feedback
 from hsp_control.trajectories import Hold, Trajectory, TrajectorySample
 
 

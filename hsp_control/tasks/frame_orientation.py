@@ -22,20 +22,14 @@ from hsp_control.common.rotations import (
     rotate_back,
 )
 from hsp_control.geometry.start import Start
+from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
 from hsp_control.robot.kinematics import FrameKinematics, FrameMotion
 from hsp_control.tasks.compliant_task import CompliantTask
 from hsp_control.tasks.frame_task import FrameTask, TrackingTask, frame_of
 from hsp_control.tasks.impedance_gains import Rotating
 from hsp_control.tasks.placing import place_orientation
-from hsp_control.tasks.task import (
-    Drawn,
-    ErrorPart,
-    Feedback,
-    TaskSample,
-    add_feedback,
-    copy_rows,
-)
+from hsp_control.tasks.task import Drawn, ErrorPart, Feedback, add_feedback, copy_rows
 from hsp_control.trajectories import (
     HoldOrientation,
     OrientationSample,

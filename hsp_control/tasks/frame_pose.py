@@ -14,6 +14,7 @@ from hsp_control.common.rotations import quaternion_from_rotation
 from hsp_control.common.step_plan import merged
 from hsp_control.declaration import AnyOf
 from hsp_control.geometry.start import Start
+from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
 from hsp_control.robot.kinematics import FrameKinematics, FrameMotion
 from hsp_control.tasks.compliant_task import CompliantTask
@@ -25,14 +26,7 @@ from hsp_control.tasks.frame_orientation import (
 from hsp_control.tasks.frame_task import FrameTask, TrackingTask, frame_of
 from hsp_control.tasks.impedance_gains import Rotating
 from hsp_control.tasks.placing import place_pose
-from hsp_control.tasks.task import (
-    Drawn,
-    ErrorPart,
-    Feedback,
-    TaskSample,
-    add_feedback,
-    copy_rows,
-)
+from hsp_control.tasks.task import Drawn, ErrorPart, Feedback, add_feedback, copy_rows
 from hsp_control.trajectories import (
     ComposedPose,
     PoseSample,

@@ -8,14 +8,10 @@ from typing import Any
 from hsp_control.common.step_plan import StepPlan
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Positive
+from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.kinematics import FrameKinematics
-from hsp_control.tasks.task import (
-    Feedback,
-    SecondOrderTask,
-    TaskSample,
-    default_name,
-)
+from hsp_control.tasks.task import Feedback, SecondOrderTask, default_name
 from hsp_control.trajectories.following import Follower
 
 

@@ -35,7 +35,8 @@ from hsp_control.common.linalg import (
     squared_norm,
 )
 from hsp_control.common.rotations import compose, jexp3_dot, jlog3
-from hsp_control.tasks.task import Feedback, TaskSample
+from hsp_control.law import TaskSample
+from hsp_control.tasks.task import Feedback
 
 _THRESHOLD = 0.03
 """Default threshold of the law's singularities: see `Controller`."""

@@ -16,11 +16,12 @@ from hsp_control.common.native import bind
 from hsp_control.common.rotations import cross, rotate, rotate_back
 from hsp_control.declaration.quantities import Vector3
 from hsp_control.geometry.start import Start
+from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
 from hsp_control.robot.kinematics import FrameKinematics, FrameMotion
 from hsp_control.tasks.frame_task import FrameTask, frame_of
 from hsp_control.tasks.placing import place_orientation
-from hsp_control.tasks.task import Drawn, ErrorPart, Feedback, TaskSample, add_feedback
+from hsp_control.tasks.task import Drawn, ErrorPart, Feedback, add_feedback
 from hsp_control.trajectories import (
     HoldOrientation,
     OrientationSample,

@@ -14,13 +14,14 @@ from hsp_control.common.rotations import quaternion_from_rotation
 from hsp_control.common.step_plan import StepPlan
 from hsp_control.declaration import within
 from hsp_control.geometry.start import Start
+from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.kinematics import FrameMotion
 from hsp_control.tasks.frame_orientation import ORIENTATION_SCRATCH
 from hsp_control.tasks.frame_pose import POSE_ERROR, PoseOrPoint, pose_error_equation
 from hsp_control.tasks.frame_task import TrackingTask, frame_of
 from hsp_control.tasks.placing import place_pose
-from hsp_control.tasks.task import ErrorPart, Feedback, TaskSample, default_name
+from hsp_control.tasks.task import ErrorPart, Feedback, default_name
 from hsp_control.trajectories import ComposedPose, PoseSample, PoseTrajectory
 
 

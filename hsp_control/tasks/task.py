@@ -18,51 +18,13 @@ from hsp_control.declaration import Part, within
 from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.quantities import Positive, PositiveCount, plain
 from hsp_control.geometry.start import Start
+from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.gains import Gains
 from hsp_control.trajectories import Schedule
 from hsp_control.trajectories.crossfade import AnyReference
 from hsp_control.trajectories.remembering import with_memories_copied
 from hsp_control.trajectories.streams.stream import Streamed
-
-
-class TaskSample(NamedTuple):
-    """J a + J'v = a_x: the rows of a task at one state.
-
-    Units are given for positions and orientations; other tasks have their own.
-
-    Attributes:
-        jacobian: Task Jacobian J, shape (m, nv).
-        jacobian_dot: Its time derivative J', shape (m, nv).
-        error: e, reference minus actual, in the error coordinates of the task, shape
-            (m,) [m or rad].
-        error_rate: e', shape (m,) [m/s or rad/s].
-        acceleration: Desired acceleration a_x, with which
-            e'' + Kv e' + Kp e + offset = 0, in the frame of J's rows, shape (m,)
-            [m/s² or rad/s²].
-    """
-
-    jacobian: Array
-    jacobian_dot: Array
-    error: Array
-    error_rate: Array
-    acceleration: Array
-
-    @classmethod
-    def allocate(cls, rows: int, nv: int) -> "TaskSample":
-        """Return a sample of zeros with m = ``rows``."""
-        return cls(
-            np.zeros((rows, nv)),
-            np.zeros((rows, nv)),
-            np.zeros(rows),
-            np.zeros(rows),
-            np.zeros(rows),
-        )
-
-    def rows(self, start: int, stop: int) -> "TaskSample":
-        """Return the rows from ``start`` to ``stop`` - 1, as views of this memory."""
-        return TaskSample(*(array[start:stop] for array in self))
-
 
 _UNBOUNDED = np.zeros((0, 3))
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from hsp_control import (
     Robot,
 )
+from hsp_control.law import CONSTANT, IDENTITY
 from hsp_control.law.pseudo_inverse import weighted_pseudo_inverse
-from hsp_control.null_space.metrics.metric import CONSTANT, IDENTITY
 
 Array = NDArray[np.float64]
 

@@ -6,8 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hsp_control.law import Outcome, Problem, Resolution
-from hsp_control.null_space.metrics.metric import IDENTITY, VARYING
+from hsp_control.law import IDENTITY, VARYING, Outcome, Problem, Resolution
 
 Array = NDArray[np.float64]
 

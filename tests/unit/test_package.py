@@ -55,6 +55,14 @@ def test_all_names_exist_and_are_listed() -> None:
         _ = hsp_control.Robto
 
 
+@pytest.mark.process
+def test_the_law_reads_alone() -> None:
+    """Whoever reads equation (13) needs some twenty modules, and no declarations."""
+    modules = imported("import hsp_control.law")
+    assert not modules & {"pydantic", "ruckig", "pinocchio", "hsp_control.robot"}
+    assert len([name for name in modules if name.startswith("hsp_control")]) <= 25
+
+
 def test_few_names_are_at_the_top() -> None:
     """What most programs need; a hint leads to the others."""
     names = [name for name in hsp_control._HOMES if name not in hsp_control._NAMESPACES]

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from hsp_control.declaration import within
 from hsp_control.geometry.start import Start
+from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
-from hsp_control.tasks.task import ErrorPart, Feedback, SecondOrderTask, TaskSample
+from hsp_control.tasks.task import ErrorPart, Feedback, SecondOrderTask
 from hsp_control.trajectories import Hold, Trajectory
 
 Array = NDArray[np.float64]

@@ -11,8 +11,8 @@ from hsp_control.common.arrays import Array
 from hsp_control.constraints.contacts.contact import Contact
 from hsp_control.constraints.contacts.point_contact import point_rows
 from hsp_control.declaration.quantities import Positive, read_only
+from hsp_control.law import TaskSample
 from hsp_control.robot.kinematics import FrameKinematics
-from hsp_control.tasks import TaskSample
 
 
 class BallContact(Contact, type="ball"):

@@ -24,9 +24,9 @@ from hsp_control.constraints.contacts.commanded_force import (
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import Positive, Vector3, read_only
 from hsp_control.geometry.start import Start
+from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
 from hsp_control.robot.kinematics import FrameKinematics
-from hsp_control.tasks import TaskSample
 from hsp_control.trajectories.remembering import with_memories_copied
 from hsp_control.trajectories.schedule import Schedule
 

@@ -12,8 +12,8 @@ from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
 from hsp_control.constraints.contacts.contact import Contact
 from hsp_control.declaration.quantities import Vector3
+from hsp_control.law import TaskSample
 from hsp_control.robot.kinematics import FrameKinematics, FrameMotion
-from hsp_control.tasks import TaskSample
 
 
 class PointContact(Contact, type="point"):

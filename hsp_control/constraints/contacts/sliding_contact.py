@@ -16,8 +16,8 @@ from hsp_control.constraints.contacts.contact import Contact
 from hsp_control.constraints.contacts.point_contact import point_rows
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Positive, Vector3
+from hsp_control.law import TaskSample
 from hsp_control.robot.kinematics import FrameKinematics
-from hsp_control.tasks import TaskSample
 
 
 class SlidingContact(Contact, type="sliding"):

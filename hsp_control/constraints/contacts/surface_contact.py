@@ -13,8 +13,8 @@ from hsp_control.common.exceptions import ContactError
 from hsp_control.common.native import bind
 from hsp_control.constraints.contacts.contact import Contact
 from hsp_control.declaration.quantities import Points, Positive, Vector3, read_only
+from hsp_control.law import TaskSample
 from hsp_control.robot.kinematics import FrameKinematics
-from hsp_control.tasks import TaskSample
 from hsp_control.tasks.task import copy_rows
 
 

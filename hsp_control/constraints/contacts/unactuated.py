@@ -3,8 +3,8 @@
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
+from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
-from hsp_control.tasks import TaskSample
 
 
 class UnactuatedRows:

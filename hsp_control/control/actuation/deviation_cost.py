@@ -15,10 +15,9 @@ from hsp_control.common.linalg import (
     solve_lower_transposed,
     squared_norm,
 )
-from hsp_control.law import Resolution
+from hsp_control.law import IDENTITY, Resolution
 from hsp_control.law.pseudo_inverse import whiten
 from hsp_control.law.resolution import Factors, Projectors
-from hsp_control.null_space.metrics.metric import IDENTITY
 
 _ONE_LEVEL, _SEVERAL_LEVELS = 1e-6, 1e-8
 """Least cost of null-space deviation relative to the first level: for one level and for

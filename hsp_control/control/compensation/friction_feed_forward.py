@@ -9,8 +9,8 @@ from hsp_control.common.exceptions import CompensationError, SimulationError
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import Positive, Weights
+from hsp_control.law import VARYING
 from hsp_control.law.pseudo_inverse import apply_pseudo_inverse, weighted_pseudo_inverse
-from hsp_control.null_space.metrics.metric import VARYING
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.friction import JointFriction
 

@@ -4,8 +4,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.controller import Controller
-from hsp_control.null_space.fields import FieldSample
-from hsp_control.null_space.metrics import MetricSample
+from hsp_control.law import FieldSample, MetricSample
 from hsp_control.robot import RobotState
 
 _STEP = 1e-5

@@ -4,11 +4,11 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.linalg import cholesky
+from hsp_control.law import VARYING
 from hsp_control.law.pseudo_inverse import (
     apply_pseudo_inverse_transpose,
     weighted_pseudo_inverse,
 )
-from hsp_control.null_space.metrics.metric import VARYING
 from hsp_control.robot import RobotState
 from hsp_control.tasks import Task
 

@@ -1,11 +1,12 @@
 """Null-space fields and costs: the goals of self-motion."""
 
+from hsp_control.law import FieldSample as FieldSample
+
 from .clearance import Clearance as Clearance
 from .compiled_cost import CompiledCost as CompiledCost
 from .cost import Cost as Cost
 from .cost import FunctionCost as FunctionCost
 from .equal_joint_angles import EqualJointAngles as EqualJointAngles
-from .field import FieldSample as FieldSample
 from .field import FieldSum as FieldSum
 from .field import NullSpaceField as NullSpaceField
 from .inverse_condition import InverseCondition as InverseCondition

@@ -14,11 +14,10 @@ from hsp_control.common.step_plan import StepPlan
 from hsp_control.declaration.quantities import Positive
 from hsp_control.geometry import Proximity, Proxy
 from hsp_control.geometry.start import Start
+from hsp_control.law import FieldSample, MetricSample
 from hsp_control.null_space.differences import rate_along_flow
 from hsp_control.null_space.fields.barrier import barrier
 from hsp_control.null_space.fields.cost import Cost, descend
-from hsp_control.null_space.fields.field import FieldSample
-from hsp_control.null_space.metrics import MetricSample
 from hsp_control.robot import Robot, RobotState
 
 

@@ -9,9 +9,8 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.native import bind
 from hsp_control.common.step_plan import StepPlan
+from hsp_control.law import FieldSample, MetricSample
 from hsp_control.null_space.fields.cost import Cost, descend
-from hsp_control.null_space.fields.field import FieldSample
-from hsp_control.null_space.metrics import MetricSample
 from hsp_control.robot import RobotState
 
 Derivatives = Callable[[], float]

@@ -13,10 +13,9 @@ from hsp_control.common.exceptions import FieldError
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
 from hsp_control.common.step_plan import StepPlan
+from hsp_control.law import VARYING, FieldSample, MetricSample, raise_covector
 from hsp_control.null_space.differences import gradient, rate_along_flow
-from hsp_control.null_space.fields.field import FieldSample, NullSpaceField
-from hsp_control.null_space.metrics import MetricSample
-from hsp_control.null_space.metrics.metric import VARYING, raise_covector
+from hsp_control.null_space.fields.field import NullSpaceField
 from hsp_control.robot import RobotState
 
 

@@ -19,26 +19,9 @@ from hsp_control.common.step_plan import StepPlan
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import NonNegative, OrInstance
 from hsp_control.geometry.start import Start
+from hsp_control.law import FieldSample, MetricSample
 from hsp_control.null_space.fields.weight import Ramp, Weight, product, sample_weight
-from hsp_control.null_space.metrics import MetricSample
 from hsp_control.robot import RobotState
-
-
-class FieldSample(NamedTuple):
-    """g and g' = ∂g/∂q·v + ∂g/∂t: a field at one state.
-
-    Attributes:
-        g: The field, a desired joint velocity, shape (nv,) [rad/s, m/s].
-        g_dot: g', its total time derivative, shape (nv,) [rad/s², m/s²].
-    """
-
-    g: Array
-    g_dot: Array
-
-    @classmethod
-    def allocate(cls, nv: int) -> "FieldSample":
-        """Return a sample of zeros, shape (nv,) each."""
-        return cls(np.zeros(nv), np.zeros(nv))
 
 
 class NullSpaceField(Part, ABC, family="fields", error=FieldError):

@@ -1,8 +1,8 @@
 """The field of rest: self-motion stops."""
 
 from hsp_control.common.step_plan import StepPlan
-from hsp_control.null_space.fields.field import FieldSample, NullSpaceField
-from hsp_control.null_space.metrics import MetricSample
+from hsp_control.law import FieldSample, MetricSample
+from hsp_control.null_space.fields.field import NullSpaceField
 from hsp_control.robot import RobotState
 
 

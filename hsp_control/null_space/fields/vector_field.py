@@ -8,9 +8,9 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
+from hsp_control.law import FieldSample, MetricSample
 from hsp_control.null_space.differences import rate_along_flow
-from hsp_control.null_space.fields.field import FieldSample, NullSpaceField
-from hsp_control.null_space.metrics import MetricSample
+from hsp_control.null_space.fields.field import NullSpaceField
 from hsp_control.robot import RobotState
 
 

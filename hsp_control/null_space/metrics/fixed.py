@@ -11,7 +11,8 @@ from hsp_control.common.exceptions import MetricError
 from hsp_control.common.step_plan import StepPlan
 from hsp_control.declaration import within
 from hsp_control.geometry.start import Start
-from hsp_control.null_space.metrics.metric import CONSTANT, Metric, MetricSample
+from hsp_control.law import CONSTANT, MetricSample
+from hsp_control.null_space.metrics.metric import Metric
 from hsp_control.robot import RobotState
 
 

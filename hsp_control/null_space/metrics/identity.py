@@ -3,7 +3,8 @@
 from typing import ClassVar
 
 from hsp_control.common.step_plan import StepPlan
-from hsp_control.null_space.metrics.metric import IDENTITY, Metric, MetricSample
+from hsp_control.law import IDENTITY, MetricSample
+from hsp_control.null_space.metrics.metric import Metric
 from hsp_control.robot import RobotState
 
 

@@ -13,7 +13,8 @@ from hsp_control.common.native import bind
 from hsp_control.common.step_plan import StepPlan
 from hsp_control.declaration.quantities import Positive
 from hsp_control.geometry.start import Start
-from hsp_control.null_space.metrics.metric import VARYING, Metric, MetricSample
+from hsp_control.law import VARYING, MetricSample
+from hsp_control.null_space.metrics.metric import Metric
 from hsp_control.robot import RobotState
 
 

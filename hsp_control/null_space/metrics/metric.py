@@ -2,40 +2,14 @@
 
 from abc import ABC, abstractmethod
 from functools import partial
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, Self
 
-import numpy as np
-
-from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import MetricError
-from hsp_control.common.kernels import kernel
-from hsp_control.common.linalg import solve_lower, solve_lower_transposed
 from hsp_control.common.step_plan import StepPlan
 from hsp_control.declaration import Part
 from hsp_control.geometry.start import Start
+from hsp_control.law import MetricSample
 from hsp_control.robot import RobotState
-
-IDENTITY, CONSTANT, VARYING = 0, 1, 2
-"""Form of a metric: W = I (no solves); W' = 0 (solves); any W (solves, terms in W')."""
-
-
-class MetricSample(NamedTuple):
-    """W = L Lᵀ and W': a metric at one state.
-
-    Attributes:
-        W: The metric, symmetric positive definite, shape (nv, nv).
-        L: Its Cholesky factor, lower triangular, shape (nv, nv).
-        W_dot: W', its time derivative along v, shape (nv, nv) [unit of W per s].
-    """
-
-    W: Array
-    L: Array
-    W_dot: Array
-
-    @classmethod
-    def allocate(cls, nv: int) -> "MetricSample":
-        """Return the identity metric of nv degrees of freedom, with W' = 0."""
-        return cls(np.eye(nv), np.eye(nv), np.zeros((nv, nv)))
 
 
 class Metric(Part, ABC, family="metrics", error=MetricError):
@@ -98,11 +72,3 @@ class Metric(Part, ABC, family="metrics", error=MetricError):
             state: The robot's state: t, q, v and the kinematics.
             out: The sample to write into, shapes (nv, nv).
         """
-
-
-@kernel
-def raise_covector(covector: Array, L: Array, form: int) -> None:
-    """Overwrite a covector, shape (nv,), by W⁻¹ covector, with W = L Lᵀ."""
-    if form != IDENTITY:
-        solve_lower(L, covector)
-        solve_lower_transposed(L, covector)

@@ -7,9 +7,9 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.controller import Controller
+from hsp_control.law import MetricSample
 from hsp_control.null_space.fields import NullSpaceField
 from hsp_control.null_space.fields.field import terms_of
-from hsp_control.null_space.metrics import MetricSample
 from hsp_control.robot import RobotState
 
 _Term = TypeVar("_Term", bound=NullSpaceField)

@@ -41,14 +41,13 @@ from hsp_control.common.linalg import (
     solve_rows_transposed,
     triangularise_rows,
 )
-from hsp_control.law import law
+from hsp_control.law import CONSTANT, IDENTITY, law, raise_covector
 from hsp_control.null_space.metrics import (
     CoordinatesMetric,
     IdentityMetric,
     MassMatrixMetric,
     Metric,
 )
-from hsp_control.null_space.metrics.metric import CONSTANT, IDENTITY, raise_covector
 from hsp_control.robot import kinematics, valid_state
 from hsp_control.tasks import TaskSample
 from hsp_control.trajectories import HoldOrientation

@@ -49,9 +49,9 @@ from hsp_control.common.exceptions import (
     ShapeError,
     TrajectoryError,
 )
+from hsp_control.law import VARYING
 from hsp_control.null_space.fields import FieldSample, FunctionField
 from hsp_control.null_space.metrics import ConstantMetric, Metric, MetricSample
-from hsp_control.null_space.metrics.metric import VARYING
 from hsp_control.tasks import TaskSample
 from hsp_control.tasks.task import Feedback
 from hsp_control.trajectories import (

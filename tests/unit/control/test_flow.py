@@ -31,9 +31,9 @@ from hsp_control import (
 from hsp_control.common.exceptions import (
     ControllerError,
 )
+from hsp_control.law import CONSTANT
 from hsp_control.null_space.fields import FunctionField
 from hsp_control.null_space.metrics import Metric, MetricSample
-from hsp_control.null_space.metrics.metric import CONSTANT
 from hsp_control.robot.integrators import Dop853
 
 Array = NDArray[np.float64]

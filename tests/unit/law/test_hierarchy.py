@@ -22,13 +22,13 @@ from hsp_control import (
     simulate,
 )
 from hsp_control.common.exceptions import ControllerError
+from hsp_control.law import CONSTANT, IDENTITY, VARYING
 from hsp_control.null_space.metrics import (
     ConstantMetric,
     IdentityMetric,
     MassMatrixMetric,
     Metric,
 )
-from hsp_control.null_space.metrics.metric import CONSTANT, IDENTITY, VARYING
 from hsp_control.robot.integrators import Dop853
 from hsp_control.trajectories import Circle
 

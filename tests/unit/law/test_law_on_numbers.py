@@ -8,9 +8,8 @@ from hypothesis import strategies as st
 from law_numbers import Numbers, numbers, orthogonal, resolve
 from numpy.typing import NDArray
 
-from hsp_control.law import Resolution, singular_values
+from hsp_control.law import CONSTANT, IDENTITY, VARYING, Resolution, singular_values
 from hsp_control.null_space.metrics import CoordinatesMetric, MetricSample
-from hsp_control.null_space.metrics.metric import CONSTANT, IDENTITY, VARYING
 
 Array = NDArray[np.float64]
 seeds = st.integers(0, 2**32 - 1)

@@ -30,6 +30,7 @@ from hsp_control import (
     RobotState,
     TargetPosture,
 )
+from hsp_control.law import VARYING
 from hsp_control.null_space.fields import FieldSample, FunctionField
 from hsp_control.null_space.metrics import (
     ConstantMetric,
@@ -39,7 +40,6 @@ from hsp_control.null_space.metrics import (
     Metric,
     MetricSample,
 )
-from hsp_control.null_space.metrics.metric import VARYING
 from hsp_control.trajectories import HoldOrientation
 
 Array = NDArray[np.float64]

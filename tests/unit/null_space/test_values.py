@@ -28,11 +28,11 @@ from hsp_control.common.exceptions import ImmutableError
 from hsp_control.declaration import Part
 from hsp_control.geometry import Scene, shapes
 from hsp_control.geometry.start import Start
+from hsp_control.law import VARYING
 from hsp_control.null_space import fields as null_space_fields
 from hsp_control.null_space import metrics
 from hsp_control.null_space.fields import FieldSum, Ramp
 from hsp_control.null_space.metrics import MassMatrixMetric, Metric, MetricSample
-from hsp_control.null_space.metrics.metric import VARYING
 
 Array = NDArray[np.float64]
 

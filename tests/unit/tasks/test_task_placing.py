@@ -38,8 +38,8 @@ from hsp_control.common.exceptions import (
 )
 from hsp_control.geometry import Scene
 from hsp_control.geometry.start import Start
+from hsp_control.law import TaskSample
 from hsp_control.tasks import AngularMomentum, RelativePose
-from hsp_control.tasks.task import TaskSample
 from hsp_control.trajectories import (
     Blend,
     BlendOrientation,

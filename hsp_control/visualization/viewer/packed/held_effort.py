@@ -4,7 +4,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.controller import Controller
-from hsp_control.null_space.metrics import MetricSample
+from hsp_control.law import MetricSample
 from hsp_control.robot import RobotState
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.log_series import held_period

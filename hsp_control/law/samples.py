@@ -1,0 +1,94 @@
+"""What the law reads at one state: tasks, a field and a metric."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.kernels import kernel
+from hsp_control.common.linalg import solve_lower, solve_lower_transposed
+
+IDENTITY, CONSTANT, VARYING = 0, 1, 2
+"""Form of a metric: W = I (no solves); W' = 0 (solves); any W (solves, terms in W')."""
+
+
+class TaskSample(NamedTuple):
+    """J a + J'v = a_x: the rows of a task at one state.
+
+    Units are given for positions and orientations; other tasks have their own.
+
+    Attributes:
+        jacobian: Task Jacobian J, shape (m, nv).
+        jacobian_dot: Its time derivative J', shape (m, nv).
+        error: e, reference minus actual, in the error coordinates of the task, shape
+            (m,) [m or rad].
+        error_rate: e', shape (m,) [m/s or rad/s].
+        acceleration: Desired acceleration a_x, with which
+            e'' + Kv e' + Kp e + offset = 0, in the frame of J's rows, shape (m,)
+            [m/s² or rad/s²].
+    """
+
+    jacobian: Array
+    jacobian_dot: Array
+    error: Array
+    error_rate: Array
+    acceleration: Array
+
+    @classmethod
+    def allocate(cls, rows: int, nv: int) -> "TaskSample":
+        """Return a sample of zeros with m = ``rows``."""
+        return cls(
+            np.zeros((rows, nv)),
+            np.zeros((rows, nv)),
+            np.zeros(rows),
+            np.zeros(rows),
+            np.zeros(rows),
+        )
+
+    def rows(self, start: int, stop: int) -> "TaskSample":
+        """Return the rows from ``start`` to ``stop`` - 1, as views of this memory."""
+        return TaskSample(*(array[start:stop] for array in self))
+
+
+class FieldSample(NamedTuple):
+    """g and g' = ∂g/∂q·v + ∂g/∂t: a field at one state.
+
+    Attributes:
+        g: The field, a desired joint velocity, shape (nv,) [rad/s, m/s].
+        g_dot: g', its total time derivative, shape (nv,) [rad/s², m/s²].
+    """
+
+    g: Array
+    g_dot: Array
+
+    @classmethod
+    def allocate(cls, nv: int) -> "FieldSample":
+        """Return a sample of zeros, shape (nv,) each."""
+        return cls(np.zeros(nv), np.zeros(nv))
+
+
+class MetricSample(NamedTuple):
+    """W = L Lᵀ and W': a metric at one state.
+
+    Attributes:
+        W: The metric, symmetric positive definite, shape (nv, nv).
+        L: Its Cholesky factor, lower triangular, shape (nv, nv).
+        W_dot: W', its time derivative along v, shape (nv, nv) [unit of W per s].
+    """
+
+    W: Array
+    L: Array
+    W_dot: Array
+
+    @classmethod
+    def allocate(cls, nv: int) -> "MetricSample":
+        """Return the identity metric of nv degrees of freedom, with W' = 0."""
+        return cls(np.eye(nv), np.eye(nv), np.zeros((nv, nv)))
+
+
+@kernel
+def raise_covector(covector: Array, L: Array, form: int) -> None:
+    """Overwrite a covector, shape (nv,), by W⁻¹ covector, with W = L Lᵀ."""
+    if form != IDENTITY:
+        solve_lower(L, covector)
+        solve_lower_transposed(L, covector)
