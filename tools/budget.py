@@ -1,4 +1,4 @@
-"""Compare the lines of each room, of tests and of pages with what pyproject.toml allows.
+"""Compare the lines of rooms, tests and pages with what pyproject.toml allows.
 
     make lint        or        .venv/bin/python tools/budget.py
 
@@ -25,7 +25,7 @@ _PARTS = {
 
 
 def counted(root: Path) -> dict[str, int]:
-    """Return the lines of the package's rooms, of the package, and of what is beside it.
+    """Return the lines of the package's rooms, of all of it, and of what is beside.
 
     What a checkout does not contain, such as an installed site, does not count.
     """
@@ -37,7 +37,9 @@ def counted(root: Path) -> dict[str, int]:
         if room.name not in _WITHOUT_CODE
     }
     found["package"] = _lines(package, "*.py")
-    return found | {name: _lines(root / of, kind) for name, (of, kind) in _PARTS.items()}
+    return found | {
+        name: _lines(root / of, kind) for name, (of, kind) in _PARTS.items()
+    }
 
 
 def wrong(found: Mapping[str, int], allowed: Mapping[str, int]) -> list[str]:

@@ -143,13 +143,6 @@ def position_unit(rollout: Rollout) -> str:
     return ", ".join(dict.fromkeys(position_units(rollout)))
 
 
-def null_space_unit(rollout: Rollout) -> str:
-    """Return the unit of ‖e_N‖_W; for the mass matrix the root of twice an energy."""
-    if rollout.meta.get("metric") == "MassMatrixMetric":
-        return "√J"
-    return rate_unit(rollout)
-
-
 def rate_unit(rollout: Rollout) -> str:
     """Return the unit of a norm of joint rates: ``rad/s``, ``m/s``, ``(rad, m)/s``."""
     unit = position_unit(rollout)

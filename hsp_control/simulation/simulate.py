@@ -164,10 +164,10 @@ def simulate(
     status, message = "completed", ""
     try:
         for row, (state, output, tau, own_channels) in enumerate(loop):
-            if row == 0 and not periods:  # else `applied` has told
+            if row == 0 and periods:  # else efforts are continuous, and have no rate
+                warn_of_slow_efforts(robot, q, controller.limits)
+            elif row == 0:  # else `applied` has told
                 warn_of_jump(robot, q, v, tau)
-                if periods:  # else efforts are continuous, and have no rate
-                    warn_of_slow_efforts(robot, q, controller.limits)
             plant_channels = plant.log_channels(state.t, state.q, state.v, tau)
             recorder.record(state, output, tau, {**own_channels, **plant_channels})
             if on_progress is not None:

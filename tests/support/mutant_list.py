@@ -424,8 +424,8 @@ MUTANTS = (
     Mutant(
         "M' without Cᵀ",
         METRICS + "mass_matrix.py",
-        "W_dot[i, j] = C[i, j] + C[j, i]",
-        "W_dot[i, j] = C[i, j]",
+        "W_dot[i, j] = (C[i, j] + C[j, i]) / unit",
+        "W_dot[i, j] = C[i, j] / unit",
         ON_ROBOTS + "applies_the_short_form",
     ),
     Mutant(
@@ -740,10 +740,24 @@ MUTANTS = (
         "tests/integration/test_limit_configurations.py -k swing",
     ),
     Mutant(
+        "limits: springs come first",
+        ACTUATION + "deviation_cost.py",
+        "(standing or not springs)",
+        "(standing or not springs or True)",
+        "tests/unit/control/test_deviation_cost.py -k springs_yield",
+    ),
+    Mutant(
+        "clearance: the rate on a cylinder's axis",
+        "hsp_control/geometry/signed_distance.py",
+        "0.0 if on_axis else 1.0 / r",
+        "1.0 / max(r, 1e-320)",
+        "tests/unit/geometry/test_distances.py -k nothing_is_nan",
+    ),
+    Mutant(
         "limits: on contacts an error loosens levels",
         ACTUATION + "deviation_cost.py",
-        "if directions.first > 0:",
-        "if directions.first < 0:",
+        "last, standing = costs.shape[1] - 1, directions.first > 0",
+        "last, standing = costs.shape[1] - 1, False",
         OF_STEPS + "optimum",
     ),
     Mutant(

@@ -10,7 +10,6 @@ from hsp_control.simulation.log_series import (
     column_unit,
     field_terms,
     held_period,
-    null_space_unit,
     rate_unit,
 )
 from hsp_control.visualization import palette
@@ -63,7 +62,7 @@ def draw_null_space_error(axes: Axes, rollout: Rollout) -> None:
         note(axes, f"effort held for {1e3 * period:g} ms")
     mark_damped(axes, rollout)
     log_scale(axes, norm, top=1e-6)
-    axes.set_ylabel(rf"$\Vert e_N \Vert_W$ [{null_space_unit(rollout)}]")
+    axes.set_ylabel(rf"$\Vert e_N \Vert_W$ [{rate_unit(rollout)}]")
     time_axis(axes, t)
     legend_below(axes)
 

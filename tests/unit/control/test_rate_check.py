@@ -427,7 +427,6 @@ ALL: dict[str, Any] = {
     "momentum_observer": {"bandwidth": 20, "clip": [10] * 7},
     "friction_feed_forward": {"coulomb": 0.1, "viscous": [0.1] * 7},
     "integral_action": {"ki": {"hand": [[9, 0, 0], [0, 9, 0], [0, 0, 9]]}, "limit": 5},
-    "effort_rate": 1000,
     "start_up_ramp": {"duration": 0.01, "natural_frequency": 2},
 }
 
@@ -436,8 +435,7 @@ def test_all_compensators_from_yaml_and_each_turned_off(tmp_path: Path) -> None:
     file = tmp_path / "all.yaml"
     import yaml
 
-    limits = {"effort_rate": "none"}  # the compensation's is in its place
-    file.write_text(yaml.safe_dump(config(limits=limits, compensation=ALL)))
+    file.write_text(yaml.safe_dump(config(compensation=ALL)))
     made = load_experiment(file)
     assert made.compensation.names == tuple(ALL)
     assert isinstance(Command(made.controller, made.compensation), Command)

@@ -79,7 +79,7 @@ EXAMPLES: dict[str, list[dict[str, Any]]] = {
     "identity": [{}],
     "constant": [{"matrix": np.linspace(0.5, 2.0, 7)}, {"matrix": W}],
     "coordinates": [{"matrix": np.tril(np.ones((7, 7)))}],
-    "mass_matrix": [{}],
+    "mass_matrix": [{"inertia": 0.3}],
 }
 OTHER: dict[str, Any] = {
     "joints": ["panda_joint1", "panda_joint2"],

@@ -130,7 +130,8 @@ def test_of_many_joints_the_busiest_are_named(logs: dict[str, Rollout]) -> None:
     n = 30
     names = [f"leg_{k}_joint" for k in range(n)]
     waves = np.sin(logs["rest"].t)[:, None] * np.arange(n)
-    robot = logs["rest"].meta["robot"] | {"dofs": names, "nq": n, "nv": n}
+    own = {"dofs": names, "units": ["rad"] * n, "nq": n, "nv": n}
+    robot = logs["rest"].meta["robot"] | own
     log = changed(logs["rest"], columns={"tau": waves}, robot=robot)
     axes = drawn(plots.draw_efforts, log)
     busiest = [f"{k}_joint" for k in range(23, 30)]

@@ -95,7 +95,7 @@ def _panels(rollout: Rollout, controller: Controller | None) -> Iterator[Panel]:
     period = log_series.held_period(rollout)
     yield Panel(
         "Null-space error ‖e_N‖",
-        log_series.null_space_unit(rollout),
+        log_series.rate_unit(rollout),
         list(_null_space(rollout, controller)),
         logarithmic=True,
         note=f"effort held for {1e3 * period:g} ms" if period else "",
