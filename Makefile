@@ -26,7 +26,7 @@ help: ## list the targets
 
 # The bytecode of what these import is written, whatever the shell says: without it each
 # later start takes longer, and tests start hundreds of processes.
-demo test thorough docs wheel-test: export PYTHONDONTWRITEBYTECODE :=
+demo test test-system thorough docs wheel-test: export PYTHONDONTWRITEBYTECODE :=
 demo: $(USE) ## the paper's run, and a Panda under a ball, with and without its field
 	@echo "Running paper/4_moving_obstacle; the first run compiles its kernels, once ..."
 	@$(BIN)/hsp run paper/4_moving_obstacle --out out/demo --no-view
@@ -50,11 +50,15 @@ quick: $(STAMP) ## what to run after every edit: a minute of CPU
 	  $(ARGS)
 
 # A file's tests stay in one process, which makes what they share once.
+SPREAD := -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 test: $(STAMP) ## run the tests
-	@$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile $(ARGS)
+	@$(BIN)/python -m pytest $(SPREAD) -m "not system" $(ARGS)
+
+test-system: $(STAMP) ## run those of browsers, notebooks, processes and whole walks
+	@$(BIN)/python -m pytest $(SPREAD) -m system $(ARGS)
 
 thorough: $(STAMP) ## run the tests with more seeds, and every configuration's page
-	@HSP_THOROUGH=1 $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile $(ARGS)
+	@HSP_THOROUGH=1 $(BIN)/python -m pytest $(SPREAD) $(ARGS)
 
 lint: $(STAMP) ## ruff, mypy --strict, the layers of the architecture, budgets of lines
 	@$(BIN)/ruff check
@@ -159,7 +163,7 @@ clean: ## remove caches, builds and the demo's output; .venv stays
 	@rm -rf build dist machine_code docs/_build docs/_static/replays docs/reference/generated out/demo .coverage .*_cache .hypothesis
 	@find hsp_control tests -name __pycache__ -prune -exec rm -rf {} +
 
-.PHONY: help docs links figures animations notebooks demo quick sims test thorough lint coverage fuzz mutants wheel wheel-test release format constraints clean
+.PHONY: help docs links figures animations notebooks demo quick sims test test-system thorough lint coverage fuzz mutants wheel wheel-test release format constraints clean
 
 # ------------------------------------------------------------------- the environment
 

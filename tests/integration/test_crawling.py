@@ -88,6 +88,7 @@ def test_a_velocity_in_time_is_followed_as_far_as_the_legs_reach():
     assert followed[-1, 1] / followed[-1, 0] == pytest.approx(0.2, rel=1e-9)
 
 
+@pytest.mark.system
 def test_it_goes_up_a_step_of_two_centimetres():
     """The trunk rises with the ground."""
     step = "{shape: {type: box, size: [2, 2, 0.04]}, position: [1.25, 0, 0]}"

@@ -20,6 +20,7 @@ def largest(run, name):
     return np.linalg.norm(run[f"estimate.{name}"], axis=1).max()
 
 
+@pytest.mark.system
 @pytest.mark.slow
 def test_talos_takes_a_step_on_an_estimated_base():
     """One key turns it on; nothing else of the configuration changes."""
@@ -39,6 +40,7 @@ def test_talos_takes_a_step_on_an_estimated_base():
     assert (run["estimate.contacts"][swings] == 1.0).mean() > 0.9
 
 
+@pytest.mark.system
 @pytest.mark.slow
 def test_solo_trots_on_an_estimated_base_and_again_the_same(tmp_path):
     given = ("estimators.base=true", "plan.until=0.6", "simulation.duration=1.2")

@@ -70,6 +70,7 @@ def test_strict_reading_admits_it_by_name_only(installed: Path, tmp_path: Path) 
     assert admitted.returncode == 0, admitted.stderr
 
 
+@pytest.mark.system
 @pytest.mark.slow
 def test_it_runs_plots_and_exports(installed: Path, tmp_path: Path) -> None:
     short = ["--set", "simulation.duration=0.3"]
@@ -92,6 +93,7 @@ def test_it_sweeps(installed: Path, tmp_path: Path) -> None:
     assert ran.returncode == 0, ran.stderr
 
 
+@pytest.mark.system
 @pytest.mark.slow
 def test_its_robot_is_reached_by_name(installed: Path, tmp_path: Path) -> None:
     words = ["live", DEMO, "--robot", "example://anywhere", "--duration", "0.2"]

@@ -23,6 +23,7 @@ PUT_DOWN = (
 )
 
 
+@pytest.mark.system
 @pytest.mark.slow
 @pytest.mark.parametrize("estimated", [False, True])
 def test_a_foot_is_put_down_where_the_ground_is_felt(estimated):

@@ -43,6 +43,7 @@ def test_diagonal_feet_swing_together_and_the_others_bear():
             assert (aloft > 0.7) if foot in swinging else (aloft < 0.1)
 
 
+@pytest.mark.system
 def test_it_returns_to_its_line_after_a_push():
     """Across it; what it loses along it, it does not make up for."""
     push = "{frame: base_link, force: [-4, 8, 0], start: 1, duration: 0.1}"
@@ -91,6 +92,7 @@ def test_its_velocity_changes_no_faster_than_it_may():
     assert run["plan.velocity"][:, 0].max() == pytest.approx(0.3, abs=0.12)
 
 
+@pytest.mark.system
 def test_a_streamed_velocity_is_followed_and_repeated_from_the_log(tmp_path):
     velocity = Stream(acceleration=2.0)
     given = load_experiment("whole_body/solo12_trot").scenario
@@ -120,6 +122,7 @@ def test_a_streamed_velocity_is_followed_and_repeated_from_the_log(tmp_path):
         assert np.array_equal(run[name], again[name], equal_nan=True), name
 
 
+@pytest.mark.system
 def test_it_trots_where_it_can_be_touched():
     session = Session(playable("whole_body/solo12_trot"))
     while session.t < 0.4:

@@ -116,6 +116,7 @@ def test_the_null_space_error_decays_within_each_phase():
     assert compared >= 2
 
 
+@pytest.mark.system
 def test_arms_swing_by_a_field():
     """Two elbows, in opposite directions, once in two steps."""
     run = walk()
@@ -146,6 +147,7 @@ def test_the_same_run_again_is_the_same_to_the_bit(tmp_path):
         assert np.array_equal(first[name], again[name], equal_nan=True), name
 
 
+@pytest.mark.system
 def test_a_push_that_fells_is_said():
     push = "{frame: torso_2_link, force: [0, 900, 0], start: 0.1, duration: 0.3}"
     settings = (f"plant.pushes=[{push}]", "simulation.duration=3")
@@ -155,6 +157,7 @@ def test_a_push_that_fells_is_said():
     assert run.t[-1] < 2.0
 
 
+@pytest.mark.system
 def test_a_push_that_one_sole_does_not_hold_is_held_by_both():
     """To the left, just before the right foot swings, which cannot step across."""
     push = "{frame: torso_2_link, force: [0, 200, 0], start: 1.62, duration: 0.1}"
@@ -197,6 +200,7 @@ def test_the_page_s_yaml_and_python_run():
     assert load_experiment(yaml.safe_load(space["walk"].to_yaml())).scenario == made
 
 
+@pytest.mark.system
 def test_it_walks_on_footsteps_that_are_given():
     """A step to the left ahead, and the other foot beside it."""
     rows = "[[0.15, 0.1, 0.1], [0.15, -0.08, 0.1]]"
@@ -234,6 +238,7 @@ def test_a_lighter_robot_walks_by_the_same_plan():
     assert np.sqrt((error**2).sum(axis=1).mean()) < 0.005
 
 
+@pytest.mark.system
 def test_the_centre_of_pressure_stays_in_the_middle_while_a_leg_swings():
     """Without the leg's momentum in the plan it reaches the toes and the sides, 0.9."""
     run = lighter()

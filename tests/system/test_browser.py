@@ -151,6 +151,7 @@ def cursors(watched: Watched) -> list[float]:
 # -- an exported page -----------------------------------------------------------------
 
 
+@pytest.mark.smoke
 def test_the_arm_is_drawn_and_moves(
     planar: Rollout, planar_page: Path, watch: Callable[..., Watched]
 ) -> None:

@@ -79,6 +79,7 @@ def outputs(page: Any, plot: int) -> list[str]:
     return page.locator("#side section").nth(plot).locator("output").all_inner_texts()
 
 
+@pytest.mark.smoke
 def test_axes_have_units(page: Any) -> None:
     units = page.locator("#side svg").nth(JOINTS).locator(".unit").all_text_contents()
     assert sorted(units) == ["[rad]", "t [s]"]

@@ -200,6 +200,7 @@ def test_a_killed_box_ends_the_loop() -> None:
             box.kill()
 
 
+@pytest.mark.smoke
 def test_a_client_that_dies_is_told() -> None:
     experiment = circle()
     with serving(experiment) as box:

@@ -437,6 +437,7 @@ except franka.NetworkException as error:
             box.kill()
 
 
+@pytest.mark.smoke
 def test_a_second_client_is_refused_and_the_first_goes_on() -> None:
     with served() as rig:
         told = rig.run("""

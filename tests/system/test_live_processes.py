@@ -240,6 +240,7 @@ def test_ctrl_c_is_the_operator_s_stop(tmp_path: Path) -> None:
     assert not list(tmp_path.glob("*.journal"))
 
 
+@pytest.mark.smoke
 def test_a_robot_that_cannot_start_says_so(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -85,6 +85,7 @@ def test_a_page_that_stalls_or_leaves_holds_nothing_up(
     assert (tmp_path / "panda_obstacle-play.npz").is_file()
 
 
+@pytest.mark.smoke
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

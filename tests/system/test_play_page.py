@@ -304,6 +304,7 @@ def test_the_keyboard_moves_by_a_centimetre(page: Any) -> None:
     assert page.evaluate("play.selected") is None
 
 
+@pytest.mark.smoke
 def test_keys_steer_the_run(page: Any) -> None:
     for key, do in ((" ", "pause"), (".", "step"), ("r", "reset"), ("s", "save")):
         page.keyboard.press(key)

@@ -349,6 +349,7 @@ def test_presenting_leaves_the_scene_its_title_and_what_happens(
     assert not page.evaluate("document.body.classList.contains('resting')")
 
 
+@pytest.mark.smoke
 def test_others_are_told_the_time(page: Any) -> None:
     page.evaluate(
         """window.told = [];

@@ -137,6 +137,7 @@ def test_mistakes_at_the_command_line_are_one_line(
     )
 
 
+@pytest.mark.smoke
 def test_a_client_watches_a_loop(tmp_path: Path) -> None:
     prefix, _, _ = fresh()
     command, seen = Command(law()), []

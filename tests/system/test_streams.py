@@ -16,6 +16,7 @@ pytestmark = pytest.mark.process
 EXAMPLE = Path(__file__).parents[2] / "examples" / "stream"
 
 
+@pytest.mark.smoke
 def test_a_run_follows_another_process_and_its_log_repeats_it(tmp_path: Path) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))

@@ -101,6 +101,7 @@ def cluster(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]
 # --- what is in it -------------------------------------------------------------------
 
 
+@pytest.mark.smoke
 def test_a_row_is_what_a_single_run_gives(swept: Sweep) -> None:
     row = 7
     keys = {name: swept[name][row] for name in swept.parameters}

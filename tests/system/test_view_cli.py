@@ -70,6 +70,7 @@ def test_view_prints_its_address_and_keeps_no_script_waiting(
     assert not caplog.records
 
 
+@pytest.mark.smoke
 def test_run_shows_what_it_computes_and_keeps_its_log(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -55,6 +55,7 @@ def test_all_names_exist_and_are_listed() -> None:
         _ = hsp_control.Robto
 
 
+@pytest.mark.smoke
 @pytest.mark.process
 def test_the_law_reads_alone() -> None:
     """Whoever reads equation (13) needs some twenty modules, and no declarations."""

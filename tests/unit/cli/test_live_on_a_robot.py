@@ -46,6 +46,7 @@ def command(tmp_path: Path, address: str) -> list[str]:
     return [*words, "--robot", f"some://{address}"]
 
 
+@pytest.mark.system
 def test_it_begins_where_the_robot_is(tmp_path: Path) -> None:
     hardware = Somewhere("hold", Robot.load("panda"), 0.001)
     assert isinstance(hardware, LocatedHardware)
@@ -56,6 +57,7 @@ def test_it_begins_where_the_robot_is(tmp_path: Path) -> None:
     assert np.abs(run["task.hand.error"][run.t < 0.1]).max() < 1e-5
 
 
+@pytest.mark.system
 def test_a_robot_that_does_not_know_where_it_is_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -64,6 +66,7 @@ def test_a_robot_that_does_not_know_where_it_is_is_refused(
     assert "panda_joint1 is nan from the configuration's start" in told
 
 
+@pytest.mark.system
 def test_a_fault_is_one_line_of_the_errors(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

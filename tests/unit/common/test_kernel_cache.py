@@ -95,6 +95,7 @@ def edit(file: Path, old: str, new: str) -> None:
     file.write_text(text.replace(old, new))
 
 
+@pytest.mark.system
 def test_only_an_edit_of_what_it_is_made_of_compiles_again(installed: Path) -> None:
     package = installed / "hsp_control"
     assert loaded(installed) == COMPILED
@@ -150,6 +151,7 @@ def test_a_folder_of_one_s_own(read_only: Path, tmp_path: Path) -> None:
     assert run(read_only, NUMBA_CACHE_DIR=cache).stdout.strip() == "1"
 
 
+@pytest.mark.system
 def test_the_machine_code_of_a_wheel(installed: Path, tmp_path: Path) -> None:
     """It is used where nothing else is kept, and only for what it was made of."""
     name, needed = shipped_processor()

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 import yaml
+from places import THOROUGH
 from scenario_document import check_place, line_of
 
 from hsp_control import load_experiment
@@ -306,7 +307,9 @@ def test_any_mistake_in_any_configuration_is_named_at_its_place() -> None:
             if kind in seen:
                 continue
             seen.add(kind)
-            for what, wrong, expected in mistakes(data, path):
+            # A third of the mistakes of each kind; another third of the next.
+            some = slice(None) if THOROUGH else slice(len(seen) % 3, None, 3)
+            for what, wrong, expected in [*mistakes(data, path)][some]:
                 error = refusal(Document(wrong, marks, "file"))
                 if error is None:
                     continue
@@ -321,4 +324,4 @@ def test_any_mistake_in_any_configuration_is_named_at_its_place() -> None:
                 assert not any(word in first for word in FOREIGN), case
                 if what != "misspelt":
                     assert where == f"file:{line_of(text, at)}", case
-    assert refused > 3000
+    assert refused > (3000 if THOROUGH else 1000)

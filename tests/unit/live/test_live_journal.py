@@ -71,6 +71,7 @@ class Interrupting:
         raise KeyboardInterrupt
 
 
+@pytest.mark.system
 @pytest.mark.parametrize("cut", [0, 5, 200, None])
 @pytest.mark.parametrize("row", [20, -1])
 def test_ctrl_c_within_a_row_loses_none(

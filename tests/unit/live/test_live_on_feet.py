@@ -83,6 +83,7 @@ def live(
 # --- plans and estimators ------------------------------------------------------------
 
 
+@pytest.mark.system
 @pytest.mark.slow
 def test_a_live_plan_does_what_the_simulation_does(tmp_path: Path) -> None:
     """The estimator's errors, the plan's phases and the efforts are those of a run."""
@@ -105,6 +106,7 @@ def test_a_live_plan_does_what_the_simulation_does(tmp_path: Path) -> None:
     assert report.ended == "fault", "it was not given the time to come to rest"
 
 
+@pytest.mark.system
 @pytest.mark.slow
 @pytest.mark.parametrize("by", ["duration", "operator"])
 def test_a_regular_end_lets_the_plan_come_to_rest(by: str) -> None:
@@ -130,6 +132,7 @@ def test_a_regular_end_lets_the_plan_come_to_rest(by: str) -> None:
     assert robot.robot.q[2] > 0.9 * experiment.q0[2]
 
 
+@pytest.mark.system
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "plan",
@@ -151,6 +154,7 @@ def test_a_walk_that_is_stopped_brings_its_feet_together(plan: str) -> None:
     assert robot.robot.q[2] > 0.9 * experiment.q0[2]
 
 
+@pytest.mark.system
 @pytest.mark.slow
 def test_a_fall_is_found_said_and_ends_with_damped_joints() -> None:
     push = "{frame: base_link, moment: [6, 0, 0], start: 0.3, duration: 0.3}"
@@ -176,6 +180,7 @@ def test_a_fall_is_found_said_and_ends_with_damped_joints() -> None:
         assert report.t < 4.0, "a fall must end the run"
 
 
+@pytest.mark.system
 def test_what_a_plan_or_an_estimator_misses_is_said_before_the_run() -> None:
     felt = "plan={type: sensed, contacts: {front_left: {force: 1}}}"
     tasks = "tasks={trunk: {type: frame_orientation, frame: base_link}}"
@@ -204,6 +209,7 @@ def test_what_a_plan_or_an_estimator_misses_is_said_before_the_run() -> None:
         )
 
 
+@pytest.mark.system
 @pytest.mark.slow
 def test_a_measured_force_is_fed_back(tmp_path: Path) -> None:
     wipes = hsp.load_experiment("forces/panda_wipe", "simulation.duration=0.3")
@@ -218,6 +224,7 @@ def test_a_measured_force_is_fed_back(tmp_path: Path) -> None:
 # --- the feet and the safe stop ------------------------------------------------------
 
 
+@pytest.mark.system
 def test_joints_and_feet_exert_the_force_of_a_safe_stop() -> None:
     """x = Sᵀ tau + Jᵀ f, and tau does the work of x while the feet stand still."""
     experiment = trotting()
@@ -243,6 +250,7 @@ def test_joints_and_feet_exert_the_force_of_a_safe_stop() -> None:
     assert np.abs(held).max() < 3.0 * np.abs(law).max() + 1.0
 
 
+@pytest.mark.system
 def test_feet_that_are_not_pressed_do_not_bear() -> None:
     experiment = trotting()
     feet = BearingFeet(experiment.robot, experiment.controller.contacts)
@@ -261,6 +269,7 @@ def test_feet_that_are_not_pressed_do_not_bear() -> None:
     assert BearingFeet(panda(), ()).hold
 
 
+@pytest.mark.system
 def test_a_floating_base_that_is_not_measured_moves_on_as_it_moved() -> None:
     experiment, h = trotting(), 0.001
     reckoning = DeadReckoning(experiment.robot, h)
@@ -274,6 +283,7 @@ def test_a_floating_base_that_is_not_measured_moves_on_as_it_moved() -> None:
     np.testing.assert_allclose(moved, 10 * h * v, atol=1e-12)
 
 
+@pytest.mark.system
 def test_no_motor_of_a_floating_base_is_ever_sent_an_effort() -> None:
     experiment = trotting()
     limits = experiment.scenario.live.effort_limits(experiment.robot)
@@ -286,6 +296,7 @@ def test_no_motor_of_a_floating_base_is_ever_sent_an_effort() -> None:
 # --- what is measured ----------------------------------------------------------------
 
 
+@pytest.mark.system
 def test_a_state_with_sensors_comes_back() -> None:
     q, v = start(), np.arange(7.0)
     wrench = np.arange(6.0)
@@ -314,6 +325,7 @@ def test_a_state_with_sensors_comes_back() -> None:
             valid_measurement(layout.unpack(numbers[:size], panda()), panda(), 0.001)
 
 
+@pytest.mark.system
 def test_the_wire_carries_what_the_robot_measures() -> None:
     """Of a simulated robot on feet; one without sensors sends what it always did."""
     robot = simulated_robot(trotting())
@@ -328,6 +340,7 @@ def test_the_wire_carries_what_the_robot_measures() -> None:
     assert after.t == 0.001
 
 
+@pytest.mark.system
 @pytest.mark.parametrize(
     ("changed", "message"),
     [

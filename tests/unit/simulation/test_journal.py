@@ -201,6 +201,7 @@ def test_a_full_disk_is_an_error_with_the_file_s_name() -> None:
         JournalWriter(full)
 
 
+@pytest.mark.system
 @pytest.mark.slow
 def test_the_commands_take_it(
     rollout: Rollout, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -13,6 +13,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from numpy.typing import NDArray
+from places import THOROUGH
 from scipy.linalg import sqrtm
 from task_cases import (
     GAINS,
@@ -45,6 +46,7 @@ from hsp_control.geometry.start import Start
 from hsp_control.null_space.metrics import (
     IdentityMetric,
     MassMatrixMetric,
+    Metric,
 )
 from hsp_control.tasks import Impedance, TaskSample
 from hsp_control.tasks.impedance_gains import Rotating, Scratch, impedance_gains
@@ -129,7 +131,11 @@ def test_the_equation_holds_whatever_the_force_and_the_metric(
 ) -> None:
     """Λ e'' + (½ Λ' + D) e' + K sat(e) = -f along the motion that follows from f."""
     rng = np.random.default_rng(3)
-    for seed, metric in ((1, IdentityMetric()), (2, MassMatrixMetric())):
+    metrics: list[tuple[int, Metric]]
+    metrics = [(2, MassMatrixMetric()), (1, IdentityMetric())]
+    if not THOROUGH:
+        metrics = metrics[1:] if kind == "bounded" else metrics[:1]
+    for seed, metric in metrics:
         motion = place(case, seed)
         robot, rows = motion.robot, case.family.rows
         plain = case.family.build(robot, motion, 0.5, GAINS, seed)

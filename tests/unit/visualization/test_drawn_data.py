@@ -207,6 +207,7 @@ def test_a_task_of_a_user_s_own_says_itself_what_is_drawn() -> None:
     np.testing.assert_array_equal(target.desired, path.desired)
 
 
+@pytest.mark.system
 @pytest.mark.parametrize("name", ["pose", "several", "posture", "obstacle"])
 def test_a_log_that_says_nothing_of_its_tasks_is_drawn(
     logs: dict[str, Rollout], name: str, tmp_path: Path

@@ -89,6 +89,7 @@ def test_a_box_has_two_numbers_on_every_edge() -> None:
 # --- files, and what drawing leaves behind -------------------------------------------
 
 
+@pytest.mark.system
 def test_figures_are_written_in_every_format(
     logs: dict[str, Rollout], tmp_path: Path
 ) -> None:
@@ -128,6 +129,7 @@ def test_a_figure_keeps_its_style_wherever_it_is_saved(tmp_path: Path) -> None:
     assert label.get_color() == palette.INK
 
 
+@pytest.mark.system
 @pytest.mark.process
 def test_matplotlib_comes_late_and_no_display_is_needed(tmp_path: Path) -> None:
     program = """
