@@ -41,7 +41,7 @@ from hsp_control.law.outcome import BEYOND_ANY_LEVEL, NOT_FINITE
 from hsp_control.null_space.fields import NullSpaceField
 from hsp_control.null_space.metrics import Metric
 from hsp_control.robot import Robot, RobotState
-from hsp_control.robot.state import Move
+from hsp_control.robot.robot import Move
 from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.impedance import parts_of

@@ -9,7 +9,7 @@ from hsp_control.common.native import NativeCall, are_native
 from hsp_control.control.actuation.actuation import CODES
 from hsp_control.law.outcome import BEYOND_ANY_LEVEL
 from hsp_control.robot.native_move import NativeMove
-from hsp_control.robot.state import Move
+from hsp_control.robot.robot import Move
 
 
 class FreeStep(NamedTuple):

@@ -1,21 +1,22 @@
-"""A quadruped that crawls: one run, from foot to foot."""
+"""A quadruped that crawls, and its run from foot to foot."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal
+from dataclasses import KW_ONLY
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.controller import Controller
 from hsp_control.control.measurement import Measurement
+from hsp_control.declaration.quantities import Positive, ProperFraction
 from hsp_control.plans.footsteps import Footstep
 from hsp_control.plans.four_feet import PointFoot, RunningQuadruped
 from hsp_control.plans.polygon import convex_hull, nearest_inside
+from hsp_control.plans.quadruped import QuadrupedPlan
 from hsp_control.plans.quintic import at_rest, to_rest
 from hsp_control.robot import RobotState
-
-if TYPE_CHECKING:
-    from hsp_control.plans.crawl import Crawl
+from hsp_control.tasks import Gains
 
 CLOSING = 4
 """Swings without velocity before it stands, which bring the feet below the hips."""
@@ -23,12 +24,40 @@ FADE = 0.3
 """Share of the time on four feet in which the force of the next foot fades."""
 
 
+class Crawl(QuadrupedPlan, type="crawl"):
+    """A quadruped crawls: one foot swings while three bear, and it could stop any time.
+
+    On four feet the centre of mass moves above the triangle of the three that will
+    bear; there it rests while the fourth swings. The feet follow each other on each
+    side, the hind one first (McGhee and Frank 1968). A foot lands half a stride ahead
+    of its place; it is a contact when it is felt, early or late, higher or lower.
+    """
+
+    gait: ClassVar[str] = "crawl"
+    center_priority: ClassVar[int] = 1
+    center_gains: ClassVar[Gains] = Gains(natural_frequency=8.0)
+
+    _: KW_ONLY
+    swing: Positive = 0.35
+    """Duration of a swing [s]."""
+    stance: Positive = 0.45
+    """Duration of the time on four feet between two swings, in which the body moves
+    [s]."""
+    margin: ProperFraction = 0.3
+    """By which share the triangle of the feet is made smaller for the centre of mass
+    [-]."""
+
+    def begin(self, controller: Controller) -> "RunningCrawl":
+        """Return what crawls; see `Plan.begin`."""
+        return RunningCrawl(self.begun(), controller, self.margin)
+
+
 class RunningCrawl(RunningQuadruped):
     """What a `Crawl` became for one run."""
 
     _mode: Literal["standing", "four", "three"]
 
-    def __init__(self, crawl: "Crawl", controller: Controller, margin: float) -> None:
+    def __init__(self, crawl: Crawl, controller: Controller, margin: float) -> None:
         """Find the references and the switches; see `RunningQuadruped`.
 
         Args:

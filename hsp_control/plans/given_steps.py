@@ -1,16 +1,13 @@
 """Footsteps that are given, one after the other."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hsp_control.common.exceptions import PlanError
+from hsp_control.plans.biped import BipedPlan
 from hsp_control.plans.footsteps import Footstep, Stance, Velocity, between
 from hsp_control.plans.step_planner import Next, StepPlanner
-
-if TYPE_CHECKING:
-    from hsp_control.plans.walk import Walk
 
 REST = Velocity(0.0, 0.0, 0.0)
 _REACHED = 1e-6
@@ -26,7 +23,7 @@ class GivenSteps(StepPlanner):
 
     def __init__(
         self,
-        walk: "Walk",
+        walk: BipedPlan,
         stance: Stance,
         robot: str,
         places: Mapping[float, Footstep],

@@ -6,20 +6,18 @@ divergent component that is still within the soles is brought back where it is.
 """
 
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
+from hsp_control.plans.biped import BipedPlan
 from hsp_control.plans.foot import Foot
 from hsp_control.plans.footsteps import Footstep, Stance
 from hsp_control.plans.pendulum import Phase, error_after
 from hsp_control.plans.polygon import nearest_inside
 from hsp_control.plans.step_adjustment import Adjustment, adjust, shift_gain
 from hsp_control.plans.swing import Swing
-
-if TYPE_CHECKING:
-    from hsp_control.plans.walk import Walk
 
 _DEADBAND = 0.005
 """Error of the divergent component at touchdown that needs no adjustment [m]."""
@@ -60,7 +58,7 @@ class PlannedSwing(NamedTuple):
 class PushRecovery:
     """Decides from ξ whether and where a foot steps."""
 
-    def __init__(self, walk: "Walk", stance: Stance, frequency: float) -> None:
+    def __init__(self, walk: BipedPlan, stance: Stance, frequency: float) -> None:
         """Set the walk, how the feet stand, and ω [1/s]."""
         self._walk, self._stance, self._frequency = walk, stance, frequency
         self._shift = shift_gain(frequency, walk.double_support)

@@ -2,20 +2,18 @@
 
 from collections.abc import Callable, Mapping
 from math import hypot
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import PlanError
+from hsp_control.plans.biped import BipedPlan
 from hsp_control.plans.foot import Foot
 from hsp_control.plans.footsteps import Footstep, Stance, Velocity, between
 from hsp_control.plans.legs import hip_height, leg_length
 from hsp_control.plans.pendulum import Phase
 from hsp_control.robot import RobotState
-
-if TYPE_CHECKING:
-    from hsp_control.plans.walk import Walk
 
 PREVIEW = 4
 """Steps that a plan looks ahead; what comes later has decayed to a thousandth."""
@@ -62,7 +60,7 @@ class StepPlanner:
         stopping: Whether the robot is to stand as soon as it can.
     """
 
-    def __init__(self, walk: "Walk", stance: Stance, robot: str) -> None:
+    def __init__(self, walk: BipedPlan, stance: Stance, robot: str) -> None:
         """Set the walk, and how the feet stand.
 
         Args:

@@ -1,16 +1,19 @@
-"""A quadruped that trots: one run, from swing to swing."""
+"""A quadruped that trots, and its run from swing to swing."""
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
+from hsp_control.control.controller import Controller
 from hsp_control.control.measurement import Measurement
 from hsp_control.plans.footsteps import Footstep
 from hsp_control.plans.four_feet import PointFoot, RunningQuadruped
 from hsp_control.plans.pendulum import GRAVITY
+from hsp_control.plans.quadruped import QuadrupedPlan
 from hsp_control.robot import RobotState
+from hsp_control.tasks import Gains
 
 READY = 0.2
 """Time on four feet before the first swing; the body waits for it [s]."""
@@ -24,6 +27,24 @@ CLOSING = 2
 """Swings without velocity before it stands, which bring the feet below the hips."""
 _COMMITTED = 0.05
 """A step is not moved so shortly before it lands [s]."""
+
+
+class Trot(QuadrupedPlan, type="trot"):
+    """A quadruped trots: two diagonal feet swing while two bear.
+
+    It stands, trots with the given velocity, and stands again when that is zero. A
+    foot lands where the body will be, farther by what the body is too fast (the capture
+    point; Raibert 1986, Pratt et al. 2006). It starts from where it is and becomes a
+    contact when it is felt on the ground, early or late, higher or lower.
+    """
+
+    gait: ClassVar[str] = "trot"
+    center_priority: ClassVar[int] = 2
+    center_gains: ClassVar[Gains] = Gains(6.0, 5.0)
+
+    def begin(self, controller: Controller) -> "RunningTrot":
+        """Return what trots; see `Plan.begin`."""
+        return RunningTrot(self.begun(), controller)
 
 
 class RunningTrot(RunningQuadruped):

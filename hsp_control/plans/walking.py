@@ -1,7 +1,7 @@
-"""A biped that walks: one run, from phase to phase."""
+"""A biped that walks, and its run from phase to phase."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from hsp_control.common.exceptions import PlanError
 from hsp_control.control.controller import Controller
 from hsp_control.control.log_channel import LogChannel
 from hsp_control.control.measurement import Measurement
+from hsp_control.plans.biped import BODY, TRUNK, BipedPlan
 from hsp_control.plans.falling import FallDetector
 from hsp_control.plans.foot import Foot
 from hsp_control.plans.footsteps import Footstep, Velocity, between
@@ -31,9 +32,6 @@ from hsp_control.plans.swing import Swing, turned
 from hsp_control.robot import RobotState
 from hsp_control.trajectories.fed import Fed, FedOrientation
 
-if TYPE_CHECKING:
-    from hsp_control.plans.walk import Walk
-
 FIRST_SHIFT = (0.4, 0.6)
 """Time to get ready, and time to shift the weight for the first step [s]."""
 LATE = 0.08
@@ -53,6 +51,25 @@ _CALM = 0.02
 Mode = Literal["standing", "double", "single"]
 
 
+class Walk(BipedPlan, type="walk"):
+    """A biped walks on flat ground: a plan of the divergent component of motion.
+
+    It stands, walks with the given velocity, and stands again when that is zero or the
+    steps are done. The centre of mass follows the pendulum with feedback within the
+    sole (`plans/pendulum.py`); a push that the sole cannot hold moves the next step,
+    in place and in time (`plans/step_adjustment.py`). A swing foot starts from where it
+    is and becomes a contact when it is felt on the ground, early or late.
+
+    It has the tasks ``center_of_mass`` and ``trunk``, and one for each foot with the
+    name of its contact.
+    """
+
+    def begin(self, controller: Controller) -> "RunningWalk":
+        """Return what walks; see `Plan.begin`."""
+        names = self._feet(controller.contacts)
+        return RunningWalk(self.begun(), controller, names, BODY, TRUNK)
+
+
 class RunningWalk(RunningPlan):
     """What a `Walk` became for one run: phases, footsteps and feedback.
 
@@ -64,7 +81,7 @@ class RunningWalk(RunningPlan):
 
     def __init__(
         self,
-        walk: "Walk",
+        walk: Walk,
         controller: Controller,
         feet: tuple[str, ...],
         body: str,

@@ -10,4 +10,4 @@ from .integrators import Rk4 as Rk4
 from .integrators import SemiImplicitEuler as SemiImplicitEuler
 from .mujoco_coordinates import MujocoCoordinates as MujocoCoordinates
 from .robot import Robot as Robot
-from .state import RobotState as RobotState
+from .robot import RobotState as RobotState

@@ -6,8 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
-from hsp_control.robot.robot import Robot
-from hsp_control.robot.state import RobotState
+from hsp_control.robot.robot import Robot, RobotState
 
 _STEPS = 200
 _LONGEST = 0.5

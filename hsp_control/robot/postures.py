@@ -8,8 +8,7 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ShapeError
 from hsp_control.declaration.quantities import Vector
-from hsp_control.robot.robot import Robot
-from hsp_control.robot.state import RobotState
+from hsp_control.robot.robot import Robot, RobotState
 
 Posture = Annotated[Literal["start", "home"] | Vector, "posture"]
 """``start``, ``home``, the positions of the joints, shape (nv,) [rad or m], or a

@@ -26,12 +26,12 @@ from hsp_control.common.resources import bundled_configs
 from hsp_control.visualization.viewer import LiveView, Viewer
 from hsp_control.visualization.viewer.commands import PLOTS, set_property
 from hsp_control.visualization.viewer.export import FilmStyle, export_film, export_html
-from hsp_control.visualization.viewer.export.clip_reduction import (
+from hsp_control.visualization.viewer.export.encoding import find_ffmpeg
+from hsp_control.visualization.viewer.latest_commands import key_of
+from hsp_control.visualization.viewer.offline.clip_reduction import (
     ANGLE_BOUND,
     POSITION_BOUND,
 )
-from hsp_control.visualization.viewer.export.encoding import find_ffmpeg
-from hsp_control.visualization.viewer.latest_commands import key_of
 
 pytestmark = pytest.mark.browser
 

@@ -34,8 +34,8 @@ from hsp_control.visualization.viewer import (
     server,
 )
 from hsp_control.visualization.viewer.commands import CAMERA, CAPTION, CLIP
-from hsp_control.visualization.viewer.export import inline
 from hsp_control.visualization.viewer.latest_commands import LatestCommands, key_of
+from hsp_control.visualization.viewer.offline import inline
 from hsp_control.visualization.viewer.pipe_protocol import (
     DELETE,
     SET,

@@ -5,12 +5,12 @@ from hsp_control.config.view_settings import ViewSettings as ViewSettings
 
 from .comparison import ComparedRun as ComparedRun
 from .export import FilmStyle as FilmStyle
-from .export import InlineView as InlineView
 from .export import export_film as export_film
 from .export import export_html as export_html
-from .export import show as show
 from .live import LiveView as LiveView
+from .offline.inline import InlineView as InlineView
 from .recorder import Recorder as Recorder
 from .replay import robot_of as robot_of
+from .replay import show as show
 from .replay import view_logs as view_logs
 from .viewer import Viewer as Viewer

@@ -4,6 +4,7 @@ import logging
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 from hsp_control.common.exceptions import AccessError, HspControlError, ViewerError
 from hsp_control.config.document import Document
@@ -11,11 +12,14 @@ from hsp_control.config.experiment import build
 from hsp_control.config.loaded_scenario import load_robot
 from hsp_control.config.scenario import Scenario
 from hsp_control.config.validation import validate
+from hsp_control.control.controller import Controller
 from hsp_control.robot import Robot
 from hsp_control.robot.description.access import ANYWHERE, Access, only_within
 from hsp_control.robot.description.sources import packaged_folders
 from hsp_control.simulation import Rollout
 from hsp_control.visualization.viewer.comparison import ComparedRun
+from hsp_control.visualization.viewer.offline.inline import HEIGHT, InlineView
+from hsp_control.visualization.viewer.recorder import Recorder
 from hsp_control.visualization.viewer.transport import Transport
 from hsp_control.visualization.viewer.viewer import Viewer
 
@@ -149,6 +153,40 @@ def view_logs(
         viewer.close()
         raise
     return viewer
+
+
+def show(
+    rollout: Rollout,
+    *,
+    robot: Robot | None = None,
+    controller: Controller | None = None,
+    height: int = HEIGHT,
+    **view: Any,
+) -> InlineView:
+    """Return a view of a run for a notebook: it starts no server and needs none.
+
+    It is paused at the run's start; its player, legend and keys are those of the view.
+
+    Args:
+        rollout: The run.
+        robot: The robot; None: it and its controller are rebuilt from the configuration
+            in the log.
+        controller: The run's controller: see `Viewer.play`.
+        height: The height of its frame [pixels].
+        view: Settings that replace those of the log's ``view``: see `Viewer`.
+
+    Raises:
+        ViewerError: If the robot cannot be rebuilt, the run is empty or of another
+            robot, a view has no such field, or a value is not valid.
+        ExportError: If a mesh cannot be read, or the library for it is not installed.
+    """
+    if robot is None:
+        _, robot, _, controller = rebuild_run(rollout, "the log")
+    recorder = Recorder()
+    own = (rollout.config or {}).get("view", {})
+    with Viewer(robot, transport=recorder, **{**own, **view}) as viewer:
+        viewer.draw_scene(rollout, controller=controller)
+    return InlineView(recorder.scene, height=height)
 
 
 def _load(path: Path, name: str, access: Access) -> ComparedRun:

@@ -31,6 +31,7 @@ from hsp_control.visualization.viewer.commands import (
 from hsp_control.visualization.viewer.comparison import ComparedRun, Comparison
 from hsp_control.visualization.viewer.motion import motion_of
 from hsp_control.visualization.viewer.obstacle_drawing import ObstacleDrawing
+from hsp_control.visualization.viewer.offline.inline import InlineView
 from hsp_control.visualization.viewer.robot_drawing import RobotDrawing
 from hsp_control.visualization.viewer.run_drawing import RunDrawing, all_layers, clear
 from hsp_control.visualization.viewer.run_plots import plots_of
@@ -276,8 +277,6 @@ class Viewer:
         The live page is shown in a frame, with the reason, where a robot's meshes
         cannot be read.
         """
-        from hsp_control.visualization.viewer.export import InlineView  # imports us
-
         try:
             return InlineView(self.transport.scene, url=self.url)._repr_html_()
         except ExportError as error:

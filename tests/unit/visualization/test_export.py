@@ -28,15 +28,15 @@ from hsp_control.visualization.viewer.export import (
     export_film,
     export_html,
 )
-from hsp_control.visualization.viewer.export.clip_reduction import (
+from hsp_control.visualization.viewer.export.html import write_page
+from hsp_control.visualization.viewer.export.screenshots import frame_times
+from hsp_control.visualization.viewer.offline.clip_reduction import (
     ANGLE_BOUND,
     POSITION_BOUND,
 )
-from hsp_control.visualization.viewer.export.html import write_page
-from hsp_control.visualization.viewer.export.meshes import read_mesh
-from hsp_control.visualization.viewer.export.scene_reduction import VERTEX_STEP
-from hsp_control.visualization.viewer.export.screenshots import frame_times
-from hsp_control.visualization.viewer.export.triangle_meshes import (
+from hsp_control.visualization.viewer.offline.meshes import read_mesh
+from hsp_control.visualization.viewer.offline.scene_reduction import VERTEX_STEP
+from hsp_control.visualization.viewer.offline.triangle_meshes import (
     sort_along_curve,
     split_creases,
     weld,

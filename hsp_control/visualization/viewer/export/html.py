@@ -16,8 +16,8 @@ from hsp_control.visualization.viewer.comparison import (
     ghost_color,
     run_parts,
 )
-from hsp_control.visualization.viewer.export.page import assemble
-from hsp_control.visualization.viewer.export.scene_reduction import reduce_scene
+from hsp_control.visualization.viewer.offline.page import assemble
+from hsp_control.visualization.viewer.offline.scene_reduction import reduce_scene
 from hsp_control.visualization.viewer.packed.packing import ArrayTable
 from hsp_control.visualization.viewer.packed.plot_packing import (
     PlottedRun,

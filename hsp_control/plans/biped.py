@@ -1,4 +1,4 @@
-"""A biped that walks: what YAML and Python say, and the tasks that it needs."""
+"""Bipeds that walk: the tasks that they need, and their two feet."""
 
 from collections.abc import Sequence
 from dataclasses import KW_ONLY
@@ -7,7 +7,6 @@ from typing import Literal
 from hsp_control.common.exceptions import PlanError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.constraints.contacts import Contact, SurfaceContact
-from hsp_control.control.controller import Controller
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import (
     Flag,
@@ -22,7 +21,6 @@ from hsp_control.plans.composing import composed
 from hsp_control.plans.legs import leg_freedoms, root_frame
 from hsp_control.plans.moving import MovingPlan
 from hsp_control.plans.plan import PlanParts
-from hsp_control.plans.walking import RunningWalk
 from hsp_control.robot import Robot
 from hsp_control.tasks import CenterOfMass, FrameOrientation, FramePose, Gains, Task
 from hsp_control.tasks.frame_task import TrackingTask
@@ -33,18 +31,8 @@ _SIX = 6
 """Freedoms of a sole, which stands flat or swings."""
 
 
-class Walk(MovingPlan, type="walk"):
-    """A biped walks on flat ground: a plan of the divergent component of motion.
-
-    It stands, walks with the given velocity, and stands again when that is zero or the
-    steps are done. The centre of mass follows the pendulum with feedback within the
-    sole (`plans/pendulum.py`); a push that the sole cannot hold moves the next step,
-    in place and in time (`plans/step_adjustment.py`). A swing foot starts from where it
-    is and becomes a contact when it is felt on the ground, early or late.
-
-    It has the tasks ``center_of_mass`` and ``trunk``, and one for each foot with the
-    name of its contact.
-    """
+class BipedPlan(MovingPlan):
+    """A plan of two flat soles that step, one after the other."""
 
     _: KW_ONLY
     steps: PositiveCount | None = None
@@ -124,11 +112,6 @@ class Walk(MovingPlan, type="walk"):
             ),
         ]
         return composed(own, tasks, contacts, names)
-
-    def begin(self, controller: Controller) -> RunningWalk:
-        """Return what walks; see `Plan.begin`."""
-        names = self._feet(controller.contacts)
-        return RunningWalk(self.begun(), controller, names, BODY, TRUNK)
 
     def _feet(self, contacts: Sequence[Contact]) -> tuple[str, ...]:
         """Return the names of the two contacts that walk.

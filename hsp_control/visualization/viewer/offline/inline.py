@@ -1,19 +1,12 @@
 """A view that is part of a notebook: the exported page inside a cell's output."""
 
 from html import escape
-from typing import Any
 
-from hsp_control.control.controller import Controller
-from hsp_control.robot import Robot
-from hsp_control.simulation import Rollout
 from hsp_control.visualization.viewer.commands import CAPTION, PLOTS, unpack
-from hsp_control.visualization.viewer.export.page import assemble
-from hsp_control.visualization.viewer.export.scene_reduction import reduce_scene
 from hsp_control.visualization.viewer.latest_commands import LatestCommands, key_of
+from hsp_control.visualization.viewer.offline.page import assemble
+from hsp_control.visualization.viewer.offline.scene_reduction import reduce_scene
 from hsp_control.visualization.viewer.packed.packing import ArrayTable
-from hsp_control.visualization.viewer.recorder import Recorder
-from hsp_control.visualization.viewer.replay import rebuild_run
-from hsp_control.visualization.viewer.viewer import Viewer
 
 HEIGHT = 520
 """Height of a view in a notebook [pixels]."""
@@ -89,37 +82,3 @@ class InlineView:
             f'allowfullscreen style="width: 100%; height: {self.height}px; border: 0; '
             'border-radius: 8px"></iframe>'
         )
-
-
-def show(
-    rollout: Rollout,
-    *,
-    robot: Robot | None = None,
-    controller: Controller | None = None,
-    height: int = HEIGHT,
-    **view: Any,
-) -> InlineView:
-    """Return a view of a run for a notebook: it starts no server and needs none.
-
-    It is paused at the run's start; its player, legend and keys are those of the view.
-
-    Args:
-        rollout: The run.
-        robot: The robot; None: it and its controller are rebuilt from the configuration
-            in the log.
-        controller: The run's controller: see `Viewer.play`.
-        height: The height of its frame [pixels].
-        view: Settings that replace those of the log's ``view``: see `Viewer`.
-
-    Raises:
-        ViewerError: If the robot cannot be rebuilt, the run is empty or of another
-            robot, a view has no such field, or a value is not valid.
-        ExportError: If a mesh cannot be read, or the library for it is not installed.
-    """
-    if robot is None:
-        _, robot, _, controller = rebuild_run(rollout, "the log")
-    recorder = Recorder()
-    own = (rollout.config or {}).get("view", {})
-    with Viewer(robot, transport=recorder, **{**own, **view}) as viewer:
-        viewer.draw_scene(rollout, controller=controller)
-    return InlineView(recorder.scene, height=height)

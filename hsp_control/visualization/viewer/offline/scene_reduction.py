@@ -7,14 +7,14 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.visualization.viewer.commands import Json
-from hsp_control.visualization.viewer.export.clip_reduction import reduce_clip
-from hsp_control.visualization.viewer.export.meshes import Piece, read_mesh
-from hsp_control.visualization.viewer.export.triangle_meshes import (
+from hsp_control.visualization.viewer.materials import material
+from hsp_control.visualization.viewer.offline.clip_reduction import reduce_clip
+from hsp_control.visualization.viewer.offline.meshes import Piece, read_mesh
+from hsp_control.visualization.viewer.offline.triangle_meshes import (
     sort_along_curve,
     split_creases,
     weld,
 )
-from hsp_control.visualization.viewer.materials import material
 from hsp_control.visualization.viewer.packed.packing import ArrayTable, step_of
 from hsp_control.visualization.viewer.threejs import matrix, unique_name
 

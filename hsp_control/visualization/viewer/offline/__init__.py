@@ -1,0 +1,1 @@
+"""What is shown, as one page that needs no server."""
