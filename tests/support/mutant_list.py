@@ -34,7 +34,7 @@ ACTUATION, COMPENSATION = CONTROL + "actuation/", CONTROL + "compensation/"
 SIMULATION, LIVE = PACKAGE + "simulation/", PACKAGE + "live/"
 PLANTS = SIMULATION + "plants/"
 PLANS, ESTIMATION = PACKAGE + "plans/", PACKAGE + "estimation/"
-SWEEPS = PACKAGE + "sweeps/"
+SWEEPS, PLAY, BOX = PACKAGE + "sweeps/", PACKAGE + "play/", PACKAGE + "franka_box/"
 DECLARATION = PACKAGE + "declaration/"
 CONFIG, CLI = PACKAGE + "config/", PACKAGE + "cli/"
 
@@ -56,6 +56,7 @@ OF_STEPS = UNIT + "control/test_limited_step.py -k "
 OF_QP = UNIT + "control/test_dual_active_set.py -k "
 OF_COMPENSATION = UNIT + "control/test_compensation.py -k "
 OF_STRETCHES = UNIT + "simulation/test_stretch.py -k "
+OF_PLAY = "tests/integration/test_play.py -k "
 OF_SWEEPS = "tests/system/test_sweep_designs.py"
 OF_IMPERFECTIONS = UNIT + "simulation/test_imperfections.py -k "
 
@@ -426,8 +427,8 @@ MUTANTS = (
     Mutant(
         "M' without Cᵀ",
         METRICS + "mass_matrix.py",
-        "W_dot[i, j] = C[i, j] + C[j, i]",
-        "W_dot[i, j] = C[i, j]",
+        "W_dot[i, j] = (C[i, j] + C[j, i]) / unit",
+        "W_dot[i, j] = C[i, j] / unit",
         ON_ROBOTS + "applies_the_short_form",
     ),
     Mutant(
@@ -723,8 +724,8 @@ MUTANTS = (
     Mutant(
         "limits: on contacts an error loosens levels",
         ACTUATION + "deviation_cost.py",
-        "if directions.first > 0:",
-        "if directions.first < 0:",
+        "directions.first > 0",
+        "directions.first < 0",
         OF_STEPS + "optimum",
     ),
     Mutant(
@@ -1292,6 +1293,182 @@ MUTANTS = (
         "np.linalg.inv(one + s * self.difference)",
         "np.diag(np.diag(np.linalg.inv(one + s * self.difference)))",
         UNIT + "control/test_loaded_loop.py -k grows_and_decays",
+    ),
+    Mutant(
+        "safe stop: the hold pushes away",
+        LIVE + "safe_stop.py",
+        "w * w * displacement + 2.0 * w * v",
+        "-w * w * displacement + 2.0 * w * v",
+        UNIT + "live/test_safe_stop.py -k not_the_model",
+    ),
+    Mutant(
+        "safe stop: the hold is not damped",
+        LIVE + "safe_stop.py",
+        "w * w * displacement + 2.0 * w * v",
+        "w * w * displacement",
+        UNIT + "live/test_safe_stop.py -k not_the_model",
+    ),
+    Mutant(
+        "limiter: steps from what the robot lacks",
+        LIVE + "effort_limiter.py",
+        "lower, upper = self._most - self._step, self._least + self._step",
+        "lower, upper = self._least - self._step, self._most + self._step",
+        UNIT + "live/test_live_robot.py -k keeps_the_rate",
+    ),
+    Mutant(
+        "monitor: no jump is as long as the gap",
+        LIVE + "measurement_monitor.py",
+        "passed = max(passed, (measurement.sequence - last.sequence) * self._period)",
+        "passed = max(passed, self._period)",
+        UNIT + "live/test_live_faults.py -k a_jump",
+    ),
+    Mutant(
+        "monitor: ages before zero are young",
+        LIVE + "measurement_monitor.py",
+        "if not abs(measurement.age) <= allowed.age:",
+        "if not measurement.age <= allowed.age:",
+        UNIT + "live/test_live_faults.py -k each_fault",
+    ),
+    Mutant(
+        "monitor: positions below are within",
+        LIVE + "measurement_monitor.py",
+        "self._lower = lower - settings.position_margin",
+        "self._lower = lower + settings.position_margin",
+        UNIT + "live/test_live_faults.py -k margin",
+    ),
+    Mutant(
+        "clock: a jump stays in the time",
+        LIVE + "robot_clock.py",
+        "self._offset -= passed - period",
+        "self._offset += passed - period",
+        UNIT + "live/test_live_faults.py -k each_fault",
+    ),
+    Mutant(
+        "reckoning: explicit Euler",
+        LIVE + "dead_reckoning.py",
+        "self._robot.integrate(state.q, h * v), v)",
+        "self._robot.integrate(state.q, h * state.v), v)",
+        UNIT + "live/test_safe_stop.py -k reckoning",
+    ),
+    Mutant(
+        "feet: arms of points backwards",
+        LIVE + "bearing_feet.py",
+        "linear - np.cross(arm, angular, axis=0)",
+        "linear + np.cross(arm, angular, axis=0)",
+        UNIT + "live/test_live_on_feet.py -k joints_and_feet",
+    ),
+    Mutant(
+        "feet: a foot pulls",
+        LIVE + "bearing_feet.py",
+        "else force > 0.0",
+        "else force != 0.0",
+        UNIT + "live/test_live_on_feet.py -k not_pressed",
+    ),
+    Mutant(
+        "link: the window of ages never moves on",
+        LIVE + "link.py",
+        "self._end = arrival + self._window",
+        "self._end = np.inf",
+        UNIT + "live/test_live_udp.py -k age_is",
+    ),
+    Mutant(
+        "faults: late packets come a packet early",
+        LIVE + "faults.py",
+        "for left, late in self._waiting if left <= 1]",
+        "for left, late in self._waiting if left <= 2]",
+        UNIT + "live/test_live_udp.py -k each_fault",
+    ),
+    Mutant(
+        "sensors: wrenches in the order of names",
+        LIVE + "sensor_layout.py",
+        "Inertial(self.inertial, rest[-3], rest[-2])",
+        "Inertial(self.inertial, rest[-2], rest[-3])",
+        UNIT + "live/test_live_on_feet.py -k comes_back",
+    ),
+    Mutant(
+        "frozen: a robot that stands is frozen",
+        LIVE + "frozen_state.py",
+        "            and measurement.v.any()\n",
+        "",
+        UNIT + "live/test_live_faults.py -k at_rest",
+    ),
+    # ------------------------------------------------------------------------ play
+    Mutant(
+        "play: Khatib's law with J'v added",
+        PLAY + "operational_space.py",
+        "active.rows.acceleration - J_dot @ state.v",
+        "active.rows.acceleration + J_dot @ state.v",
+        OF_PLAY + "operational",
+    ),
+    Mutant(
+        "play: its own path comes back at once",
+        PLAY + "grips.py",
+        "self._refer(self._own, t, BACK)",
+        "self._refer(self._own, t, 0.0)",
+        OF_PLAY + "jolt",
+    ),
+    Mutant(
+        "play: the hand of the posture runs away",
+        PLAY + "posture_grip.py",
+        "_HOLDING * lost, np.zeros",
+        "-_HOLDING * lost, np.zeros",
+        OF_PLAY + "elbow",
+    ),
+    Mutant(
+        "play: a slider changes all the time",
+        PLAY + "handles.py",
+        "< KNOB_PERIOD:",
+        "< 0.0:",
+        OF_PLAY + "slider",
+    ),
+    Mutant(
+        "play: a gain beyond what the period bears",
+        PLAY + "knobs.py",
+        "min(_REACH * rate, max(_BORNE / period, rate))",
+        "_REACH * rate",
+        OF_PLAY + "damping_ratios",
+    ),
+    Mutant(
+        "play: damping as the stiffness, not its root",
+        PLAY + "knobs.py",
+        "np.sqrt(factor) * np.asarray(damping)",
+        "factor * np.asarray(damping)",
+        OF_PLAY + "damping_ratios",
+    ),
+    Mutant(
+        "play: a frequency loses its damping ratio",
+        PLAY + "knobs.py",
+        "np.diag(Kv).mean() / (2.0 * frequency)",
+        "np.diag(Kv).mean() / frequency",
+        OF_PLAY + "damping_ratios",
+    ),
+    Mutant(
+        "play: somebody pulls at the joint's origin",
+        PLAY + "session.py",
+        "joint, place.actInv(point), hand",
+        "joint, np.zeros(3), hand",
+        OF_PLAY + "pulls_at_the_elbow",
+    ),
+    Mutant(
+        "play: two steps are one",
+        PLAY + "real_time.py",
+        "running, steps = False, steps + 1",
+        "running, steps = False, 1",
+        OF_PLAY + "about_time",
+    ),
+    Mutant(
+        "key: held for ever",
+        PLAY + "dead_mans_key.py",
+        "self._clock() + TIMEOUT if held",
+        "float('inf') if held",
+        "tests/integration/test_steered_loop.py",
+    ),
+    Mutant(
+        "key: a page that closes still holds it",
+        PLAY + "steered_loop.py",
+        'case {"do": "left"}:\n                    self._hold(held=False)',
+        'case {"do": "left"}:\n                    pass',
+        "tests/integration/test_steered_loop.py",
     ),
     # -------------------------------------------------------------- config and cli
     Mutant(
