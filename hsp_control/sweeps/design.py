@@ -74,7 +74,7 @@ def points(
         fractions = qmc.LatinHypercube(dimension, rng=rng).random(samples)
     else:
         # Balanced only for powers of two: draw the next one and drop the rest.
-        exponent = max(samples - 1, 0).bit_length()
+        exponent = (samples - 1).bit_length()
         fractions = qmc.Sobol(dimension, rng=rng).random_base2(exponent)[:samples]
     return [
         tuple(

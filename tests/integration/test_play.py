@@ -16,6 +16,7 @@ from hsp_control.null_space.fields import ObstacleClearance
 from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.fields.weight import sample_weight
 from hsp_control.play import Picture, Session, play
+from hsp_control.play.knobs import _scaled, knobs_of
 from hsp_control.play.playable import playable
 from hsp_control.simulation.plants import RigidBody
 from hsp_control.simulation.plants.push import Push, Pushes, Spring
@@ -252,6 +253,28 @@ def test_a_knob_goes_no_further_than_the_period_bears(session: Session) -> None:
     assert np.abs(session.rollout().v).max() < 5.0
 
 
+class Told:
+    """Keeps the gains that a knob asks for."""
+
+    def gains(self, name: str, gains: hsp.Gains) -> None:
+        self.made = gains.matrices(6)
+
+
+def test_knobs_keep_damping_ratios() -> None:
+    own = "tasks.hand.gains={natural_frequency: 5, damping_ratio: 0.7}"
+    controller, told = hsp.load_experiment(PANDA, own).controller, Told()
+    knob = knobs_of(controller, 0.001)["frequency.hand"]
+    knob.turn(told, 20.0)  # type: ignore[arg-type]
+    np.testing.assert_allclose(told.made[0], 20.0**2 * np.eye(6))
+    np.testing.assert_allclose(told.made[1], 2.0 * 0.7 * 20.0 * np.eye(6))
+    softer = _scaled(hsp.Impedance(100.0, damping=30.0), 0.25)
+    assert (softer.stiffness, softer.damping) == (25.0, 15.0)
+    # Up to ten times the rate, or to a fifth per period; never below what it is.
+    for period, high in ((0.001, 50.0), (0.02, 10.0), (1.0, 5.0)):
+        knob = knobs_of(controller, period)["frequency.hand"]
+        assert (knob.low, knob.high) == pytest.approx((0.5, high))
+
+
 def test_a_slider_that_is_dragged_makes_few_changes(session: Session) -> None:
     for k in range(100):
         session.take({"do": "set", "id": "null_space_gain", "value": 10.0 + 0.1 * k})
@@ -295,7 +318,8 @@ def test_somebody_pulls_at_the_elbow_and_the_hand_goes_on(
     go(session, 0.2)
     q = session.controller.state.q.copy()
     place = session.controller.state.data.oMi[4]
-    point = np.array(place.translation)
+    on_link = np.array([0.02, -0.03, 0.05])
+    point = np.array(place.act(on_link))
     path = "/robot/panda_joint4/panda_link4"
     hand = point + np.array([0.0, 0.15, 0.0])
     message = {"do": "pull", "path": path, "point": point.tolist()}
@@ -307,7 +331,8 @@ def test_somebody_pulls_at_the_elbow_and_the_hand_goes_on(
     at, hand, newtons = pull
     assert newtons == pytest.approx(300.0 * np.linalg.norm(hand - at))
     assert 1.0 < newtons < 45.0
-    moved = session.controller.state.data.oMi[4].translation
+    moved = session.controller.state.data.oMi[4].act(on_link)
+    np.testing.assert_allclose(at, moved, atol=1e-9)
     assert moved[1] - point[1] > 0.01
     assert np.abs(session.controller.state.q - q).max() > 0.05
     session.take({"do": "let_go"})
@@ -439,7 +464,7 @@ def test_the_loop_does_what_the_page_says_about_time(session: Session) -> None:
         [{"do": "pause"}],
         [],
         [{"do": "step"}],
-        [{"do": "step"}],
+        [{"do": "step"}, {"do": "step"}],
         [{"do": "save"}],
         [{"do": "go"}],
     ]
@@ -456,8 +481,8 @@ def test_the_loop_does_what_the_page_says_about_time(session: Session) -> None:
 
     play(session, Picture(session, viewer), messages, save,
          end=lambda: session.t > 0.05)  # fmt: skip
-    assert times[:6] == pytest.approx([0.0, 0.0, 0.0, 0.01, 0.02, 0.02])
-    assert saved == pytest.approx([0.02])
+    assert times[:6] == pytest.approx([0.0, 0.0, 0.0, 0.01, 0.03, 0.03])
+    assert saved == pytest.approx([0.03])
     assert session.t > 0.05
 
 

@@ -1,5 +1,6 @@
 """Check values, designs and sensitivities of sweeps."""
 
+import json
 import math
 from typing import Any
 
@@ -16,8 +17,11 @@ from hsp_control.sweeps import (
     Uniform,
     sensitivity,
 )
-from hsp_control.sweeps.design import points
+from hsp_control.sweeps.design import chosen_design, points
 from hsp_control.sweeps.factor import factors
+from hsp_control.sweeps.metrics import Measure
+from hsp_control.sweeps.plan import Plan
+from hsp_control.sweeps.row import Row
 from hsp_control.sweeps.spelling import values
 from hsp_control.visualization.plots import sweep_figure
 
@@ -113,6 +117,17 @@ def test_quantiles_are_those_of_the_distribution() -> None:
     drawn = [Integers(3, 7).quantile(float(u)) for u in fractions]
     assert np.unique(drawn, return_counts=True)[1].tolist() == [20] * 5
     assert (min(drawn), max(drawn)) == (3, 7)
+    chosen = [values("a,b,c,d").quantile(float(u)) for u in fractions]
+    assert chosen == [letter for letter in "abcd" for _ in range(25)]
+
+
+def test_a_factor_is_described_in_json_and_says_which_bound_is_infinite() -> None:
+    (factor,) = factors({"a": "normal:0:0.1"})
+    found = json.loads(json.dumps(factor.description(), allow_nan=False))
+    bounds = {"low": "-inf", "high": "inf"}
+    assert found == {
+        "key": "a", "type": "Normal", "mean": 0, "deviation": 0.1, **bounds,
+    }  # fmt: skip
 
 
 def test_a_grid_has_every_combination_in_order() -> None:
@@ -129,12 +144,43 @@ def test_a_latin_hypercube_meets_every_stratum_of_every_factor_once() -> None:
         assert sorted((column * 40).astype(int)) == list(range(40))
 
 
+def test_sobol_covers_every_factor_evenly_and_draws_any_number() -> None:
+    over = factors({"a": "0:1", "b": "0:1"})
+    for samples in (1, 2, 3, 16, 17, 33):
+        assert len(points(over, "sobol", samples, 3)) == samples
+    for column in np.transpose(points(over, "sobol", 32, 3)):
+        assert sorted((column * 32).astype(int)) == list(range(32))
+
+
+def test_no_design_has_more_than_a_million_runs() -> None:
+    assert chosen_design("random", 1_000_000) == "random"
+    with pytest.raises(SweepError, match="1000001 samples; must be from 1 to 1000000"):
+        chosen_design("random", 1_000_001)
+    thousand = "1:1000:1000"
+    with pytest.raises(SweepError, match="the grid has 2000000 runs; at most 1000000"):
+        points(factors({"a": thousand, "b": thousand, "c": "1,2"}), "grid", None, 0)
+
+
 @pytest.mark.parametrize("design", ["random", "latin_hypercube", "sobol"])
 def test_a_seed_is_a_design(design: Any) -> None:
     over = factors({"a": "0:1", "b": "normal:0:1"})
     assert points(over, design, 20, 5) == points(over, design, 20, 5)
     assert points(over, design, 20, 5) != points(over, design, 20, 6)
     assert len(points(over, design, 20, 5)) == 20
+
+
+def test_rows_are_in_the_order_of_the_plan() -> None:
+    """In whichever order they finish, and also if some are missing."""
+    varied = factors({"a": "10:30:3"})
+    plan = Plan(
+        "invented", {}, varied, "grid", None, 0, points(varied, "grid", None, 0)
+    )
+    rows = [Row(k, "completed", "", {"e": 0.5 * k}, 0.0) for k in (2, 0)]
+    found = Sweep.collect(plan, {}, rows, {"e": Measure(0.0, "m", "error")})
+    assert found["run"].tolist() == [0, 2]
+    assert found["a"].tolist() == [10, 30]
+    assert found["e"].tolist() == [0.0, 1.0]
+    assert not found.complete
 
 
 # --- sensitivity ---------------------------------------------------------------------
@@ -198,6 +244,11 @@ def test_sensitivities_are_those_that_were_put_in() -> None:
     # Ranks: what the oracle of correlations gives.
     oracle = stats.spearmanr(invented()["bowl"][5:], invented()["distance.y.min"][5:])
     assert bowl[2] == pytest.approx(oracle.statistic, abs=1e-12)
+    # Twelve classes of equal size: from the F of an analysis of variance.
+    classes = (stats.rankdata(invented()["bowl"][5:]) - 1.0) * 12 // 195
+    rank = stats.rankdata(invented()["distance.y.min"][5:])
+    F = stats.f_oneway(*(rank[classes == k] for k in range(12))).statistic
+    assert share[1, 2] == pytest.approx(1.0 - 194 / (11 * F + 183), abs=1e-12)
 
 
 def test_what_cannot_be_told_is_not_told() -> None:

@@ -132,15 +132,23 @@ def test_from_the_truth_it_stays_there():
         assert np.abs(channels["estimate.velocity_error"].value).max() < 2e-3
         assert channels["estimate.contacts"].value <= 2.0
     assert estimate.wrenches is heard[-1].wrenches
+    R = experiment.robot.state(0.0, each.q, each.v).frame("base_link").rotation
+    turned, _ = tilted(experiment.robot, each.q, 0.1 * R[2], np.zeros(3))
+    error = running.log_channels(turned, each.v)["estimate.rotation_error"].value
+    assert error == pytest.approx([0.0, 0.0, -0.1], abs=1e-3)
 
 
-def test_a_foot_counts_while_it_is_pressed():
+@pytest.mark.parametrize("share", [0.0, 0.09])
+def test_a_foot_counts_while_it_is_pressed(share):
+    """With a tenth of the robot's weight."""
     experiment, heard = swaying()
+    mass = sum(inertia.mass for inertia in experiment.robot.model.inertias)
     running = BaseEstimator().begin(experiment.controller, heard[0].inertial)
     for each in heard[:10]:
         running.update(each)
     assert len(running.filter.names) == 8
-    lifted = dict(heard[10].wrenches) | {SOLES[0]: np.zeros(6)}
+    touch = np.array([0.0, 0.0, 9.81 * share * mass, 0.0, 0.0, 0.0])
+    lifted = dict(heard[10].wrenches) | {SOLES[0]: touch}
     running.update(heard[10]._replace(wrenches=lifted))
     assert {name for name, _ in running.filter.names} == {"right_foot"}
     running.update(heard[11])

@@ -53,6 +53,26 @@ def test_estimates_are_what_rigid_contacts_exert(name):
             assert np.abs(true - found).max() < share * weight
 
 
+@pytest.mark.parametrize("name", CASES)
+def test_wrenches_that_push_on_a_robot_at_rest_are_found(name):
+    """Any wrenches; a ball is pushed where it touches, below its centre."""
+    experiment, random = load_experiment(name), np.random.default_rng(1)
+    robot, q, rest = experiment.robot, experiment.q0, np.zeros(experiment.robot.nv)
+    state, tau = robot.state(0.0, q, rest), robot.inverse_dynamics(q, rest, rest)
+    pushes = {}
+    for contact in experiment.controller.contacts:
+        wrench = random.normal(size=6)
+        if contact.yaml_type == "ball":
+            wrench[3:] = np.cross([0.0, 0.0, -contact.radius], wrench[:3])
+        pushes[contact.frame] = wrench
+        tau -= state.frame(contact.frame).jacobian.T @ wrench
+    running = ContactForces(bandwidth=1e6).begin(experiment.controller, None)
+    for k in range(2):
+        out = running.update(Measurement(k, 0.01 * k, q, rest, applied=tau))
+    for frame, wrench in pushes.items():
+        assert out.wrenches[frame] == pytest.approx(wrench, abs=1e-8)
+
+
 def test_only_what_is_missing_is_estimated_and_that_is_said():
     experiment = load_experiment("whole_body/solo12_trunk")
     robot, q = experiment.robot, experiment.q0

@@ -120,6 +120,24 @@ def test_the_innovation_is_linear_in_the_error():
         assert z / step == pytest.approx(H[:, k], abs=1e-5)
 
 
+def test_a_correction_is_that_of_least_squares():
+    """P⁻¹ grows by Hᵀ N⁻¹ H, and the error is -P Hᵀ N⁻¹ z: without a gain."""
+    random = np.random.default_rng(6)
+    before = random_filter(random)
+    A = random.normal(size=(FIXED + 6, FIXED + 6))
+    before.covariance = A @ A.T
+    seen, n = random.normal(size=(2, 3)), np.diag(random.uniform(0.5, 2.0, 6))
+    after, turned = deepcopy(before), np.kron(np.eye(2), before.rotation)
+    after.correct(seen, n)
+    H, N = before.observation(), turned @ n @ turned.T
+    grown = np.linalg.inv(before.covariance) + H.T @ np.linalg.solve(N, H)
+    assert after.covariance == pytest.approx(np.linalg.inv(grown), rel=1e-6, abs=1e-8)
+    z = (seen @ before.rotation.T + before.position - before.points).ravel()
+    wanted = -np.linalg.solve(grown, H.T @ np.linalg.solve(N, z))
+    assert displaced(before, wanted).points == pytest.approx(after.points)
+    assert displaced(before, wanted).velocity == pytest.approx(after.velocity)
+
+
 def test_a_new_point_has_the_error_of_where_it_is_seen_from():
     random = np.random.default_rng(4)
     true = random_filter(random, points=0)

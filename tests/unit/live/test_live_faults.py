@@ -28,6 +28,7 @@ from live_rigs import (
 
 from hsp_control import Rollout
 from hsp_control.common.exceptions import HardwareError, HspControlError
+from hsp_control.constraints.limits import own_limits
 from hsp_control.control.compensation import Command
 from hsp_control.live import (
     LiveSettings,
@@ -38,6 +39,7 @@ from hsp_control.live import (
     StopSettings,
     run_loop,
 )
+from hsp_control.live.measurement_monitor import MeasurementMonitor
 
 RATE, EFFORT = 1000.0, 80.0
 QUICK = StopSettings(hold=0.02)
@@ -189,6 +191,31 @@ def test_each_fault_of_a_measurement_is_named(kind: str, tmp_path: Path) -> None
     logged = Rollout.load(log)
     assert (logged.status, logged.meta["message"]) == ("stopped", report.reason)
     assert (np.diff(logged.t) < 0.02).all()  # also where the robot's clock jumps
+
+
+@pytest.mark.parametrize("end", ["lower", "upper"])
+def test_positions_may_be_beyond_a_limit_by_their_margin(end: str) -> None:
+    monitor = MeasurementMonitor(panda(), None, SETTINGS, PERIOD)
+    outwards = -1.0 if end == "lower" else 1.0
+    limit, v = getattr(own_limits(panda()), end)[1], np.zeros(7)
+    for share, fits in ((-2.0, True), (-0.5, True), (0.9, True), (1.1, False)):
+        q = start().copy()
+        q[1] = limit + outwards * share * SETTINGS.position_margin
+        found = monitor.violation(Measurement(1, 0.0, q, v))
+        assert (found is None) == fits, share
+
+
+@pytest.mark.parametrize("states", [1, 3])
+def test_a_jump_is_farther_than_the_greatest_speed_over_the_gap(states: int) -> None:
+    """Also where the clock stands still: the numbers of the states count."""
+    monitor = MeasurementMonitor(panda(), None, SETTINGS, PERIOD)
+    monitor.last = Measurement(4, 0.5, start(), np.zeros(7))
+    speed = own_limits(panda()).velocity[3] * (1.0 + SETTINGS.velocity_margin)
+    for factor, fits in ((0.99, True), (1.01, False)):
+        way = factor * speed * states * PERIOD + SETTINGS.position_margin
+        q = start() + way * np.eye(7)[3]
+        found = monitor.jump(Measurement(4 + states, 0.5, q, np.zeros(7)))
+        assert (found is None) == fits, factor
 
 
 def test_a_robot_at_rest_is_not_frozen() -> None:

@@ -256,7 +256,7 @@ def test_feet_that_are_not_pressed_do_not_bear() -> None:
     feet = BearingFeet(experiment.robot, experiment.controller.contacts)
     q, v = experiment.q0, experiment.v0
     pressed = {name: np.zeros(6) for name in FEET}
-    pressed["HL_FOOT"][2] = 2.0
+    pressed["HL_FOOT"][2], pressed["HR_FOOT"][2] = 2.0, -2.0  # noise may pull
     feet.feel(Measurement(1, 0.0, q, v, wrenches=pressed))
     assert [each.frame for each in feet.contacts] == ["HL_FOOT"]
     assert feet.hold

@@ -108,10 +108,15 @@ def test_a_reaction_is_a_plan_of_short_lines():
 
 
 def test_the_reaction_to_a_swing_obeys_the_pendulum(talos):
-    """η' = ω (η - δ), and zero at touchdown, with δ = K a."""
+    """η' = ω (η - δ), and zero at touchdown, with δ = K a; K changes on the way."""
     _, state, legs = talos
     yaw = 0.4
     legs.begin(state, yaw, 0.6, W)
+    bent = np.zeros(state.robot.nv)
+    bent[state.robot.velocity_index("leg_left_4_joint")] = 0.8
+    q = state.robot.integrate(state.q, bent)
+    landed = state.robot.state(0.0, q, np.zeros(state.robot.nv))
+    legs.lands(landed, 1.0, yaw)
     standing, target = Footstep(0.0, 0.0, yaw), Footstep(0.5, 0.3, yaw)
     place = np.array([-0.1, 0.1, 0.1])
     swing = Swing(2.0, 0.6, place, np.eye(3), target, np.eye(3), 0.1, 0.05)
@@ -119,9 +124,11 @@ def test_the_reaction_to_a_swing_obeys_the_pendulum(talos):
     times = np.linspace(2.0, 2.6, 13)[1:-1]
     sampled = np.array([swing.position(t).acceleration for t in times])
     assert swing.accelerations(times) == pytest.approx(sampled, abs=1e-12)
-    K = legs._gain(state, 1.0, 0.0)  # in axes of the world
+    first, last = (legs._gain(each, 1.0, 0.0) for each in (state, landed))  # in world
+    assert np.abs(last - first).max() > 0.1 * np.abs(first).max()
     assert np.abs(reaction.points).max() > 0.01
     for t, a in zip(times, sampled, strict=True):
+        K = first + (t - 2.0) / 0.6 * (last - first)
         # Linear between 49 samples of a motion of 0.6 s.
         assert reaction.point(t) == pytest.approx(K @ a, abs=5e-4)
         rate = (reaction.shift(t + H) - reaction.shift(t - H)) / (2 * H)

@@ -106,6 +106,16 @@ def test_height_is_enough():
     assert height == pytest.approx(0.0165, abs=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("height", "force", "bears"),
+    [(0.02, 2.9, False), (0.01, 3.0, False), (0.02, 3.0, True)],
+)
+def test_with_height_and_force_both_must_be_felt(height, force, bears):
+    experiment, running = told(f"{{force: 3, height: {height}}}")
+    contact, _ = feel(experiment, running, 0.0, force)  # it stands at 0.0165 m
+    assert contact.is_on == bears
+
+
 def test_a_force_that_nothing_measures_is_said():
     experiment, running = told("{force: 3}")
     with pytest.raises(PlanError, match=r"plan.contacts.front_left.force: nothing mea"):

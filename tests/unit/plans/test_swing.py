@@ -4,10 +4,17 @@ import numpy as np
 import pytest
 
 from hsp_control.common.rotations import log3, turn
+from hsp_control.plans import Walk
 from hsp_control.plans.footsteps import Footstep, Stance, Velocity, between, near
 from hsp_control.plans.polygon import convex_hull, nearest_inside
 from hsp_control.plans.quintic import Motion, to_rest
-from hsp_control.plans.step_adjustment import adjust, shift_gain
+from hsp_control.plans.step_adjustment import (
+    WEIGHT_DCM,
+    WEIGHT_TIME,
+    adjust,
+    shift_gain,
+)
+from hsp_control.plans.step_planner import StepPlanner
 from hsp_control.plans.swing import APPROACH, DESCENT, Swing
 
 H = 1e-5
@@ -95,6 +102,15 @@ def test_steps_at_a_velocity_go_on_at_this_velocity():
     assert place.local(after.point) == pytest.approx([0.48, 0.0], abs=1e-12)
 
 
+@pytest.mark.parametrize(("width", "arm"), [(0.17, 0.1), (0.3, 0.15)])
+def test_feet_that_turn_accelerate_as_those_that_walk(width, arm):
+    """They are half a width beside the middle; less than 0.1 m counts as that."""
+    walk = Walk(speed=0.5, turn=9.0, acceleration=0.4, swing=0.6, double_support=0.15)
+    planner = StepPlanner(walk, STANCE._replace(width=width), "a biped")
+    first = planner._next_velocity(Velocity(0.0, 0.0, 0.0), 0.0, 0)
+    assert first == pytest.approx((0.3, 0.0, 0.3 / arm))
+
+
 def test_steps_on_a_circle_stay_on_it():
     v, foot = Velocity(0.2, 0.0, 0.5), Footstep(0.0, 0.085, 0.0)
     side, middles = -1.0, []
@@ -156,6 +172,30 @@ def test_a_step_without_a_push_stays_where_it_is():
     )
     assert found.target == pytest.approx(planned, abs=1e-12)
     assert found.remaining == 0.3
+
+
+def test_no_place_and_no_time_is_better_than_those_of_an_adjusted_step():
+    planned, wanted, shift = Footstep(0.3, 0.1, 0.2), np.array([0.25, 0.05]), 0.8
+    weight, one = np.sqrt(WEIGHT_DCM), np.eye(2)
+    for way, pushed in np.random.default_rng(5).normal(scale=0.05, size=(20, 2, 2)):
+
+        def missing(T, way=way, pushed=pushed):
+            return (way + pushed) * np.exp(3.3 * (T - 0.3)) - way
+
+        found = adjust(
+            planned, 0.3, (0.1, 0.5), lambda T: missing(T) + wanted, wanted, shift,
+            lambda u: u,
+        )  # fmt: skip
+        rows = np.vstack([one, weight * shift * one])
+        least = np.inf
+        for T in (*np.linspace(0.1, 0.5, 12), 0.3):
+            moved, cost, *_ = np.linalg.lstsq(rows, [0, 0, *weight * missing(T)])
+            if cost.sum() + WEIGHT_TIME * (T - 0.3) ** 2 < least:
+                least = cost.sum() + WEIGHT_TIME * (T - 0.3) ** 2
+                best = T, planned.point + moved, missing(T) - shift * moved
+        assert found.remaining == pytest.approx(best[0])
+        assert found.target.point == pytest.approx(best[1])
+        assert found.left == pytest.approx(best[2], abs=1e-12)
 
 
 def test_a_push_is_answered_by_place_and_where_that_ends_by_time():

@@ -1,16 +1,18 @@
 """A walk is a value; what does not fit it is said before the first step."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from hsp_control import FramePose, Gains, Robot, load_experiment
+from hsp_control import Controller, FramePose, Gains, Robot, load_experiment
 from hsp_control.common.exceptions import FallError, HspControlError, PlanError
 from hsp_control.constraints.contacts import BallContact, SurfaceContact
 from hsp_control.control.measurement import Measurement
 from hsp_control.plans import Walk
 from hsp_control.plans.falling import FallDetector
+from hsp_control.plans.foot import Foot
 from hsp_control.tasks import CenterOfMass
 from hsp_control.trajectories import Hold, Schedule, Stops
 from hsp_control.trajectories.switch import Switch
@@ -172,8 +174,12 @@ def test_falls_are_found(talos):
         detector.check(moved(step))
     step[4] = 0.7
     detector.check(moved(step))
+    step[4] = tilted  # the tilt counts from the start
+    leaning = moved(step)
+    FallDetector("base_link", feet, leaning).check(leaning)
     knees = np.zeros(talos.nv)
     for side in ("left", "right"):
+        detector.check(moved(knees))  # on one leg it stands, above the lower foot
         for joint, angle in ((3, -1.2), (4, 2.2), (5, -1.0)):
             knees[talos.velocity_index(f"leg_{side}_{joint}_joint")] = angle
     with pytest.raises(FallError, match=r"its centre of mass is at \d+ % of its first"):
@@ -199,6 +205,22 @@ def test_a_walk_may_begin_in_any_direction(talos, heading):
     assert abs(target[2] - heading) % (2 * np.pi) == pytest.approx(0.0, abs=1e-3)
 
 
+def test_a_footstep_is_the_middle_of_a_sole(talos):
+    """Wherever the frame's origin is: also beside it, as on a narrow ankle."""
+    frame = SurfaceContact("left_sole_link", **SOLE, center=[0.02, 0.01, 0.0])
+    given = {"left_foot": replace(frame, name="left_foot"), "right_foot": FEET[1]}
+    made = Walk().parts(talos, [], list(given.values()))
+    controller = Controller(talos, made.tasks, contacts=made.contacts)
+    foot, turned = Foot("left_foot", controller), np.zeros(talos.nv)
+    turned[5] = 0.6
+    q = talos.integrate(talos.home(), turned)
+    foot.begin(talos.state(0.0, q, np.zeros(talos.nv)), 0.6)
+    assert foot.corners(1.0).mean(axis=0) == pytest.approx(foot.place.point)
+    origin = foot.origin_of(foot.place)
+    state = talos.state(0.0, q, np.zeros(talos.nv))
+    assert origin.point == pytest.approx(state.position("left_sole_link")[:2])
+
+
 GIVEN = "plan={type: walk, footsteps: %s}"
 
 
@@ -217,6 +239,8 @@ def test_footsteps_are_taken_from_the_middle_between_the_feet():
     preview = planner.look_ahead(*given)
     assert preview.target.point - middle == pytest.approx([0.2, 0.085], abs=1e-6)
     assert preview.swings.count(True) == 3
+    for before, after in pairwise(preview.phases):
+        assert np.array_equal(after.start, before.end)
     # The weight ends between the last two steps.
     assert preview.phases[-1].end - middle == pytest.approx([0.4, 0.0], abs=1e-6)
 
