@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-_WITHOUT_CODE = {"__pycache__", "_site"}
+_NOT_WRITTEN = {"__pycache__", "_build", "generated"}
 _PARTS = {
     "tests": ("tests", "*.py"),
     "pages": ("docs", "*.md"),
@@ -34,7 +34,7 @@ def counted(root: Path) -> dict[str, int]:
     found = {
         room.name: _lines(room, "*.py")
         for room in sorted(rooms)
-        if room.name not in _WITHOUT_CODE
+        if room.name not in _NOT_WRITTEN
     }
     found["package"] = _lines(package, "*.py")
     return found | {
@@ -64,7 +64,7 @@ def _lines(folder: Path, pattern: str) -> int:
     return sum(
         file.read_bytes().count(b"\n")
         for file in folder.rglob(pattern)
-        if not _WITHOUT_CODE & set(file.parts)
+        if not _NOT_WRITTEN & set(file.parts)
     )
 
 

@@ -1035,7 +1035,7 @@ MUTANTS = (
     ),
     Mutant(
         "sensed: the ground is lost at half the force",
-        PLANS + "sensed.py",
+        PLANS + "sensing.py",
         "else 0.25 * self.force",
         "else 0.5 * self.force",
         UNIT + "plans/test_sensed.py",
