@@ -5,7 +5,7 @@
 """
 
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from pydantic import (
     BaseModel,
@@ -18,10 +18,8 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema, core_schema
 
+from hsp_control.declaration.families import Declared
 from hsp_control.declaration.plain import kind, shown
-
-if TYPE_CHECKING:
-    from hsp_control.declaration.part import Part
 
 
 class ByType:
@@ -33,7 +31,7 @@ class ByType:
     for none. The members that exist when a value is checked count.
     """
 
-    def __init__(self, base: "type[Part]") -> None:
+    def __init__(self, base: type[Declared]) -> None:
         """Set the base class of the family."""
         self.base = base
         self._model: type[BaseModel] | None = None
@@ -53,7 +51,7 @@ class ByType:
             )
         return self._model
 
-    def validate(self, value: Any) -> "tuple[Part, ...]":
+    def validate(self, value: Any) -> tuple[Declared, ...]:
         """Return the parts that a mapping or a sequence gives."""
         if isinstance(value, Mapping):
             assert self.base.family is not None
@@ -66,7 +64,7 @@ class ByType:
             raise ValueError(f"{shown(value)} is {kind(value)}; expected a mapping")
         return self._distinct(tuple(value))
 
-    def _distinct(self, parts: "tuple[Part, ...]") -> "tuple[Part, ...]":
+    def _distinct(self, parts: tuple[Declared, ...]) -> tuple[Declared, ...]:
         """Return parts of the family.
 
         Raises:
@@ -94,7 +92,7 @@ class ByType:
         return handler(self.model.__pydantic_core_schema__)
 
 
-def as_entry(part: "Part") -> Any:
+def as_entry(part: Declared) -> Any:
     """Return what YAML may say for a part after its type: the shortest form."""
     given = part.changed_fields()
     if not given:
@@ -113,7 +111,7 @@ class _Entry:
         first: The name of its first field; None if it has none.
     """
 
-    def __init__(self, member: "type[Part]") -> None:
+    def __init__(self, member: type[Declared]) -> None:
         """Set the member."""
         self.member = member
         self.first = next(iter(member.__pydantic_fields__), None)  # type: ignore[attr-defined]

@@ -2,21 +2,19 @@
 
 import dataclasses
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pydantic import ValidationError
 
 from hsp_control.common.exceptions import HspControlError
+from hsp_control.declaration.families import Declared
 from hsp_control.declaration.findings import Finding, findings
 from hsp_control.declaration.keys import KeyPath, written
 from hsp_control.declaration.schema import shape
 from hsp_control.declaration.wording import explained
 
-if TYPE_CHECKING:
-    from hsp_control.declaration.part import Part
 
-
-def argument_error(cls: "type[Part]", error: ValidationError) -> HspControlError:
+def argument_error(cls: type[Declared], error: ValidationError) -> HspControlError:
     """Return the part's own error for what pydantic found wrong with its arguments."""
     fields = dataclasses.fields(cls)  # type: ignore[arg-type]
     names = [field.name for field in fields if not field.kw_only]
@@ -39,7 +37,7 @@ def argument_error(cls: "type[Part]", error: ValidationError) -> HspControlError
     return as_error(found[0], cls)
 
 
-def as_error(finding: Finding, cls: "type[Part]") -> HspControlError:
+def as_error(finding: Finding, cls: type[Declared]) -> HspControlError:
     """Return the error of a finding about an argument of a part."""
     where = ": ".join(part for part in (cls.__name__, written(finding.path)) if part)
     own = domain_error(finding.error)

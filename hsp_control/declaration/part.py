@@ -1,10 +1,9 @@
 """The base class of all parts: immutable values with checked fields."""
 
 import dataclasses
-from collections.abc import Callable, Mapping
-from dataclasses import MISSING, Field
+from collections.abc import Callable
 from functools import wraps
-from typing import Any, ClassVar, NoReturn, dataclass_transform
+from typing import Any, NoReturn, dataclass_transform
 
 import numpy as np
 from pydantic import (
@@ -18,9 +17,10 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from hsp_control.common.exceptions import HspControlError, ImmutableError
+from hsp_control.declaration.any_of import AnyOf
 from hsp_control.declaration.docstrings import attribute_docstrings
 from hsp_control.declaration.equality import same
-from hsp_control.declaration.families import Family
+from hsp_control.declaration.families import Declared, Family, value_fields
 from hsp_control.declaration.mistakes import Carrier, argument_error
 from hsp_control.declaration.plain_data import plain_data
 
@@ -32,7 +32,7 @@ _CONFIG = ConfigDict(
 
 
 @dataclass_transform(frozen_default=True)
-class Part:
+class Part(Declared):
     """A value that declares one part of a controller, a world or a simulation.
 
     A subclass annotates its fields; each has a docstring that says what it is and in
@@ -52,22 +52,7 @@ class Part:
     are equal if their fields are, have a hash, and can be pickled; their `repr` is the
     call that makes them. A method ``__post_init__`` may check how the fields fit
     together. A field may stand for a property that a base class asks for.
-
-    Attributes:
-        family: The family that the part belongs to; None for parts of parts.
-        yaml_type: What YAML calls it in ``type:``; None for parts of parts, and for
-            classes that only Python uses.
-        error: The class of the errors about its fields.
-        yaml_key: The field that YAML gives as the key of a mapping, not inside it.
-        documentation: The docstring of each field, by name.
     """
-
-    family: ClassVar[Family | None] = None
-    yaml_type: ClassVar[str | None] = None
-    error: ClassVar[type[HspControlError]] = HspControlError
-    yaml_key: ClassVar[str | None] = None
-    documentation: ClassVar[Mapping[str, str]] = {}
-    __pydantic_core_schema__: ClassVar[CoreSchema]
 
     def __init_subclass__(
         cls,
@@ -122,7 +107,7 @@ class Part:
     ) -> CoreSchema:
         """Return the schema; for the base of a family, that of all its members."""
         if cls.family is not None and cls.family.base is cls and source is cls:
-            return cls.family.core_schema()
+            return AnyOf(cls).core_schema()
         return handler(source)
 
     @classmethod
@@ -170,18 +155,6 @@ class Part:
         data: dict[str, Any] = plain_data(self)
         return data
 
-    def all_fields(self) -> dict[str, Any]:
-        """Return all fields, by name."""
-        return {f.name: getattr(self, f.name) for f in value_fields(self)}
-
-    def changed_fields(self) -> dict[str, Any]:
-        """Return the fields that are not their defaults, by name."""
-        return {
-            f.name: getattr(self, f.name)
-            for f in value_fields(self)
-            if not _is_default(self, f)
-        }
-
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Part) or type(self) is not type(other):
             return NotImplemented
@@ -210,11 +183,6 @@ class Part:
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "Part":
         return self
-
-
-def value_fields(part: Part | type[Part]) -> tuple["Field[Any]", ...]:
-    """Return the fields of a part."""
-    return dataclasses.fields(part)  # type: ignore[arg-type]
 
 
 def _with_one_error(init: Callable[..., None]) -> Callable[..., None]:
@@ -287,16 +255,6 @@ def _refuse_deletion(self: Part, name: str) -> NoReturn:
         ImmutableError: Always.
     """
     raise ImmutableError(f"{type(self).__name__}.{name} cannot be deleted")
-
-
-def _is_default(part: Part, field: "Field[Any]") -> bool:
-    if field.default_factory is not MISSING:
-        default = field.default_factory()
-    elif field.default is MISSING:
-        return False
-    else:
-        default = field.default
-    return same(getattr(part, field.name), default)
 
 
 def _hashable(value: Any) -> Any:

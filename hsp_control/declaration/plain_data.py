@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_origin
+from typing import Any, get_origin
 
 import numpy as np
 from pydantic import BaseModel
@@ -12,10 +12,8 @@ from hsp_control.common.exceptions import ConfigError
 from hsp_control.declaration import schema
 from hsp_control.declaration.by_type import ByType, as_entry
 from hsp_control.declaration.equality import same
+from hsp_control.declaration.families import Declared
 from hsp_control.declaration.located import within
-
-if TYPE_CHECKING:
-    from hsp_control.declaration.part import Part
 
 _SIMPLE = bool, int, float, str, type(None)
 
@@ -36,7 +34,7 @@ def plain_data(value: Any, *, defaults: bool = False) -> Any:
         return value.tolist()
     if isinstance(value, Path):
         return str(value)
-    if hasattr(value, "changed_fields"):
+    if isinstance(value, Declared):
         return _of_part(value, defaults)
     if isinstance(value, BaseModel):
         return _of_model(value, defaults)
@@ -48,7 +46,7 @@ def plain_data(value: Any, *, defaults: bool = False) -> Any:
     raise ConfigError(f"YAML cannot say {what}: it is Python, not data")
 
 
-def _of_part(part: "Part", defaults: bool) -> dict[str, Any]:
+def _of_part(part: Declared, defaults: bool) -> dict[str, Any]:
     data: dict[str, Any] = {}
     if part.family is not None:
         data["type"] = _type_of(part)
@@ -64,7 +62,7 @@ def _of_part(part: "Part", defaults: bool) -> dict[str, Any]:
     return data
 
 
-def _type_of(part: "Part") -> str:
+def _type_of(part: Declared) -> str:
     """Return what YAML calls the part's class.
 
     Raises:

@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_ori
 from pydantic import RootModel
 from pydantic.fields import FieldInfo
 
+from hsp_control.declaration.any_of import AnyOf
 from hsp_control.declaration.by_type import ByType
-from hsp_control.declaration.families import AnyOf
 from hsp_control.declaration.quantities import ArrayField
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from hsp_control.declaration.part import value_fields
+from hsp_control.declaration.families import value_fields
 from hsp_control.declaration.quantities import plain
 from hsp_control.geometry.shapes.shape import Shape
 

@@ -12,6 +12,7 @@ from pydantic_core import CoreSchema
 
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.declaration import AnyOf, Part, within
+from hsp_control.declaration.families import Declared
 from hsp_control.declaration.quantities import Count, Weights
 from hsp_control.robot import Robot
 from hsp_control.robot.description.access import ANYWHERE, Access
@@ -177,7 +178,7 @@ class _OrItsName(AnyOf):
         return {"anyOf": [{"enum": names}, super()._json_schema(schema, handler)]}
 
 
-def _fields(member: type[Part]) -> list[Any]:
+def _fields(member: type[Declared]) -> list[Any]:
     return [*member.__pydantic_fields__.values()]  # type: ignore[attr-defined]
 
 

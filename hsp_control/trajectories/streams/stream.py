@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from pydantic import AfterValidator
 
 from hsp_control.common.exceptions import StreamError, TrajectoryError
-from hsp_control.declaration.part import value_fields
+from hsp_control.declaration.families import value_fields
 from hsp_control.declaration.quantities import (
     NonNegative,
     Positive,

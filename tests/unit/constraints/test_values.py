@@ -35,7 +35,7 @@ from hsp_control.constraints.limits import (
     SelfDistance,
 )
 from hsp_control.declaration import Part
-from hsp_control.declaration.part import value_fields
+from hsp_control.declaration.families import value_fields
 from hsp_control.trajectories import Schedule
 
 NAMES: dict[str, Any] = {

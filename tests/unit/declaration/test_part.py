@@ -17,7 +17,7 @@ from pydantic import TypeAdapter
 
 from hsp_control.common.exceptions import ConfigError, HspControlError, ImmutableError
 from hsp_control.declaration import AnyOf, Part, families
-from hsp_control.declaration.part import value_fields
+from hsp_control.declaration.families import value_fields
 from hsp_control.declaration.quantities import (
     Count,
     Flag,

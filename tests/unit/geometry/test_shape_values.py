@@ -19,7 +19,7 @@ from hsp_control.common.exceptions import (
     SceneError,
 )
 from hsp_control.declaration import Part
-from hsp_control.declaration.part import value_fields
+from hsp_control.declaration.families import value_fields
 from hsp_control.geometry.scene import Scene
 from hsp_control.geometry.shapes import (
     Box,

@@ -38,7 +38,7 @@ from hsp_control.common.exceptions import (
     TaskError,
 )
 from hsp_control.declaration import Part
-from hsp_control.declaration.part import value_fields
+from hsp_control.declaration.families import value_fields
 from hsp_control.tasks import AngularMomentum, Impedance, RelativePose
 from hsp_control.trajectories import (
     ComposedPose,
