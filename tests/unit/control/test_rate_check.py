@@ -494,6 +494,13 @@ def test_all_compensators_from_yaml_and_each_turned_off(tmp_path: Path) -> None:
             "ω0 of task 'hand' of at most 100 1/s .* of at most 426 1/s",
         ),
         (
+            {
+                "plant": {"type": "rigid_body", "sensors": {"delay": 1}},
+                "null_space": {"gain": 1100},  # without a delay up to 2000
+            },
+            "null_space.gain: unstable at this rate: .* 1 period of delay",
+        ),
+        (
             {"compensation": {"velocity_filter": {"cutoff": 600, "order": 2}}},
             "compensation.velocity_filter: cutoff is 600 Hz; .* needs less than 500 Hz",
         ),

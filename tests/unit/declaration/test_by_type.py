@@ -81,6 +81,8 @@ def test_data_are_as_short_as_can_be() -> None:
     assert Chain(filters=[Noise(seed=1)]).to_dict() == {
         "filters": {"noise": {"seed": 1}}
     }
+    both = {"std": 0.2, "seed": 1}
+    assert Chain(filters=[Noise(0.2, seed=1)]).to_dict() == {"filters": {"noise": both}}
     assert Chain().to_dict() == {}
 
 

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import pytest
-from pydantic import TypeAdapter
+from pydantic import TypeAdapter, ValidationError
 
 from hsp_control.common.exceptions import ConfigError, HspControlError, ImmutableError
 from hsp_control.declaration import AnyOf, Part, families
@@ -21,13 +21,18 @@ from hsp_control.declaration.families import value_fields
 from hsp_control.declaration.quantities import (
     Count,
     Flag,
+    Fraction,
     Gain,
     Matrix,
     Name,
     Names,
     NonNegative,
     Number,
+    Periods,
     Positive,
+    PositiveCount,
+    ProperFraction,
+    Share,
     Tensor,
     Vector,
     Vector3,
@@ -609,6 +614,29 @@ def test_assignment_is_refused() -> None:
             delattr(BALL, name)
     with pytest.raises(ImmutableError, match=r"Rod.size cannot be assigned"):
         Rod(1.0).size = 2.0  # type: ignore[misc]
+
+
+@pytest.mark.parametrize(
+    ("kind", "allowed", "refused"),
+    [
+        (Positive, [1e-300, 9.0], [0.0, -1.0, math.inf]),
+        (NonNegative, [0.0, 9.0], [-1e-300, math.inf]),
+        (Share, [0.0, 0.99], [-1e-300, 1.0]),
+        (Fraction, [1e-300, 1.0], [0.0, 1.01]),
+        (ProperFraction, [1e-300, 0.99], [0.0, 1.0]),
+        (Count, [0, 9], [-1]),
+        (PositiveCount, [1, 9], [0]),
+        (Periods, [0, 100_000], [-1, 100_001]),
+    ],
+)
+def test_bounds_belong_to_a_number_or_do_not(
+    kind: Any, allowed: list[float], refused: list[float]
+) -> None:
+    for value in allowed:
+        assert TypeAdapter(kind).validate_python(value) == value
+    for value in refused:
+        with pytest.raises(ValidationError):
+            TypeAdapter(kind).validate_python(value)
 
 
 def test_names_of_files_are_stored_as_text() -> None:

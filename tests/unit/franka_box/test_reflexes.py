@@ -101,6 +101,13 @@ def test_each_limit_of_a_commanded_motion_is_watched() -> None:
     )
 
 
+def test_a_constant_acceleration_is_no_jerk() -> None:
+    limits, most = panda().limits, np.full(7, 0.9 * ACCELERATION)
+    before = Reference(home(), 0.1 * most, most)
+    new = reference.extrapolated(before)
+    assert not list(reflexes.commanded_motion(new, before, limits))
+
+
 def test_a_motion_starts_where_the_arm_is() -> None:
     limits, at = panda().limits, home()
     reach = limits.velocity[1] * PERIOD
