@@ -117,7 +117,7 @@ def test_only_an_edit_of_what_it_is_made_of_compiles_again(installed: Path) -> N
     assert loaded(installed) == COMPILED
     assert loaded(installed) == LOADED
     # A constant that a kernel reads from another file: not that of `multiply`.
-    metric = package / "null_space" / "metrics" / "metric.py"
+    metric = package / "law" / "samples.py"
     edit(
         metric,
         "IDENTITY, CONSTANT, VARYING = 0, 1, 2",
