@@ -87,6 +87,6 @@ def unreached(
             moved[key] = float(since[-1])
             here = rests & (times - since >= STAYS) & (out == 0.0)
             out[here], units[here] = length[here], unit
-        # Logs of earlier versions have no such column.
+        # A log that says little has no such column.
         far = columns.get(f"task.{task}.bounded", none) > 0.0
         yield Unreached(task, far & (out == 0.0), out, units)

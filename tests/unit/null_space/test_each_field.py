@@ -27,6 +27,7 @@ from hsp_control import (
     FunctionCost,
     JointCentering,
     Rest,
+    Robot,
     RobotState,
     TargetPosture,
 )
@@ -78,6 +79,17 @@ def test_joint_centering_leaves_unlimited_joints_alone() -> None:
     continuous = [robot.velocity_index(j).start for j in JOINTS["kinova"]]
     np.testing.assert_array_equal(gradient[continuous], 0.0)
     assert (np.delete(gradient, continuous) != 0.0).all()
+
+
+def test_joint_centering_draws_no_joint_faster_than_its_weight() -> None:
+    """A finger opens by 4 cm: over its own range it would be drawn at 2500 1/s."""
+    robot = Robot.load("panda", locked={})
+    speeds = JointCentering().gradient_rate(
+        robot.state(0.0, robot.home(), np.ones(robot.nv))
+    )
+    assert robot.units[7] == "m"
+    assert speeds[7] == 1.0
+    assert (speeds <= 1.0).all()
 
 
 def test_limit_barrier_is_zero_in_the_middle_and_finite_beyond_a_limit() -> None:

@@ -90,7 +90,7 @@ def test_rows_in_parts_tell_the_same() -> None:
     assert moved == {"hand position": 0.0, "hand orientation": 0.0}
 
 
-def test_a_task_that_is_off_and_an_old_log_say_nothing() -> None:
+def test_a_task_that_is_off_and_a_log_that_says_little_say_nothing() -> None:
     columns = log(task__hand__error=np.full((len(T), 6), np.nan))
     for name in ("damped", "status", "task.hand.bounded"):
         del columns[name]
