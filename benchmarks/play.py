@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 from marked_sections import DOCS, replace_section
 
+from hsp_control.companions.film.chromium import headless_browser
 from hsp_control.play import Picture, Session, play
 from hsp_control.play.playable import playable
 from hsp_control.visualization.viewer import Viewer
-from hsp_control.visualization.viewer.export.chromium import headless_browser
 from hsp_control.visualization.viewer.server import Server
 
 sys.path.append(str(Path(__file__).parents[1] / "tests" / "support"))

@@ -21,7 +21,7 @@ import pinocchio as pin
 import robosuite
 from marked_sections import DOCS, replace_section
 
-import hsp_control.adapters.robosuite  # noqa: F401  it registers HSP_POSE
+import hsp_control.companions.simulators.robosuite  # noqa: F401  it registers HSP_POSE
 from hsp_control.common.arrays import Array
 
 STEP = 0.002  # of robosuite's simulation [s]

@@ -4,7 +4,7 @@ from math import pi
 from pathlib import Path
 
 import hsp_control as hsp
-from hsp_control.visualization.viewer.export import FilmStyle, export_film
+from hsp_control.companions.film import FilmStyle, export_film
 
 FOLDER = Path(__file__).parent / "figures"
 PERIOD = 2.0 * pi / 3.0  # of the paper's circle and disk [s]

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from hsp_control.companions.film.chromium import headless_browser
 from hsp_control.play import Picture, Session
 from hsp_control.play.playable import playable
 from hsp_control.visualization.viewer import Viewer
-from hsp_control.visualization.viewer.export.chromium import headless_browser
 from hsp_control.visualization.viewer.server import Server
 
 FILE = Path(__file__).parent / "figures" / "play.webp"

@@ -8,23 +8,21 @@ The names that most programs need are here. All others are in namespaces:
 ``hsp.trajectories``, ``hsp.tasks``, ``hsp.fields``, ``hsp.metrics``, ``hsp.contacts``,
 ``hsp.limits``, ``hsp.shapes``, ``hsp.changes``, ``hsp.compensation``,
 ``hsp.integrators``, ``hsp.robot``, ``hsp.plans``, ``hsp.estimation``, ``hsp.plants``,
-``hsp.simulation``, ``hsp.live``, ``hsp.config``, ``hsp.sweeps``, ``hsp.viewer`` and
-``hsp.errors``.
+``hsp.simulation``, ``hsp.live``, ``hsp.config``, ``hsp.viewer`` and ``hsp.errors``;
+and each companion has one: ``hsp.walking``, ``hsp.sweeps``, ``hsp.franka`` ...
 """
 
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hsp_control.common.version import __version__ as __version__
 
 if TYPE_CHECKING:  # what a type checker reads; the names are looked up below
     from . import config as config
-    from . import estimation as estimation
     from . import live as live
-    from . import plans as plans
     from . import robot as robot
     from . import simulation as simulation
-    from . import sweeps as sweeps
     from . import tasks as tasks
     from . import trajectories as trajectories
     from .common import exceptions as errors  # noqa: F401 (a namespace)
@@ -38,6 +36,8 @@ if TYPE_CHECKING:  # what a type checker reads; the names are looked up below
     from .control import ControlOutput as ControlOutput
     from .control import changes as changes
     from .control import compensation as compensation
+    from .control import estimator as estimation  # noqa: F401 (a namespace)
+    from .control import plan as plans  # noqa: F401 (a namespace)
     from .geometry import Obstacle as Obstacle
     from .geometry import Sphere as Sphere
     from .geometry import shapes as shapes
@@ -59,7 +59,6 @@ if TYPE_CHECKING:  # what a type checker reads; the names are looked up below
     from .simulation import Rollout as Rollout
     from .simulation import plants as plants
     from .simulation import simulate as simulate
-    from .sweeps import sweep as sweep
     from .tasks import CenterOfMass as CenterOfMass
     from .tasks import FrameOrientation as FrameOrientation
     from .tasks import FramePose as FramePose
@@ -96,7 +95,6 @@ _NAMES = {
     "simulation": "Rollout simulate",
     "live": "run_loop",
     "config": "Experiment load_experiment",
-    "sweeps": "sweep",
     "visualization.viewer": "Viewer show",
     "common.exceptions": "HspControlError",
 }
@@ -108,18 +106,17 @@ _NAMESPACES = {
     "config": "config",
     "contacts": "constraints.contacts",
     "errors": "common.exceptions",
-    "estimation": "estimation",
+    "estimation": "control.estimator",
     "fields": "null_space.fields",
     "integrators": "robot.integrators",
     "limits": "constraints.limits",
     "live": "live",
     "metrics": "null_space.metrics",
-    "plans": "plans",
+    "plans": "control.plan",
     "plants": "simulation.plants",
     "robot": "robot",
     "shapes": "geometry.shapes",
     "simulation": "simulation",
-    "sweeps": "sweeps",
     "tasks": "tasks",
     "trajectories": "trajectories",
     "viewer": "visualization.viewer",
@@ -137,6 +134,8 @@ def __getattr__(name: str) -> Any:
         value: Any = import_module(f"{__name__}.{_NAMESPACES[name]}")
     elif name in _HOMES:
         value = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    elif name in _companions():
+        value = import_module(f"{__name__}.companions.{name}")
     else:
         raise AttributeError(
             f"module {__name__!r} has no attribute {name!r}{_hint(name)}"
@@ -156,5 +155,11 @@ def _hint(name: str) -> str:
     return ""
 
 
+def _companions() -> list[str]:
+    """Return the names of the companions that are there."""
+    folder = Path(__file__).parent / "companions"
+    return [each.parent.name for each in folder.glob("*/__init__.py")]
+
+
 def __dir__() -> list[str]:
-    return sorted([*globals(), *__all__])
+    return sorted([*globals(), *__all__, *_companions()])

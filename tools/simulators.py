@@ -29,7 +29,14 @@ def main() -> int:
     """Install everything, and return the exit code of the tests."""
     pip("--editable", str(ROOT), *BESIDE, *TESTS)
     pip("--no-deps", *ALONE)
-    command = [sys.executable, "-m", "pytest", "-W", "ignore", "tests/simulators"]
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-W",
+        "ignore",
+        "tests/companions/simulators",
+    ]
     return subprocess.run([*command, *sys.argv[1:]], cwd=ROOT, check=False).returncode
 
 

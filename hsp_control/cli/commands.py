@@ -22,19 +22,21 @@ from rich.table import Table
 from hsp_control.cli import check as checks
 from hsp_control.cli import robot_table
 from hsp_control.cli.consoles import errors as _errors
-from hsp_control.cli.consoles import message_of, warnings_printed, working
+from hsp_control.cli.consoles import message_of, working
 from hsp_control.cli.consoles import out as _out
 from hsp_control.cli.interrupts import DeferredInterrupt
 from hsp_control.cli.limit_rows import limit_rows
 from hsp_control.cli.loading import read
 from hsp_control.cli.startup import INTERRUPTED
 from hsp_control.cli.stopwatch import Stopwatch
+from hsp_control.common.entry_points import entry_points
 from hsp_control.common.exceptions import LogError, SimulationError
 from hsp_control.config import Experiment, json_schema
 from hsp_control.config.loaded_scenario import LoadedScenario, load_scenario
 from hsp_control.robot import Robot
 from hsp_control.robot.description.sources import example_robots
 from hsp_control.simulation import Rollout
+from hsp_control.simulation.measures import measures
 from hsp_control.simulation.recorder import Recorder
 from hsp_control.simulation.unreached import FAR, OUT, unreached
 
@@ -42,7 +44,6 @@ if TYPE_CHECKING:
     from hsp_control.cli.screen import Screen
 
 
-@warnings_printed()
 def run(options: argparse.Namespace) -> int:
     """Simulate, save the log and print a summary; rows computed so far are kept."""
     loaded = load_scenario(read(options))
@@ -124,9 +125,7 @@ def _tell(rollout: Rollout, log: Path, stopwatch: Stopwatch) -> None:
 
 
 def _tell_json(rollout: Rollout, log: Path, stopwatch: Stopwatch) -> None:
-    """Print what a run did, by the names of a sweep's columns; null where undefined."""
-    from hsp_control.sweeps.metrics import measures
-
+    """Print what a run did, by the names of its measures; null where undefined."""
     found = {name: each.value for name, each in measures(rollout).items()}
     numbers = {name: x if np.isfinite(x) else None for name, x in found.items()}
     told = {"log": str(log), "status": rollout.status, "rows": len(rollout)} | numbers
@@ -147,7 +146,6 @@ def _saved_elsewhere(rollout: Rollout, log: Path, error: LogError) -> Path:
     return elsewhere
 
 
-@warnings_printed()
 def view(options: argparse.Namespace) -> int:
     """Show logs in the browser."""
     from hsp_control.cli.screen import show_logs
@@ -156,19 +154,16 @@ def view(options: argparse.Namespace) -> int:
     return 0
 
 
-@warnings_printed()
 def check(options: argparse.Namespace) -> int:
     """Build all objects, evaluate the law once, and print a summary."""
     return checks.check(options)
 
 
-@warnings_printed()
 def plot(options: argparse.Namespace) -> int:
-    """Draw the figures of a log or of a sweep."""
-    if options.log.suffix == ".parquet":
-        from hsp_control.cli import sweep as sweeps
-
-        return sweeps.plot(options)
+    """Draw the figures of a log, or of a file whose ending a companion knows."""
+    others = entry_points("plots")
+    if other := others.get(options.log.suffix.removeprefix(".")):
+        return int(other.load()(options))
     from hsp_control.visualization.plots import save_figures
 
     rollout = Rollout.load(options.log)
@@ -186,7 +181,6 @@ def plot(options: argparse.Namespace) -> int:
     return 0
 
 
-@warnings_printed()
 def export(options: argparse.Namespace) -> int:
     """Write a log as a page or as films."""
     from hsp_control.cli import export as exports
@@ -194,7 +188,6 @@ def export(options: argparse.Namespace) -> int:
     return exports.export(options)
 
 
-@warnings_printed()
 def play(options: argparse.Namespace) -> int:
     """Let a page steer a simulated robot in real time."""
     from hsp_control.cli import play as plays
@@ -202,35 +195,11 @@ def play(options: argparse.Namespace) -> int:
     return plays.play(options)
 
 
-@warnings_printed()
-def sweep(options: argparse.Namespace) -> int:
-    """Run a configuration many times."""
-    from hsp_control.cli import sweep as sweeps
-
-    return sweeps.sweep(options)
-
-
-@warnings_printed()
 def live(options: argparse.Namespace) -> int:
     """Control a simulated robot in another process in real time."""
     from hsp_control.cli import live as lives
 
     return lives.live(options)
-
-
-@warnings_printed()
-def franka_box(options: argparse.Namespace) -> int:
-    """Be a Franka's control box, without a robot."""
-    from hsp_control.cli import franka_box as boxes
-
-    return boxes.franka_box(options)
-
-
-def franka_model(options: argparse.Namespace) -> int:
-    """Save a Franka arm's own model."""
-    from hsp_control.cli import franka_model as models
-
-    return models.franka_model(options)
 
 
 def inspect(options: argparse.Namespace) -> int:

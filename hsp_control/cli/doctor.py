@@ -5,7 +5,7 @@ import json
 import os
 import platform
 import resource
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from importlib import metadata
 from pathlib import Path
 from typing import Literal, NamedTuple
@@ -14,8 +14,8 @@ from packaging.requirements import Requirement
 
 from hsp_control.cli.consoles import out
 from hsp_control.common import kernel_cache
+from hsp_control.common.entry_points import entry_points
 from hsp_control.common.version import __version__
-from hsp_control.visualization.viewer.export.chromium import find_browser
 
 _PACKAGE = "hsp_control"
 _SHOWN = ("pin", "numpy", "scipy", "numba", "pydantic", "meshcat")
@@ -47,7 +47,7 @@ def doctor(options: argparse.Namespace) -> int:
         _cache(),
         _dynamics(),
         _threads(),
-        _browser(),
+        *_companions(),
         *_real_time(),
         *_extras(),
     ]
@@ -128,16 +128,11 @@ def _threads() -> Check:
     )
 
 
-def _browser() -> Check:
-    found = find_browser()
-    if found is None:
-        return Check(
-            "browser",
-            "note",
-            "no Chromium on the path",
-            "films need one (apt-get install chromium); pages open in any browser",
-        )
-    return Check("browser", "ok", found)
+def _companions() -> Iterator[Check]:
+    """Ask companions, by the entry points of ``hsp_control.checks``."""
+    for _, entry in sorted(entry_points("checks").items()):
+        check: Callable[[], Check] = entry.load()
+        yield check()
 
 
 def _real_time() -> Iterator[Check]:

@@ -3,6 +3,7 @@
 import argparse
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
@@ -10,6 +11,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from hsp_control.cli.consoles import errors, out, working
+from hsp_control.cli.options.companions import export_formats
 from hsp_control.common.exceptions import ExportError
 
 if TYPE_CHECKING:
@@ -21,64 +23,36 @@ _LONGEST = 24
 
 def export(options: argparse.Namespace) -> int:
     """Write every requested file; a file that fails does not stop the others."""
-    from hsp_control.visualization.viewer.export import (
-        FilmStyle,
-        export_film,
-        export_html,
-    )
+    from hsp_control.visualization.viewer.export_page import export_html
     from hsp_control.visualization.viewer.replay import access_for, load_runs
 
-    films = [path for path in (options.mp4, options.gif, options.webp) if path]
-    if not (options.html or options.rrd or films):
-        raise ExportError(
-            "nothing to write: give a file with --html, --mp4, --gif, --webp or --rrd"
-        )
-    for kind in ("mp4", "gif", "webp", "rrd"):
-        _check_ending(getattr(options, kind), f".{kind}")
-    if len(options.logs) > 1 and (films or options.rrd):
-        raise ExportError(
-            f"{'a film' if films else 'a file of Rerun'} shows one run, "
-            f"{len(options.logs)} logs are given: give one log, "
-            "or --html for a page with a switch between them"
-        )
+    formats = {end: each for each in export_formats() for end in each.files}
+    asked = {end: path for end in formats if (path := getattr(options, end))}
+    if not (options.html or asked):
+        known = ", ".join(f"--{name}" for name in ("html", *formats))
+        raise ExportError(f"nothing to write: give a file with one of {known}")
+    for ending, path in asked.items():
+        if path.suffix.lower() != f".{ending}":
+            raise ExportError(f"--{ending} {path}: the name must end with .{ending}")
+        if len(options.logs) > 1:
+            raise ExportError(
+                f"{formats[ending].what} shows one run, {len(options.logs)} logs are "
+                "given: give one log, or --html for a page with a switch between them"
+            )
     strict = options.strict or bool(options.allow)
     access = access_for(options.logs, strict, options.allow)
     runs = _titled(load_runs(options.logs, access))
-    run = runs[0]
-    style = FilmStyle(
-        size=options.size,
-        frame_rate=options.fps,
-        speed=options.speed,
-        plots=options.plots,
-        caption=options.caption,
-        start=options.first,
-        end=options.last,
-    )
 
     def page(path: Path) -> Path:
         with working(f"Writing {path.name}"):
             return export_html(runs, path)
 
-    def film(path: Path) -> Path:
+    def added(ending: str, path: Path) -> Path:
         with _Bar(path.name) as bar:
-            return export_film(
-                run.rollout,
-                path,
-                style=style,
-                robot=run.robot,
-                controller=run.controller,
-                progress=bar.update,
-            )
+            return formats[ending].write(runs[0], path, options, bar.update)
 
-    def rerun(path: Path) -> Path:
-        from hsp_control.visualization.rerun_log import log_to_rerun
-
-        log_to_rerun(run.rollout, run.robot, path=path)
-        return path
-
-    wanted = [(options.html, page), (options.rrd, rerun)]
-    kept = [(path, write) for path, write in wanted if path]
-    return _write([*kept, *((path, film) for path in films)])
+    wanted = [(path, partial(added, ending)) for ending, path in asked.items()]
+    return _write([*([(options.html, page)] if options.html else []), *wanted])
 
 
 def _titled(runs: list["ComparedRun"]) -> list["ComparedRun"]:
@@ -134,8 +108,3 @@ class _Bar:
 
     def __exit__(self, *ended: object) -> None:
         self._progress.stop()
-
-
-def _check_ending(path: Path | None, ending: str) -> None:
-    if path is not None and path.suffix.lower() != ending:
-        raise ExportError(f"--{ending[1:]} {path}: the name must end with {ending}")

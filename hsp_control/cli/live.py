@@ -34,11 +34,11 @@ from hsp_control.live import (
     LoopReport,
     OperatorRequests,
     connect,
+    publish,
     run_loop,
 )
 from hsp_control.live.adapting import AdaptingHardware, LocatedHardware
 from hsp_control.live.deadlines import Quantiles
-from hsp_control.live.ros2 import publish
 from hsp_control.live.stop_signals import stop_signals
 from hsp_control.simulation import Rollout
 

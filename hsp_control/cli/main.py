@@ -6,10 +6,11 @@ import sys
 from collections.abc import Sequence
 
 from hsp_control.cli.options.command_line import command_line
+from hsp_control.cli.options.companions import AddedCommand
 from hsp_control.cli.startup import INTERRUPTED, end_quietly, is_command
 from hsp_control.common.exceptions import HspControlError
 
-_OWN_INTERRUPTS = {"export", "play", "sweep", "view"}
+_OWN_INTERRUPTS = {"export", "play", "view"}
 """Commands that must close processes and pages, or save rows, at Ctrl-C."""
 _PACKAGES = {"libgomp.so.1": "libgomp1 (Debian, Ubuntu) or libgomp (Fedora)"}
 """What has a library that the wheels of our dependencies expect."""
@@ -43,13 +44,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         # With other commands Ctrl-C ends the process at once, as during start-up: there
         # is nothing to save, and an exception may get lost in callbacks of libraries.
-        if (
-            options.command in _OWN_INTERRUPTS or getattr(options, "view", False)
-        ) and signal.getsignal(signal.SIGINT) is end_quietly:
+        added: AddedCommand | None = getattr(options, "added", None)
+        ends_in_order = (
+            added.own_interrupts
+            if added is not None
+            else options.command in _OWN_INTERRUPTS or getattr(options, "view", False)
+        )
+        if ends_in_order and signal.getsignal(signal.SIGINT) is end_quietly:
             signal.signal(signal.SIGINT, signal.default_int_handler)
-        with compiling_shown(consoles.errors):
-            command = options.command.replace("-", "_")
-            return int(getattr(commands, command)(options))
+        run = getattr(commands, options.command) if added is None else added.run
+        with compiling_shown(consoles.errors), consoles.warnings_printed():
+            return int(run(options))
     except HspControlError as error:
         print(f"hsp: {consoles.message_of(error)}", file=sys.stderr)
     except ImportError as error:  # Pinocchio's wheel links what slim systems lack

@@ -24,16 +24,16 @@ from hsp_control.control.changes import Change
 from hsp_control.control.compensation import Compensation, RateFinding
 from hsp_control.control.composition import Base
 from hsp_control.control.controller import Controller
+from hsp_control.control.estimator import Estimator, begun
+from hsp_control.control.plan import Plan
 from hsp_control.declaration.named import keyed
 from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.plain_data import plain_data
-from hsp_control.estimation import Estimator, begun
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.live.settings import LiveSettings
 from hsp_control.null_space.fields import NullSpaceField
 from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.metrics import Metric
-from hsp_control.plans import Plan
 from hsp_control.robot import Robot
 from hsp_control.robot.description.robot_description import RobotDescription
 from hsp_control.robot.integrators import Integrator

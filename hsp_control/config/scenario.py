@@ -17,15 +17,15 @@ from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits, LimitsOrNone
 from hsp_control.control.changes import Change
 from hsp_control.control.compensation import Compensation
+from hsp_control.control.estimator import Estimators
+from hsp_control.control.plan import Plan
 from hsp_control.declaration import Part
 from hsp_control.declaration.named import BY_NAME
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.declaration.quantities import READ_ONLY, Name, ReadOnlyDict
-from hsp_control.estimation import Estimators
 from hsp_control.geometry.scene import Scene
 from hsp_control.live.settings import LiveSettings
 from hsp_control.null_space.settings import NullSpaceSettings
-from hsp_control.plans import Plan
 from hsp_control.robot.description.robot_description import RobotDescription
 from hsp_control.simulation.initial_state import InitialState, StartOrAuto
 from hsp_control.simulation.plants import AnyPlant, RigidBody

@@ -87,6 +87,9 @@ class AnyOf:
         return self.core_schema()
 
     def _json_schema(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> Any:
+        for base in self.bases:
+            assert base.family is not None
+            base.family.load_companions()
         options = [
             _described(name, member, handler) for name, member in self.members.items()
         ]

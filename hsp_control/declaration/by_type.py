@@ -89,6 +89,8 @@ class ByType:
         )
 
     def _json_schema(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> Any:
+        assert self.base.family is not None
+        self.base.family.load_companions()
         return handler(self.model.__pydantic_core_schema__)
 
 

@@ -5,11 +5,11 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import MISSING, Field
-from importlib.metadata import EntryPoint, entry_points
 from typing import Any, ClassVar
 
 from pydantic_core import CoreSchema, PydanticCustomError
 
+from hsp_control.common.entry_points import entry_points, is_ours
 from hsp_control.common.exceptions import AccessError, ConfigError, HspControlError
 from hsp_control.declaration.equality import same
 
@@ -95,20 +95,20 @@ class Family:
             )
         self.members[type_name] = member
 
-    def entry_points(self) -> dict[str, EntryPoint]:
-        """Return what installed packages add, by name."""
-        return {e.name: e for e in entry_points(group=f"hsp_control.{self.name}")}
-
     def load(self, type_name: Any) -> None:
-        """Import the class of an installed package, if it is not yet known.
+        """Import the class of a companion or an installed package, if it is not known.
+
+        For a name that nobody knows all companions are, so that a message can list
+        their types.
 
         Raises:
             ConfigError: If it cannot be imported, or does not declare this type.
         """
         if not isinstance(type_name, str) or type_name in self.members:
             return
-        entry = self.entry_points().get(type_name)
+        entry = entry_points(self.name).get(type_name)
         if entry is None:
+            self.load_companions()
             return
         check_admitted(type_name, entry.value)
         try:
@@ -121,6 +121,12 @@ class Family:
             raise ConfigError(
                 f"{entry.value} does not declare the type {type_name!r} of {self.name}"
             )
+
+    def load_companions(self) -> None:
+        """Import the members that this package's companions add."""
+        for entry in entry_points(self.name).values():
+            if is_ours(entry):
+                entry.load()
 
 
 _ADMITTED: ContextVar[frozenset[str] | None] = ContextVar("_ADMITTED", default=None)

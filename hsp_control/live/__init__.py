@@ -1,6 +1,7 @@
 """Real-time control: run a controller on a robot each period, ending in a safe stop."""
 
 from .backends import connect as connect
+from .backends import publish as publish
 from .deadlines import Deadlines as Deadlines
 from .effort_source import EffortSource as EffortSource
 from .faults import Faults as Faults

@@ -1,19 +1,19 @@
-"""Robots that installed packages can reach: ``hsp live --robot name://address``."""
+"""What installed packages connect a live loop to: robots, and those who watch."""
 
-from importlib.metadata import entry_points
+from collections.abc import Callable
+from importlib.metadata import EntryPoint
 from typing import Protocol
 
+from hsp_control.common.entry_points import entry_points
 from hsp_control.common.exceptions import LiveError
 from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.live.effort_source import EffortSource
 from hsp_control.live.hardware import Hardware
 from hsp_control.robot import Robot
 
-GROUP = "hsp_control.hardware"
-"""The group of the entry points; each is a `Connect`."""
-
 
 class Connect(Protocol):
-    """Connects to a robot: the function that a package names as an entry point."""
+    """Connects to a robot: an entry point of the group ``hsp_control.hardware``."""
 
     def __call__(self, address: str, robot: Robot, period: float) -> Hardware:
         """Return the connected robot.
@@ -40,13 +40,35 @@ def connect(url: str, robot: Robot, period: float) -> Hardware:
         LiveError: If no package provides the name.
         HardwareError: If the robot cannot be reached.
     """
+    address, known = _known("--robot", url, "hardware")
+    make: Connect = known.load()
+    return make(address, robot, period)
+
+
+def publish(url: str, source: EffortSource) -> Callable[[float], object]:
+    """Return what publishes a loop, once a period, to those who watch at an address.
+
+    Args:
+        url: ``name://address``; an entry point of ``hsp_control.publishers`` has it.
+        source: What computes the efforts.
+
+    Raises:
+        LiveError: If no package provides the name.
+        HardwareError: If the address is wrong, or something is not installed.
+    """
+    address, known = _known("--publish", url, "publishers")
+    make: Callable[[str, EffortSource], Callable[[float], object]] = known.load()
+    return make(address, source)
+
+
+def _known(option: str, url: str, group: str) -> tuple[str, EntryPoint]:
+    """Return the address and what is installed for ``name://address``."""
     name, separator, address = url.partition("://")
-    known = {entry.name: entry for entry in entry_points(group=GROUP)}
+    known = entry_points(group)
     if not separator or name not in known:
         there = listing(known) or "none"
         raise LiveError(
-            f"--robot {url!r}: needs NAME://ADDRESS with a name that an installed "
+            f"{option} {url!r}: needs NAME://ADDRESS with a name that an installed "
             f"package provides{did_you_mean(name, known)} (installed: {there})"
         )
-    make: Connect = known[name].load()
-    return make(address, robot, period)
+    return address, known[name]

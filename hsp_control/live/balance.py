@@ -6,7 +6,7 @@ import pinocchio as pin
 
 from hsp_control.common.exceptions import FallError
 from hsp_control.constraints.contacts import Contact
-from hsp_control.plans.falling import FallDetector
+from hsp_control.control.falling import FallDetector
 from hsp_control.robot import Robot, RobotState
 
 _ROOT = 1

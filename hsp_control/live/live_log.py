@@ -11,12 +11,12 @@ from hsp_control.common.arrays import Array
 from hsp_control.control.controller import Controller
 from hsp_control.control.log_channel import LogChannel
 from hsp_control.control.output import ControlOutput
+from hsp_control.control.plan import RunningPlan
 from hsp_control.geometry.scene import Scene
 from hsp_control.live.effort_limiter import EffortLimiter
 from hsp_control.live.report import LoopReport
 from hsp_control.live.safe_stop import Phase
 from hsp_control.live.state_reader import StateReader
-from hsp_control.plans import RunningPlan
 from hsp_control.robot import RobotState
 from hsp_control.simulation.control_chain import ControlChain, EffortSource
 from hsp_control.simulation.journal import JournalWriter

@@ -10,7 +10,8 @@ import numpy as np
 
 from hsp_control.common.exceptions import LiveError
 from hsp_control.control.controller import Controller
-from hsp_control.estimation import Estimator
+from hsp_control.control.estimator import Estimator
+from hsp_control.control.plan import Plan
 from hsp_control.geometry.scene import Scene
 from hsp_control.live.balance import balance_of
 from hsp_control.live.bearing_feet import BearingFeet
@@ -27,7 +28,6 @@ from hsp_control.live.safe_stop import SafeStop
 from hsp_control.live.settings import LiveSettings, check_held
 from hsp_control.live.state_reader import StateReader
 from hsp_control.live.stop_signals import stop_signals
-from hsp_control.plans import Plan
 from hsp_control.simulation.control_chain import ControlChain
 
 _WARM_UP = 20

@@ -12,9 +12,9 @@ from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.controller import Controller
 from hsp_control.control.log_channel import LogChannel
 from hsp_control.control.output import ControlOutput
+from hsp_control.control.plan import RunningPlan
 from hsp_control.geometry.scene import Scene
 from hsp_control.law.problem import Record
-from hsp_control.plans import RunningPlan
 from hsp_control.robot import Robot, RobotState
 from hsp_control.simulation.contact_columns import ContactColumns
 from hsp_control.simulation.limit_excess import VELOCITY, LimitExcess

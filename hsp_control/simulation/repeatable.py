@@ -6,9 +6,9 @@ from typing import Any
 
 from hsp_control.common.exceptions import ConfigError
 from hsp_control.control.controller import Controller
+from hsp_control.control.plan import RunningPlan
 from hsp_control.declaration.nested import parts_within, with_parts_replaced
 from hsp_control.declaration.plain_data import plain_data
-from hsp_control.plans import RunningPlan
 from hsp_control.tasks import Task
 from hsp_control.trajectories.streams.stream import Streamed
 

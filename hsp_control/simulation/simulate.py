@@ -14,11 +14,11 @@ from hsp_control.common.exceptions import (
 from hsp_control.control.compensation import Command, Compensation
 from hsp_control.control.compensation import check_rate as check_loop
 from hsp_control.control.controller import Controller
+from hsp_control.control.estimator import Estimator
 from hsp_control.control.first_state import warn_of_jump, warn_of_slow_efforts
+from hsp_control.control.plan import Plan, RunningPlan
 from hsp_control.declaration import within
-from hsp_control.estimation import Estimator
 from hsp_control.geometry.scene import Scene
-from hsp_control.plans import Plan, RunningPlan
 from hsp_control.robot.integrators import Dop853, Integrator
 from hsp_control.simulation.control_chain import ControlChain
 from hsp_control.simulation.loops import continuous_loop, sampled_loop

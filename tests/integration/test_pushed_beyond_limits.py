@@ -5,7 +5,7 @@ import pytest
 
 from hsp_control import Rollout, load_experiment
 from hsp_control.cli.main import main
-from hsp_control.sweeps.metrics import measures
+from hsp_control.simulation.measures import measures
 
 pytest.importorskip("mujoco")
 TWIST = "{frame: panda_hand, moment: [0, 0, -60], start: 0.05, duration: 0.1}"

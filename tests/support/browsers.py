@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from hsp_control.visualization.viewer.export.chromium import (
+from hsp_control.companions.film.chromium import (
     find_browser,
     headless_browser,
 )

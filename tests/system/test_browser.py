@@ -23,10 +23,10 @@ from places import ROOT, THOROUGH
 from hsp_control import Robot, Rollout, load_experiment
 from hsp_control.cli import main
 from hsp_control.common.resources import bundled_configs
-from hsp_control.visualization.viewer import LiveView, Viewer
+from hsp_control.companions.film import FilmStyle, export_film
+from hsp_control.companions.film.encoding import find_ffmpeg
+from hsp_control.visualization.viewer import LiveView, Viewer, export_html
 from hsp_control.visualization.viewer.commands import PLOTS, set_property
-from hsp_control.visualization.viewer.export import FilmStyle, export_film, export_html
-from hsp_control.visualization.viewer.export.encoding import find_ffmpeg
 from hsp_control.visualization.viewer.latest_commands import key_of
 from hsp_control.visualization.viewer.offline.clip_reduction import (
     ANGLE_BOUND,

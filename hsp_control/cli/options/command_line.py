@@ -3,9 +3,8 @@
 import argparse
 from pathlib import Path
 
+from hsp_control.cli.options.companions import added_commands
 from hsp_control.cli.options.export import add_export
-from hsp_control.cli.options.franka_box import add_box_options
-from hsp_control.cli.options.franka_model import add_model_options
 from hsp_control.cli.options.inspect import add_inspect
 from hsp_control.cli.options.live import add_live
 from hsp_control.cli.options.parser import Parser
@@ -16,7 +15,6 @@ from hsp_control.cli.options.shared import (
     add_strict,
     complete,
 )
-from hsp_control.cli.options.sweep import add_sweep
 from hsp_control.common.resources import bundled_robots
 from hsp_control.common.version import __version__
 
@@ -111,17 +109,12 @@ def command_line() -> argparse.ArgumentParser:
     )
 
     add_export(_command(commands, "export", "write logs as a page, or one as a film"))
-    add_sweep(_command(commands, "sweep", "run a configuration many times"))
     add_live(_command(commands, "live", "control a simulated robot in another process"))
 
-    box = _command(
-        commands, "franka-box", "serve libfranka's research interface, without a robot"
-    )
-    add_configuration(box, "the arm: a robot's name, its URDF, ", "panda")
-    add_box_options(box)
-
-    model = _command(commands, "franka-model", "save a Franka arm's model as a URDF")
-    complete(add_model_options(model), bundled_robots)
+    for called, added in added_commands().items():
+        command = _command(commands, called, added.help)
+        command.set_defaults(added=added)
+        added.add_options(command)
 
     robots = _command(
         commands, "robots", "list the robots that can be loaded, or describe one"

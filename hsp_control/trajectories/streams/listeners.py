@@ -5,8 +5,9 @@ from threading import Thread
 from typing import Protocol
 from weakref import WeakValueDictionary, ref
 
+from hsp_control.common.entry_points import entry_points
 from hsp_control.common.exceptions import StreamError
-from hsp_control.trajectories.streams import ros2_listener, udp_listener
+from hsp_control.trajectories.streams import udp_listener
 from hsp_control.trajectories.streams.inbox import Inbox
 from hsp_control.trajectories.streams.message import Space
 
@@ -15,7 +16,7 @@ Listen = Callable[["ref[Inbox]"], None]
 
 
 class Kind(Protocol):
-    """A kind of address; a module."""
+    """A kind of address: a module, an entry point of ``hsp_control.targets``."""
 
     def check_address(self, source: str) -> object:
         """Raise if the address is invalid."""
@@ -27,10 +28,6 @@ class Kind(Protocol):
         """Open it."""
 
 
-_KINDS: dict[str, Kind] = {
-    udp_listener.SCHEME: udp_listener,
-    ros2_listener.SCHEME: ros2_listener,
-}
 _inboxes: WeakValueDictionary[str, Inbox] = WeakValueDictionary()
 _threads: dict[str, Thread] = {}
 
@@ -84,10 +81,14 @@ def listening_inbox(source: str, space: Space) -> Inbox:
 
 
 def _kind(source: str) -> Kind:
-    for scheme, kind in _KINDS.items():
-        if source.startswith(scheme):
-            return kind
+    if source.startswith(udp_listener.SCHEME):
+        return udp_listener
+    others = entry_points("targets")
+    if found := others.get(source.partition("://")[0]):
+        kind: Kind = found.load()
+        return kind
+    schemes = [udp_listener.SCHEME, *(f"{name}://" for name in others)]
     raise StreamError(
-        f"source is {source!r}; an address begins with {' or '.join(_KINDS)}, and the "
+        f"source is {source!r}; an address begins with {' or '.join(schemes)}, and the "
         "path of a recording contains no '://'"
     )

@@ -21,6 +21,4 @@ from .saving import save_figures as save_figures
 from .style import new_figure as new_figure
 from .style import styled as styled
 from .style import use_style as use_style
-from .sweep import save_sweep_figure as save_sweep_figure
-from .sweep import sweep_figure as sweep_figure
 from .task_errors import draw_task_errors as draw_task_errors

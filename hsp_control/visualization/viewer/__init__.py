@@ -4,9 +4,7 @@ from hsp_control.config.view_settings import ShownItems as ShownItems
 from hsp_control.config.view_settings import ViewSettings as ViewSettings
 
 from .comparison import ComparedRun as ComparedRun
-from .export import FilmStyle as FilmStyle
-from .export import export_film as export_film
-from .export import export_html as export_html
+from .export_page import export_html as export_html
 from .live import LiveView as LiveView
 from .offline.inline import InlineView as InlineView
 from .recorder import Recorder as Recorder

@@ -37,8 +37,8 @@ class Somewhere(InProcessRobot):
 
 @pytest.fixture(autouse=True)
 def offered(monkeypatch: pytest.MonkeyPatch) -> None:
-    entry = EntryPoint("some", f"{__name__}:Somewhere", backends.GROUP)
-    monkeypatch.setattr(backends, "entry_points", lambda group: [entry])
+    entry = EntryPoint("some", f"{__name__}:Somewhere", "hsp_control.hardware")
+    monkeypatch.setattr(backends, "entry_points", lambda group: {"some": entry})
 
 
 def command(tmp_path: Path, address: str) -> list[str]:

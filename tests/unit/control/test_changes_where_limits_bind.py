@@ -20,7 +20,7 @@ from hsp_control.control.compensation import (
     Compensation,
     FrictionFeedForward,
 )
-from hsp_control.plans.switched import Switched
+from hsp_control.control.switched import Switched
 from hsp_control.trajectories import HoldOrientation, Schedule
 from hsp_control.trajectories.switch import Switch
 from hsp_control.trajectories.timing import smooth_step

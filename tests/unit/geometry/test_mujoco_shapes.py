@@ -12,7 +12,6 @@ from hsp_control.geometry import link_shapes
 from hsp_control.geometry.body_geometry import enclosing_ellipsoid_capsule
 from hsp_control.geometry.self_pairs import self_pairs
 from hsp_control.robot import MujocoCoordinates
-from hsp_control.visualization.rerun_log import _archetypes
 from hsp_control.visualization.viewer.robot_drawing import RobotDrawing
 from hsp_control.visualization.viewer.visuals import read_visuals
 
@@ -168,20 +167,3 @@ def test_it_is_drawn_with_its_meshes_in_place() -> None:
     drawn = [command.path for command in RobotDrawing(robot).draw()]
     assert len(drawn) == 2
     assert not any("placeholder" in path for path in drawn)
-
-
-def test_rerun_draws_every_kind_of_geom() -> None:
-    rerun = pytest.importorskip("rerun")
-    drawn = []
-    for kind in GEOMS:
-        visual = read_visuals(Robot.from_mujoco(pair(kind, "sphere")))[0]
-        (archetype,) = _archetypes(rerun, visual, "a")
-        drawn.append(type(archetype).__name__)
-    assert drawn == [
-        "Ellipsoids3D",
-        "Capsules3D",
-        "Cylinders3D",
-        "Boxes3D",
-        "Ellipsoids3D",
-        "Mesh3D",
-    ]

@@ -7,7 +7,7 @@ from hsp_control import load_experiment
 from hsp_control.common.exceptions import FallError, SimulationError
 from hsp_control.control.compensation import Command
 from hsp_control.control.measurement import Measurement
-from hsp_control.plans import Plan, PlanParts, RunningPlan
+from hsp_control.control.plan import Plan, PlanParts, RunningPlan
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation import simulate
 from hsp_control.simulation.control_chain import ControlChain

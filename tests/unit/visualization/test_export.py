@@ -22,14 +22,10 @@ from scipy.spatial import cKDTree
 from hsp_control import Robot, Rollout, load_experiment
 from hsp_control.cli import main
 from hsp_control.common.exceptions import ExportError, ViewerError
-from hsp_control.visualization.viewer.export import (
-    FilmStyle,
-    encoding,
-    export_film,
-    export_html,
-)
-from hsp_control.visualization.viewer.export.html import write_page
-from hsp_control.visualization.viewer.export.screenshots import frame_times
+from hsp_control.companions.film import FilmStyle, encoding, export_film
+from hsp_control.companions.film.screenshots import frame_times
+from hsp_control.visualization.viewer import export_html
+from hsp_control.visualization.viewer.export_page import write_page
 from hsp_control.visualization.viewer.offline.clip_reduction import (
     ANGLE_BOUND,
     POSITION_BOUND,

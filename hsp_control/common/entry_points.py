@@ -1,0 +1,47 @@
+"""What installed packages add, and what companions in this one do: entry points."""
+
+from collections.abc import Callable, Mapping
+from importlib import import_module, metadata
+from importlib.metadata import EntryPoint
+from pathlib import Path
+from typing import Any
+
+_PACKAGE = Path(__file__).parents[1]
+
+
+def entry_points(group: str) -> dict[str, EntryPoint]:
+    """Return what is added to ``hsp_control.<group>``, by name.
+
+    Companions whose folder was deleted add nothing, although the package's metadata
+    still name them.
+    """
+    found = metadata.entry_points(group=f"{_PACKAGE.name}.{group}")
+    return {entry.name: entry for entry in found if _is_there(entry)}
+
+
+def is_ours(entry: EntryPoint) -> bool:
+    """Return whether an entry point is one of this package's own."""
+    return entry.module.partition(".")[0] == _PACKAGE.name
+
+
+def _is_there(entry: EntryPoint) -> bool:
+    place = _PACKAGE.parent.joinpath(*entry.module.split("."))
+    files = place.with_suffix(".py"), place / "__init__.py"
+    return not is_ours(entry) or any(file.is_file() for file in files)
+
+
+def at_first_use(package: str, names: Mapping[str, str]) -> Callable[[str], Any]:
+    """Return a package's ``__getattr__``, which imports names when they are used.
+
+    Args:
+        package: Its ``__name__``.
+        names: Its modules, each with the public names that it has, between spaces.
+    """
+
+    def attribute(name: str) -> Any:
+        for module, there in names.items():
+            if name in there.split():
+                return getattr(import_module(f"{package}.{module}"), name)
+        raise AttributeError(f"module {package!r} has no attribute {name!r}")
+
+    return attribute

@@ -1,0 +1,16 @@
+"""Films of a run: a browser without a window draws each picture of the page."""
+
+from typing import TYPE_CHECKING
+
+from hsp_control.common.entry_points import at_first_use
+
+if TYPE_CHECKING:  # for type checkers; a help text must not import what is slow
+    from .film import FilmStyle as FilmStyle
+    from .film import export_film as export_film
+
+__getattr__ = at_first_use(
+    __name__,
+    {
+        "film": "FilmStyle export_film",
+    },
+)

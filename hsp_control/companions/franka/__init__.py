@@ -1,0 +1,20 @@
+"""A Franka arm (pylibfranka): ``hsp live CONFIG --robot franka://ADDRESS``."""
+
+from typing import TYPE_CHECKING
+
+from hsp_control.common.entry_points import at_first_use
+
+if TYPE_CHECKING:  # for type checkers; a help text must not import what is slow
+    from .connecting import connect as connect
+    from .hardware import FrankaHardware as FrankaHardware
+    from .settings import FrankaSettings as FrankaSettings
+    from .settings import Load as Load
+
+__getattr__ = at_first_use(
+    __name__,
+    {
+        "connecting": "connect",
+        "hardware": "FrankaHardware",
+        "settings": "FrankaSettings Load",
+    },
+)

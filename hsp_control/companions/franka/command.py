@@ -1,0 +1,34 @@
+"""``hsp franka-model`` and its options; what is slow is imported when it runs."""
+
+import argparse
+from pathlib import Path
+
+from hsp_control.cli.options.companions import AddedCommand
+from hsp_control.cli.options.shared import complete
+from hsp_control.common.resources import bundled_robots
+
+
+def _add_options(model: argparse.ArgumentParser) -> None:
+    model.add_argument(
+        "address",
+        metavar="ADDRESS",
+        help="of the control box, with settings as behind franka:// (docs/franka.md)",
+    )
+    model.add_argument("urdf", type=Path, metavar="FILE", help="the URDF to write")
+    like = model.add_argument(
+        "--like",
+        metavar="ROBOT",
+        help="keep this robot's names, frames and shapes, such as panda's",
+    )
+    complete(like, bundled_robots)
+
+
+def _run(options: argparse.Namespace) -> int:
+    from hsp_control.companions.franka.saving_model import franka_model
+
+    return franka_model(options)
+
+
+FRANKA_MODEL = AddedCommand(
+    help="save a Franka arm's model as a URDF", add_options=_add_options, run=_run
+)

@@ -1,0 +1,155 @@
+"""A Franka arm under torque control, as the live loop sees it."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import inf, pi
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import HardwareError
+from hsp_control.companions.franka import client
+from hsp_control.companions.franka.client_process import ClientProcess
+from hsp_control.companions.franka.settings import FrankaSettings
+from hsp_control.live.hardware import Measurement
+from hsp_control.live.settings import LiveSettings
+from hsp_control.robot import Robot
+
+EFFORT_RATE = 999.0
+"""Greatest rate of what is sent [N·m/s].
+
+The arm accepts 1000, counted from an effort that it tells in single precision: 100 N·m
+are told to 4e-6, which is 0.004 N·m/s."""
+_START = 5.0
+"""Longest time that starting or ending the torque control takes [s]."""
+_LAST_WORDS = 1.5
+"""Time to wait for what the client says when it hears nothing for 1 s [s]."""
+
+
+class FrankaHardware:
+    """`Hardware`: seven joints that take tau - g(q) each millisecond.
+
+    The second `read` starts the torque control and waits for it: the first states come
+    without, while the loop compiles. A reflex, the stop button and a lost line are
+    raised by `read`; the arm then holds itself.
+
+    Attributes:
+        period: Time between two states [s].
+        q: Configuration when it was connected, shape (7,) [rad].
+        lines: What was found and set when connecting, one sentence each.
+    """
+
+    period = 0.001
+
+    def __init__(
+        self,
+        robot: Robot,
+        process: ClientProcess,
+        settings: FrankaSettings,
+        q: Array,
+        lines: Sequence[str],
+    ) -> None:
+        """Take over a process that is connected to the arm.
+
+        Args:
+            robot: The controller's model.
+            process: The process.
+            settings: Those of the filter count here.
+            q: Its configuration, shape (7,) [rad].
+            lines: What was found and set.
+        """
+        self._robot, self._process = robot, process
+        self.q, self.lines = q, lines
+        self._reads, self._origin = 0, 0.0
+        self._running = self._closed = False
+        self._effort = np.zeros(7)
+        self._sent_any = False
+        self._applied = np.zeros(7)
+        cutoff = settings.cutoff_frequency or inf
+        # The filter of libfranka's own control loop (lowpass_filter.cpp).
+        self._new_part = self.period / (self.period + 1.0 / (2.0 * pi * cutoff))
+
+    def adapted(self, settings: LiveSettings) -> LiveSettings:
+        """Return settings with what is fixed on this arm.
+
+        It adds g(q) itself, and accepts no higher rate than `EFFORT_RATE`.
+
+        Raises:
+            LiveError: If there are neither one nor seven effort rates.
+        """
+        rates = np.minimum(settings.rate_limits(self._robot), EFFORT_RATE)
+        return replace(settings, compensates_gravity=True, effort_rate=rates.tolist())
+
+    @property
+    def fault(self) -> str | None:
+        """Why the arm stopped by itself or was lost, once it is known."""
+        return self._process.fault
+
+    def read(self, timeout: float) -> Measurement | None:
+        """Return the state that follows the last effort; see `Hardware.read`.
+
+        Raises:
+            HardwareError: If the arm stopped by itself, does not start or is lost.
+        """
+        if not self._process.waiting:
+            if self._running:  # the loop sent nothing: the last effort stays
+                self._send(client.EFFORT)
+            else:
+                self._process.ask(client.READ if self._reads == 0 else client.START)
+        starts = self._reads == 1
+        answer = self._process.receive(max(timeout, _START) if starts else timeout)
+        if answer is None:
+            if starts:
+                raise HardwareError(f"torque control did not start in {_START:g} s")
+            return None
+        _, t, *numbers = client.STATE.unpack(answer)
+        if not self._running:  # time stands still while the loop compiles
+            self._origin = t
+        self._running = self._reads > 0
+        self._reads += 1
+        q, v, self._applied = np.array(numbers).reshape(3, 7)
+        sequence = round((t - self._origin) / self.period)
+        t = sequence * self.period
+        return Measurement(sequence, t, q, v, applied=self._applied)
+
+    def write(self, effort: Array) -> None:
+        """Send an effort for the last state; without a new state it is too late.
+
+        Raises:
+            HardwareError: If the robot cannot be reached, or the first effort contains
+                g(q).
+        """
+        if self._process.waiting:
+            return
+        largest = float(np.abs(effort - self._applied).max())
+        if not self._sent_any and largest > 2.0 * EFFORT_RATE * self.period:
+            raise HardwareError(
+                f"the first effort jumps by {largest:.3g} N·m; a Franka adds g(q) "
+                "itself: run the loop with hardware.adapted(settings)"
+            )
+        self._sent_any = True
+        self._effort = self._applied + self._new_part * (effort - self._applied)
+        self._send(client.EFFORT)
+
+    def close(self) -> None:
+        """End the torque control with the last effort; see `Hardware.close`.
+
+        Its client may say only now why the arm did not answer: `fault`.
+        """
+        if self._closed:
+            return
+        self._closed = True
+        process = self._process
+        try:
+            if process.waiting:
+                process.receive(_LAST_WORDS)
+            if self._running and not process.waiting and process.fault is None:
+                self._send(client.FINISH)
+                process.receive(_START)
+        except HardwareError:
+            pass  # it is kept: `fault`
+        finally:
+            process.close()
+
+    def _send(self, kind: bytes) -> None:
+        self._process.ask(client.REQUEST.pack(kind, *self._effort.tolist()))

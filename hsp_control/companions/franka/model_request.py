@@ -1,0 +1,93 @@
+"""Ask a control box for the robot's URDF, which pylibfranka does not hand out."""
+
+import socket
+from time import monotonic, sleep
+
+import numpy as np
+
+from hsp_control.common.exceptions import HardwareError
+from hsp_control.companions.franka.layouts import (
+    CONNECTED,
+    HEADER,
+    PORT,
+    REQUESTS,
+    VERSION,
+    Command,
+    Status,
+    message,
+)
+
+_TIMEOUT = 10.0
+_OTHER_CLIENT = 2.0
+_LARGEST = 20_000_000
+"""Largest answer that is read [bytes]."""
+
+
+def robot_urdf(address: str) -> str:
+    """Return the URDF of the robot at an address: the arm, without its end effector.
+
+    A box serves one client, and may take a moment to notice that the last one has gone:
+    for two seconds this asks again.
+
+    Raises:
+        HardwareError: If the control box cannot be reached or does not answer.
+    """
+    end = monotonic() + _OTHER_CLIENT
+    while True:
+        try:
+            return _received(address)
+        except ConnectionResetError as error:
+            if monotonic() > end:
+                raise HardwareError(
+                    f"the control box at {address} serves another client: {error}"
+                ) from None
+            sleep(0.1)
+        except (OSError, UnicodeDecodeError) as error:
+            raise HardwareError(f"the control box at {address}: {error}") from None
+
+
+def _received(address: str) -> str:
+    with (
+        socket.create_connection((address, PORT), _TIMEOUT) as link,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as states,
+    ):
+        states.bind(("", 0))
+        port = states.getsockname()[1]
+        hello = np.array((VERSION, port), REQUESTS[Command.CONNECT]).tobytes()
+        answer = _asked(link, Command.CONNECT, 0, hello)
+        if len(answer) < CONNECTED.itemsize:
+            raise HardwareError(
+                f"the control box at {address} answered with {len(answer)} bytes; "
+                f"needs {CONNECTED.itemsize}"
+            )
+        status, version = np.frombuffer(answer, CONNECTED, 1)[0]
+        if status != Status.SUCCESS:
+            raise HardwareError(
+                f"the control box at {address} speaks version {version} of the "
+                f"research interface; this is version {VERSION}"
+            )
+        answer = _asked(link, Command.GET_ROBOT_MODEL, 1, b"")
+        if answer[0] != Status.SUCCESS:
+            raise HardwareError(
+                f"the control box at {address} does not hand out its model now: "
+                "unlock the joints, end other programs"
+            )
+        return answer[1:].decode()
+
+
+def _asked(link: socket.socket, command: int, count: int, request: bytes) -> bytes:
+    link.sendall(message(command, count, request))
+    size = int(np.frombuffer(_exactly(link, HEADER.itemsize), HEADER)[0]["size"])
+    if not HEADER.itemsize < size < _LARGEST:
+        raise HardwareError(f"the control box announced an answer of {size} bytes")
+    return _exactly(link, size - HEADER.itemsize)
+
+
+def _exactly(link: socket.socket, size: int) -> bytes:
+    data = b""
+    while len(data) < size:
+        more = link.recv(size - len(data))
+        if not more:
+            raise HardwareError("the control box closed the connection")
+        data += more
+    return data

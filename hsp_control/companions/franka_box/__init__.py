@@ -1,0 +1,20 @@
+"""A Franka's control box without a robot: for unmodified clients of libfranka."""
+
+from typing import TYPE_CHECKING
+
+from hsp_control.common.entry_points import at_first_use
+
+if TYPE_CHECKING:  # for type checkers; a help text must not import what is slow
+    from .arm import Arm as Arm
+    from .box import Box as Box
+    from .server import DEADLINE as DEADLINE
+    from .server import Server as Server
+
+__getattr__ = at_first_use(
+    __name__,
+    {
+        "arm": "Arm",
+        "box": "Box",
+        "server": "DEADLINE Server",
+    },
+)

@@ -1,0 +1,195 @@
+"""What each request does: a table from the command to its handler."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pinocchio as pin
+
+from hsp_control.common.arrays import Array
+from hsp_control.companions.franka.layouts import (
+    REQUESTS,
+    Command,
+    Controller,
+    MotionGenerator,
+    MoveStatus,
+    RobotMode,
+    Status,
+    message,
+)
+from hsp_control.companions.franka_box.box import Box
+from hsp_control.companions.franka_box.hand import placement
+from hsp_control.companions.franka_box.motion import OF_THE_HAND, SERVED
+from hsp_control.companions.franka_box.reflexes import Thresholds
+
+Say = Callable[[str], object]
+_TOLERANCE = 1e-5
+"""How far below zero a moment of inertia may be, by rounding [kg·m²]."""
+
+
+class Requests:
+    """Answers the requests of a client, except the first, which connects it."""
+
+    def __init__(self, box: Box, say: Say) -> None:
+        """Set the box, and who is told what is refused."""
+        self._box, self._say = box, say
+        self._handlers: dict[Command, Callable[[int, np.void], int | None]] = {
+            Command.MOVE: self._move,
+            Command.STOP_MOVE: self._stop_move,
+            Command.SET_COLLISION_BEHAVIOR: self._set_collision_behavior,
+            Command.SET_JOINT_IMPEDANCE: self._set_joint_impedance,
+            Command.SET_CARTESIAN_IMPEDANCE: self._set_cartesian_impedance,
+            Command.SET_GUIDING_MODE: self._set_guiding_mode,
+            Command.SET_EE_TO_K: self._set_ee_to_k,
+            Command.SET_NE_TO_EE: self._set_ne_to_ee,
+            Command.SET_LOAD: self._set_load,
+            Command.AUTOMATIC_ERROR_RECOVERY: self._recover,
+        }
+
+    def answer(self, command: Command, number: int, payload: bytes) -> None:
+        """Answer a request, into the box's outbox.
+
+        Args:
+            command: The command; not `Command.CONNECT`.
+            number: Number of the request.
+            payload: Of the size of `REQUESTS`.
+        """
+        outbox = self._box.outbox
+        if command is Command.GET_ROBOT_MODEL:
+            urdf = self._box.arm.urdf.encode()
+            outbox.append(message(command, number, bytes([Status.SUCCESS]) + urdf))
+            return
+        kind = REQUESTS[command]
+        body = np.frombuffer(payload, kind)[0] if kind.itemsize else np.void(b"")
+        setter = command.name.startswith("SET_")
+        if setter and self._box.mode is RobotMode.MOVE:
+            status: int | None = self._impossible(command, "the arm moves")
+        else:
+            status = self._handlers[command](number, body)
+        if status is not None:
+            outbox.append(message(command, number, bytes([status])))
+
+    def _impossible(self, command: Command, why: str) -> int:
+        self._say(f"refused: {_spelled(command)}: {why}")
+        return Status.COMMAND_NOT_POSSIBLE_REJECTED
+
+    def _invalid(self, command: Command, what: str) -> int:
+        self._say(f"refused: {_spelled(command)}: {what}")
+        return Status.INVALID_ARGUMENT_REJECTED
+
+    def _move(self, number: int, body: np.void) -> int | None:
+        box = self._box
+        try:
+            by = Controller(int(body["controller"]))
+            generator = MotionGenerator(int(body["motion_generator"]) + 1)
+        except ValueError:
+            self._say(
+                f"refused: move: controller {body['controller']} or motion generator "
+                f"{body['motion_generator']} does not exist"
+            )
+            return MoveStatus.COMMAND_NOT_POSSIBLE_REJECTED
+        if box.mode is not RobotMode.IDLE:
+            self._say(f"refused: move: the mode is {box.mode.name.lower()}, not idle")
+        elif (by, generator) not in SERVED or body["asynchronous"]:
+            kind = "asynchronous " if body["asynchronous"] else ""
+            self._say(
+                f"refused: move: {kind}{_spelled(generator)} with {_spelled(by)} is "
+                "not served"
+            )
+        elif generator in OF_THE_HAND and box.model.is_singular:
+            self._say("refused: move: the arm is in a singular posture")
+            return MoveStatus.START_AT_SINGULAR_POSE_REJECTED
+        else:
+            box.begin(number, by, generator)
+            return None
+        return MoveStatus.COMMAND_NOT_POSSIBLE_REJECTED
+
+    def _stop_move(self, number: int, body: np.void) -> int:
+        self._box.end(MoveStatus.PREEMPTED, "stopped by the client")
+        return Status.SUCCESS
+
+    def _set_collision_behavior(self, number: int, body: np.void) -> int:
+        """Set thresholds; of those for acceleration and for constant speed the larger.
+
+        Which of both holds is not decided by an effort alone.
+        """
+        limits = {}
+        for bound in ("lower", "upper"):
+            for kind in ("torque", "force"):
+                pair = [body[f"{bound}_{kind}_{at}"] for at in _PHASES]
+                limits[bound, kind] = np.maximum(*pair)
+        command = Command.SET_COLLISION_BEHAVIOR
+        for kind in ("torque", "force"):
+            low, high = limits["lower", kind], limits["upper", kind]
+            if not (np.isfinite([low, high]).all() and (low >= 0.0).all()):
+                return self._invalid(command, "a threshold is negative or not finite")
+            if (low > high).any():
+                return self._invalid(command, "a lower threshold is above the upper")
+        self._box.thresholds = Thresholds(
+            limits["lower", "torque"],
+            limits["upper", "torque"],
+            limits["lower", "force"],
+            limits["upper", "force"],
+        )
+        return Status.SUCCESS
+
+    def _set_joint_impedance(self, number: int, body: np.void) -> int:
+        stiffness = np.array(body["K_theta"])
+        if not _is_stiffness(stiffness):
+            return self._invalid(Command.SET_JOINT_IMPEDANCE, f"{stiffness} N·m/rad")
+        self._box.joint_stiffness = stiffness
+        return Status.SUCCESS
+
+    def _set_cartesian_impedance(self, number: int, body: np.void) -> int:
+        stiffness = np.array(body["K_x"])
+        if not _is_stiffness(stiffness):
+            return self._invalid(Command.SET_CARTESIAN_IMPEDANCE, f"{stiffness}")
+        self._box.cartesian_stiffness = stiffness
+        return Status.SUCCESS
+
+    def _set_guiding_mode(self, number: int, body: np.void) -> int:
+        return self._impossible(
+            Command.SET_GUIDING_MODE, "nobody can take this arm by the hand"
+        )
+
+    def _set_ee_to_k(self, number: int, body: np.void) -> int:
+        frame = placement(body["EE_T_K"])
+        if frame is None:
+            return self._invalid(Command.SET_EE_TO_K, "not a homogeneous transform")
+        self._box.model.EE_T_K = frame
+        self._box.readings.set_end_effector(self._box.model)
+        return Status.SUCCESS
+
+    def _set_ne_to_ee(self, number: int, body: np.void) -> int:
+        frame = placement(body["NE_T_EE"])
+        if frame is None:
+            return self._invalid(Command.SET_NE_TO_EE, "not a homogeneous transform")
+        self._box.model.NE_T_EE = frame
+        self._box.readings.set_end_effector(self._box.model)
+        return Status.SUCCESS
+
+    def _set_load(self, number: int, body: np.void) -> int:
+        mass, com = float(body["m_load"]), np.array(body["F_x_Cload"])
+        inertia = np.array(body["I_load"]).reshape(3, 3).T
+        command = Command.SET_LOAD
+        if not (np.isfinite(mass) and mass >= 0.0 and np.isfinite(com).all()):
+            return self._invalid(command, f"{mass:g} kg at {com.tolist()} m")
+        symmetric = np.isfinite(inertia).all() and np.allclose(inertia, inertia.T)
+        if not (symmetric and np.linalg.eigvalsh(inertia)[0] >= -_TOLERANCE):
+            return self._invalid(command, "no inertia of a body")
+        self._box.carry(pin.Inertia(mass, com, inertia))
+        self._box.readings.set_end_effector(self._box.model)
+        return Status.SUCCESS
+
+    def _recover(self, number: int, body: np.void) -> None:
+        self._box.recover(number)
+
+
+_PHASES = ("acceleration", "nominal")
+
+
+def _is_stiffness(values: Array) -> bool:
+    return bool(np.isfinite(values).all() and (values >= 0.0).all())
+
+
+def _spelled(item: Command | Controller | MotionGenerator) -> str:
+    return item.name.lower().replace("_", " ")

@@ -1,0 +1,15 @@
+"""Runs in Rerun's viewer."""
+
+from typing import TYPE_CHECKING
+
+from hsp_control.common.entry_points import at_first_use
+
+if TYPE_CHECKING:  # for type checkers; a help text must not import what is slow
+    from .log import log_to_rerun as log_to_rerun
+
+__getattr__ = at_first_use(
+    __name__,
+    {
+        "log": "log_to_rerun",
+    },
+)

@@ -1,0 +1,41 @@
+"""What ``ros2://`` means to ``hsp live``; needs Cyclone DDS only where it is used."""
+
+from collections.abc import Callable
+
+from hsp_control.companions.ros2.installed import check_installed
+from hsp_control.live.effort_source import EffortSource
+from hsp_control.live.hardware import Hardware
+from hsp_control.robot import Robot
+
+
+def connect(address: str, robot: Robot, period: float) -> Hardware:
+    """Return the robot whose states and commands are topics of ROS 2.
+
+    Args:
+        address: ``CONTROLLER?states=TOPIC&joints=A,B&domain=N``; see `Ros2Hardware`.
+        robot: The controller's model.
+        period: The control period [s].
+
+    Raises:
+        HardwareError: If Cyclone DDS is not installed, or the robot is not there.
+    """
+    check_installed()
+    from hsp_control.companions.ros2.hardware import Ros2Hardware
+
+    return Ros2Hardware(address, robot, period)
+
+
+def publish(address: str, effort_source: EffortSource) -> Callable[[float], None]:
+    """Return what publishes a loop's states and poses; see `Watched`.
+
+    Args:
+        address: ``NAME?rate=HZ&domain=N``.
+        effort_source: What computes the efforts.
+
+    Raises:
+        HardwareError: If Cyclone DDS is not installed, or the address is invalid.
+    """
+    check_installed()
+    from hsp_control.companions.ros2.watch import Watched
+
+    return Watched(address, effort_source)

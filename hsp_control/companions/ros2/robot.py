@@ -1,0 +1,65 @@
+"""A simulated robot on ROS 2: ``python -m hsp_control.companions.ros2.robot``.
+
+It publishes its states and takes efforts as a robot with ros2_control does; see
+docs/ros2.md.
+"""
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+from hsp_control.cli.live_experiment import simulated_robot
+from hsp_control.common.exceptions import HspControlError
+from hsp_control.companions.ros2.installed import check_installed
+from hsp_control.config import load_experiment
+from hsp_control.live import OperatorRequests
+from hsp_control.live.stop_signals import stop_signals
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the robot until it has stopped; return 0, or 2 after one error message."""
+    parser = argparse.ArgumentParser(prog="hsp_control.companions.ros2.robot")
+    parser.add_argument("config", metavar="CONFIG", help="as of `hsp live`")
+    parser.add_argument("address", metavar="ros2://CONTROLLER")
+    parser.add_argument(
+        "--set", action="append", default=[], dest="overrides", metavar="KEY=VALUE"
+    )
+    parser.add_argument(
+        "--lockstep",
+        action="store_true",
+        help="a period passes with each effort, instead of in real time",
+    )
+    options = parser.parse_args(arguments)
+    requests = OperatorRequests()
+    try:
+        with stop_signals(requests, takes_over=True):
+            reason = _run(options, requests)
+    except KeyboardInterrupt:
+        print("hsp: stopped by the user", file=sys.stderr)
+        return 2
+    except HspControlError as error:
+        print(f"hsp: {error}", file=sys.stderr)
+        return 2
+    print(f"The robot: {reason}")
+    return 0
+
+
+def _run(options: argparse.Namespace, requests: OperatorRequests) -> str:
+    check_installed()
+    from hsp_control.companions.ros2.simulated import RobotTopics, serve
+
+    experiment = load_experiment(options.config, *options.overrides)
+    robot = simulated_robot(experiment)
+    topics = RobotTopics(options.address, experiment.robot)
+    print(f"{topics.states}, {topics.commands}: ready", flush=True)
+    serve(
+        robot,
+        topics,
+        stop_reason=lambda: requests.reason,
+        lockstep=options.lockstep,
+    )
+    return robot.reason or "no effort arrived"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

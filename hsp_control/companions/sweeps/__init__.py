@@ -1,0 +1,30 @@
+"""Sweeps: run one experiment many times with different values."""
+
+from typing import TYPE_CHECKING
+
+from hsp_control.common.entry_points import at_first_use
+
+if TYPE_CHECKING:  # for type checkers; a help text must not import what is slow
+    from .distributions import Choices as Choices
+    from .distributions import Distribution as Distribution
+    from .distributions import Integers as Integers
+    from .distributions import LogUniform as LogUniform
+    from .distributions import Normal as Normal
+    from .distributions import Uniform as Uniform
+    from .figure import save_sweep_figure as save_sweep_figure
+    from .figure import sweep_figure as sweep_figure
+    from .results import Sweep as Sweep
+    from .sensitivity import Sensitivity as Sensitivity
+    from .sensitivity import sensitivity as sensitivity
+    from .sweeping import sweep as sweep
+
+__getattr__ = at_first_use(
+    __name__,
+    {
+        "distributions": "Choices Distribution Integers LogUniform Normal Uniform",
+        "figure": "save_sweep_figure sweep_figure",
+        "results": "Sweep",
+        "sensitivity": "Sensitivity sensitivity",
+        "sweeping": "sweep",
+    },
+)

@@ -1,0 +1,71 @@
+"""``hsp sweep`` and its options; what is slow is imported when it runs."""
+
+import argparse
+from pathlib import Path
+
+from hsp_control.cli.options.companions import AddedCommand
+from hsp_control.cli.options.shared import add_configuration
+
+
+def _add_options(sweep: argparse.ArgumentParser) -> None:
+    add_configuration(sweep)
+    sweep.add_argument(
+        "--over",
+        action="append",
+        default=[],
+        metavar="KEY=VALUES",
+        help="what is varied: a,b,c or LOW:HIGH:COUNT or log:LOW:HIGH:COUNT, or (with "
+        "--samples) uniform:LOW:HIGH, loguniform:LOW:HIGH, normal:MEAN:DEVIATION, "
+        "integers:LOW:HIGH; may be repeated",
+    )
+    sweep.add_argument(
+        "--samples", type=int, metavar="N", help="runs; default: every combination"
+    )
+    sweep.add_argument(
+        "--design",
+        metavar="DESIGN",
+        help="grid, random, latin_hypercube or sobol; default: grid without --samples, "
+        "latin_hypercube with them",
+    )
+    sweep.add_argument("--seed", type=int, default=0, metavar="S", help="default: 0")
+    sweep.add_argument(
+        "--out",
+        type=Path,
+        metavar="FILE",
+        help="a Parquet file; what is in it already is not computed again; default: "
+        "out/NAME-sweep.parquet",
+    )
+    sweep.add_argument(
+        "--fresh", action="store_true", help="ignore what the file holds already"
+    )
+    sweep.add_argument(
+        "--time-limit",
+        type=float,
+        metavar="SECONDS",
+        help="the longest computation of a run; default: any",
+    )
+    sweep.add_argument(
+        "--workers", type=int, metavar="N", help="processes; default: one per core"
+    )
+    sweep.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="use the workers of this Dask scheduler, such as tcp://host:8786",
+    )
+    sweep.add_argument(
+        "--plot", action="store_true", help="draw what was found, beside the file"
+    )
+
+
+def _run(options: argparse.Namespace) -> int:
+    from hsp_control.companions.sweeps.running_command import sweep
+
+    return sweep(options)
+
+
+SWEEP = AddedCommand(
+    help="run a configuration many times",
+    add_options=_add_options,
+    run=_run,
+    own_interrupts=True,  # it saves rows
+)

@@ -1,0 +1,114 @@
+"""A factor: one key path of a configuration, and its values."""
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hsp_control.common.exceptions import SweepError
+from hsp_control.companions.sweeps.distributions import Choices, Distribution
+from hsp_control.companions.sweeps.spelling import values
+from hsp_control.declaration.keys import split_assignment, written
+
+
+@dataclass(frozen=True)
+class Factor:
+    """A varied parameter.
+
+    Attributes:
+        keys: The parts of its key path, as text.
+        distribution: Its values.
+    """
+
+    keys: tuple[str, ...]
+    distribution: Distribution
+
+    @property
+    def name(self) -> str:
+        """The key path with dots: the name of its column in the result."""
+        return written(self.keys)
+
+    @property
+    def origin(self) -> str:
+        """What messages about its values contain instead of file and line."""
+        return f"--over {self.name}"
+
+    def description(self) -> dict[str, Any]:
+        """Return the factor as JSON data."""
+        kind = type(self.distribution).__name__
+        numbers = {
+            name: str(value) if value in (-math.inf, math.inf) else value  # not in JSON
+            for name, value in vars(self.distribution).items()
+        }
+        return {"key": self.name, "type": kind, **numbers}
+
+
+def factors(over: Mapping[str, Any] | Iterable[str]) -> tuple[Factor, ...]:
+    """Return the factors of a sweep.
+
+    Args:
+        over: Key paths and their values: texts ``key=values`` as on the command line,
+            or a mapping from key path to such a text, to a sequence of values, or to a
+            `Distribution`.
+
+    Raises:
+        SweepError: If a key path or values cannot be read, a key is given twice, or
+            there is no key.
+    """
+    pairs = over.items() if isinstance(over, Mapping) else map(_split, over)
+    found = [_factor(key, spec) for key, spec in pairs]
+    if not found:
+        raise SweepError(
+            "nothing is varied; give --over, for example --over null_space.gain=1:20:5"
+        )
+    names = [factor.name for factor in found]
+    for name in names:
+        if names.count(name) > 1:
+            raise SweepError(f"--over {name}: is given twice")
+    return tuple(found)
+
+
+def _split(text: str) -> tuple[str, str]:
+    try:
+        keys, spec = split_assignment(text)
+    except ValueError:
+        raise SweepError(
+            f"--over {text}: needs the form key=values, for example "
+            "null_space.gain=1:20:5"
+        ) from None
+    return written(tuple(keys)), spec
+
+
+def _factor(key: str, spec: Any) -> Factor:
+    try:
+        keys, rest = split_assignment(f"{key}=")
+    except ValueError:
+        rest = key
+    if rest:
+        raise SweepError(f"--over {key}: is not a key path such as null_space.gain")
+    try:
+        return Factor(tuple(keys), _distribution(spec))
+    except SweepError as error:
+        raise SweepError(f"--over {key}: {error}") from None
+
+
+def _distribution(spec: Any) -> Distribution:
+    if isinstance(spec, Distribution):
+        return spec
+    if isinstance(spec, str):
+        return values(spec)
+    if isinstance(spec, np.ndarray):
+        spec = spec.tolist()
+    if not isinstance(spec, list | tuple | range):
+        raise SweepError(
+            f"{spec!r} is not valid; needs text such as '1:10:5', a list of values, or "
+            "a distribution"
+        )
+    return Choices(tuple(_plain(value) for value in spec))
+
+
+def _plain(value: Any) -> Any:
+    """Return NumPy scalars and arrays as Python numbers and lists, for JSON."""
+    return value.tolist() if isinstance(value, np.generic | np.ndarray) else value

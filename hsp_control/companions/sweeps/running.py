@@ -1,0 +1,121 @@
+"""Run one task, in any process or machine: text in, text out."""
+
+import json
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from threading import current_thread, main_thread
+from time import perf_counter
+
+import numpy as np
+
+from hsp_control.common.exceptions import HspControlError, SimulationError
+from hsp_control.companions.sweeps.plan import document
+from hsp_control.companions.sweeps.row import CRASHED, TIMED_OUT, Row
+from hsp_control.config.experiment import build
+from hsp_control.simulation import Rollout
+from hsp_control.simulation.measures import Measure, measures
+from hsp_control.simulation.run_meta import versions
+
+
+def run_task(task: str) -> str:
+    """Run a task and return its result; no error is raised.
+
+    Both are JSON: a worker needs and executes only the code of this package.
+
+    Args:
+        task: See `Plan.task`.
+
+    Returns:
+        The result, for `read_result`.
+    """
+    start = perf_counter()
+    found: dict[str, Measure] = {}
+    try:
+        status, message, rollout = _run(task)
+        if rollout is not None:
+            found = measures(rollout)
+    except Exception as error:  # one failed run must not end the sweep
+        status, message = "failed", f"{type(error).__name__}: {error}"
+    return json.dumps(
+        {
+            "status": status,
+            "message": message,
+            "measures": {name: list(measure) for name, measure in found.items()},
+            "wall_time": perf_counter() - start,
+            "versions": _versions(),
+        }
+    )
+
+
+def crashed(reason: str) -> str:
+    """Return the result of a task whose worker died."""
+    return json.dumps({"status": CRASHED, "message": reason})
+
+
+def read_result(run: int, text: str) -> tuple[Row, dict[str, Measure], dict[str, str]]:
+    """Return a result's row, its measures, and the package versions of its worker."""
+    result = json.loads(text)
+    found = {k: Measure(*measure) for k, measure in result.get("measures", {}).items()}
+    metrics = {name: measure.value for name, measure in found.items()}
+    row = Row(
+        run,
+        result["status"],
+        result["message"],
+        metrics,
+        result.get("wall_time", 0.0),
+    )
+    return row, found, result.get("versions", {})
+
+
+def _run(task: str) -> tuple[str, str, Rollout | None]:
+    limit = json.loads(task).get("time_limit")
+    try:
+        with _at_most(limit) as check:
+            rollout = build(document(task)).run(on_row=check)
+    except _TooLongError:
+        return TIMED_OUT, f"took longer than {limit:g} s", None
+    except SimulationError as error:
+        if isinstance(error.rollout, Rollout):
+            return "diverged", str(error.__cause__ or error), error.rollout
+        return "refused", str(error), None
+    except HspControlError as error:
+        return "refused", str(error), None
+    return rollout.status, str(rollout.meta["message"]), rollout
+
+
+class _TooLongError(BaseException):
+    """A run took too long; no handler of other errors may keep it from ending."""
+
+
+@contextmanager
+def _at_most(seconds: float | None) -> Iterator[Callable[[object], None]]:
+    """Raise where the block takes longer, at once in a process's main thread.
+
+    In another thread, such as Dask's, it is what is yielded that raises: at each row.
+    """
+    end = np.inf if seconds is None else perf_counter() + seconds
+    timed = seconds is not None and current_thread() is main_thread()
+
+    def check(recorder: object) -> None:
+        if perf_counter() > end:
+            raise _TooLongError
+
+    def stop(signal_number: int, frame: object) -> None:
+        raise _TooLongError
+
+    before = signal.signal(signal.SIGALRM, stop) if timed else None
+    try:
+        if timed:
+            signal.setitimer(signal.ITIMER_REAL, seconds or 0.0)
+        yield check
+    finally:
+        if timed:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+            signal.signal(signal.SIGALRM, before)
+
+
+@cache
+def _versions() -> dict[str, str]:
+    return versions()

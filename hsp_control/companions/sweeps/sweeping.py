@@ -1,0 +1,164 @@
+"""Run one experiment many times."""
+
+import os
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hsp_control.common.exceptions import HspControlError, SweepError
+from hsp_control.companions.sweeps.dask_workers import DaskWorkers
+from hsp_control.companions.sweeps.design import chosen_design, points
+from hsp_control.companions.sweeps.factor import factors
+from hsp_control.companions.sweeps.local_workers import LocalWorkers
+from hsp_control.companions.sweeps.plan import Plan, document, insert
+from hsp_control.companions.sweeps.results import Sweep
+from hsp_control.companions.sweeps.running import read_result
+from hsp_control.companions.sweeps.store import Store
+from hsp_control.config.experiment import build
+from hsp_control.config.source import read_document
+from hsp_control.simulation.run_meta import versions
+
+
+def sweep(
+    source: str | PathLike[str] | dict[str, Any],
+    over: Mapping[str, Any] | Iterable[str],
+    *,
+    samples: int | None = None,
+    design: str | None = None,
+    seed: int = 0,
+    out: str | PathLike[str] | None = None,
+    overrides: Iterable[str] = (),
+    workers: int | None = None,
+    scheduler: str | None = None,
+    fresh: bool = False,
+    time_limit: float | None = None,
+    on_progress: Callable[[int, int, int], None] | None = None,
+) -> Sweep:
+    """Run an experiment many times with different values, and return the results.
+
+    The results depend only on the arguments before ``out`` and on ``overrides``: not on
+    the number of workers, the order in which they finish, or interruptions.
+
+    Args:
+        source: A configuration; see `hsp_control.load_experiment`.
+        over: The varied parameters: key paths of the configuration and their values, as
+            a mapping ``{"null_space.gain": "1:20:5"}`` or as texts ``key=values``.
+            Values are a text (see `spelling.values`), a sequence or
+            a `Distribution`.
+        samples: The number of runs; None: all combinations.
+        design: ``grid``, ``random``, ``latin_hypercube`` or ``sobol``; None: the grid
+            without ``samples``, Latin hypercube with them.
+        seed: Seed of the design.
+        out: A Parquet file. Runs of the same sweep that it or its journal contains are
+            not computed again. None: nothing is written.
+        overrides: Values to change in all runs, each ``key.path=value``.
+        workers: The number of processes; None: one per core.
+        scheduler: Address of a Dask scheduler, whose workers are used instead.
+        fresh: Start again, and overwrite ``out``.
+        time_limit: The longest computation of a run [s]; None: any. A run that takes
+            longer has the status ``timed out``, and is repeated when the sweep resumes.
+        on_progress: Called with the number of runs that are done, of all runs, and of
+            runs that are done but not completed.
+
+    Returns:
+        The sweep. Ctrl-C ends it early; the sweep and its file then contain all rows
+        computed so far, and `Sweep.complete` is False.
+
+    Raises:
+        SweepError: If the sweep is not well defined, its file belongs to another sweep
+            or cannot be written, or no worker can be started.
+        HspControlError: If the configuration cannot be built with any of the first
+            values. Single runs that cannot be built, diverge or crash are rows.
+    """
+    if time_limit is not None and not 0.0 < time_limit < np.inf:
+        raise SweepError(f"time_limit is {time_limit} s; must be positive")
+    varied = factors(over)
+    form = chosen_design(design, samples)
+    base = read_document(source)
+    for assignment in overrides:
+        base.override(assignment)
+    plan = Plan(
+        name=base.name,
+        data=base.to_dict(),
+        factors=varied,
+        design=form,
+        samples=samples,
+        seed=seed,
+        points=points(varied, form, samples, seed),
+        time_limit=time_limit,
+    )
+    try:
+        first = plan.first_run()
+    except HspControlError:
+        insert(base, plan.changes(0))
+        build(base)  # raises the same error, with the line of the file
+        raise
+    experiment = plan.experiment(first)
+    if experiment.hears:
+        raise SweepError(
+            f"a stream hears {experiment.hears[0]}, which only one run can; sweep the "
+            "log of a run, or give the stream a recording as its source"
+        )
+    identity = plan.identity(experiment)
+    path = None if out is None else Path(out)
+    if path is not None and path.suffix != ".parquet":
+        raise SweepError(f"{path}: the name of a sweep's file must end with .parquet")
+    with _workers(workers, scheduler) as pool:
+        store = Store(plan, identity, path, fresh=fresh)
+        try:
+            with suppress(KeyboardInterrupt):
+                if store.pending:
+                    _compile(plan, first)
+                _run_pending(plan, store, pool, on_progress)
+        except BaseException:
+            store.close()
+            raise
+        return store.close()
+
+
+def _workers(count: int | None, scheduler: str | None) -> LocalWorkers | DaskWorkers:
+    if scheduler is not None:
+        if count is not None:
+            raise SweepError("the scheduler has its own workers; remove --workers")
+        return DaskWorkers(scheduler)
+    if count is None:
+        count = len(os.sched_getaffinity(0))
+    return LocalWorkers(count)
+
+
+def _compile(plan: Plan, run: int) -> None:
+    """Simulate one log period of a run: workers then find compiled kernels."""
+    period = plan.experiment(run).scenario.simulation.log_period
+    short = document(plan.task(run))
+    short.assign(["simulation", "duration"], period, "")
+    with suppress(HspControlError):  # the row of that run will contain the error
+        if build(short).run().status == "interrupted":
+            raise KeyboardInterrupt
+
+
+def _run_pending(
+    plan: Plan,
+    store: Store,
+    pool: LocalWorkers | DaskWorkers,
+    on_progress: Callable[[int, int, int], None] | None,
+) -> None:
+    own = versions()
+    failures = sum(row.status != "completed" for row in store.rows.values())
+    if on_progress is not None:
+        on_progress(len(store.rows), len(plan), failures)
+    for run, text in pool.map((run, plan.task(run)) for run in store.pending):
+        row, found, others = read_result(run, text)
+        if others and others != own:
+            name = next(name for name in own if others.get(name) != own[name])
+            raise SweepError(
+                f"a worker has {name} {others.get(name)}, here is {own[name]}: "
+                "they must be equal"
+            )
+        store.add(row, found)
+        failures += row.status != "completed"
+        if on_progress is not None:
+            on_progress(len(store.rows), len(plan), failures)

@@ -1,0 +1,9 @@
+"""Walking: plans for two feet and four, and the estimators of a floating base."""
+
+from .crawling import Crawl as Crawl
+from .estimation.base_estimator import BaseEstimator as BaseEstimator
+from .estimation.contact_forces import ContactForces as ContactForces
+from .sensing import Sensed as Sensed
+from .sensing import SensedContact as SensedContact
+from .trotting import Trot as Trot
+from .walking import Walk as Walk

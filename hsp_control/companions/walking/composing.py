@@ -1,0 +1,91 @@
+"""The parts of a controller that follows a plan: its own tasks, or given ones."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from typing import Any
+
+from hsp_control.common.exceptions import PlanError
+from hsp_control.constraints.contacts import Contact
+from hsp_control.control.plan import PlanParts
+from hsp_control.declaration import within
+from hsp_control.tasks import CenterOfMass, FrameOrientation, FramePose, Task
+from hsp_control.tasks.frame_task import TrackingTask
+from hsp_control.trajectories import ComposedPose
+from hsp_control.trajectories.fed import Fed, FedOrientation
+from hsp_control.trajectories.switch import Switch
+
+
+def composed(
+    own: Sequence[TrackingTask],
+    tasks: Sequence[Task],
+    contacts: Sequence[Contact],
+    feet: Collection[str],
+) -> PlanParts:
+    """Return the parts of a controller whose references and contacts a plan feeds.
+
+    Args:
+        own: The tasks that the plan needs; the task of a foot has its name.
+        tasks: The tasks that are given; they replace those of the same name.
+        contacts: The contacts that are given.
+        feet: The names of the contacts that the plan switches.
+
+    Raises:
+        PlanError: If a task or a contact does not fit the plan.
+    """
+    given = {task.name: task for task in tasks}
+    made, fed = [], []
+    for needed in own:
+        with within("tasks", needed.name):
+            task = given.pop(needed.name, needed)
+            made.append(_followed(task, needed, needed.name in feet))
+    for contact in contacts:
+        if contact.name not in feet:
+            fed.append(contact)
+            continue
+        with within("contacts", contact.name):
+            if contact.schedule is not None:
+                raise PlanError(
+                    "it has a schedule, but the plan switches it; give only one"
+                )
+        fed.append(replace(contact, schedule=Switch()))
+    return PlanParts((*given.values(), *made), tuple(fed))
+
+
+def _followed(task: Task, needed: TrackingTask, swings: bool) -> Task:
+    """Return a task whose reference, and if it swings its presence, is the plan's.
+
+    Args:
+        task: The task, perhaps one that was given.
+        needed: What the plan would take.
+        swings: Whether it counts only while a foot swings.
+
+    Raises:
+        PlanError: If the task is another one.
+    """
+    if type(task) is not type(needed):
+        raise PlanError(
+            f"it is a {task.yaml_type}; the plan needs a {needed.yaml_type} of this "
+            "name"
+        )
+    if swings and getattr(task, "frame", None) != getattr(needed, "frame", None):
+        raise PlanError(
+            f"its frame is {getattr(task, 'frame', None)!r}; the foot's is "
+            f"{getattr(needed, 'frame', None)!r}"
+        )
+    if isinstance(needed, CenterOfMass) and getattr(task, "axes", "") != needed.axes:
+        raise PlanError(
+            f"its axes are {getattr(task, 'axes', '')!r}; the plan needs "
+            f"{needed.axes!r}"
+        )
+    if task.schedule is not None:
+        raise PlanError("it has a schedule, but the plan says when it counts")
+    changes: dict[str, Any] = {"blend": None, "trajectory": Fed(3)}
+    if isinstance(needed, CenterOfMass):
+        changes["trajectory"] = Fed(len(needed.axes))
+    elif isinstance(needed, FrameOrientation):
+        changes["trajectory"] = FedOrientation()
+    elif isinstance(needed, FramePose):
+        changes["trajectory"] = ComposedPose(Fed(3), FedOrientation())
+    if swings:
+        changes["schedule"] = Switch(on=False)
+    return replace(task, **changes)

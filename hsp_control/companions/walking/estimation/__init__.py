@@ -1,0 +1,1 @@
+"""Estimation: what is not measured of a walking robot, from what is."""

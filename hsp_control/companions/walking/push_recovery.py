@@ -1,0 +1,155 @@
+"""What a biped does about a push: another step, or none.
+
+What the sole of the standing foot cannot bring back moves the next step, in place and
+in time (`plans/step_adjustment.py`). Across the standing foot no leg can step: a
+divergent component that is still within the soles is brought back where it is.
+"""
+
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.companions.walking.biped import BipedPlan
+from hsp_control.companions.walking.foot import Foot
+from hsp_control.companions.walking.footsteps import Footstep, Stance
+from hsp_control.companions.walking.pendulum import Phase, error_after
+from hsp_control.companions.walking.polygon import nearest_inside
+from hsp_control.companions.walking.step_adjustment import (
+    Adjustment,
+    adjust,
+    shift_gain,
+)
+from hsp_control.companions.walking.swing import Swing
+
+_DEADBAND = 0.005
+"""Error of the divergent component at touchdown that needs no adjustment [m]."""
+_COMMITTED = 0.12
+"""A step is not adjusted so shortly before it lands [s]."""
+_SHORTEST = 0.55
+"""The shortest swing that an adjustment may choose, in swings [-]."""
+_LONGEST = 1.25
+"""The longest one, in swings [-]."""
+
+
+class PlannedSwing(NamedTuple):
+    """A swing as it was planned, and where the divergent component ξ is now.
+
+    Attributes:
+        side: 1 if the left foot swings, -1 for the right one.
+        standing: The foot that stands.
+        swinging: The foot that swings.
+        target: Where it was to land.
+        phase: The phase of the pendulum.
+        first: ξ at its start, shape (2,) [m].
+        since: The present time, from its start [s].
+        wanted: ξ as it was to be now, shape (2,) [m].
+        dcm: ξ as it is, shape (2,) [m].
+    """
+
+    side: float
+    standing: Foot
+    swinging: Foot
+    target: Footstep
+    phase: Phase
+    first: Array
+    since: float
+    wanted: Array
+    dcm: Array
+
+
+class PushRecovery:
+    """Decides from ξ whether and where a foot steps."""
+
+    def __init__(self, walk: BipedPlan, stance: Stance, frequency: float) -> None:
+        """Set the walk, how the feet stand, and ω [1/s]."""
+        self._walk, self._stance, self._frequency = walk, stance, frequency
+        self._shift = shift_gain(frequency, walk.double_support)
+
+    def holds(self, plan: PlannedSwing, soles: Array) -> bool:
+        """Return whether soles hold a push that one sole and a step do not.
+
+        Args:
+            plan: The swing that is to begin.
+            soles: The corners of both soles, shape (m, 2) [m].
+        """
+        swing = self._walk.swing
+        window = _SHORTEST * swing, _LONGEST * swing
+        left = self._best_step(plan, swing, window).left
+        return self._is_too_far(plan, left) and _is_within(soles, plan.dcm)
+
+    def step(self, plan: PlannedSwing, swing: Swing, t: float) -> Adjustment | None:
+        """Return where and when a foot that swings is to land; None if as it does.
+
+        Args:
+            plan: The swing as it was planned.
+            swing: The swing as it is, after earlier adjustments.
+            t: The present time [s].
+        """
+        remaining = swing.end - t
+        if remaining < _COMMITTED:
+            return None
+        duration = self._walk.swing
+        planned = swing.start + duration - t
+        now = plan.swinging.place_of(swing.target)
+        landing = plan.phase.dcm(plan.first, plan.since + planned, self._frequency)
+        needed = landing + self._shift * (now.point - plan.target.point)
+        if float(np.abs(self._dcm_after(plan, remaining) - needed).max()) < _DEADBAND:
+            return None
+        earliest = max(swing.start + _SHORTEST * duration - t, _COMMITTED)
+        latest = swing.start + _LONGEST * duration - t
+        return self._best_step(plan, planned, (earliest, max(latest, earliest)))
+
+    def is_better_put_down(self, plan: PlannedSwing, step: Adjustment) -> bool:
+        """Return whether the standing sole holds a push, but the step would not."""
+        held = _is_within(plan.standing.corners(1.0), plan.dcm)
+        return held and self._is_too_far(plan, step.left)
+
+    def _is_too_far(self, plan: PlannedSwing, left: Array) -> bool:
+        """Return whether the sole of the next step cannot hold an error, (2,) [m]."""
+        standing = plan.standing.place
+        reach = self._walk.margin * plan.swinging.reach
+        return bool((np.abs(standing.local(standing.point + left)) > reach).any())
+
+    def _best_step(
+        self, plan: PlannedSwing, planned: float, window: tuple[float, float]
+    ) -> Adjustment:
+        """Return where and when the swing foot is to land.
+
+        Args:
+            plan: The swing as it was planned.
+            planned: The time until the foot was to land [s].
+            window: The earliest and the latest touchdown from now [s].
+        """
+        standing = plan.standing.place
+        return adjust(
+            plan.target,
+            planned,
+            window,
+            partial(self._dcm_after, plan),
+            plan.phase.dcm(plan.first, plan.since + planned, self._frequency),
+            self._shift,
+            lambda place: self._stance.kept(standing, plan.side, place),
+        )
+
+    def _dcm_after(self, plan: PlannedSwing, T: float) -> Array:
+        """Return what ξ will be, with feedback within the sole, shape (2,) [m].
+
+        Args:
+            plan: The swing as it was planned.
+            T: Time from now, at most until touchdown [s].
+        """
+        walk, frequency, place = self._walk, self._frequency, plan.standing.place
+        error = place.local(place.point + plan.dcm - plan.wanted)
+        left = [
+            error_after(float(e), T, frequency, walk.feedback, walk.margin * r)
+            for e, r in zip(error, plan.standing.reach, strict=True)
+        ]
+        axes = place.world(np.array(left)) - place.point
+        return np.asarray(plan.phase.dcm(plan.first, plan.since + T, frequency) + axes)
+
+
+def _is_within(corners: Array, point: Array) -> bool:
+    """Return whether a point is in a polygon, shapes (m, 2) and (2,) [m]."""
+    return bool((nearest_inside(corners, point) == point).all())

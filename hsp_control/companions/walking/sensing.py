@@ -1,0 +1,316 @@
+"""Contacts that begin and end when that is felt."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import KW_ONLY, replace
+from typing import Annotated, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import PlanError
+from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.constraints.contacts import Contact
+from hsp_control.control.controller import Controller
+from hsp_control.control.log_channel import LogChannel
+from hsp_control.control.measurement import Measurement
+from hsp_control.control.plan import Plan, PlanParts, RunningPlan
+from hsp_control.control.switched import Switched
+from hsp_control.declaration import Part, within
+from hsp_control.declaration.named import BY_NAME
+from hsp_control.declaration.quantities import (
+    READ_ONLY,
+    Flag,
+    Name,
+    NonNegative,
+    Number,
+    Positive,
+)
+from hsp_control.robot import Robot, RobotState
+from hsp_control.tasks import Task
+from hsp_control.trajectories.schedule import Intervals, Schedule
+from hsp_control.trajectories.switch import Switch
+
+
+class SensedContact(Part, error=PlanError):
+    """When a contact begins to bear, and when it ends.
+
+    It begins when it is pressed with ``force``, or is at ``height``, or both if both
+    are given; then its force rises. It ends when it is pressed with less than
+    ``release`` for ``patience``, because the ground is gone, and fades as long again;
+    or when it is not wanted any more, and fades over ``ramp``.
+    """
+
+    yaml_key: ClassVar[str | None] = "name"
+
+    force: Positive | None = None
+    """Normal force from which it bears [N]."""
+    _: KW_ONLY
+    height: Number | None = None
+    """Height of its frame, along its normal, at or below which it bears [m]."""
+    release: NonNegative | None = None
+    """Normal force below which it has lost the ground [N]; a quarter of ``force`` by
+    default."""
+    patience: NonNegative = 0.02
+    """For how long the force must be below ``release`` [s]."""
+    ramp: Positive = 0.2
+    """How long its force takes to rise, and to fade [s]."""
+    wanted: Intervals | None = None
+    """Intervals in which it may bear: [start, end] [s], None for no start or no end;
+    always by default."""
+    starts: Flag = False
+    """Whether it bears at the start, before anything is felt [-]."""
+    task: str | None = None
+    """Name of a task that counts while it does not bear [-]: what moves its link."""
+    name: str = ""
+    """Name of the contact [-]. In YAML, its key."""
+
+    def __post_init__(self) -> None:
+        """Check that something is sensed, and that the intervals follow one another."""
+        if self.force is None and self.height is None:
+            raise PlanError("give force or height: what tells that it bears")
+        if self.release is not None and self.force is None:
+            raise PlanError("release is a force; give force, too")
+        if self.release is not None and self.release >= (self.force or 0.0):
+            raise PlanError(
+                f"release is {self.release:g} N; must be below force = {self.force:g} N"
+            )
+        with within("wanted"):
+            self.schedule()
+
+    @property
+    def lets_go(self) -> float | None:
+        """Normal force below which it has lost the ground [N]; None: it never does."""
+        if self.release is not None:
+            return self.release
+        return None if self.force is None else 0.25 * self.force
+
+    def schedule(self) -> Schedule:
+        """Return when it may bear."""
+        if self.wanted is None:
+            return Schedule.always()
+        return Schedule(self.wanted, ramp=0.0)
+
+
+class Sensed(Plan, type="sensed"):
+    """Contacts are switched by what is felt: measured or estimated forces, or height.
+
+    Everything else, tasks and their references, is as it is declared. A contact rises
+    and fades over its ramp, so that efforts stay continuous.
+    """
+
+    contacts: Annotated[
+        dict[Name, SensedContact], Field(min_length=1), BY_NAME, READ_ONLY
+    ]
+    """The contacts that are sensed, by name; others are as they are declared."""
+
+    def parts(
+        self, robot: Robot, tasks: Sequence[Task], contacts: Sequence[Contact]
+    ) -> PlanParts:
+        """Return the parts with switches as schedules; see `Plan.parts`."""
+        there = {each.name: each for each in contacts}
+        known = {each.name: each for each in tasks}
+        moves: dict[str, SensedContact] = {}
+        for name, rule in self.contacts.items():
+            with within("plan", "contacts", name):
+                if name not in there:
+                    raise PlanError(
+                        f"there is no contact {name!r}{did_you_mean(name, there)} "
+                        f"(there are {listing(there) or 'none'})"
+                    )
+                if there[name].schedule is not None:
+                    raise PlanError(
+                        "the contact has a schedule, but the plan switches it; give "
+                        "only one, or the intervals as wanted"
+                    )
+                if rule.task is None:
+                    continue
+                with within("task"):
+                    if rule.task not in known:
+                        raise PlanError(
+                            f"there is no task {rule.task!r}"
+                            f"{did_you_mean(rule.task, known)} (there are "
+                            f"{listing(known) or 'none'})"
+                        )
+                    if known[rule.task].schedule is not None or rule.task in moves:
+                        raise PlanError(
+                            f"{rule.task!r} has a schedule, or moves two contacts; it "
+                            "counts while the contact does not bear"
+                        )
+                moves[rule.task] = rule
+        return PlanParts(
+            tuple(
+                replace(each, schedule=Switch(on=not moves[each.name].starts))
+                if each.name in moves
+                else each
+                for each in tasks
+            ),
+            tuple(
+                replace(each, schedule=Switch(on=self.contacts[each.name].starts))
+                if each.name in self.contacts
+                else each
+                for each in contacts
+            ),
+        )
+
+    def begin(self, controller: Controller) -> "RunningSensed":
+        """Return what switches; see `Plan.begin`."""
+        return RunningSensed(self, controller)
+
+
+class FeltContact(Switched):
+    """A contact in one run: whether it bears, and what is felt.
+
+    Attributes:
+        name: Its name.
+        frame: Its frame.
+        force: The normal force that is felt [N]; NaN without one.
+        height: The height of its frame along the normal [m].
+        estimated: Whether the force is estimated.
+        events: How often it has begun or ended.
+    """
+
+    def __init__(self, name: str, rule: SensedContact, controller: Controller) -> None:
+        """Find its switches in a controller.
+
+        Raises:
+            PlanError: If the controller is not made of the plan's parts.
+        """
+        self.name, self._rule = name, rule
+        contact = {each.name: each for each in controller.contacts}.get(name)
+        task = {each.name: each for each in controller.tasks}.get(rule.task or "")
+        if (
+            contact is None
+            or not isinstance(contact.schedule, Switch)
+            or (task is None) != (rule.task is None)
+            or not (task is None or isinstance(task.schedule, Switch))
+        ):
+            raise PlanError(
+                f"the contact {name!r} does not follow the plan: make the controller "
+                "of the plan's parts"
+            )
+        self.frame: str = contact.frame
+        self._normal: Array = contact.axes[:, 2]
+        self.contact = contact.schedule
+        switch = None if task is None else task.schedule
+        self.task = switch if isinstance(switch, Switch) else None
+        self._wanted = rule.schedule()
+        self.force, self.height, self.estimated = np.nan, np.nan, False
+        self.events = 0
+
+    def start(self) -> None:
+        """Return to the start, before anything is felt."""
+        self.reset()
+        self._pressed = -np.inf  # nothing was felt yet
+        self._leaving = False
+        self.events = 0
+
+    @property
+    def bears(self) -> bool:
+        """Whether it is switched on."""
+        return self.contact.is_on
+
+    def update(self, t: float, state: RobotState, measured: Measurement) -> None:
+        """Feel, and switch.
+
+        Raises:
+            PlanError: If a force is needed, and there is none.
+        """
+        rule = self._rule
+        force = measured.normal_force(self.frame, self._normal)
+        if force is None and rule.force is not None:
+            raise PlanError(
+                f"plan.contacts.{self.name}.force: nothing measures or estimates the "
+                f"force at {self.frame!r}; give height instead, or a contact_observer"
+            )
+        self.force = np.nan if force is None else force
+        self.estimated = self.frame in measured.estimated
+        self.height = float(self._normal @ state.position(self.frame))
+        wanted = self._wanted.active(t)
+        if not self.bears:
+            if not self.contact.active(t) and self._leaving:
+                self._leaving = False  # its force has faded
+                self.events += 1
+            if wanted and self._is_felt():
+                self._bear(t)
+        elif not wanted:
+            self._leave(t, rule.ramp)
+        elif self._is_lost(t):
+            self._leave(t, rule.patience)
+
+    def _is_felt(self) -> bool:
+        rule = self._rule
+        pressed = rule.force is None or self.force >= rule.force
+        return pressed and (rule.height is None or self.height <= rule.height)
+
+    def _is_lost(self, t: float) -> bool:
+        limit = self._rule.lets_go
+        if limit is None or self.force >= limit or self._pressed == -np.inf:
+            self._pressed = t
+        return t - self._pressed > self._rule.patience
+
+    def _bear(self, t: float) -> None:
+        self._pressed, self._leaving = t, False
+        self.bear(t, self._rule.ramp)
+        self.events += 1
+
+    def _leave(self, t: float, ramp: float) -> None:
+        self._leaving = True
+        self.unload(t, ramp)
+
+
+class RunningSensed(RunningPlan):
+    """What a `Sensed` became for one run."""
+
+    def __init__(self, sensed: Sensed, controller: Controller) -> None:
+        """Find the switches.
+
+        Raises:
+            PlanError: If the controller is made of other parts.
+        """
+        super().__init__(sensed)
+        self._controller = controller
+        self._state = RobotState(controller.robot)
+        self._felt = [
+            FeltContact(name, rule, controller)
+            for name, rule in sensed.contacts.items()
+        ]
+        self._begun = False
+
+    def start(self, state: RobotState) -> None:
+        """Begin before anything is felt; see `RunningPlan.start`."""
+        for each in self._felt:
+            each.start()
+        self._begun = True
+
+    def update(self, measured: Measurement) -> None:
+        """Switch contacts; see `RunningPlan.update`."""
+        state = self._state.update(measured.t, measured.q, measured.v)
+        if not self._begun:
+            self.start(state)
+        for each in self._felt:
+            each.update(measured.t, state, measured)
+
+    def log_channels(self) -> Mapping[str, LogChannel]:
+        """Return what is felt of each contact, and whether it bears."""
+        channels: dict[str, LogChannel] = {}
+        for each in self._felt:
+            prefix = f"plan.{each.name}"
+            channels |= {
+                f"{prefix}.bears": LogChannel(
+                    float(each.bears), "-", "whether it is switched on"
+                ),
+                f"{prefix}.events": LogChannel(
+                    float(each.events), "-", "how often it has begun or ended"
+                ),
+                f"{prefix}.felt": LogChannel(
+                    each.force, "N", "normal force as measured or estimated"
+                ),
+                f"{prefix}.estimated": LogChannel(
+                    float(each.estimated), "-", "1 if the force is estimated"
+                ),
+                f"{prefix}.height": LogChannel(
+                    each.height, "m", "of its frame, along the normal"
+                ),
+            }
+        return channels

@@ -1,0 +1,220 @@
+"""The steps to come: places, phases, and when a walk stands again."""
+
+from collections.abc import Callable, Mapping
+from math import hypot
+from typing import NamedTuple
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import PlanError
+from hsp_control.companions.walking.biped import BipedPlan
+from hsp_control.companions.walking.foot import Foot
+from hsp_control.companions.walking.footsteps import Footstep, Stance, Velocity, between
+from hsp_control.companions.walking.legs import hip_height, leg_length
+from hsp_control.companions.walking.pendulum import Phase
+from hsp_control.robot import RobotState
+
+PREVIEW = 4
+"""Steps that a plan looks ahead; what comes later has decayed to a thousandth."""
+LAST_SHIFT = 1.5
+"""The last shift of the weight, in double supports [-]."""
+_NOT_BESIDE = 0.01
+"""How far feet may be from standing beside each other [m, rad]."""
+_STRETCH = 0.9
+"""Share of a leg's reach that a step uses [-]."""
+
+
+class Preview(NamedTuple):
+    """What is to come.
+
+    Attributes:
+        phases: The phases, from a shift of the weight until the robot stands.
+        swings: Which of them are swings.
+        velocity: That of the next step.
+        target: Where the next step goes; None if there is none.
+    """
+
+    phases: list[Phase]
+    swings: list[bool]
+    velocity: Velocity
+    target: Footstep | None
+
+
+class Next(NamedTuple):
+    """The next step.
+
+    Attributes:
+        velocity: The velocity of the body.
+        target: Where the foot goes; None if the robot is to stand.
+    """
+
+    velocity: Velocity
+    target: Footstep | None
+
+
+class StepPlanner:
+    """Plans steps from the velocity that is wanted.
+
+    Attributes:
+        stopping: Whether the robot is to stand as soon as it can.
+    """
+
+    def __init__(self, walk: BipedPlan, stance: Stance, robot: str) -> None:
+        """Set the walk, and how the feet stand.
+
+        Args:
+            walk: The plan.
+            stance: How the feet stand beside each other.
+            robot: The name of the robot, for the message.
+
+        Raises:
+            PlanError: If a stride is longer than the legs reach.
+        """
+        self._walk, self._stance = walk, stance
+        self.stopping = False
+        self.period = walk.swing + walk.double_support
+        speed = hypot(walk.speed, walk.sideways)
+        if speed * self.period > stance.longest:
+            raise PlanError(
+                f"{speed:.3g} m/s with {self.period:.3g} s per step are strides of "
+                f"{speed * self.period:.3g} m; the legs of {robot} reach "
+                f"{stance.longest:.3g} m. Walk slower, or with a shorter swing"
+            )
+
+    def wanted(self, t: float, taken: int) -> Velocity:
+        """Return the velocity that is wanted after some steps; none if they are all."""
+        steps = self._walk.steps
+        if self.stopping or (steps is not None and taken >= steps):
+            return Velocity(0.0, 0.0, 0.0)
+        return self._walk.velocity_at(t)
+
+    def look_ahead(
+        self,
+        t: float,
+        taken: int,
+        velocity: Velocity,
+        side: float,
+        places: Mapping[float, Footstep],
+        shift: float,
+        point: Array,
+        lead: Callable[[float, Mapping[float, Footstep], Footstep], Array],
+    ) -> Preview:
+        """Return what is to come, from a phase on two feet on.
+
+        Args:
+            t: The present time [s].
+            taken: How many steps were taken.
+            velocity: The velocity of the step before.
+            side: 1 if the left foot swings next, -1 for the right one.
+            places: Where the feet stand, by side.
+            shift: How long the weight takes to shift to the standing foot [s].
+            point: Where the repellent point is, shape (2,) [m].
+            lead: What `Phase.lead` is for the foot of a side, where the feet stand, and
+                where it goes.
+        """
+        walk, places = self._walk, dict(places)
+        phases, swings = list[Phase](), list[bool]()
+        first: Next | None = None
+        for k in range(PREVIEW):
+            step = self._next(velocity, t, taken + k, side, places)
+            velocity, target = step
+            first = first or step
+            if target is None:
+                break
+            center = places[-side].point
+            beside = lead(side, places, target)
+            phases += [
+                Phase(shift, point, center),
+                Phase(walk.swing, center, center, beside),
+            ]
+            swings += [False, True]
+            places[side] = target
+            side, point, shift = -side, center, walk.double_support
+        assert first is not None
+        middle = between(places[1.0], places[-1.0]).point
+        phases += [
+            Phase(LAST_SHIFT * walk.double_support, point, middle),
+            Phase(1.0, middle, middle),
+        ]
+        return Preview(phases, [*swings, False, False], *first)
+
+    def sets_out(self, t: float, taken: int) -> bool:
+        """Return whether a robot that stands is to walk."""
+        return not self.wanted(t, taken).is_zero
+
+    def first_side(self, t: float, taken: int) -> float:
+        """Return the foot that swings first: 1 is the left one, -1 the right one."""
+        wanted = self.wanted(t, taken)
+        return -1.0 if wanted.left < 0.0 or wanted.turn < 0.0 else 1.0
+
+    def _next(
+        self,
+        velocity: Velocity,
+        t: float,
+        taken: int,
+        side: float,
+        places: Mapping[float, Footstep],
+    ) -> Next:
+        """Return the next step.
+
+        Args:
+            velocity: The velocity of the step before.
+            t: The present time [s].
+            taken: How many steps were taken before it.
+            side: 1 if the left foot swings, -1 for the right one.
+            places: Where the feet stand, by side.
+        """
+        velocity = self._next_velocity(velocity, t, taken)
+        target = self._stance.next(places[-side], side, velocity, self.period)
+        stands = velocity.is_zero and _beside(places[side], target)
+        return Next(velocity, None if stands else target)
+
+    def _next_velocity(self, now: Velocity, t: float, taken: int) -> Velocity:
+        """Return the velocity of a step, as near to what is wanted as it may be.
+
+        Args:
+            now: The velocity of the step before.
+            t: The present time [s].
+            taken: How many steps were taken before it.
+        """
+        wanted = self.wanted(t, taken)
+        largest = self._walk.acceleration * self.period
+        bounds = largest, largest, largest / max(0.5 * self._stance.width, 0.1)
+        return now.towards(wanted, bounds)
+
+
+def stance_of(feet: Mapping[float, Foot], state: RobotState, crouch: float) -> Stance:
+    """Return how the feet of a biped stand, and how far its legs reach.
+
+    Args:
+        feet: The feet, by side.
+        state: The state in which the robot stands.
+        crouch: How far the centre of mass is lowered [m].
+
+    Raises:
+        PlanError: If the feet are so near that they would meet.
+    """
+    left, right = feet[1.0], feet[-1.0]
+    width = float(right.place.local(left.place.point)[1])
+    soles = 0.5 * (left.sole_width + right.sole_width)
+    narrowest = soles + 0.02
+    if width < narrowest:
+        raise PlanError(
+            f"the feet {left.name!r} and {right.name!r} stand {width:.3g} m apart; "
+            f"their soles are {soles:.3g} m wide and would meet"
+        )
+    squares = [
+        leg_length(state.robot, each.frame) ** 2
+        - (hip_height(state, each.frame) - crouch) ** 2
+        for each in feet.values()
+    ]
+    # Each leg reaches half of the step.
+    longest = 2.0 * _STRETCH * float(np.sqrt(max(min(squares), 0.0)))
+    return Stance(width, narrowest, max(3.0 * width, width + 0.1), longest)
+
+
+def _beside(place: Footstep, target: Footstep) -> bool:
+    """Return whether a foot stands where it is to stand."""
+    away = hypot(place.x - target.x, place.y - target.y)
+    return away < _NOT_BESIDE and abs(place.yaw - target.yaw) < _NOT_BESIDE

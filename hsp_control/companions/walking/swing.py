@@ -1,0 +1,145 @@
+"""A swing foot: from where it is to a place that may still change, and softly down."""
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.rotations import log3, turn
+from hsp_control.companions.walking.footsteps import Footstep
+from hsp_control.companions.walking.quintic import Motion, Quintic, at_rest, to_rest
+from hsp_control.trajectories.timing import smooth_step
+
+APPROACH = 0.92
+"""Share of the swing after which the foot is above its place, and only descends."""
+DESCENT = 0.1
+"""How fast a foot descends that has not touched the ground in time [m/s]."""
+_SETTLING = 0.06
+"""How long it takes to reach that speed [s]."""
+
+
+class Swing:
+    """The motion of a foot from take-off to touchdown; C² whatever is redirected.
+
+    It begins at rest where the foot is, turns towards the flat ground, and is at rest
+    again above its place when it is to touch. If the ground is not there, it descends.
+
+    Attributes:
+        start: When it began [s].
+        end: When the foot is to touch the ground [s].
+        target: Where it is to stand.
+    """
+
+    def __init__(
+        self,
+        t: float,
+        duration: float,
+        position: Array,
+        rotation: Array,
+        target: Footstep,
+        goal: Array,
+        height: float,
+        lift: float,
+        descent: float = DESCENT,
+    ) -> None:
+        """Plan the motion.
+
+        Args:
+            t: When it begins [s].
+            duration: How long it takes [s].
+            position: Where the foot's frame is, shape (3,) [m].
+            rotation: Its orientation, shape (3, 3).
+            target: Where the foot is to stand.
+            goal: Its orientation there, flat on the ground, shape (3, 3).
+            height: The height of its frame when it stands [m].
+            lift: How high it is lifted [m].
+            descent: How fast it goes on down without ground [m/s].
+        """
+        self._descent = descent
+        self.start, self.end, self.target = t, t + duration, target
+        self._rotation, self._axis = rotation.copy(), np.zeros(3)
+        log3(goal @ rotation.T, self._axis)  # in world axes
+        self._height, self._top = height, max(float(position[2]), height) + lift
+        along = at_rest([position[0], position[1], 0.0])
+        self._along = to_rest(along, self._there, t, APPROACH * duration)
+        self._up = to_rest(at_rest(position[2:]), [self._top], t, 0.5 * duration)
+        self._down = self._descending(at_rest([self._top]), self._up.end)
+
+    @property
+    def _there(self) -> Array:
+        """Where the foot is to stand, and that it has then turned: x, y, 1."""
+        return np.array([self.target.x, self.target.y, 1.0])
+
+    def _descending(self, now: Motion, t: float) -> Quintic:
+        return to_rest(now, [self._height], t, max(self.end - t, 1e-3))
+
+    def share(self, t: float) -> float:
+        """Return how much of the swing has passed at time t [s]."""
+        return (t - self.start) / (self.end - self.start)
+
+    def redirect(
+        self, t: float, target: Footstep, end: float, *, rises: bool = True
+    ) -> None:
+        """Go on to another place, of the same yaw, and touch at another time.
+
+        Args:
+            t: The present time [s].
+            target: Where the foot is to stand.
+            end: When it is to touch [s].
+            rises: Whether it still rises to its full height, if there is time.
+        """
+        along, vertical = self._along.sample(t), self._vertical(t)
+        self.target, self.end = target, end
+        until = self.start + APPROACH * (end - self.start)
+        self._along = to_rest(along, self._there, t, max(until - t, 0.05))
+        apex = 0.5 * (self.start + end)
+        if rises and apex - t > 0.05 and t < self._up.end:
+            self._up = to_rest(vertical, [self._top], t, apex - t)
+            self._down = self._descending(at_rest([self._top]), self._up.end)
+        else:
+            self._up = Quintic(t, 0.0, np.zeros((6, 1)))  # it is over
+            self._down = self._descending(vertical, t)
+
+    def position(self, t: float) -> Motion:
+        """Return x, x' and x'' of the foot's frame, shape (3,) each."""
+        along, vertical = self._along.sample(t), self._vertical(t)
+        return Motion(
+            *(np.append(a[:2], z) for a, z in zip(along, vertical, strict=True))
+        )
+
+    def accelerations(self, times: Array) -> Array:
+        """Return x'' of the foot's frame at times until touchdown, shape (m, 3)."""
+        up = times < self._up.end
+        vertical = np.where(
+            up[:, None], self._up.accelerations(times), self._down.accelerations(times)
+        )
+        return np.hstack([self._along.accelerations(times)[:, :2], vertical])
+
+    def orientation(self, t: float) -> Motion:
+        """Return R, ω and ω', shapes (3, 3), (3,) and (3,)."""
+        s, s_dot, s_ddot = (float(each[2]) for each in self._along.sample(t))
+        rotation = np.zeros((3, 3))
+        turn(self._rotation, self._axis, s, rotation)
+        return Motion(rotation, s_dot * self._axis, s_ddot * self._axis)
+
+    def _vertical(self, t: float) -> Motion:
+        """Return z, z' and z'', shape (1,) each."""
+        if t < self._up.end:
+            return self._up.sample(t)
+        if t < self._down.end:
+            return self._down.sample(t)
+        s, s_dot, _ = smooth_step(t, self._down.end, _SETTLING)
+        late = t - self._down.end
+        u = min(late / _SETTLING, 1.0)
+        # The integral of the smooth step.
+        fallen = u**4 * (2.5 + u * (u - 3.0)) * _SETTLING + max(late - _SETTLING, 0.0)
+        return Motion(
+            np.array([self._height - self._descent * fallen]),
+            np.array([-self._descent * s]),
+            np.array([-self._descent * s_dot]),
+        )
+
+
+def turned(yaw: float, rotation: Array) -> Array:
+    """Return an orientation that is turned about the vertical by an angle [rad]."""
+    out = np.zeros((3, 3))
+    turn(rotation, np.array([0.0, 0.0, 1.0]), yaw, out)
+    return out

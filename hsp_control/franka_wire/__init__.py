@@ -1,1 +1,0 @@
-"""The research interface of a Franka on the wire, for both of its ends."""

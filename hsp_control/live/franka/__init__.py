@@ -1,6 +1,0 @@
-"""A Franka arm (pylibfranka): ``hsp live CONFIG --robot franka://ADDRESS``."""
-
-from .connecting import connect as connect
-from .hardware import FrankaHardware as FrankaHardware
-from .settings import FrankaSettings as FrankaSettings
-from .settings import Load as Load

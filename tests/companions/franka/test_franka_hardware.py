@@ -1,0 +1,176 @@
+"""A Franka arm as the loop sees it, with a client that answers to order."""
+
+from math import pi
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from hsp_control import Robot
+from hsp_control.common.exceptions import HardwareError
+from hsp_control.companions.franka import (
+    FrankaHardware,
+    FrankaSettings,
+    Load,
+    client,
+    connecting,
+)
+from hsp_control.companions.franka.client_process import ClientProcess
+from hsp_control.live import Hardware, LiveSettings, Measurement
+from hsp_control.live.adapting import AdaptingHardware
+
+Array = NDArray[np.float64]
+APPLIED = np.linspace(-0.6, 0.6, 7)
+
+
+class Answers:
+    """A `ClientProcess` with the given answers.
+
+    Attributes:
+        asked: The letters of the requests.
+        efforts: Those that were sent.
+    """
+
+    def __init__(self) -> None:
+        self.asked = b""
+        self.efforts: list[Array] = []
+        self.waiting = self.late = self.closed = False
+        self.fault: str | None = None
+        self.t = 7.0
+
+    def ask(self, message: bytes) -> None:
+        assert not self.waiting
+        self.waiting = True
+        self.asked += message[:1]
+        if message[:1] in {client.EFFORT, client.FINISH}:
+            self.efforts.append(np.array(client.REQUEST.unpack(message)[1:]))
+
+    def receive(self, timeout: float) -> bytes | None:
+        if self.fault is not None:
+            raise HardwareError(self.fault)
+        if self.late:
+            return None
+        self.waiting = False
+        self.t += 0.001
+        numbers = np.concatenate([np.arange(7.0), np.zeros(7), APPLIED])
+        return client.STATE.pack(b"S", self.t, *numbers.tolist())
+
+    def close(self) -> None:
+        self.closed = True
+
+
+def arm(**settings: float) -> tuple[FrankaHardware, Answers]:
+    answers = Answers()
+    chosen = FrankaSettings("a", **settings)  # type: ignore[arg-type]
+    robot = Robot.load("panda")
+    hardware = FrankaHardware(robot, answers, chosen, np.zeros(7), [])  # type: ignore[arg-type]
+    return hardware, answers
+
+
+def state(hardware: FrankaHardware) -> Measurement:
+    found = hardware.read(0.001)
+    assert found is not None
+    return found
+
+
+def test_control_starts_at_the_second_read_and_time_with_it() -> None:
+    hardware, answers = arm()
+    assert isinstance(hardware, Hardware)
+    assert isinstance(hardware, AdaptingHardware)
+    first, second = state(hardware), state(hardware)
+    hardware.write(np.zeros(7))
+    third = state(hardware)
+    assert answers.asked == b"RSE"
+    assert [m.sequence for m in (first, second, third)] == [0, 0, 1]
+    np.testing.assert_allclose([first.t, second.t, third.t], [0.0, 0.0, 0.001])
+    np.testing.assert_array_equal(third.q, np.arange(7.0))
+    np.testing.assert_array_equal(third.applied, APPLIED)
+    hardware.close()
+    hardware.close()
+    assert answers.asked == b"RSEF"
+    assert answers.closed
+
+
+def test_an_effort_answers_a_state() -> None:
+    """Without a new state the last effort stays, and no effort is sent for it."""
+    hardware, answers = arm()
+    state(hardware)
+    state(hardware)
+    hardware.write(APPLIED)
+    answers.late = True
+    assert hardware.read(0.001) is None
+    hardware.write(2.0 * APPLIED)
+    answers.late = False
+    state(hardware)
+    assert answers.asked == b"RSE"
+    answers.fault = "a reflex"
+    with pytest.raises(HardwareError, match="a reflex"):
+        hardware.read(0.001)
+    assert hardware.fault == "a reflex"
+    hardware.close()
+    assert b"F" not in answers.asked
+
+
+def test_control_that_does_not_start_is_an_error() -> None:
+    hardware, answers = arm()
+    state(hardware)
+    answers.late = True
+    with pytest.raises(HardwareError, match="torque control did not start in 5 s"):
+        hardware.read(0.001)
+
+
+def test_the_filter_is_libfranka_s() -> None:
+    """lowpass_filter.cpp: gain y + (1 - gain) y_last, gain = h / (h + 1 / (2 π f))."""
+    hardware, answers = arm(cutoff_frequency=100.0)
+    state(hardware)
+    state(hardware)
+    effort = APPLIED + 0.5
+    hardware.write(effort)
+    gain = 0.001 / (0.001 + 1.0 / (2.0 * pi * 100.0))
+    wanted = gain * effort + (1.0 - gain) * APPLIED
+    np.testing.assert_allclose(answers.efforts[-1], wanted, rtol=1e-12)
+    unfiltered, answers = arm()
+    state(unfiltered)
+    state(unfiltered)
+    unfiltered.write(effort)
+    np.testing.assert_allclose(answers.efforts[-1], effort, rtol=1e-12)
+
+
+def test_a_first_effort_with_gravity_is_refused() -> None:
+    hardware, answers = arm()
+    state(hardware)
+    state(hardware)
+    robot = Robot.load("panda")
+    gravity = robot.inverse_dynamics(robot.home(), np.zeros(7), np.zeros(7))
+    with pytest.raises(HardwareError, match=r"jumps by 2\d.* N·m; a Franka adds g"):
+        hardware.write(gravity)
+    assert answers.asked == b"RS"
+
+
+def test_the_loop_s_settings_become_the_arm_s() -> None:
+    hardware, _ = arm()
+    adapted = hardware.adapted(LiveSettings(missing=7))
+    assert adapted.compensates_gravity
+    assert adapted.missing == 7
+    robot = Robot.load("panda")
+    np.testing.assert_array_equal(adapted.rate_limits(robot), 999.0)
+    slower = hardware.adapted(LiveSettings(effort_rate=[2000.0] * 6 + [300.0]))
+    np.testing.assert_array_equal(slower.rate_limits(robot), [999.0] * 6 + [300.0])
+
+
+def test_a_load_that_the_robot_did_not_take_is_refused() -> None:
+    load = Load(0.5, center=[0.0, 0.0, 0.1])
+    settings = FrankaSettings("a", load=load)
+    taken = {"mass": 0.5, "center": [0.0, 0.0, 0.1], "inertia": [0.0] * 9}
+    connecting._check_load(settings, taken)
+    for name, other in (("mass", 0.0), ("center", [0.0] * 3), ("inertia", [0.1] * 9)):
+        with pytest.raises(HardwareError, match=f"{name} .* after set_load"):
+            connecting._check_load(settings, taken | {name: other})
+
+
+def test_without_pylibfranka_the_extra_is_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    with pytest.raises(HardwareError, match=r"pip install 'hsp_control\[franka\]'"):
+        ClientProcess()

@@ -1,0 +1,107 @@
+"""What is written behind franka://, and what the arm's errors are told as."""
+
+import tomllib
+from importlib.metadata import EntryPoint
+from pathlib import Path
+
+import numpy as np
+import pytest
+from places import ROOT
+
+from hsp_control.common.exceptions import LiveError
+from hsp_control.companions.franka import FrankaSettings, Load, connect
+from hsp_control.companions.franka.layouts import Error
+from hsp_control.companions.franka.reflexes import MODES, REFLEXES, explained
+from hsp_control.live import backends
+
+pylibfranka = pytest.importorskip("pylibfranka")
+
+
+def test_text_and_file_say_what_python_says(tmp_path: Path) -> None:
+    wanted = FrankaSettings(
+        "172.16.0.2",
+        realtime="ignore",
+        load=Load(0.4, center=[0.0, 0.0, 0.05]),
+        cutoff_frequency=100.0,
+    )
+    text = "?realtime=ignore&load.mass=0.4&load.center=[0, 0, 0.05]"
+    assert FrankaSettings.parse(f"172.16.0.2{text}&cutoff_frequency=100.0") == wanted
+    file = tmp_path / "lab.yaml"
+    file.write_text(
+        "address: 172.16.0.2\nrealtime: enforce\ncutoff_frequency: 100.0\n"
+        "load: {mass: 0.4, center: [0, 0, 0.05]}\n"
+    )
+    assert FrankaSettings.parse(f"{file}?realtime=ignore") == wanted
+    assert FrankaSettings.parse("a?cutoff_frequency=1.0e+2").cutoff_frequency == 100.0
+
+
+@pytest.mark.parametrize(
+    ("text", "match"),
+    [
+        ("a?realtme=ignore", r"franka://a.*unknown key 'realtme'; did you mean 'realt"),
+        ("a?realtime=maybe", "realtime: unknown value 'maybe'"),
+        ("a?recover=3", "recover: "),
+        ("a?realtime=ignore&realtime=enforce", "the option 'realtime' is given twice"),
+        ("a?realtime", "needs options KEY=VALUE"),
+        ("a?load.mass=-1", "load.mass: -1 is negative"),
+        ("a?load.mas=1", r"load.*'mas'; did you mean 'mass'"),
+        ("a?load.mass=1&load.inertia=[[a,0,0],[0,1,0],[0,0,1]]", "load.inertia"),
+        ("a?load=1&load.mass=1", "load is 1, not a mapping"),
+        ("a?collision_torque=[1, 2]", "collision_torque"),
+        ("a?cutoff_frequency=[", "cutoff_frequency=.*flow"),
+        ("?realtime=ignore", "address"),
+        ("no_such_lab.yaml", "no_such_lab.yaml: No such file"),
+    ],
+)
+def test_a_mistake_is_named(text: str, match: str) -> None:
+    with pytest.raises(LiveError, match=match):
+        FrankaSettings.parse(text)
+
+
+def test_a_load_is_a_body() -> None:
+    with pytest.raises(LiveError, match="not symmetric"):
+        Load(1.0, inertia=[[1.0, 0.5, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    with pytest.raises(LiveError, match="add up to the largest"):
+        Load(1.0, inertia=np.diag([1.0, 1.0, 3.0]))
+    Load(1.0, inertia=np.diag([1.0, 1.0, 2.0]))
+
+
+def test_every_error_and_mode_of_libfranka_is_explained() -> None:
+    errors = {name for name in dir(pylibfranka.Errors) if not name.startswith("_")}
+    assert set(REFLEXES) == errors
+    modes = {mode.name for mode in pylibfranka.RobotMode.__members__.values()}
+    assert set(MODES) == modes - {"Idle"}
+
+
+def test_an_exception_is_told_with_its_names() -> None:
+    text = (
+        "libfranka: Move command aborted: motion aborted by reflex! "
+        '["joint_reflex", "power_limit_violation"]\n'
+        "control_command_success_rate: 0.97 packets lost in a row in the last sample: 2"
+    )
+    told = explained("ControlException", text)
+    for part in (
+        "joint_reflex: ",
+        "collision_torque",
+        "power_limit_violation: ",
+        "0.97",
+    ):
+        assert part in told
+    stopped = "libfranka: Move command aborted: User Stop pressed!"
+    assert "stop button was pressed" in explained("ControlException", stopped)
+    other = explained("ValueError", "something new\nand more")
+    assert other == "ValueError: something new; and more"
+
+
+@pytest.mark.parametrize("error", Error, ids=lambda error: error.spelling)
+def test_every_error_is_explained_as_its_message_spells_it(error: Error) -> None:
+    text = f'libfranka: motion aborted by reflex! ["{error.spelling}"]'
+    what = REFLEXES[error.spelling.lower().removesuffix("_flag")][0]
+    assert what in explained("ControlException", text)
+
+
+def test_the_package_offers_the_arm() -> None:
+    with (ROOT / "pyproject.toml").open("rb") as file:
+        points = tomllib.load(file)["project"]["entry-points"]
+    point = EntryPoint("franka", points[backends.GROUP]["franka"], backends.GROUP)
+    assert point.load() is connect

@@ -1,0 +1,390 @@
+"""The box without sockets: modes, gravity, lost commands, reflexes, recovery."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from franka_boxes import home, panda, plant
+
+from hsp_control.common.exceptions import LiveError
+from hsp_control.companions.franka.layouts import (
+    COMMAND,
+    HEADER,
+    PERIOD,
+    REQUESTS,
+    STATE,
+    Command,
+    Controller,
+    Error,
+    MotionGenerator,
+    MoveStatus,
+    RobotMode,
+    Status,
+)
+from hsp_control.companions.franka_box import Box
+from hsp_control.companions.franka_box.requests import Requests
+from hsp_control.simulation.plants import Payload, VelocityNoise
+
+REST = np.zeros(7)
+TORQUE = Controller.EXTERNAL, MotionGenerator.NONE
+
+
+class Talking(Box):
+    """A box whose lines are kept."""
+
+    def __init__(self, simulated: Any = None, q: Any = None) -> None:
+        self.said: list[str] = []
+        start = home() if q is None else q
+        super().__init__(panda(), simulated or plant(), start, self.said.append)
+
+
+def command(**fields: Any) -> Any:
+    record = np.zeros(1, COMMAND)
+    for name, value in fields.items():
+        record[name] = value
+    return record[0]
+
+
+def state(box: Box) -> Any:
+    return np.frombuffer(box.state()[1], STATE)[0]
+
+
+def answers(box: Box) -> list[tuple[Command, int, int]]:
+    """Return command, number and status of the responses, and empty the outbox."""
+    found = []
+    for data in box.outbox:
+        kind, number, size = np.frombuffer(data, HEADER, 1)[0].item()
+        assert size == len(data)
+        found.append((Command(kind), number, data[HEADER.itemsize]))
+    box.outbox.clear()
+    return found
+
+
+def ask(box: Talking, kind: Command, number: int = 5, **fields: Any) -> list[Any]:
+    payload = np.zeros(1, REQUESTS[kind]) if REQUESTS[kind].itemsize else b""
+    for name, value in fields.items():
+        payload[name] = value  # type: ignore[index]
+    data = payload if isinstance(payload, bytes) else payload.tobytes()
+    Requests(box, box.said.append).answer(kind, number, data)
+    return answers(box)
+
+
+def test_without_effort_an_arm_floats_where_it_is() -> None:
+    """Gravity is the box's: an exact model leaves nothing, at any posture."""
+    start = home() + 0.1
+    box = Talking(q=start)
+    box.begin(1, *TORQUE)
+    for _ in range(200):
+        box.step(command())
+    np.testing.assert_allclose(box.q, start, atol=1e-9)
+    assert answers(box) == [(Command.MOVE, 1, MoveStatus.MOTION_STARTED)]
+    told = state(box)
+    assert told["robot_mode"] == RobotMode.MOVE
+    assert told["control_command_success_rate"] == 1.0
+    np.testing.assert_allclose(told["tau_J"], box.model.gravity, rtol=1e-6)
+    np.testing.assert_allclose(told["tau_ext_hat_filtered"], REST, atol=1e-6)
+
+
+def test_a_payload_sinks_unless_its_load_is_set() -> None:
+    sunk = []
+    for mass in (0.0, 2.0):
+        box = Talking(
+            plant(payload=Payload("panda_link8", 2.0, center=[0.0, 0.0, 0.1]))
+        )
+        assert ask(box, Command.SET_LOAD, m_load=mass, F_x_Cload=[0, 0, 0.1]) == [
+            (Command.SET_LOAD, 5, Status.SUCCESS)
+        ]
+        assert state(box)["m_load"] == mass
+        box.begin(1, *TORQUE)
+        for _ in range(100):
+            box.step(command())
+        sunk.append(float(np.abs(box.q - home()).max()))
+    assert sunk[0] > 1e-3
+    assert sunk[1] < 1e-9
+
+
+def test_a_motion_begins_at_the_effort_that_its_client_is_told() -> None:
+    """What holds a payload is the box's effort: a client's rate is taken from zero."""
+    box = Talking(plant(payload=Payload("panda_link8", 2.0)))
+    for _ in range(300):
+        box.step(None)
+    assert np.abs(state(box)["tau_J_d"]).max() > 5.0
+    box.begin(1, *TORQUE)
+    assert not state(box)["tau_J_d"].any()
+    box.step(command(tau_J_d=state(box)["tau_J_d"] + 0.9))
+    assert box.motion is not None
+
+
+def test_the_same_commands_give_the_same_bits() -> None:
+    random = np.random.default_rng(3)
+    efforts = np.cumsum(random.uniform(-0.5, 0.5, (100, 7)), axis=0)
+    states = []
+    for _ in range(2):
+        box = Talking(plant(sensors=[VelocityNoise(1e-3)], seed=7))
+        box.begin(1, *TORQUE)
+        seen = []
+        for effort in efforts:
+            box.step(command(tau_J_d=effort))
+            seen.append(box.state()[1])
+        states.append(seen)
+    assert states[0] == states[1]
+
+
+def test_an_effort_acts_for_one_period() -> None:
+    """After the first step v = h M⁻¹ tau, with the rotors in M, to first order in h."""
+    box, effort = Talking(), np.array([0.9, -0.8, 0.7, -0.6, 0.5, -0.4, 0.3])
+    box.begin(1, *TORQUE)
+    box.step(command(tau_J_d=effort))
+    robot = box.plant.robot
+    gravity = box.arm.robot.inverse_dynamics(home(), REST, REST)
+    expected = robot.forward_dynamics(home(), REST, effort + gravity)
+    np.testing.assert_allclose(box.v, PERIOD * expected, rtol=1e-3)
+    told = state(box)
+    np.testing.assert_allclose(told["tau_J_d"], effort, rtol=1e-6)
+    np.testing.assert_allclose(told["dtau_J"] * PERIOD, effort, atol=1e-3)
+
+
+def test_lost_commands_hold_the_effort_and_the_twentieth_ends_the_motion() -> None:
+    box, effort = Talking(), np.full(7, 0.4)
+    box.begin(1, *TORQUE)
+    for _ in range(50):
+        box.step(None)  # before the first command nothing is lost
+    box.step(command(tau_J_d=effort))
+    for lost in range(1, 20):
+        box.step(None)
+        assert box.motion is not None
+        assert box.motion.lost == lost
+        np.testing.assert_allclose(state(box)["tau_J_d"], effort, rtol=1e-6)
+    answers(box)
+    box.step(None)
+    assert answers(box) == [(Command.MOVE, 1, MoveStatus.REFLEX_ABORTED)]
+    told = state(box)
+    flags = np.flatnonzero(told["errors"]).tolist()
+    assert flags == np.flatnonzero(told["reflex_reason"]).tolist()
+    assert flags == [Error.COMMUNICATION_CONSTRAINTS_VIOLATION]
+    assert told["robot_mode"] == RobotMode.REFLEX
+    assert told["control_command_success_rate"] == 0.0
+
+
+def test_a_reflex_brakes_within_the_published_acceleration() -> None:
+    box = Talking()
+    box.begin(1, *TORQUE)
+    effort = 0.0
+    while box.v[0] < 0.5:
+        effort = min(effort + 0.5, 5.0)
+        box.step(command(tau_J_d=effort * np.eye(7)[0]))
+    speed, start = box.v[0], box.q[0]
+    box.step(command(tau_J_d=[40.0, 0, 0, 0, 0, 0, 0]))
+    assert box.motion is None
+    box.settle()
+    assert np.abs(box.v).max() < 1e-3
+    assert box.q[0] - start == pytest.approx(speed**2 / 20.0, rel=0.2)
+
+
+def test_recovery_answers_when_the_arm_is_back() -> None:
+    box, upper = Talking(), panda().limits.upper[3]
+    box.begin(1, *TORQUE)
+    push = 0.0
+    while box.motion is not None:
+        push = min(push + 0.2, 4.0)
+        box.step(command(tau_J_d=push * np.eye(7)[3] - 5.0 * box.v))
+    assert ask(box, Command.MOVE, controller=2, motion_generator=4)[-1] == (
+        Command.MOVE, 5, MoveStatus.COMMAND_NOT_POSSIBLE_REJECTED
+    )  # fmt: skip
+    assert ask(box, Command.AUTOMATIC_ERROR_RECOVERY, 9) == []
+    assert state(box)["robot_mode"] == RobotMode.AUTOMATIC_ERROR_RECOVERY
+    assert box.q[3] > upper
+    box.settle()
+    assert answers(box) == [(Command.AUTOMATIC_ERROR_RECOVERY, 9, Status.SUCCESS)]
+    assert box.q[3] < upper - 0.005
+    told = state(box)
+    assert told["robot_mode"] == RobotMode.IDLE
+    assert not told["errors"].any()
+    assert told["reflex_reason"].any()  # of the last motion, until the next reflex
+
+
+def test_the_errors_of_the_last_motion_are_those_of_the_last_reflex() -> None:
+    box = Talking()
+    for effort, error in (
+        (np.full(7, 2.0), Error.CONTROLLER_TORQUE_DISCONTINUITY),
+        (None, Error.COMMUNICATION_CONSTRAINTS_VIOLATION),
+    ):
+        box.begin(1, *TORQUE)
+        box.step(command())
+        while box.motion is not None:
+            box.step(None if effort is None else command(tau_J_d=effort))
+        told = state(box)
+        assert np.flatnonzero(told["reflex_reason"]).tolist() == [error]
+        ask(box, Command.AUTOMATIC_ERROR_RECOVERY)
+        box.settle()
+        assert not state(box)["errors"].any()
+
+
+def test_an_arm_that_folds_into_itself_stops() -> None:
+    """Joints 4 and 6 fold the hand towards the base, within their limits."""
+    box = Talking()
+    box.begin(1, Controller.JOINT_IMPEDANCE, MotionGenerator.JOINT_VELOCITY)
+    ramp = 0.0
+    while box.motion is not None and box.periods < 6000:
+        ramp = min(ramp + 0.004, 0.5)
+        box.step(command(dq_c=[0, -ramp, 0, -ramp * 0.6, 0, -ramp, 0]))
+    told = state(box)
+    names = {Error(int(k)) for k in np.flatnonzero(told["errors"])}
+    assert names == {Error.SELF_COLLISION_AVOIDANCE_VIOLATION}, box.said
+
+
+def test_what_a_client_may_not_do_while_the_arm_moves() -> None:
+    box = Talking()
+    box.begin(1, *TORQUE)
+    answers(box)
+    assert ask(box, Command.SET_LOAD, m_load=1.0) == [
+        (Command.SET_LOAD, 5, Status.COMMAND_NOT_POSSIBLE_REJECTED)
+    ]
+    assert ask(box, Command.MOVE, controller=2, motion_generator=4) == [
+        (Command.MOVE, 5, MoveStatus.COMMAND_NOT_POSSIBLE_REJECTED)
+    ]
+    assert ask(box, Command.STOP_MOVE, 8) == [
+        (Command.MOVE, 1, MoveStatus.PREEMPTED),
+        (Command.STOP_MOVE, 8, Status.SUCCESS),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("fields", "served"),
+    [
+        ({"controller": 2, "motion_generator": 4}, True),
+        ({"controller": 2, "motion_generator": 0}, True),
+        ({"controller": 0, "motion_generator": 1}, True),
+        ({"controller": 0, "motion_generator": 2}, True),
+        ({"controller": 1, "motion_generator": 3}, True),
+        ({"controller": 1, "motion_generator": 0}, True),
+        ({"controller": 1, "motion_generator": 4}, False),
+        ({"controller": 0, "motion_generator": 4}, False),
+        ({"controller": 0, "motion_generator": 0, "asynchronous": 1}, False),
+        ({"controller": 77, "motion_generator": 4}, False),
+    ],
+)
+def test_which_motions_are_served(fields: dict[str, int], served: bool) -> None:
+    (answer,) = ask(Talking(), Command.MOVE, **fields)
+    status = (
+        MoveStatus.MOTION_STARTED
+        if served
+        else MoveStatus.COMMAND_NOT_POSSIBLE_REJECTED
+    )
+    assert answer == (Command.MOVE, 5, status)
+
+
+def test_a_hand_does_not_start_in_a_singular_posture() -> None:
+    q = home()
+    q[[1, 3, 5]] = 0.0, -0.0699, np.pi / 2 - 0.07  # the arm is nearly stretched
+    box = Talking(q=q)
+    assert ask(box, Command.MOVE, controller=0, motion_generator=2) == [
+        (Command.MOVE, 5, MoveStatus.START_AT_SINGULAR_POSE_REJECTED)
+    ]
+    (answer,) = ask(box, Command.MOVE, controller=0, motion_generator=0)
+    assert answer[2] == MoveStatus.MOTION_STARTED
+
+
+def test_a_command_that_is_not_finite_ends_the_motion() -> None:
+    box = Talking()
+    box.begin(1, *TORQUE)
+    answers(box)
+    box.step(command(tau_J_d=[np.nan] * 7))
+    assert answers(box) == [(Command.MOVE, 1, MoveStatus.INPUT_ERROR_ABORTED)]
+    assert np.isfinite(box.q).all()
+
+
+@pytest.mark.parametrize(
+    ("kind", "fields"),
+    [
+        (Command.SET_LOAD, {"m_load": np.nan}),
+        (Command.SET_LOAD, {"m_load": 1.0, "I_load": [1, 2, 3, 4, 5, 6, 7, 8, 9]}),
+        (Command.SET_EE_TO_K, {"EE_T_K": np.ones(16)}),
+        (Command.SET_NE_TO_EE, {"NE_T_EE": np.full(16, np.nan)}),
+        (Command.SET_JOINT_IMPEDANCE, {"K_theta": -np.ones(7)}),
+        (Command.SET_CARTESIAN_IMPEDANCE, {"K_x": np.full(6, np.nan)}),
+        (Command.SET_COLLISION_BEHAVIOR, {"lower_force_nominal": np.ones(6)}),
+        (Command.SET_COLLISION_BEHAVIOR, {"upper_torque_nominal": [np.inf] * 7}),
+    ],
+)
+def test_invalid_arguments_are_refused(kind: Command, fields: dict[str, Any]) -> None:
+    box = Talking()
+    assert ask(box, kind, **fields) == [(kind, 5, Status.INVALID_ARGUMENT_REJECTED)]
+    (line,) = box.said
+    assert line.startswith("refused: set ")
+
+
+def test_contacts_and_collisions_follow_the_thresholds() -> None:
+    box = Talking(plant(payload=Payload("panda_tcp", 3.0)))
+    ask(
+        box,
+        Command.SET_COLLISION_BEHAVIOR,
+        lower_torque_nominal=np.full(7, 3.0),
+        upper_torque_nominal=np.full(7, 9.0),
+        upper_force_nominal=np.full(6, 100.0),
+    )
+    box.begin(1, Controller.JOINT_IMPEDANCE, MotionGenerator.JOINT_POSITION)
+    while box.motion is not None and box.periods < 1000:
+        box.step(command(q_c=box.motion.reference.q))  # type: ignore[union-attr]
+    told = state(box)
+    names = {Error(int(k)) for k in np.flatnonzero(told["errors"])}
+    assert names == {Error.JOINT_REFLEX}
+    over = np.abs(told["tau_ext_hat_filtered"])
+    np.testing.assert_array_equal(told["joint_contact"], over > 3.0)
+    assert told["joint_collision"].any()
+
+
+@pytest.mark.parametrize(
+    ("controller", "kind", "stiffness"),
+    [
+        (Controller.JOINT_IMPEDANCE, Command.SET_JOINT_IMPEDANCE, [200.0] * 7),
+        (
+            Controller.CARTESIAN_IMPEDANCE,
+            Command.SET_CARTESIAN_IMPEDANCE,
+            [500.0, 500.0, 500.0, 300.0, 300.0, 300.0],
+        ),
+    ],
+)
+def test_an_unknown_payload_stretches_the_springs_that_are_set(
+    controller: Controller, kind: Command, stiffness: list[float]
+) -> None:
+    """At rest the joints yield by tau / K, or the hand by its weight over K."""
+    box = Talking(plant(payload=Payload("panda_tcp", 1.0)))
+    field = "K_theta" if kind is Command.SET_JOINT_IMPEDANCE else "K_x"
+    assert ask(box, kind, **{field: stiffness})[0][2] == Status.SUCCESS
+    before = box.model.O_T_EE
+    box.begin(1, controller, MotionGenerator.JOINT_POSITION)
+    for _ in range(2500):
+        box.step(command(q_c=home()))
+    assert np.abs(box.v).max() < 5e-3
+    if field == "K_theta":
+        weight = box.plant.robot.inverse_dynamics(box.q, REST, REST)
+        yielded = (weight - box.model.gravity) / stiffness
+        np.testing.assert_allclose(home() - box.q, yielded, rtol=0.1, atol=1e-3)
+    else:
+        sunk = before.translation[2] - box.model.O_T_EE.translation[2]
+        assert sunk == pytest.approx(9.81 / 500.0, rel=0.1)
+
+
+def test_a_client_is_told_the_pose_that_it_commands() -> None:
+    box = Talking()
+    box.begin(1, Controller.JOINT_IMPEDANCE, MotionGenerator.CARTESIAN_VELOCITY)
+    twist = 2e-4 * np.array([1, 0, 2, 0, 1, 0])
+    start = box.model.O_T_EE.translation.copy()
+    for step in range(1, 4):
+        box.step(command(O_dP_EE_c=step * twist))
+    told = state(box)
+    moved = told["O_T_EE_c"].reshape(4, 4).T[:3, 3] - start
+    np.testing.assert_allclose(moved, 6 * PERIOD * twist[:3], atol=1e-7)
+    assert box.motion is not None
+    np.testing.assert_allclose(told["O_dP_EE_c"], 3 * twist, rtol=1e-6)
+    np.testing.assert_allclose(told["O_ddP_EE_c"], twist / PERIOD, rtol=1e-6)
+
+
+def test_a_start_beyond_a_limit_is_refused() -> None:
+    q = home()
+    q[3] = 0.0
+    with pytest.raises(
+        LiveError, match=r"the start is not allowed: .*joint 4 at 0 rad"
+    ):
+        Talking(q=q)

@@ -1,0 +1,192 @@
+"""Motion generators of the hand: the joints follow it, and its limits are watched."""
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from franka_boxes import home, panda
+
+from hsp_control.companions.franka.layouts import COMMAND, PERIOD, Error
+from hsp_control.companions.franka_box import hand, reference, reflexes
+from hsp_control.companions.franka_box.generators import (
+    Generator,
+    HandPoses,
+    HandTwists,
+    JointPositions,
+)
+from hsp_control.companions.franka_box.model import Model
+
+STEPS = 1500
+
+
+def made(kind: type[Any]) -> tuple[Any, Model]:
+    model, start = Model(panda()), reference.at_rest(home())
+    arguments = [start, panda().limits]
+    return kind(*arguments, *([model] if issubclass(kind, HandPoses) else [])), model
+
+
+def command(**fields: Any) -> Any:
+    record = np.zeros(1, COMMAND)
+    for name, value in fields.items():
+        record[name] = value
+    return record[0]
+
+
+def columns(pose: pin.SE3) -> Any:
+    return pose.homogeneous.T.ravel()
+
+
+def follow(generator: Generator, told: Any, *, first: bool = False) -> list[Error]:
+    return [v.error for v in generator.follow(told, first=first)]
+
+
+def way(step: int) -> tuple[Any, Any]:
+    """Return displacement and twist of a smooth way out and back, in base's axes."""
+    t = 2.0 * np.pi * step / STEPS
+    most = np.array([0.05, -0.04, 0.06, 0.1, -0.1, 0.2]) / 2.0
+    speed = 2.0 * np.pi / (STEPS * PERIOD)
+    return most * (1.0 - np.cos(t)), most * speed * np.sin(t)
+
+
+def test_joints_follow_the_hand_to_its_pose() -> None:
+    generator, model = made(HandPoses)
+    start = model.hand_at(home())[0]
+    for step in range(STEPS + 1):
+        moved, _ = way(step)
+        pose = pin.SE3(
+            pin.exp3(moved[3:]) @ start.rotation, start.translation + moved[:3]
+        )
+        told = command(O_T_EE_c=columns(pose))
+        assert follow(generator, told, first=step == 0) == []
+        at, J = model.hand_at(generator.reference.q)
+        assert np.abs(hand.displacement(pose, at)).max() < 1e-5
+        np.testing.assert_allclose(
+            J @ generator.reference.dq, generator.hand.twist, atol=2e-3
+        )
+
+
+def test_joints_follow_the_twist_of_the_hand() -> None:
+    """What is integrated comes back where the twist's integral is zero."""
+    generator, model = made(HandTwists)
+    start = model.hand_at(home())[0]
+    for step in range(STEPS + 1):
+        assert follow(generator, command(O_dP_EE_c=way(step)[1])) == []
+        at, _ = model.hand_at(generator.reference.q)
+        assert np.abs(hand.displacement(generator.hand.pose, at)).max() < 1e-5
+    np.testing.assert_allclose(
+        generator.hand.pose.homogeneous, start.homogeneous, atol=1e-4
+    )
+
+
+def test_an_elbow_that_is_commanded_is_reached_by_a_hand_that_stays() -> None:
+    generator, model = made(HandPoses)
+    start = model.hand_at(home())[0]
+    for step in range(STEPS + 1):
+        elbow = 0.2 * (1.0 - np.cos(np.pi * step / STEPS)) / 2.0
+        told = command(O_T_EE_c=columns(start), valid_elbow=1, elbow_c=[elbow, -1.0])
+        assert follow(generator, told, first=step == 0) == []
+        assert generator.reference.q[2] == pytest.approx(elbow, abs=1e-5)
+    at, _ = model.hand_at(generator.reference.q)
+    assert np.abs(hand.displacement(start, at)).max() < 1e-5
+
+
+@pytest.mark.parametrize(
+    ("first", "elbow", "error"),
+    [
+        (True, [0.0, 1.0], Error.CARTESIAN_MOTION_GENERATOR_ELBOW_SIGN_INCONSISTENT),
+        (True, [0.1, -1.0], Error.CARTESIAN_MOTION_GENERATOR_START_ELBOW_INVALID),
+        (False, [0.1, -1.0], Error.CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION),
+    ],
+)
+def test_an_elbow_elsewhere_is_refused(first: bool, elbow: Any, error: Error) -> None:
+    generator, model = made(HandPoses)
+    pose = columns(model.hand_at(home())[0])
+    told = command(O_T_EE_c=pose, valid_elbow=1, elbow_c=elbow)
+    assert follow(generator, told, first=first)[0] is error
+
+
+def test_each_limit_of_a_commanded_hand_is_watched() -> None:
+    still = hand.at_rest(panda().nominal_end_effector)
+    too_fast, acceleration, jerk = (
+        Error.CARTESIAN_MOTION_GENERATOR_VELOCITY_LIMITS_VIOLATION,
+        Error.CARTESIAN_MOTION_GENERATOR_VELOCITY_DISCONTINUITY,
+        Error.CARTESIAN_MOTION_GENERATOR_ACCELERATION_DISCONTINUITY,
+    )
+    directions = np.array([[0.6, 0, 0.8, 0, 0, 0], [0, 0, 0, 0, 0.6, -0.8]])
+    for k, direction in enumerate(directions):
+        jerky = reflexes.HAND_JERK[k] * PERIOD**2
+        sudden = reflexes.HAND_ACCELERATION[k] * PERIOD
+        for speed, found in (
+            (0.99 * jerky, []),
+            (1.01 * jerky, [jerk]),
+            (1.01 * sudden, [acceleration, jerk]),
+            (1.01 * reflexes.HAND_VELOCITY[k], [too_fast, acceleration, jerk]),
+        ):
+            new = hand.to_twist(speed * direction, still)
+            violations = list(reflexes.commanded_hand(new, still))
+            assert [v.error for v in violations] == found
+            name = ("translation", "rotation")[k]
+            assert all(v.reason.startswith(name) for v in violations)
+
+
+def test_joints_that_cannot_follow_the_hand_are_told_apart() -> None:
+    """About the tool's axis the hand may jerk faster than joint 7 that turns it."""
+    generator, model = made(HandTwists)
+    axis = model.hand_at(home())[0].rotation[:, 2]
+    jerky = 0.9 * reflexes.HAND_JERK[1] * PERIOD**2
+    assert follow(generator, command(O_dP_EE_c=[0, 0, 0, *(jerky * axis)])) == [
+        Error.CARTESIAN_MOTION_GENERATOR_JOINT_ACCELERATION_DISCONTINUITY
+    ]
+
+
+def test_a_hand_starts_where_it_is_and_its_pose_is_one() -> None:
+    near, far = np.zeros(6), np.zeros(6)
+    near[0], far[0] = 2.9e-3, 3.1e-3
+    for moved, found in (
+        (near, []),
+        (far, [Error.CARTESIAN_POSITION_MOTION_GENERATOR_START_POSE_INVALID]),
+    ):
+        generator, model = made(HandPoses)
+        start = model.hand_at(home())[0]
+        pose = pin.SE3(start.rotation, start.translation + moved[:3])
+        assert follow(generator, command(O_T_EE_c=columns(pose)), first=True) == found
+    generator, _ = made(HandPoses)
+    assert follow(generator, command(O_T_EE_c=np.ones(16))) == [
+        Error.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME_FLAG
+    ]
+
+
+def test_a_twist_is_that_of_the_poses_it_makes() -> None:
+    """In the base's axes, however the hand is turned."""
+    pose = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.8, 1.2), np.array([0.3, 0.1, 0.5]))
+    before, twist = hand.at_rest(pose), np.array([0.1, -0.2, 0.3, 0.5, -0.4, 0.3])
+    made = hand.to_twist(twist, before)
+    np.testing.assert_allclose(hand.to_pose(made.pose, before).twist, twist, atol=1e-9)
+
+
+def test_a_lost_command_keeps_the_acceleration_of_the_hand() -> None:
+    """Of a constant angular acceleration about one axis, and a straight line."""
+    a = np.array([0.4, 0.0, 0.2, 0.0, 0.0, 0.8])
+    motion = hand.at_rest(pin.SE3.Identity())
+    for k in range(1, 6):
+        motion = hand.to_twist(k * PERIOD * a, motion)
+    exact, mine = hand.to_twist(6 * PERIOD * a, motion), hand.extrapolated(motion)
+    assert np.abs(hand.displacement(mine.pose, exact.pose)).max() < 1e-12
+    np.testing.assert_allclose(mine.twist, exact.twist, atol=1e-12)
+    generator, model = made(HandTwists)
+    generator.hand = hand.HandMotion(
+        model.hand_at(home())[0], np.zeros(6), np.array([1.0, 0, 0, 0, 0, 0])
+    )
+    generator.extrapolate()
+    at, _ = model.hand_at(generator.reference.q)
+    assert at.translation[0] > model.hand_at(home())[0].translation[0]
+
+
+def test_the_first_position_is_the_start() -> None:
+    """A client may begin at the measured position: noise is no jerk."""
+    generator, _ = made(JointPositions)
+    noisy = home() + 1e-4 * np.array([1, -1, 1, -1, 1, -1, 1])
+    assert follow(generator, command(q_c=noisy), first=True) == []
+    assert follow(generator, command(q_c=noisy)) == []
+    assert not generator.reference.ddq.any()

@@ -1,0 +1,117 @@
+"""The box's page says what is there, and its log what has happened."""
+
+import inspect
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from franka_boxes import home, panda, plant
+
+from hsp_control import Rollout, load_experiment
+from hsp_control.cli.main import main
+from hsp_control.cli.options.command_line import command_line
+from hsp_control.common.exceptions import LogError
+from hsp_control.companions.franka.layouts import (
+    COMMAND,
+    PERIOD,
+    Controller,
+    Error,
+    MotionGenerator,
+)
+from hsp_control.companions.franka_box import Arm, Box, generators, reflexes
+from hsp_control.companions.franka_box.log import BoxLog
+from hsp_control.live.simulated_robot import sampled
+
+PAGE = (Path(__file__).parents[3] / "docs" / "franka_box.md").read_text("utf-8")
+
+
+def test_the_errors_of_the_page_are_those_that_the_box_has() -> None:
+    modules = [inspect.getsource(module) for module in (reflexes, generators)]
+    raised = set(re.findall(r"\bError\.([A-Z_0-9]+)", "".join(modules)))
+    _, table = PAGE.split("## Reflexes")
+    rows = [row.split("|")[1] for row in table.splitlines() if row.startswith("| `")]
+    told = [name for row in rows for name in re.findall(r"`(\w+)`", row)]
+    assert sorted(told) == sorted(Error[name].spelling for name in raised)
+
+
+def test_the_options_of_the_page_exist() -> None:
+    values = {"ADDRESS": "127.0.0.2", "FILE": "x.npz", "KEY=VALUE": "a=1"}
+    for option, _, value in re.findall(r"^\| `(--[a-z]+)( (\S+))?` \|", PAGE, re.M):
+        given = [values.get(value, "1")] if value else []
+        assert command_line().parse_args(["franka-box", option, *given])
+
+
+def test_the_plant_of_the_page_is_one() -> None:
+    (text,) = re.findall(r"```yaml\n(.*?)```", PAGE, re.S)
+    experiment = load_experiment(yaml.safe_load(text))
+    simulated = sampled(experiment.plant, experiment.integrator, PERIOD)
+    box = Box(Arm(experiment.robot), simulated, experiment.q0, print)
+    for _ in range(5):
+        box.step(None)
+    assert np.isfinite(box.q).all()
+
+
+def test_the_log_has_the_true_motion(tmp_path: Path) -> None:
+    experiment = load_experiment(
+        {"robot": {"name": "panda"}, "tasks": {"hand": {"type": "frame_pose"}}}
+    )
+    box, seen = Box(panda(), plant(), home(), print), []
+    with BoxLog(tmp_path / "run.npz", experiment, box) as log:
+        log_row = box.on_period
+        box.on_period = lambda: (seen.append((box.t, box.q)), log_row())
+        box.step(None)
+        box.begin(1, Controller.EXTERNAL, MotionGenerator.NONE)
+        command = np.zeros(1, COMMAND)
+        for step in range(100):
+            command["tau_J_d"] = 0.01 * step
+            box.step(command[0])
+    run = Rollout.load(log.path)
+    true = dict(seen)
+    assert len(run["t"]) == 11
+    for t, q in zip(run["t"], run["q"], strict=True):
+        assert true[t].tolist() == q.tolist()
+    assert set(run["box.mode"].tolist()) == {2.0}
+    assert not log.path.with_suffix(".journal").exists()
+    assert run.status == "completed"
+    with pytest.raises(OSError, match="no line"), BoxLog(log.path, experiment, box):
+        raise OSError("no line")
+    torn = Rollout.load(log.path)
+    assert (torn.status, torn.meta["message"]) == ("stopped", "no line")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["planar3r"], "planar3r has the joints"),
+        (["panda", "--host", "10.1.1.1"], "listens on loopback only"),
+        (["panda", "--deadline", "0"], "deadline 0 µs; must be above 0"),
+        (["panda", "--priority", "100"], "real-time priority 100"),
+        (["panda", "--set", "start.velocity=[1, 0, 0, 0, 0, 0, 0]"], "at rest"),
+    ],
+)
+def test_a_mistake_is_one_line(
+    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["franka-box", *arguments]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("hsp: ")
+    assert said in line
+
+
+def test_strict_reading_expands_no_xacro_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "arm.urdf.xacro").write_text("<robot/>")
+    assert main(["franka-box", str(tmp_path / "arm.urdf.xacro"), "--strict"]) == 2
+    assert "strict reading allows no xacro file" in capsys.readouterr().err
+
+
+def test_a_log_has_the_name_of_one(tmp_path: Path) -> None:
+    box = Box(panda(), plant(), home(), print)
+    experiment = load_experiment(
+        {"robot": {"name": "panda"}, "tasks": {"hand": {"type": "frame_pose"}}}
+    )
+    with pytest.raises(LogError, match=r"the name of a log ends in \.npz"):
+        BoxLog(tmp_path / "run.csv", experiment, box)

@@ -1,0 +1,135 @@
+"""The layouts of the protocol, and the arm as clients are told it."""
+
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from franka_boxes import panda
+
+from hsp_control import Robot
+from hsp_control.common.exceptions import LiveError
+from hsp_control.companions.franka.layouts import (
+    COMMAND,
+    HEADER,
+    REQUESTS,
+    STATE,
+    Command,
+)
+from hsp_control.companions.franka_box.arm import Arm, ArmLimits
+
+FR3_URDF_LIMITS = {
+    "lower": [-2.7501, -1.7918, -2.9065, -3.0481, -2.8101, 0.54092, -3.01960],
+    "upper": [2.7501, 1.7918, 2.9065, -0.1458, 2.8101, 4.52050, 3.01960],
+    "velocity": [2.62, 2.62, 2.62, 2.62, 5.26, 4.18, 5.26],
+    "effort": [87, 87, 87, 87, 12, 12, 12],
+    "velocity_offset": [0.30, 0.20, 0.20, 0.30, 0.35, 0.35, 0.35],
+    "deceleration": [6.0, 2.585, 3.5, 4.0, 17.0, 5.5, 17.0],
+}
+
+
+def test_the_layouts_have_the_sizes_of_the_packed_structures() -> None:
+    """As a C++ compiler gives them for libfranka-common's headers."""
+    sizes = {command: layout.itemsize for command, layout in REQUESTS.items()}
+    assert (HEADER.itemsize, STATE.itemsize, COMMAND.itemsize) == (12, 1377, 371)
+    assert sizes == {
+        Command.CONNECT: 4,
+        Command.MOVE: 113,
+        Command.STOP_MOVE: 0,
+        Command.SET_COLLISION_BEHAVIOR: 416,
+        Command.SET_JOINT_IMPEDANCE: 56,
+        Command.SET_CARTESIAN_IMPEDANCE: 48,
+        Command.SET_GUIDING_MODE: 7,
+        Command.SET_EE_TO_K: 128,
+        Command.SET_NE_TO_EE: 128,
+        Command.SET_LOAD: 104,
+        Command.AUTOMATIC_ERROR_RECOVERY: 0,
+        Command.GET_ROBOT_MODEL: 0,
+    }
+
+
+@pytest.mark.parametrize("name", ["panda", "iiwa14"])
+def test_what_clients_are_told_has_the_same_dynamics(name: str) -> None:
+    robot = Robot.load(name)
+    arm = Arm(robot)
+    told = pin.buildModelFromXML(arm.urdf)
+    told.inertias[7] += arm.flange.act(arm.end_effector)
+    random = np.random.default_rng(1)
+    for _ in range(20):
+        q, v, a = random.normal(size=(3, 7))
+        np.testing.assert_allclose(
+            pin.rnea(told, told.createData(), q, v, a),
+            robot.inverse_dynamics(q, v, a),
+            atol=1e-12,
+        )
+    for mine, theirs in (
+        (told.lowerPositionLimit, robot.model.lowerPositionLimit),
+        (told.upperPositionLimit, robot.model.upperPositionLimit),
+        (told.upperVelocityLimit, robot.model.upperVelocityLimit),
+        (told.upperEffortLimit, robot.model.upperEffortLimit),
+    ):
+        assert mine.tolist() == theirs.tolist()
+
+
+def test_the_end_effector_is_what_the_flange_carries() -> None:
+    arm = panda()
+    assert arm.end_effector.mass == pytest.approx(0.73 + 2 * 0.015)
+    assert arm.nominal_end_effector.translation == pytest.approx([0, 0, 0.1034])
+    assert arm.flange.translation == pytest.approx([0, 0, 0.107])
+
+
+def test_a_load_is_one_more_body() -> None:
+    arm = panda()
+    load = pin.Inertia(2.0, np.array([0.0, 0.1, 0.2]), np.eye(3))
+    carrying, rest = arm.carrying(load), np.zeros(7)
+    q = arm.robot.home() + 0.3  # the hand does not hang straight down
+    state = arm.robot.state(0.0, q, rest)
+    flange = state.frame("panda_link8")
+    lever = flange.rotation @ load.lever
+    point = flange.jacobian[:3] + np.cross(flange.jacobian[3:].T, lever).T
+    more = carrying.inverse_dynamics(q, rest, rest)
+    less = arm.robot.inverse_dynamics(q, rest, rest)
+    np.testing.assert_allclose(more - less, point.T @ [0, 0, 2 * 9.81], atol=1e-12)
+
+
+def test_velocity_limits_are_those_that_libfranka_computes() -> None:
+    """``computeUpperLimitsJointVelocity`` of libfranka 0.21, without its tolerance."""
+    limits = ArmLimits(**{k: np.array(x, float) for k, x in FR3_URDF_LIMITS.items()})
+    doubled = [12.0, 5.17, 7.0, 8.0, 34.0, 11.0, 34.0]
+    for share in (0.02, 0.3, 0.7, 0.999, 1.1):
+        q = limits.lower + share * (limits.upper - limits.lower)
+        lowest, highest = limits.velocities(q)
+        for k in range(7):
+            offset, most = limits.velocity_offset[k], limits.velocity[k]
+            up, down = (
+                min(most, max(0.0, -offset + np.sqrt(max(0.0, doubled[k] * room))))
+                for room in (limits.upper[k] - q[k], q[k] - limits.lower[k])
+            )
+            assert (highest[k], lowest[k]) == pytest.approx((up, -down))
+
+
+def test_velocity_limits_are_read_beside_transmissions(tmp_path: Path) -> None:
+    """A URDF names its joints again where it says what drives them."""
+    urdf, arm = panda().robot.source.urdf.read_text(), tmp_path / "arm.urdf"
+    slower = '<position_based_velocity_limits velocity_offset="0.3"/>'
+    driven = '<transmission name="t"><joint name="panda_joint3"/></transmission>'
+    joint = '<joint name="panda_joint3" type="revolute">'
+    assert joint in urdf
+    urdf = urdf.replace(joint, joint + slower)
+    arm.write_text(urdf.replace("</robot>", f"{driven}</robot>"))
+    found = Arm(Robot.load(arm, locked={"panda_finger_joint1": 0.0})).limits
+    assert found.velocity_offset.tolist() == [0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 0.0]
+
+
+def test_velocity_limits_without_a_position_stay() -> None:
+    limits = panda().limits
+    lowest, highest = limits.velocities(limits.upper + 0.1)
+    assert highest.tolist() == limits.velocity.tolist() == (-lowest).tolist()
+
+
+def test_other_robots_are_refused_by_name() -> None:
+    with pytest.raises(LiveError, match=r"planar3r has the joints .* seven revolute"):
+        Arm(Robot.load("planar3r"))
+    unlocked = Robot.load("panda", locked={})
+    with pytest.raises(LiveError, match=r"finger_joint.*lock the others"):
+        Arm(unlocked)

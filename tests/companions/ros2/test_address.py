@@ -1,0 +1,44 @@
+"""Addresses of topics: what is not said has ROS 2's default, what is wrong is named."""
+
+import pytest
+
+from hsp_control.common.exceptions import HardwareError
+from hsp_control.companions.ros2.address import parse
+
+
+def test_an_address_has_a_name_a_domain_and_options() -> None:
+    found = parse("ros2://left/eff?states=/js&domain=7", ("states", "joints"))
+    assert found == ("/left/eff", 7, {"states": "/js"})
+    assert parse("/left/eff").name == "/left/eff"
+
+
+def test_the_domain_is_that_of_ros(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
+    assert parse("a").domain == 0
+    monkeypatch.setenv("ROS_DOMAIN_ID", "12")
+    assert parse("a").domain == 12
+    assert parse("a?domain=3").domain == 3
+    monkeypatch.setenv("ROS_DOMAIN_ID", "x")
+    with pytest.raises(
+        HardwareError, match=r"^ROS_DOMAIN_ID: the domain is 'x'; needs"
+    ):
+        parse("a")
+
+
+@pytest.mark.parametrize(
+    ("address", "message"),
+    [
+        ("", r"'' is no name of ROS 2; needs letters"),
+        ("a//b", r"'a//b' is no name of ROS 2"),
+        ("1a", r"'1a' is no name of ROS 2"),
+        ("ä", r"'ä' is no name of ROS 2"),
+        ("a?domain", r"ros2://a\?domain: needs options KEY=VALUE&\.\.\."),
+        ("a?domain=233", r"the domain is '233'; needs 0 to 232"),
+        ("a?domain=-1", r"the domain is '-1'"),
+        ("a?state=/b", r"there is no option 'state'; did you mean 'states'\? \(known"),
+        ("a?states=/b&states=/c", r"the option 'states' is given twice"),
+    ],
+)
+def test_what_is_wrong_is_named(address: str, message: str) -> None:
+    with pytest.raises(HardwareError, match=message):
+        parse(address, ("states",))

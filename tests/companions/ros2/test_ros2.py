@@ -1,0 +1,165 @@
+"""A plain client of DDS in another process drives, watches and is driven.
+
+The client (`dds_client`) imports Cyclone DDS only. Both sides run in lockstep.
+"""
+
+import json
+import signal
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from live_rigs import PERIOD, law, panda, start
+from live_rigs import watched as watched_robot
+from ros2_rigs import DOMAIN, client, fresh
+
+from hsp_control import load_experiment
+from hsp_control.cli import ros2_robot
+from hsp_control.cli.live_experiment import simulated_robot
+from hsp_control.companions.ros2.hardware import Ros2Hardware
+from hsp_control.companions.ros2.watch import Watched
+from hsp_control.control.compensation import Command
+from hsp_control.live import InProcessRobot, LiveSettings, Measurement, run_loop
+
+pytestmark = pytest.mark.process
+
+LONG = 120.0
+COUNT = 200
+SETTINGS = ["live.watchdog=100000", "live.compensates_gravity=true"]
+
+
+@pytest.fixture(autouse=True)
+def signals() -> Iterator[None]:
+    before = [signal.getsignal(kind) for kind in (signal.SIGINT, signal.SIGTERM)]
+    yield
+    for kind, handler in zip((signal.SIGINT, signal.SIGTERM), before, strict=True):
+        signal.signal(kind, handler)
+
+
+def test_a_client_drives_the_simulated_robot(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    controller, states, address = fresh()
+    backwards = ",".join(panda().dof_names[::-1])
+    said = tmp_path / "said.json"
+    with client(said, "drive", DOMAIN, controller, states, COUNT):
+        arguments = ["panda_obstacle", f"ros2://{address}&joints={backwards}"]
+        arguments += [word for each in SETTINGS for word in ("--set", each)]
+        assert ros2_robot.main([*arguments, "--lockstep"]) == 0
+    printed = capsys.readouterr().out
+    assert f"{states}, {controller}/commands: ready" in printed
+    assert "The robot: the loop closed the connection" in printed
+    log = json.loads(said.read_text())
+    twin = simulated_robot(load_experiment("panda_obstacle", *SETTINGS))
+    reached = [np.concatenate([*twin.measure(), twin.tau])]
+    for _, _, _, _, tau in log:
+        twin.advance([np.array(tau)])
+        reached.append(np.concatenate([*twin.measure(), twin.tau]))
+    last = 0
+    for names, q, v, effort, _ in log:
+        assert names == list(panda().dof_names)
+        heard = np.concatenate([q, v, effort])
+        # The client may hear a state twice more before its first effort arrives.
+        last = next(
+            k for k in range(last, len(reached)) if np.array_equal(reached[k], heard)
+        )
+    assert last > COUNT - 20
+    assert np.abs(reached[last][7:14]).max() > 0.01  # it moved
+
+
+class Recording:
+    """Hardware that waits for as long as the robot lives, and remembers."""
+
+    period = PERIOD
+
+    def __init__(self, hardware: Ros2Hardware, robot: subprocess.Popen[bytes]) -> None:
+        self._hardware, self._robot = hardware, robot
+        self.heard: list[Measurement] = []
+        self.sent: list[list[float]] = []
+
+    def read(self, timeout: float) -> Measurement | None:
+        found = self._hardware.read(0.0)
+        while found is None and self._robot.poll() is None:
+            found = self._hardware.read(0.1)
+        if found is not None:
+            self.heard.append(found)
+        return found
+
+    def write(self, effort: np.ndarray) -> None:
+        self.sent.append(effort.tolist())
+        self._hardware.write(effort)
+
+    def close(self) -> None:
+        self._hardware.close()
+
+
+def test_the_loop_drives_a_client_that_is_a_robot(tmp_path: Path) -> None:
+    controller, states, address = fresh()
+    joints = [
+        f"{n}={q!r}" for n, q in zip(panda().dof_names, start().tolist(), strict=True)
+    ]
+    said = tmp_path / "said.json"
+    with client(said, "robot", DOMAIN, controller, states, COUNT, *joints) as robot:
+        with pytest.warns(RuntimeWarning, match="are ignored: gripper"):
+            connected = Ros2Hardware(address, panda(), PERIOD, timeout=LONG)
+        hardware = Recording(connected, robot)
+        settings = LiveSettings(age=1e9, missing=200, prediction_time=0.003)
+        report = run_loop(law(), hardware, settings=settings)  # type: ignore[arg-type]
+    log: list[Any] = json.loads(said.read_text())
+    assert len(log) == COUNT
+    # It had no more states at the end: the loop noticed, and stopped.
+    assert report.ended == "fault"
+    assert report.reason in {
+        "no new state for 201 periods",
+        f"the effort cannot be sent: nobody listens to {controller}/commands any more",
+    }
+    efforts = [tau for _, _, _, tau in log]
+    assert efforts == hardware.sent[:COUNT]
+    told = {tuple(q + v) for _, q, v, _ in log}
+    heard = [(*m.q.tolist(), *m.v.tolist()) for m in hardware.heard]
+    assert len(set(heard) - told) == 0
+    assert len(set(heard)) > COUNT // 4  # a busy machine loses some
+    periods = np.array([m.t for m in hardware.heard]) / PERIOD
+    assert np.allclose(periods, periods.round(), atol=1e-9, rtol=0.0)
+    assert (np.diff(periods) > 0.5).all()
+
+
+def test_mistakes_at_the_command_line_are_one_line(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert ros2_robot.main(["panda_obstacle", "ros2://eff?domains=1"]) == 2
+    assert capsys.readouterr().err == (
+        "hsp: ros2://eff?domains=1: there is no option 'domains'; did you mean "
+        "'domain'? (known: domain, states, joints)\n"
+    )
+
+
+@pytest.mark.smoke
+def test_a_client_watches_a_loop(tmp_path: Path) -> None:
+    prefix, _, _ = fresh()
+    command, seen = Command(law()), []
+    watched = Watched(f"{prefix}?domain={DOMAIN}&rate=1000", command)
+    said = tmp_path / "said.json"
+    with client(said, "watch", DOMAIN, f"{prefix}/tip/actual", 5) as watcher:
+        poses = watched._poses[f"{prefix}/tip/actual"]
+        while poses.matched == 0 and watcher.poll() is None:
+            pass
+
+        def publish(t: float) -> None:
+            seen.append(command.state.position("panda_tcp").tolist())
+            watched(t)
+
+        report = run_loop(
+            command, InProcessRobot(watched_robot()), duration=0.2, on_period=publish
+        )
+    assert report.ended == "completed"
+    poses_heard = json.loads(said.read_text())
+    assert len(poses_heard) == 5
+    for frame, stamp, *numbers in poses_heard:
+        assert frame == "panda_link0"
+        assert stamp > 1e9
+        assert numbers[:3] in seen
+        assert numbers[3:] == [0.0, 0.0, 0.0, 1.0]

@@ -1,0 +1,334 @@
+"""A robot on topics: joints by name, states by stamp, and everything wrong is named."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+from live_rigs import PERIOD, law, panda, start
+from robot_cases import load
+from ros2_rigs import DOMAIN, MILLISECOND, Broadcaster, fresh, joint_state
+
+from hsp_control.common.exceptions import HardwareError
+from hsp_control.companions.ros2 import connect
+from hsp_control.companions.ros2.hardware import Ros2Hardware
+from hsp_control.companions.ros2.joints import Joints
+from hsp_control.companions.ros2.messages import Float64MultiArray
+from hsp_control.companions.ros2.node import Node, Subscription
+from hsp_control.companions.ros2.stamps import Stamps
+from hsp_control.live import Hardware, LiveSettings, run_loop
+
+NAMES = panda().dof_names
+LONG = 30.0
+
+
+class Rig:
+    """A robot that publishes states and hears efforts, and the hardware for it."""
+
+    def __init__(self, options: str = "", **message: object) -> None:
+        controller, states, self.address = fresh()
+        self.address += options
+        self.states = states
+        node = Node(DOMAIN)
+        self.efforts: Subscription[Float64MultiArray]
+        self.efforts = node.subscription(f"{controller}/commands", Float64MultiArray)
+        self.robot = Broadcaster(states, **message)  # type: ignore[arg-type]
+
+    def connected(self) -> Ros2Hardware:
+        """Return the hardware; from then on states come one by one."""
+        with self.robot.sending():
+            found = Ros2Hardware(self.address, panda(), PERIOD, timeout=LONG)
+        while found.read(0.0) is not None:
+            pass
+        return found
+
+
+@pytest.fixture
+def rig() -> Iterator[tuple[Rig, Ros2Hardware]]:
+    made = Rig()
+    hardware = made.connected()
+    yield made, hardware
+    hardware.close()
+
+
+# --- joints --------------------------------------------------------------------------
+
+
+def test_joints_are_found_by_name_in_any_order() -> None:
+    rng, joints = np.random.default_rng(0), Joints(panda())
+    for _ in range(20):
+        order = rng.permutation(7)
+        q, v = rng.standard_normal((2, 7))
+        names = tuple(NAMES[i] for i in order)
+        message = joint_state(1, names, q[order].tolist(), v[order].tolist())
+        state = joints.state(message, "/js")
+        assert state is not None
+        assert np.array_equal(state, (q, v))
+
+
+def test_a_message_is_what_the_joints_read() -> None:
+    for robot in (panda(), load("planar3r")):
+        rng, joints = np.random.default_rng(1), Joints(robot)
+        q, v = robot.random_configuration(rng), rng.standard_normal(robot.nv)
+        tau = rng.standard_normal(robot.nv)
+        message = joints.message(3, q, v, tau)
+        state = joints.state(message, "/js")
+        assert state is not None
+        assert np.allclose(state[0], q, atol=1e-15, rtol=0.0)
+        assert np.array_equal(state[1], v)
+        assert message.effort == tau.tolist()
+
+
+@pytest.mark.parametrize(
+    ("order", "message"),
+    [
+        ("a", "joints=a: the robot has no joint 'a'"),
+        (",".join(NAMES[1:]), "joints=.*: 'panda_joint1' is missing"),
+        (",".join([*NAMES, NAMES[0]]), "joints=.*: a joint is there twice"),
+    ],
+)
+def test_an_order_of_commands_has_every_joint_once(order: str, message: str) -> None:
+    with pytest.raises(HardwareError, match=message):
+        Joints(panda()).command_order(order)
+
+
+@pytest.mark.parametrize(
+    ("names", "message"),
+    [
+        (NAMES[:-1], r"/js: a message lacks panda_joint7; it has panda_joint1, "),
+        ((*NAMES, NAMES[2]), r"/js: a message names panda_joint3 twice"),
+    ],
+)
+def test_a_message_has_every_joint_once(names: tuple[str, ...], message: str) -> None:
+    with pytest.raises(HardwareError, match=message):
+        Joints(panda()).state(joint_state(1, names, [0.0] * len(names)), "/js")
+
+
+# --- stamps --------------------------------------------------------------------------
+
+
+def test_stamps_number_the_states() -> None:
+    stamps = Stamps(PERIOD)
+    heard = [(5, True), (6, True), (6, False), (4, False), (7.4, True), (8.5, True)]
+    heard += [(11.5, True)]
+    numbers = []
+    for stamp, new in heard:
+        assert stamps.take(round(stamp * MILLISECOND)) is new
+        numbers.append(stamps.sequence)
+    assert numbers == [0, 1, 1, 1, 2, 3, 6]
+    assert stamps.t == pytest.approx(0.0065, abs=1e-12)
+    stamps.begin(0.001)
+    assert stamps.t == 0.001
+
+
+# --- reading and writing -------------------------------------------------------------
+
+
+def test_a_run_begins_at_zero_however_long_the_loop_compiles(
+    rig: tuple[Rig, Ros2Hardware],
+) -> None:
+    made, hardware = rig
+    assert isinstance(hardware, Hardware)
+    assert hardware.q.tolist() == start().tolist()
+    # The fixture's reads were the first ones.
+    hardware._reads = 0
+    for wait, t in ((0, 0.0), (5000, 0.001), (1, 0.002), (3, 0.005)):
+        made.robot.stamp += (wait - 1) * MILLISECOND if wait else 0
+        made.robot.send()
+        found = hardware.read(LONG)
+        assert found is not None
+        assert found.t == pytest.approx(t, abs=1e-12)
+    assert hardware.read(0.0) is None
+
+
+def test_the_newest_of_many_counts_and_old_ones_do_not(
+    rig: tuple[Rig, Ros2Hardware],
+) -> None:
+    made, hardware = rig
+    for k in range(500):  # a flood
+        made.robot.send(v=[1e-3 * k] * 7)
+    found = hardware.read(LONG)
+    while (newer := hardware.read(0.05)) is not None:
+        found = newer
+    assert found is not None
+    assert found.v[0] == 0.499
+    made.robot.stamp -= 2 * MILLISECOND
+    made.robot.send(v=[9.0] * 7)
+    made.robot.send(v=[9.0] * 7)
+    assert hardware.read(0.05) is None
+    assert hardware.old == 2
+
+
+def test_other_joints_are_no_states_of_this_robot(
+    rig: tuple[Rig, Ros2Hardware],
+) -> None:
+    made, hardware = rig
+    gripper = Broadcaster(made.states, names=("finger",), q=[0.02])
+    gripper.send()
+    assert hardware.read(0.05) is None
+    made.robot.send()
+    found = hardware.read(LONG)
+    assert found is not None
+    assert not found.fault
+
+
+def test_efforts_arrive_in_the_order_of_the_controller() -> None:
+    rig = Rig("&joints=" + ",".join(NAMES[::-1]))
+    hardware = rig.connected()
+    hardware.write(np.arange(7.0))
+    assert rig.efforts.wait(LONG)
+    assert rig.efforts.take()[0].message.data == [6.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.0]
+    hardware.close()
+    hardware.close()
+    assert hardware.read(0.0) is None
+
+
+def test_joints_that_the_robot_lacks_are_ignored_with_a_word() -> None:
+    names = ("finger", *NAMES)
+    rig = Rig(names=names, q=[0.5, *start()])
+    with pytest.warns(RuntimeWarning, match="does not have are ignored: finger"):
+        hardware = rig.connected()
+    rig.robot.send()
+    found = hardware.read(LONG)
+    assert found is not None
+    assert np.array_equal(found.q, start())
+
+
+# --- what is wrong -------------------------------------------------------------------
+
+
+def test_a_faulty_message_is_a_reason_to_stop_once(
+    rig: tuple[Rig, Ros2Hardware],
+) -> None:
+    made, hardware = rig
+    made.robot.send()
+    good = hardware.read(LONG)
+    made.robot.send(v=[0.0] * 6)
+    made.robot.send(names=NAMES[:5], q=[0.0] * 5)
+    bad = hardware.read(LONG)
+    assert good is not None
+    assert bad is not None
+    assert bad.fault == (
+        f"{made.states}: a message has 7 names, and velocity has 6 numbers"
+    )
+    assert bad.sequence > good.sequence
+    made.robot.send(v=[0.25] * 7)
+    after = hardware.read(LONG)
+    assert after is not None
+    assert not after.fault
+    assert after.sequence > bad.sequence
+    assert after.v[0] == 0.25
+
+
+def test_two_publishers_of_these_joints_are_a_reason_to_stop(
+    rig: tuple[Rig, Ros2Hardware],
+) -> None:
+    made, hardware = rig
+    Broadcaster(made.states, v=[1.0] * 7).send()
+    found = hardware.read(LONG)
+    assert found is not None
+    assert found.fault == f"{made.states}: two publishers send these joints"
+    assert not found.v.any()
+
+
+class Faulty:
+    """Hardware in lockstep with a broadcaster, whose states go wrong at the 20th."""
+
+    period = PERIOD
+
+    def __init__(self, rig: Rig, hardware: Ros2Hardware, **wrong: object) -> None:
+        self.rig, self.hardware, self.wrong = rig, hardware, wrong
+        self.reads, self.writes = 0, 0
+
+    def read(self, timeout: float) -> object:
+        self.reads += 1
+        if self.reads < 300:
+            self.rig.robot.send(**(self.wrong if self.reads == 20 else {}))
+            return self.hardware.read(LONG)
+        return self.hardware.read(0.0)
+
+    def write(self, effort: np.ndarray) -> None:
+        self.writes += 1
+        self.hardware.write(effort)
+
+    def close(self) -> None:
+        self.hardware.close()
+
+
+@pytest.mark.parametrize(
+    ("wrong", "reason"),
+    [
+        ({"v": [0.0, np.nan, *[0.0] * 5]}, r"the state is not finite: v\[1\] is nan"),
+        ({"v": []}, r"a message has 7 names, and velocity has 0 numbers"),
+        ({"names": NAMES[1:], "q": [0.0] * 6}, r"a message lacks panda_joint1; it has"),
+        ({"q": [9.0, *start()[1:]]}, r"panda_joint1 is at 9, outside"),
+    ],
+)
+def test_the_loop_stops_safely(
+    rig: tuple[Rig, Ros2Hardware], wrong: dict[str, object], reason: str
+) -> None:
+    hardware = Faulty(*rig, **wrong)
+    settings = LiveSettings(age=1e9)
+    report = run_loop(law(), hardware, settings=settings)  # type: ignore[arg-type]
+    assert report.ended == "fault"
+    assert reason.replace("\\", "") in report.reason
+    assert not report.silent
+    assert hardware.writes > 150  # the good states that follow serve the safe stop
+
+
+def test_nobody_listens_any_more(rig: tuple[Rig, Ros2Hardware]) -> None:
+    made, hardware = rig
+    del made.efforts
+    with pytest.raises(HardwareError, match=r"nobody listens to /.*/commands any more"):
+        hardware.write(np.zeros(7))
+
+
+@contextmanager
+def refused(message: str) -> Iterator[None]:
+    with pytest.raises(HardwareError, match=message):
+        yield
+
+
+def test_a_robot_that_is_not_there_is_not_waited_for_in_silence() -> None:
+    controller, states, address = fresh()
+    with refused(rf"nobody publishes {states} in domain {DOMAIN} \(topics with sens"):
+        Ros2Hardware(address, panda(), PERIOD, timeout=0.2)
+    robot = Broadcaster(states)
+    with robot.sending(), refused(rf"nobody listens to {controller}/commands"):
+        Ros2Hardware(address, panda(), PERIOD, timeout=5.0)
+
+
+def test_a_topic_of_another_type_is_named() -> None:
+    _, states, address = fresh()
+    wrong = Node(DOMAIN).publisher(states, Float64MultiArray)
+    with refused(
+        rf"{states} has type std_msgs/msg/Float64MultiArray; needs sensor_msgs/msg/"
+    ):
+        Ros2Hardware(address, panda(), PERIOD, timeout=0.2)
+    assert wrong.matched == 0
+
+
+@pytest.mark.parametrize(
+    ("message", "reason"),
+    [
+        ({"step": 2 * MILLISECOND}, r"a state every 0.002 s; the loop's period is"),
+        ({"step": 0}, r"the stamps of the states do not increase"),
+        ({"names": ("a",), "q": [0.0]}, r"no state of panda_joint1, .* arrived"),
+        ({"names": NAMES[:3], "q": [0.0] * 3}, r"a message lacks panda_joint4, "),
+        ({"v": []}, r"a message has 7 names, and velocity has 0 numbers"),
+    ],
+)
+def test_a_robot_that_does_not_fit_is_refused(
+    message: dict[str, object], reason: str
+) -> None:
+    rig = Rig(**message)
+    with rig.robot.sending(), refused(reason):
+        Ros2Hardware(rig.address, panda(), PERIOD, timeout=2.0)
+
+
+def test_without_cyclone_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "cyclonedds.domain", None)
+    with refused(
+        r"needs Cyclone DDS; install it with: pip install 'hsp_control\[ros2\]"
+    ):
+        connect("a", panda(), PERIOD)

@@ -1,0 +1,149 @@
+"""A simulated robot on topics: lockstep, and what makes it stop."""
+
+from collections.abc import Callable, Iterator
+from threading import Event, Thread
+
+import numpy as np
+import pytest
+from live_rigs import PERIOD, law, panda, watched
+from ros2_rigs import DOMAIN, fresh
+
+from hsp_control.companions.ros2.hardware import Ros2Hardware
+from hsp_control.companions.ros2.messages import Float64MultiArray, MultiArrayLayout
+from hsp_control.companions.ros2.node import Node, Publisher
+from hsp_control.companions.ros2.simulated import RobotTopics, serve
+from hsp_control.live import LiveSettings, Phase, SimulatedRobot, run_loop
+
+LONG = 60.0
+PATIENT = LiveSettings(age=1e9, missing=10_000, watchdog=10_000)
+
+
+class Served:
+    """A robot that is served in a thread, in lockstep."""
+
+    def __init__(self) -> None:
+        self.controller, _, self.address = fresh()
+        self.robot: SimulatedRobot = watched(PATIENT)
+        self.stop = Event()
+        topics = RobotTopics(self.address, panda())
+        self._thread = Thread(
+            target=serve,
+            args=(self.robot, topics),
+            kwargs={
+                "stop_reason": lambda: "enough" if self.stop.is_set() else None,
+                "lockstep": True,
+            },
+        )
+        self._thread.start()
+
+    def sender(self) -> Publisher[Float64MultiArray]:
+        made = Node(DOMAIN).publisher(f"{self.controller}/commands", Float64MultiArray)
+        assert made.matched == 1
+        return made
+
+    def ended(self) -> str:
+        self._thread.join(LONG)
+        assert not self._thread.is_alive()
+        return self.robot.reason
+
+
+@pytest.fixture
+def served() -> Iterator[Served]:
+    made = Served()
+    yield made
+    made.stop.set()
+    made.ended()
+
+
+class Listening:
+    """Hardware that waits for as long as it takes, and remembers.
+
+    Attributes:
+        heard: The states that it read.
+        sent: The efforts that it sent.
+    """
+
+    period = PERIOD
+
+    def __init__(self, hardware: Ros2Hardware) -> None:
+        self._hardware = hardware
+        self.heard: list[np.ndarray] = []
+        self.sent: list[np.ndarray] = []
+
+    def read(self, timeout: float) -> object:
+        found = self._hardware.read(LONG)
+        assert found is not None
+        self.heard.append(np.concatenate([found.q, found.v]))
+        return found
+
+    def write(self, effort: np.ndarray) -> None:
+        self.sent.append(effort.copy())
+        self._hardware.write(effort)
+
+    def close(self) -> None:
+        self._hardware.close()
+
+
+def test_the_wire_changes_no_bit_of_a_run(served: Served) -> None:
+    hardware = Listening(Ros2Hardware(served.address, panda(), PERIOD, timeout=LONG))
+    report = run_loop(law(), hardware, duration=0.2, settings=PATIENT)  # type: ignore[arg-type]
+    assert report.ended == "completed", report.reason
+    assert served.ended() == "the loop closed the connection"
+    # The same efforts again, without a wire: every state that was heard is there.
+    twin, states = watched(PATIENT), set()
+    states.add(np.concatenate(twin.measure()).tobytes())
+    for effort in hardware.sent:
+        twin.advance([effort])
+        states.add(np.concatenate(twin.measure()).tobytes())
+    assert {state.tobytes() for state in hardware.heard} <= states
+    assert len({state.tobytes() for state in hardware.heard}) > 200
+
+
+def wrong_size(send: Callable[[list[float]], None], _: Served) -> None:
+    send([0.0] * 6)
+
+
+def not_finite(send: Callable[[list[float]], None], _: Served) -> None:
+    send([np.nan, *[0.0] * 6])
+
+
+def second_publisher(send: Callable[[list[float]], None], served: Served) -> None:
+    other = served.sender()
+    other.send(Float64MultiArray(MultiArrayLayout(), [0.0] * 7))
+
+
+@pytest.mark.parametrize(
+    ("mistake", "reason"),
+    [
+        (wrong_size, "an effort has 6 numbers; the robot has 7 joints"),
+        (not_finite, "an effort is not finite: [nan, 0.0, "),
+        (second_publisher, "/commands: two publishers send efforts"),
+    ],
+)
+def test_a_wrong_effort_stops_the_robot(
+    served: Served, mistake: Callable[..., None], reason: str
+) -> None:
+    publisher = served.sender()
+
+    def send(data: list[float]) -> None:
+        publisher.send(Float64MultiArray(MultiArrayLayout(), data))
+
+    send([0.0] * 7)
+    mistake(send, served)
+    assert reason in served.ended()
+    assert served.robot.phase == Phase.HOLDING
+
+
+def test_a_robot_stops_when_its_controller_has_gone(served: Served) -> None:
+    publisher = served.sender()
+    publisher.send(Float64MultiArray(MultiArrayLayout(), [0.0] * 7))
+    while served.robot.phase == Phase.WAITING:
+        pass
+    del publisher
+    assert served.ended() == "the loop closed the connection"
+
+
+def test_a_robot_that_nobody_commands_ends_when_it_is_told(served: Served) -> None:
+    served.stop.set()
+    assert served.ended() == ""
+    assert served.robot.phase == Phase.WAITING

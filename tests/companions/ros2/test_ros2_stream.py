@@ -1,0 +1,138 @@
+"""Poses of ROS 2 as targets: what of a pose a stream takes, and what it refuses."""
+
+from collections.abc import Callable
+from time import monotonic
+from typing import Any
+
+import numpy as np
+import pytest
+from ros2_rigs import DOMAIN, fresh
+
+from hsp_control import Stream, StreamOrientation, StreamPose
+from hsp_control.common.exceptions import StreamError
+from hsp_control.companions.ros2.messages import (
+    Header,
+    Point,
+    Pose,
+    PoseStamped,
+    Quaternion,
+    Time,
+)
+from hsp_control.companions.ros2.node import Node, Publisher
+from hsp_control.trajectories.streams.inbox import Inbox
+from hsp_control.trajectories.streams.listeners import listening_inbox
+from hsp_control.trajectories.streams.message import ORIENTATION, POSE, Space
+
+POSITION = Space(3, False)
+HALF = 0.5
+LONG = 60.0
+
+
+def pose(
+    stamp: int = 7_500_000_000, frame: str = "world", x: float = 0.4, w: float = HALF
+) -> PoseStamped:
+    where = Pose(Point(x, 0.1, 0.5), Quaternion(HALF, HALF, HALF, w))
+    return PoseStamped(Header(Time.of(stamp), frame), where)
+
+
+def opened(space: Space, options: str = "") -> tuple[Inbox, Publisher[PoseStamped]]:
+    topic, _, _ = fresh()
+    inbox = listening_inbox(f"ros2:/{topic}?domain={DOMAIN}{options}", space)
+    publisher = Node(DOMAIN).publisher(topic, PoseStamped)
+    assert publisher.matched == 1
+    return inbox, publisher
+
+
+def until(true: Callable[[], bool]) -> None:
+    end = monotonic() + LONG
+    while not true():
+        assert monotonic() < end
+
+
+@pytest.mark.parametrize(
+    ("space", "value"),
+    [
+        (POSE, [0.4, 0.1, 0.5, HALF, HALF, HALF, HALF]),
+        (POSITION, [0.4, 0.1, 0.5]),
+        (ORIENTATION, [HALF, HALF, HALF, HALF]),
+    ],
+)
+def test_a_stream_takes_what_it_needs_of_a_pose(space: Space, value: Any) -> None:
+    inbox, publisher = opened(space)
+    publisher.send(pose())
+    until(lambda: inbox.count == 1)
+    ((_, message),) = inbox.after(0, take=True)
+    assert message.values is not None
+    assert message.values.tolist() == [value]
+    assert message.t == 7.5
+    publisher.send(pose(stamp=0, frame=""))
+    until(lambda: inbox.count == 2)
+    assert inbox.after(1, take=True)[0].message.t is None
+
+
+@pytest.mark.parametrize(
+    ("wrong", "reason"),
+    [
+        ({"frame": "camera"}, "a pose is in the frame 'camera'; needs 'world'"),
+        ({"x": np.nan}, "value contains nan; needs finite numbers of at most 1e+06"),
+        ({"w": 0.0}, "the quaternion [0.5, 0.5, 0.5, 0.0] has norm 0.866025; needs 1"),
+    ],
+)
+def test_wrong_poses_are_counted_and_dropped(
+    wrong: dict[str, Any], reason: str
+) -> None:
+    inbox, publisher = opened(POSE)
+    publisher.send(pose(**wrong))
+    until(lambda: inbox.rejected == 1)
+    assert inbox.reason == reason
+    publisher.send(pose())
+    until(lambda: inbox.count == 1)
+
+
+def test_the_frame_is_the_address_s() -> None:
+    inbox, publisher = opened(POSE, "&frame=panda_link0")
+    publisher.send(pose())
+    publisher.send(pose(frame="panda_link0"))
+    until(lambda: inbox.count == 1)
+    assert inbox.rejected == 1
+
+
+def test_a_task_s_reference_goes_where_the_topic_says() -> None:
+    topic, _, _ = fresh()
+    source = f"ros2:/{topic}?domain={DOMAIN}"
+    stream = Stream([0.4, 0.0, 0.5], source=source, delay=0.0).anchored(None)
+    stream.sample(0.0)
+    inbox = stream._mailbox.inbox
+    publisher = Node(DOMAIN).publisher(topic, PoseStamped)
+    publisher.send(pose(stamp=0, x=0.45))
+    until(lambda: inbox.count == 1)
+    for t in np.linspace(0.01, 5.0, 500):
+        reached = stream.sample(float(t))
+    assert np.allclose(reached.position, [0.45, 0.1, 0.5], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (
+            lambda: Stream(source="ros2://a b"),
+            "source is 'ros2://a b': 'a b' is no name",
+        ),
+        (
+            lambda: StreamPose(source="ros2://a?frames=b"),
+            "no option 'frames'; did you mean 'frame'",
+        ),
+        (
+            lambda: listening_inbox("ros2://a", Space(7, False)),
+            "ros2://a carries poses; this stream needs 7 numbers",
+        ),
+        (
+            lambda: StreamOrientation(source="ros2://a?domain=300"),
+            "the domain is '300'; needs 0 to 232",
+        ),
+    ],
+)
+def test_mistakes_are_named(make: Callable[[], object], message: str) -> None:
+    with pytest.raises(StreamError) as caught:
+        make()
+    assert message in str(caught.value)

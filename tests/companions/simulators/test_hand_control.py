@@ -1,0 +1,206 @@
+"""A hand whose targets come step by step, without any simulator."""
+
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import hsp_control as hsp
+from hsp_control.common.exceptions import (
+    ConfigError,
+    FieldError,
+    FrameNotFoundError,
+    HspControlError,
+    ModelError,
+    NonFiniteError,
+    SceneError,
+)
+from hsp_control.companions.simulators.hand_control import HandControl
+from hsp_control.companions.simulators.hand_settings import read_settings
+from hsp_control.companions.simulators.mujoco_arm import arm_of
+
+GAINS = hsp.Gains(kp=150.0, kv=24.0)
+PERIOD = 0.002
+LAW = {"stream": None, "limits": "none", "compensation": {}}
+
+
+@pytest.fixture(scope="module")
+def robot() -> hsp.Robot:
+    return hsp.Robot.load("panda")
+
+
+def moving(robot: hsp.Robot) -> tuple[Any, Any]:
+    """Return a state in motion."""
+    rng = np.random.default_rng(1)
+    return robot.home() + rng.normal(scale=0.1, size=7), rng.normal(size=7)
+
+
+@pytest.mark.parametrize("axes", [None, "xyz", "yz"])
+def test_between_jumps_the_error_equation_holds(
+    robot: hsp.Robot, axes: str | None
+) -> None:
+    hand = HandControl(robot, "panda_tcp", LAW, gains=GAINS, axes=axes)
+    q, v = moving(robot)
+    v *= 0.01  # and near: then the threshold is the least, and the law exact
+    hand.begin(0.0, q, v)
+    goal = hand.pose(q)
+    goal.translation = goal.translation + np.array([2e-3, -1e-3, 4e-4])
+    hand.aim(goal, 0.0)
+    hand.effort(0.0, q, v, PERIOD)
+    state = robot.state(0.0, q, v)
+    frame = state.frame("panda_tcp")
+    a = hand.command.output.acceleration
+    linear = frame.jacobian[:3] @ a + frame.jacobian_dot[:3] @ v
+    wanted = 150.0 * (goal.translation - frame.position) - 24.0 * frame.velocity[:3]
+    tracked = ["xyz".index(axis) for axis in axes or "xyz"]
+    np.testing.assert_allclose(linear[tracked], wanted[tracked], atol=1e-9)
+
+
+def test_it_begins_where_the_hand_is(robot: hsp.Robot) -> None:
+    """At rest, with the posture of the start, nothing accelerates."""
+    hand = HandControl(robot, "panda_tcp", LAW, gains=GAINS)
+    for q in (robot.home(), moving(robot)[0]):  # the second run has another start
+        hand.begin(0.0, q, np.zeros(7))
+        tau = hand.effort(0.0, q, np.zeros(7), PERIOD)
+        gravity = robot.state(0.0, q, np.zeros(7)).nonlinear_effects
+        np.testing.assert_allclose(tau, gravity, atol=1e-9)
+        away = hand.pose(q)
+        away.translation = away.translation + np.array([0.0, 0.0, 0.1])
+        hand.aim(away, PERIOD)  # forgotten by the next run
+        assert hand.effort(PERIOD, q, np.zeros(7), PERIOD) != pytest.approx(gravity)
+
+
+def test_by_default_the_posture_obeys_the_simulator_s_equation(
+    robot: hsp.Robot,
+) -> None:
+    """To first order P a = P(-2√10 v - 10 (q - q0)), as in robosuite's null space."""
+    hand = HandControl(robot, "panda_tcp", LAW, gains=GAINS)
+    start, small = robot.home(), 1e-5
+    hand.begin(0.0, start, np.zeros(7))
+    jacobian = robot.state(0.0, start, np.zeros(7)).frame("panda_tcp").jacobian
+    free = np.linalg.svd(jacobian)[2][-1]  # the arm's self-motion
+    q, v = start + small * free, 0.5 * small * free
+    hand.effort(0.0, q, v, PERIOD)
+    wanted = -2.0 * np.sqrt(10.0) * 0.5 * small - 10.0 * small
+    assert free @ hand.command.output.acceleration == pytest.approx(wanted, rel=1e-3)
+
+
+@pytest.mark.parametrize("axes", ["", "xw", "xx"])
+def test_axes_that_are_none(robot: hsp.Robot, axes: str) -> None:
+    with pytest.raises(HspControlError, match="axes"):
+        HandControl(robot, "panda_tcp", gains=GAINS, axes=axes)
+
+
+def test_efforts_are_clipped_and_the_observer_knows(robot: hsp.Robot) -> None:
+    observer = {"momentum_observer": {"bandwidth": 50, "cancel": True}}
+    settings = {"stream": None, "limits": "none", "compensation": observer}
+    hard = hsp.Gains(natural_frequency=150.0)
+    hand = HandControl(robot, "panda_tcp", settings, gains=hard)
+    q, rest = robot.home(), np.zeros(7)
+    hand.begin(0.0, q, rest)
+    goal = hand.pose(q)
+    goal.translation = goal.translation + np.array([0.0, 2.0, 0.0])
+    hand.aim(goal, 0.0)
+    effort = hand.effort(0.0, q, rest, PERIOD)
+    strongest = robot.model.upperEffortLimit
+    assert (np.abs(effort) <= strongest).all()
+    assert (np.abs(effort) == strongest).any()
+    # What the clipped effort does is no disturbance.
+    state = robot.state(0.0, q, rest)
+    acceleration = np.linalg.solve(state.mass_matrix, effort - state.nonlinear_effects)
+    hand.effort(PERIOD, q, PERIOD * acceleration, PERIOD)
+    channels = hand.command.log_channels()
+    assert np.abs(channels["observer.disturbance"].value).max() < 0.5
+
+
+@pytest.mark.parametrize("axes", [None, "xz"])
+def test_two_hands_do_not_hear_each_other_s_targets(
+    robot: hsp.Robot, axes: str | None
+) -> None:
+    q, rest = robot.home(), np.zeros(7)
+    hands = [HandControl(robot, "panda_tcp", gains=GAINS, axes=axes) for _ in range(2)]
+    goal = hands[0].pose(q)
+    goal.translation = goal.translation + np.array([0.0, 0.0, 0.1])
+    for hand in hands:
+        hand.begin(0.0, q, rest)
+    hands[0].aim(goal, 0.0)
+    efforts = [
+        [hand.effort(k * PERIOD, q, rest, PERIOD).copy() for k in range(10)][-1]
+        for hand in hands
+    ]
+    assert np.abs(efforts[0] - efforts[1]).max() > 0.1
+    still = robot.state(0.0, q, rest).nonlinear_effects
+    np.testing.assert_allclose(efforts[1], still, atol=1e-6)
+
+
+def test_a_jump_of_time_is_noticed(robot: hsp.Robot) -> None:
+    hand = HandControl(robot, "panda_tcp", gains=GAINS)
+    q, rest = robot.home(), np.zeros(7)
+    hand.begin(3.0, q, rest)
+    assert not hand.has_jumped(3.0)
+    hand.effort(3.0, q, rest, PERIOD)
+    assert not hand.has_jumped(3.0)  # asked twice at one time
+    assert not hand.has_jumped(3.0 + PERIOD)
+    assert hand.has_jumped(0.0)
+    assert hand.has_jumped(4.0)
+
+
+def test_what_is_wrong_is_named_with_its_place(
+    robot: hsp.Robot, tmp_path: Path
+) -> None:
+    file = tmp_path / "hand.yaml"
+    file.write_text("limits: none\nnull_space:\n  gian: 3\n", encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"hand\.yaml:3: null_space\.gian"):
+        read_settings(file)
+    file.write_text(
+        "null_space:\n  fields:\n    - {type: target_posture, weights: [1, 2]}\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(FieldError, match=r"hand\.yaml:3: null_space\.fields\.0"):
+        HandControl(robot, "panda_tcp", file, gains=GAINS)
+    file.write_text(
+        "scene:\n  obstacles:\n    wall:\n"
+        "      center: {type: hold, point: [0, 0, 0]}\n"
+        "      shape: {type: mesh, file: wall.stl}\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(SceneError, match=rf"hand\.yaml:5: .*{tmp_path}/wall\.stl"):
+        read_settings(file)
+    with pytest.raises(ConfigError, match="remove source"):
+        read_settings({"stream": {"source": "udp://127.0.0.1:5005"}})
+    hand = HandControl(robot, "panda_tcp", gains=GAINS)
+    with pytest.raises(NonFiniteError, match="the target contains NaN"):
+        hand.aim(pin.SE3(np.eye(3), np.full(3, np.nan)), 0.0)
+
+
+SCENE = """
+<mujoco><worldbody>
+  <body name="cart"><joint name="rail" type="slide" axis="1 0 0"/>
+    <geom size="0.1" mass="3"/>
+    <body name="arm" pos="0 0 0.2"><joint name="shoulder" axis="0 1 0"/>
+      <geom size="0.05" mass="1"/>
+      <body name="hand" pos="0.4 0 0"><joint name="elbow" axis="0 1 0"/>
+        <geom size="0.04" mass="0.5"/><site name="tip" pos="0.3 0 0"/>
+        <body name="finger"><joint name="finger" type="slide"/>
+          <geom size="0.01" mass="0.1"/></body>
+      </body>
+    </body>
+  </body>
+  <body name="table"><geom size="0.1"/></body>
+</worldbody></mujoco>"""
+
+
+def test_the_arm_is_what_carries_the_hand() -> None:
+    model = mujoco.MjModel.from_xml_string(SCENE)
+    for frame in ("tip", "hand"):
+        arm = arm_of(model, np.zeros(4), frame)
+        assert arm.joint_names == ("rail", "shoulder", "elbow")  # no finger
+    with pytest.raises(ModelError, match=r"also moved by rail.*must stand still"):
+        arm_of(model, np.zeros(4), "tip", ["shoulder", "elbow"])
+    with pytest.raises(ModelError, match="no joint moves 'table'"):
+        arm_of(model, np.zeros(4), "table")
+    with pytest.raises(FrameNotFoundError, match="did you mean 'tip'"):
+        arm_of(model, np.zeros(4), "tipp")

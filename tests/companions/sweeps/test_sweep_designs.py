@@ -1,0 +1,286 @@
+"""Check values, designs and sensitivities of sweeps."""
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from hsp_control.common.exceptions import SweepError
+from hsp_control.companions.sweeps import (
+    Integers,
+    LogUniform,
+    Normal,
+    Sweep,
+    Uniform,
+    sensitivity,
+    sweep_figure,
+)
+from hsp_control.companions.sweeps.design import chosen_design, points
+from hsp_control.companions.sweeps.factor import factors
+from hsp_control.companions.sweeps.plan import Plan
+from hsp_control.companions.sweeps.row import Row
+from hsp_control.companions.sweeps.spelling import values
+from hsp_control.simulation.measures import Measure
+
+pytestmark = pytest.mark.process
+
+# --- values and designs --------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "levels"),
+    [
+        ("1,2,5", (1, 2, 5)),
+        ("rest,flow", ("rest", "flow")),
+        ("[0, 0, 1], [0, 1, 0]", ([0, 0, 1], [0, 1, 0])),
+        ("true", (True,)),
+        ("'a:b', c", ("a:b", "c")),
+        ("{type: hold}", ({"type": "hold"},)),
+        ("0:10:3", (0, 5, 10)),
+        ("0:1:3", (0.0, 0.5, 1.0)),
+        ("-1e-2:0.5:2", (-0.01, 0.5)),
+        ("linear:1:9:5", (1, 3, 5, 7, 9)),
+        ("log:1:100:3", (1.0, 10.0, 100.0)),
+    ],
+)
+def test_lists_and_ranges_as_they_are_spelled(text: str, levels: tuple) -> None:
+    found = values(text).levels()
+    assert found is not None
+    assert [type(value) for value in found] == [type(value) for value in levels]
+    # To rounding: the ends of a range are exact, what is between need not be.
+    if isinstance(levels[0], float):
+        np.testing.assert_allclose(found, levels, rtol=1e-15)
+        assert (found[0], found[-1]) == (levels[0], levels[-1])
+    else:
+        assert found == levels
+
+
+@pytest.mark.parametrize(
+    ("text", "distribution"),
+    [
+        ("1:10", Uniform(1, 10)),
+        ("uniform:-1:1", Uniform(-1, 1)),
+        ("loguniform:0.1:10", LogUniform(0.1, 10)),
+        ("normal:0:0.1", Normal(0, 0.1)),
+        ("normal:1:0.1:0:2", Normal(1, 0.1, 0, 2)),
+        ("integers:0:99", Integers(0, 99)),
+    ],
+)
+def test_distributions_as_they_are_spelled(text: str, distribution: object) -> None:
+    assert values(text) == distribution
+    assert values(text).levels() is None
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "the values are missing"),
+        ("5:1:3", "from 5 to 1"),
+        ("1:5:1", "at least 2"),
+        ("1:5:2.5", "'2.5' is not an integer"),
+        ("1:5:1000000", "at most 100000"),
+        ("1:x:3", "'x' is not a number"),
+        ("1:2:3:4", "has 4 parts"),
+        ("nan:1", "must be finite"),
+        ("log:0:1:3", "must be positive"),
+        ("loguniform:-1:1", "must be positive"),
+        ("unifrom:1:2", "did you mean 'uniform'?"),
+        ("uniform:1", "has 1 numbers; needs uniform:LOW:HIGH"),
+        ("normal:0:0", "the deviation positive"),
+        ("normal:0:1:2:1", "cut to 2 ... 1; low must be below high"),
+        ("normal:0:1:50:60", "has no values from 50 to 60"),
+        ("integers:3:1", "no integers from 3 to 1"),
+        ("integers:0:1.5", "'1.5' is not an integer"),
+        ("[1, 2", "not a list"),
+    ],
+)
+def test_what_is_no_range_is_refused(text: str, message: str) -> None:
+    with pytest.raises(SweepError, match=message.replace("?", r"\?")):
+        values(text)
+
+
+def test_quantiles_are_those_of_the_distribution() -> None:
+    fractions = np.linspace(0.0, 1.0, 101)[:-1]
+    oracles = [
+        (Uniform(-1, 3), stats.uniform(-1, 4)),
+        (LogUniform(0.1, 50), stats.loguniform(0.1, 50)),
+        (Normal(2, 0.5), stats.norm(2, 0.5)),
+        (Normal(2, 0.5, 1.8, 4), stats.truncnorm(-0.4, 4, 2, 0.5)),
+    ]
+    for distribution, oracle in oracles:
+        ours = [distribution.quantile(float(u)) for u in fractions[1:]]
+        np.testing.assert_allclose(ours, oracle.ppf(fractions[1:]), rtol=1e-10)
+        assert math.isfinite(distribution.quantile(0.0))
+    drawn = [Integers(3, 7).quantile(float(u)) for u in fractions]
+    assert np.unique(drawn, return_counts=True)[1].tolist() == [20] * 5
+    assert (min(drawn), max(drawn)) == (3, 7)
+    chosen = [values("a,b,c,d").quantile(float(u)) for u in fractions]
+    assert chosen == [letter for letter in "abcd" for _ in range(25)]
+
+
+def test_a_factor_is_described_in_json_and_says_which_bound_is_infinite() -> None:
+    (factor,) = factors({"a": "normal:0:0.1"})
+    found = json.loads(json.dumps(factor.description(), allow_nan=False))
+    bounds = {"low": "-inf", "high": "inf"}
+    assert found == {
+        "key": "a", "type": "Normal", "mean": 0, "deviation": 0.1, **bounds,
+    }  # fmt: skip
+
+
+def test_a_grid_has_every_combination_in_order() -> None:
+    found = points(factors({"a": "1:3:3", "b": ["x", "y"]}), "grid", None, 0)
+    assert found == [(1, "x"), (1, "y"), (2, "x"), (2, "y"), (3, "x"), (3, "y")]
+
+
+def test_a_latin_hypercube_meets_every_stratum_of_every_factor_once() -> None:
+    over = factors({"a": "0:1", "b": "0:10", "c": "loguniform:1:2.718281828459045"})
+    found = np.array(points(over, "latin_hypercube", 40, 3))
+    found[:, 1] /= 10.0
+    found[:, 2] = np.log(found[:, 2])
+    for column in found.T:
+        assert sorted((column * 40).astype(int)) == list(range(40))
+
+
+def test_sobol_covers_every_factor_evenly_and_draws_any_number() -> None:
+    over = factors({"a": "0:1", "b": "0:1"})
+    for samples in (1, 2, 3, 16, 17, 33):
+        assert len(points(over, "sobol", samples, 3)) == samples
+    for column in np.transpose(points(over, "sobol", 32, 3)):
+        assert sorted((column * 32).astype(int)) == list(range(32))
+
+
+def test_no_design_has_more_than_a_million_runs() -> None:
+    assert chosen_design("random", 1_000_000) == "random"
+    with pytest.raises(SweepError, match="1000001 samples; must be from 1 to 1000000"):
+        chosen_design("random", 1_000_001)
+    thousand = "1:1000:1000"
+    with pytest.raises(SweepError, match="the grid has 2000000 runs; at most 1000000"):
+        points(factors({"a": thousand, "b": thousand, "c": "1,2"}), "grid", None, 0)
+
+
+@pytest.mark.parametrize("design", ["random", "latin_hypercube", "sobol"])
+def test_a_seed_is_a_design(design: Any) -> None:
+    over = factors({"a": "0:1", "b": "normal:0:1"})
+    assert points(over, design, 20, 5) == points(over, design, 20, 5)
+    assert points(over, design, 20, 5) != points(over, design, 20, 6)
+    assert len(points(over, design, 20, 5)) == 20
+
+
+def test_rows_are_in_the_order_of_the_plan() -> None:
+    """In whichever order they finish, and also if some are missing."""
+    varied = factors({"a": "10:30:3"})
+    plan = Plan(
+        "invented", {}, varied, "grid", None, 0, points(varied, "grid", None, 0)
+    )
+    rows = [Row(k, "completed", "", {"e": 0.5 * k}, 0.0) for k in (2, 0)]
+    found = Sweep.collect(plan, {}, rows, {"e": Measure(0.0, "m", "error")})
+    assert found["run"].tolist() == [0, 2]
+    assert found["a"].tolist() == [10, 30]
+    assert found["e"].tolist() == [0.0, 1.0]
+    assert not found.complete
+
+
+# --- sensitivity ---------------------------------------------------------------------
+
+
+def invented(runs: int = 200) -> Sweep:
+    """A sweep whose dependences are known."""
+    rng = np.random.default_rng(0)
+    up, bowl, none = rng.uniform(-1, 1, (3, runs))
+    kind = np.array(["a", "b"], dtype=object)[rng.integers(0, 2, runs)]
+    status = np.array(["completed"] * runs, dtype=object)
+    status[:5] = "diverged"
+    columns = {
+        "run": np.arange(runs),
+        "status": status,
+        "message": np.array([""] * runs, dtype=object),
+        "wall_time": np.ones(runs),
+        "up": up, "bowl": bowl, "none": none, "kind": kind,
+        "tracking.x.rms": np.exp(3.0 * up),
+        "manipulability.min": -np.exp(3.0 * up),
+        "distance.y.min": bowl**2,
+        "effort.max": np.where(kind == "a", 5.0, 1.0) + 0.1 * none,
+    }  # fmt: skip
+    columns["tracking.x.rms"][0] = 1e9  # it diverged: it must not count
+    metrics = ["tracking.x.rms", "manipulability.min", "distance.y.min", "effort.max"]
+    meta = {
+        "format": "hsp_control sweep 1",
+        "name": "invented",
+        "runs": runs,
+        "parameters": {
+            name: {"keys": [name], "json": False}
+            for name in ("up", "bowl", "none", "kind")
+        },
+        "metrics": {name: {"unit": "m", "meaning": name} for name in metrics},
+        "identity": {
+            "configuration": {"title": "Costs 5$ to 10$"},
+            "factors": [], "design": "random", "seed": 0,
+            "versions": {"hsp_control": "0"},
+        },
+    }  # fmt: skip
+    return Sweep(columns, meta)
+
+
+def test_sensitivities_are_those_that_were_put_in() -> None:
+    found = sensitivity(invented())
+    assert found.outcomes == (
+        "tracking.x.rms", "manipulability.min", "distance.y.min", "effort.max",
+    )  # fmt: skip
+    assert found.runs == 195
+    up, bowl, none, kind = (found.correlation[k] for k in range(4))
+    assert up[:2] == pytest.approx([1.0, -1.0])  # any monotone form, exactly
+    assert abs(bowl[2]) < 3 * found.noise  # an optimum in the middle correlates little
+    assert np.isnan(kind).all()  # texts have no order
+    assert abs(none[0]) < 2 * found.noise
+    share = found.share
+    assert share[0, 0] > 0.97
+    assert share[1, 2] > 0.9  # ... but explains nearly all
+    assert share[3, 3] == pytest.approx(0.75, abs=0.05)  # two halves of the ranks
+    assert max(share[2, :3]) < 0.1  # one in twenty is called an influence
+    assert share[2, 3] > 0.2  # within each half, it orders the ranks
+    # Ranks: what the oracle of correlations gives.
+    oracle = stats.spearmanr(invented()["bowl"][5:], invented()["distance.y.min"][5:])
+    assert bowl[2] == pytest.approx(oracle.statistic, abs=1e-12)
+    # Twelve classes of equal size: from the F of an analysis of variance.
+    classes = (stats.rankdata(invented()["bowl"][5:]) - 1.0) * 12 // 195
+    rank = stats.rankdata(invented()["distance.y.min"][5:])
+    F = stats.f_oneway(*(rank[classes == k] for k in range(12))).statistic
+    assert share[1, 2] == pytest.approx(1.0 - 194 / (11 * F + 183), abs=1e-12)
+
+
+def test_what_cannot_be_told_is_not_told() -> None:
+    with pytest.raises(SweepError, match="5 runs were completed"):
+        sensitivity(invented(10))
+    with pytest.raises(SweepError, match=r"did you mean 'effort.max'\?"):
+        sensitivity(invented(), ["effort.mx"])
+    unknown = invented()
+    unknown["effort.max"][5:] = np.nan
+    assert "effort.max" not in sensitivity(unknown).outcomes
+    with pytest.raises(SweepError, match="no completed run has the metric"):
+        sensitivity(unknown, ["effort.max"])
+    with pytest.raises(SweepError, match="has no run 200"):
+        invented().configuration(200)
+    with pytest.raises(SweepError, match="has no column 'upp'; did you mean 'up'"):
+        invented()["upp"]
+
+
+def test_every_pair_has_its_panel_and_failures_are_shown() -> None:
+    figure = sweep_figure(invented())
+    figure.canvas.draw()
+    axes = figure.axes
+    assert len(axes) == 16
+    corner = axes[0]
+    assert "+1.00" in corner.get_title(loc="left")
+    points, line, failed = corner.lines
+    assert len(points.get_xdata()) == 195
+    assert len(failed.get_xdata()) == 5
+    assert np.all(np.diff(line.get_ydata()) > 0.0)
+    assert corner.get_yscale() == "log"
+    assert [label.get_text() for label in axes[15].get_xticklabels()] == ["a", "b"]
+    tints = [np.array(each.get_facecolor()) for each in axes]
+    assert tints[0][2] > tints[0][0]  # grows: blue
+    assert tints[4][0] > tints[4][2]  # falls: orange
+    assert axes[2].get_title(loc="left") == "no influence"

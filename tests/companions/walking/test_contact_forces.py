@@ -1,0 +1,94 @@
+"""Forces of contacts from the efforts that the model does not explain."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from hsp_control import Controller, JointPosture, load_experiment
+from hsp_control.common.exceptions import EstimationError
+from hsp_control.companions.walking.estimation import ContactForces
+from hsp_control.control.measurement import Measurement
+from hsp_control.simulation import simulate
+from hsp_control.simulation.plants import RigidContact, RigidContacts
+
+pytest.importorskip("example_robot_data")
+CASES = {
+    "whole_body/talos_circle": ("left_sole_link", "right_sole_link"),
+    "whole_body/solo12_trunk": ("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT"),
+}
+
+
+@cache
+def standing(name):
+    """Return half a second on rigid contacts, with all forces estimated, too."""
+    experiment = load_experiment(name)
+    kind = "surface" if "talos" in name else "point"
+    contacts = [RigidContact(frame, kind=kind) for frame in CASES[name]]
+    return simulate(
+        experiment.controller,
+        experiment.q0,
+        duration=0.5,
+        control_period=0.002,
+        log_period=0.01,
+        integrator=experiment.integrator,
+        plant=RigidContacts(contacts),
+        estimators=[ContactForces(bandwidth=200.0, instead=True)],
+    )
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_estimates_are_what_rigid_contacts_exert(name):
+    run = standing(name)
+    weight = 9.81 * sum(
+        inertia.mass for inertia in load_experiment(name).robot.model.inertias
+    )
+    later = run.t > 0.1  # the observer has converged
+    for frame in CASES[name]:
+        for what, share in (("force", 0.02), ("moment", 0.005)):
+            if what == "moment" and "talos" not in name:
+                continue  # a rigid point holds the centre, a ball rolls below it
+            true = run[f"plant.contact.{frame}.{what}"][later]
+            found = run[f"estimate.contact.{frame}.{what}"][later]
+            assert np.abs(true - found).max() < share * weight
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_wrenches_that_push_on_a_robot_at_rest_are_found(name):
+    """Any wrenches; a ball is pushed where it touches, below its centre."""
+    experiment, random = load_experiment(name), np.random.default_rng(1)
+    robot, q, rest = experiment.robot, experiment.q0, np.zeros(experiment.robot.nv)
+    state, tau = robot.state(0.0, q, rest), robot.inverse_dynamics(q, rest, rest)
+    pushes = {}
+    for contact in experiment.controller.contacts:
+        wrench = random.normal(size=6)
+        if contact.yaml_type == "ball":
+            wrench[3:] = np.cross([0.0, 0.0, -contact.radius], wrench[:3])
+        pushes[contact.frame] = wrench
+        tau -= state.frame(contact.frame).jacobian.T @ wrench
+    running = ContactForces(bandwidth=1e6).begin(experiment.controller, None)
+    for k in range(2):
+        out = running.update(Measurement(k, 0.01 * k, q, rest, applied=tau))
+    for frame, wrench in pushes.items():
+        assert out.wrenches[frame] == pytest.approx(wrench, abs=1e-8)
+
+
+def test_only_what_is_missing_is_estimated_and_that_is_said():
+    experiment = load_experiment("whole_body/solo12_trunk")
+    robot, q = experiment.robot, experiment.q0
+    measured = {"FL_FOOT": np.arange(6.0)}
+    given = Measurement(0, 0.0, q, np.zeros(robot.nv), wrenches=measured)
+    running = ContactForces().begin(experiment.controller, None)
+    out = running.update(given)
+    assert out.wrenches["FL_FOOT"] is measured["FL_FOOT"]
+    assert out.estimated == {"FR_FOOT", "HL_FOOT", "HR_FOOT"}
+    assert out.wrenches.keys() == set(CASES["whole_body/solo12_trunk"])
+    every = ContactForces(instead=True).begin(experiment.controller, None)
+    assert len(every.update(given).estimated) == 4
+
+
+def test_a_robot_without_contacts_is_refused():
+    robot = load_experiment("whole_body/solo12_trunk").robot
+    flying = Controller(robot, [JointPosture(joints=["FL_HAA"])], base="flying")
+    with pytest.raises(EstimationError, match="no contacts whose forces could be est"):
+        ContactForces().begin(flying, None)

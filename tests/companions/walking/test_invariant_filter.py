@@ -1,0 +1,348 @@
+"""The filter: its Jacobians, its symmetry, its consistency, its convergence."""
+
+from copy import deepcopy
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.linalg import expm, logm
+from scipy.stats import chi2
+
+from hsp_control.companions.walking.estimation.invariant_filter import (
+    ACCELEROMETER,
+    FIXED,
+    GYROSCOPE,
+    POSITION,
+    ROTATION,
+    VELOCITY,
+    Densities,
+    InvariantFilter,
+    skew,
+)
+
+GRAVITY = np.array([0.0, 0.0, -9.81])
+DENSITIES = Densities(2e-3, 2e-2, 1e-3, 1e-2, 5e-3)
+SEEN = 2e-3  # standard deviation of what the legs see [m]
+
+
+def random_filter(random, points=2):
+    """Return a filter somewhere, with points."""
+    made = InvariantFilter(
+        expm(skew(random.normal(size=3))),
+        random.normal(size=3),
+        random.normal(size=3),
+        0.01 * np.eye(FIXED),
+        DENSITIES,
+        GRAVITY,
+    )
+    made.gyroscope_bias = 0.1 * random.normal(size=3)
+    made.accelerometer_bias = 0.1 * random.normal(size=3)
+    if points:
+        seen = random.normal(size=(points, 3))
+        made.add(range(points), seen, SEEN**2 * np.eye(3 * points))
+    return made
+
+
+def group_element(estimate):
+    """Return X as a matrix, from the definition of SE_{n+2}(3)."""
+    columns = [estimate.velocity, estimate.position, *estimate.points]
+    X = np.eye(3 + len(columns))
+    X[:3, :3] = estimate.rotation
+    X[:3, 3:] = np.transpose(columns)
+    return X
+
+
+def error_of(estimate, true):
+    """Return ξ and ζ by matrix logarithm: X̂ X⁻¹ = exp(ξ)."""
+    logarithm = logm(group_element(estimate) @ np.linalg.inv(group_element(true))).real
+    turn = logarithm[[2, 0, 1], [1, 2, 0]]
+    velocity, position, *points = logarithm[:3, 3:].T
+    biases = (
+        estimate.gyroscope_bias - true.gyroscope_bias,
+        estimate.accelerometer_bias - true.accelerometer_bias,
+    )
+    return np.concatenate([turn, velocity, position, *biases, *points])
+
+
+def displaced(true, error):
+    """Return the filter whose error is this."""
+    estimate = deepcopy(true)
+    estimate.retract(error)
+    return estimate
+
+
+def test_an_estimate_is_moved_along_the_group():
+    random = np.random.default_rng(1)
+    true = random_filter(random)
+    error = 0.5 * random.normal(size=FIXED + 6)
+    assert error_of(displaced(true, error), true) == pytest.approx(error, abs=1e-12)
+
+
+def test_the_transition_is_the_derivative_of_the_motion():
+    random = np.random.default_rng(2)
+    estimate = random_filter(random)
+    omega, force, h = random.normal(size=3), 10.0 * random.normal(size=3), 0.05
+
+    def after(error):
+        """Return the error after a period in which the readings are the same."""
+        true = displaced(estimate, -error)  # to first order
+        before = error_of(estimate, true)
+        hat = deepcopy(estimate)
+        for each in (hat, true):
+            each.predict(omega, force, h)
+        return before, error_of(hat, true)
+
+    moved, step = deepcopy(estimate), 1e-5
+    turn = h * (omega - estimate.gyroscope_bias)
+    left = sum(  # of SO(3), by its series
+        np.linalg.matrix_power(skew(turn), k) / np.prod(range(1, k + 2))
+        for k in range(20)
+    )  # fmt: skip
+    moved.predict(omega, force, h)
+    Phi = moved._transition(estimate.rotation, -h * estimate.rotation @ left, h)
+    for k in range(FIXED + 6):
+        error = step * np.eye(FIXED + 6)[k]
+        (b_plus, plus), (b_minus, minus) = after(error), after(-error)
+        found = (plus - minus) / (2.0 * step)
+        expected = Phi @ ((b_plus - b_minus) / (2.0 * step))
+        assert found == pytest.approx(expected, abs=1e-7), k
+
+
+def test_the_innovation_is_linear_in_the_error():
+    random = np.random.default_rng(3)
+    true = random_filter(random)
+    y = (true.points - true.position) @ true.rotation
+    H, step = true.observation(), 1e-6
+    for k in range(FIXED + 6):
+        hat = displaced(true, step * np.eye(FIXED + 6)[k])
+        z = (y @ hat.rotation.T + hat.position - hat.points).ravel()
+        assert z / step == pytest.approx(H[:, k], abs=1e-5)
+
+
+def test_a_correction_is_that_of_least_squares():
+    """P⁻¹ grows by Hᵀ N⁻¹ H, and the error is -P Hᵀ N⁻¹ z: without a gain."""
+    random = np.random.default_rng(6)
+    before = random_filter(random)
+    A = random.normal(size=(FIXED + 6, FIXED + 6))
+    before.covariance = A @ A.T
+    seen, n = random.normal(size=(2, 3)), np.diag(random.uniform(0.5, 2.0, 6))
+    after, turned = deepcopy(before), np.kron(np.eye(2), before.rotation)
+    after.correct(seen, n)
+    H, N = before.observation(), turned @ n @ turned.T
+    grown = np.linalg.inv(before.covariance) + H.T @ np.linalg.solve(N, H)
+    assert after.covariance == pytest.approx(np.linalg.inv(grown), rel=1e-6, abs=1e-8)
+    z = (seen @ before.rotation.T + before.position - before.points).ravel()
+    wanted = -np.linalg.solve(grown, H.T @ np.linalg.solve(N, z))
+    assert displaced(before, wanted).points == pytest.approx(after.points)
+    assert displaced(before, wanted).velocity == pytest.approx(after.velocity)
+
+
+def test_a_new_point_has_the_error_of_where_it_is_seen_from():
+    random = np.random.default_rng(4)
+    true = random_filter(random, points=0)
+    true.covariance = random.normal(size=(FIXED, FIXED))
+    true.covariance = true.covariance @ true.covariance.T
+    place, noise = random.normal(size=(1, 3)), np.diag([1.0, 4.0, 9.0])
+    grown, step = deepcopy(true), 1e-6
+    grown.add(["point"], place, noise)
+    # As a function of the error and of the noise of what is seen.
+    columns = []
+    for k in range(FIXED + 3):
+        hat = displaced(true, step * np.eye(FIXED + 3)[k][:FIXED])
+        ideal = deepcopy(true)
+        ideal.add(["point"], place, noise)
+        hat.add(["point"], place + step * np.eye(FIXED + 3)[k][FIXED:], noise)
+        columns.append(error_of(hat, ideal) / step)
+    J = np.transpose(columns)
+    P = np.zeros((FIXED + 3, FIXED + 3))
+    P[:FIXED, :FIXED], P[FIXED:, FIXED:] = true.covariance, noise
+    assert grown.covariance == pytest.approx(J @ P @ J.T, rel=1e-4, abs=1e-3)
+
+
+def test_a_point_that_is_dropped_leaves_the_others():
+    made = random_filter(np.random.default_rng(5), points=3)
+    left, P = deepcopy(made), made.covariance
+    left.drop([1])
+    assert left.names == [0, 2]
+    assert left.points == pytest.approx(made.points[[0, 2]])
+    kept = [*range(18), *range(21, 24)]
+    assert left.covariance == pytest.approx(P[np.ix_(kept, kept)])
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 10_000), yaw=st.floats(-3.0, 3.0))
+def test_it_does_not_matter_where_the_world_begins(seed, yaw):
+    """Another heading and place of the world turn the estimate, and nothing else."""
+    random = np.random.default_rng(seed)
+    here, turn = random_filter(random), expm(skew(np.array([0.0, 0.0, yaw])))
+    offset = random.normal(size=3)
+    there = deepcopy(here)
+    there.rotation, there.velocity = turn @ here.rotation, turn @ here.velocity
+    there.position = turn @ here.position + offset
+    there.points = here.points @ turn.T + offset
+    # The adjoint of the group carries the covariance.
+    size = FIXED + 6
+    Ad = np.eye(size)
+    for rows in (ROTATION, VELOCITY, POSITION, slice(15, 18), slice(18, 21)):
+        Ad[rows, rows] = turn
+    for rows in (POSITION, slice(15, 18), slice(18, 21)):
+        Ad[rows, ROTATION] = skew(offset) @ turn
+    there.covariance = Ad @ here.covariance @ Ad.T
+    for _ in range(5):
+        omega, force = random.normal(size=3), 10.0 * random.normal(size=3)
+        seen = (here.points - here.position) @ here.rotation
+        seen += 0.01 * random.normal(size=seen.shape)
+        for each in (here, there):
+            each.predict(omega, force, 0.01)
+            each.correct(seen, SEEN**2 * np.eye(6))
+    assert there.rotation == pytest.approx(turn @ here.rotation, abs=1e-9)
+    assert there.velocity == pytest.approx(turn @ here.velocity, abs=1e-8)
+    assert there.position == pytest.approx(turn @ here.position + offset, abs=1e-8)
+    assert there.gyroscope_bias == pytest.approx(here.gyroscope_bias, abs=1e-8)
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 10_000))
+def test_the_covariance_stays_one(seed):
+    random = np.random.default_rng(seed)
+    made = random_filter(random, points=1)
+    for k in range(30):
+        made.predict(random.normal(size=3), 20.0 * random.normal(size=3), 0.01)
+        if random.random() < 0.3:
+            made.add([("new", k)], random.normal(size=(1, 3)), SEEN**2 * np.eye(3))
+        if random.random() < 0.2 and made.names:
+            made.drop(made.names[:1])
+        before, n = np.trace(made.covariance), len(made.names)
+        made.correct(random.normal(size=(n, 3)), SEEN**2 * np.eye(3 * n))
+        assert np.trace(made.covariance) <= before * (1.0 + 1e-9)
+        assert made.covariance == pytest.approx(made.covariance.T)
+        assert np.linalg.eigvalsh(made.covariance).min() > -1e-12
+        assert made.rotation @ made.rotation.T == pytest.approx(np.eye(3), abs=1e-12)
+
+
+class Walker:
+    """A unit that sways above points, which come and go; all is known of it."""
+
+    def __init__(self, random, h, densities, seen, noise=1.0):
+        self.random, self.h, self.noise = random, h, noise
+        self.slip, self.deviation = densities.slip, seen
+        self.rotation, self.velocity = np.eye(3), np.array([0.3, 0.0, 0.0])
+        self.position = np.array([0.0, 0.0, 0.8])
+        self.places = {0: np.array([0.0, 0.1, 0.0]), 1: np.array([0.0, -0.1, 0.0])}
+        n = densities
+        self.walks = np.repeat([n.gyroscope_walk, n.accelerometer_walk], 3)
+        self.whites = np.repeat([n.gyroscope, n.accelerometer], 3) / np.sqrt(h)
+        self.bias = np.zeros(6)
+
+    def draw(self, *shape):
+        return self.noise * self.random.normal(size=shape)
+
+    def step(self, t):
+        """Go on; return the readings of the unit."""
+        h = self.h
+        omega = np.array([0.5 * np.sin(3 * t), 0.4 * np.cos(4 * t), 0.3 * np.sin(t)])
+        force = self.rotation.T @ (
+            np.array([np.sin(5 * t), np.cos(7 * t), 2 * np.sin(6 * t)]) - GRAVITY
+        )
+        acceleration = self.rotation @ force + GRAVITY
+        self.position = self.position + h * self.velocity + 0.5 * h * h * acceleration
+        self.velocity = self.velocity + h * acceleration
+        self.rotation = self.rotation @ expm(h * skew(omega))
+        readings = np.concatenate([omega, force]) + self.bias
+        readings += self.whites * self.draw(6)
+        self.bias = self.bias + np.sqrt(h) * self.walks * self.draw(6)
+        for name in self.places:
+            slip = np.sqrt(h) * self.slip * self.draw(3)
+            self.places[name] = self.places[name] + slip
+        return readings[:3], readings[3:]
+
+    def seen(self, names):
+        places = np.array([self.places[name] for name in names]).reshape(-1, 3)
+        exact = (places - self.position) @ self.rotation
+        return exact + self.deviation * self.draw(*exact.shape)
+
+    def true(self, estimate):
+        """Return the truth, with the points of an estimate."""
+        found = deepcopy(estimate)
+        found.rotation, found.velocity = self.rotation, self.velocity
+        found.position = self.position
+        found.points = np.array([self.places[n] for n in estimate.names]).reshape(-1, 3)
+        found.gyroscope_bias, found.accelerometer_bias = self.bias[:3], self.bias[3:]
+        return found
+
+
+def walked(random, start, duration, densities=DENSITIES, seen=SEEN, noise=1.0):
+    """Return a walker and the filter that followed it; each step has new points.
+
+    Args:
+        random: The random numbers.
+        start: Standard deviations of the error at the start, shape (15,).
+        duration: How long [s].
+        densities: What the filter expects.
+        seen: The deviation of what the legs see, as it expects [m].
+        noise: Factor of all noise of the readings.
+    """
+    h = 0.01
+    walker = Walker(random, h, densities, seen, noise)
+    walker.bias = -start[9:] * random.normal(size=6)
+    estimate = InvariantFilter(
+        walker.rotation,
+        walker.velocity,
+        walker.position,
+        np.diag(start**2),
+        densities,
+        GRAVITY,
+    )
+    error = start * random.normal(size=15)
+    error[9:] = 0.0  # the estimate is zero, the truth is not
+    estimate.retract(error)
+    names = [0, 1]
+    estimate.add(names, walker.seen(names), seen**2 * np.eye(6))
+    for k in range(round(duration / h)):
+        estimate.predict(*walker.step(k * h), h)
+        if k % 40 == 20:  # a foot leaves, and comes elsewhere
+            name = estimate.names[0]
+            estimate.drop([name])
+            walker.places[name] = walker.position * [1, 1, 0] + [0.2, 0.1, 0]
+            left = list(estimate.names)
+            estimate.correct(walker.seen(left), seen**2 * np.eye(3 * len(left)))
+            estimate.add([name], walker.seen([name]), seen**2 * np.eye(3))
+        else:
+            names = list(estimate.names)
+            estimate.correct(walker.seen(names), seen**2 * np.eye(3 * len(names)))
+    return walker, estimate
+
+
+START = np.repeat([0.05, 0.1, 0.02, 0.01, 0.1], 3)
+
+
+def test_the_covariance_says_how_large_errors_are():
+    """The mean of ξᵀ P⁻¹ ξ over random runs is in its interval (NEES)."""
+    runs = 40
+    total = 0.0
+    for seed in range(runs):
+        walker, estimate = walked(np.random.default_rng(seed), START, 1.5)
+        error = error_of(estimate, walker.true(estimate))
+        total += error @ np.linalg.solve(estimate.covariance, error)
+    size = runs * len(error)
+    low, high = chi2.ppf([0.001, 0.999], size)
+    assert low < total < high
+
+
+def test_without_noise_what_can_be_observed_converges():
+    """Tilt, velocity and biases, from a wrong start; the heading keeps its error."""
+    start = START.copy()
+    start[9:] = [*3 * [0.02], *3 * [0.05]]
+    random = np.random.default_rng(7)
+    quiet = Densities(1e-4, 1e-3, 1e-6, 1e-5, 1e-5)
+    walker, estimate = walked(random, start, 6.0, quiet, 1e-4, noise=0.0)
+    error = error_of(estimate, walker.true(estimate))
+    down = np.array([0.0, 0.0, 1.0])
+    tilt = estimate.rotation.T @ down - walker.rotation.T @ down
+    velocity = walker.rotation.T @ walker.velocity
+    assert np.abs(tilt).max() < 1e-4
+    assert estimate.rotation.T @ estimate.velocity == pytest.approx(velocity, abs=1e-4)
+    assert np.abs(error[GYROSCOPE]).max() < 1e-4
+    assert np.abs(error[ACCELEROMETER]).max() < 1e-3
+    assert abs(error[2]) > 0.01

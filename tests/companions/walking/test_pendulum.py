@@ -1,0 +1,113 @@
+"""The divergent component of motion: closed forms against equations of motion."""
+
+import numpy as np
+import pytest
+
+from hsp_control.companions.walking.pendulum import (
+    Phase,
+    dcm_of,
+    error_after,
+    in_step,
+    plan_dcm,
+)
+
+W = 3.3
+H = 1e-6
+
+
+def some_phases() -> list[Phase]:
+    rng = np.random.default_rng(1)
+    points = np.cumsum(rng.normal(scale=0.2, size=(6, 2)), axis=0)
+    return [
+        Phase(d, a, b)
+        for d, a, b in zip(
+            (0.4, 0.2, 0.7, 0.15, 0.3), points[:-1], points[1:], strict=True
+        )
+    ]
+
+
+def test_a_phase_obeys_the_equation_of_the_divergent_component():
+    phase, first = some_phases()[1], np.array([0.05, -0.02])
+    for t in (0.0, 0.07, 0.2):
+        rate = (phase.dcm(first, t + H, W) - phase.dcm(first, t - H, W)) / (2 * H)
+        at = phase.start + t / phase.duration * (phase.end - phase.start)
+        assert rate == pytest.approx(W * (phase.dcm(first, t, W) - at), abs=1e-8)
+    assert phase.dcm(first, 0.0, W) == pytest.approx(first, abs=1e-15)
+    last = phase.dcm(first, phase.duration, W)
+    assert phase.first_dcm(last, W) == pytest.approx(first, abs=1e-14)
+
+
+def test_a_plan_is_continuous_and_ends_at_rest():
+    phases = some_phases()
+    starts = plan_dcm(phases, W)
+    for k, phase in enumerate(phases):
+        end = phase.dcm(starts[k], phase.duration, W)
+        following = starts[k + 1] if k + 1 < len(starts) else phases[-1].end
+        assert end == pytest.approx(following, abs=1e-12)
+
+
+def test_integration_of_the_pendulum_stays_with_the_closed_form():
+    """c'' = ω² (c - p), by Runge and Kutta, against ξ = c + c'/ω of the plan."""
+    phases = some_phases()
+    starts = plan_dcm(phases, W)
+    c = starts[0] + np.array([0.03, 0.01])
+    x = np.concatenate([c, W * (starts[0] - c)])
+    h = 1e-4
+    for phase, start in zip(phases, starts, strict=True):
+
+        def rate(t, x, phase=phase):
+            return np.concatenate([x[2:], W * W * (x[:2] - phase.point(t))])
+
+        steps = round(phase.duration / h)
+        for k in range(steps):
+            t = k * h
+            k1 = rate(t, x)
+            k2 = rate(t + h / 2, x + h / 2 * k1)
+            k3 = rate(t + h / 2, x + h / 2 * k2)
+            k4 = rate(t + h, x + h * k3)
+            x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        end = phase.dcm(start, phase.duration, W)
+        # An error of the start grows by exp(ω t): 800 over these 2 s.
+        assert dcm_of(x[:2], x[2:], W) == pytest.approx(end, abs=1e-8)
+
+
+@pytest.mark.parametrize("error", [0.01, -0.03, 0.049, 0.0501, -0.2, 0.0])
+@pytest.mark.parametrize("t", [0.05, 0.4, 1.5])
+def test_the_error_that_bounded_feedback_leaves(error, t):
+    """Against the integrated ε' = ω (ε - sat((1 + k/ω) ε))."""
+    gain, reach, h = 4.0, 0.05, 1e-4
+    x = error
+    for _ in range(round(t / h)):
+        mid = x + 0.5 * h * W * (x - np.clip((1 + gain / W) * x, -reach, reach))
+        x += h * W * (mid - np.clip((1 + gain / W) * mid, -reach, reach))
+    assert error_after(error, t, W, gain, reach) == pytest.approx(x, abs=1e-6, rel=1e-4)
+    if abs(error) < reach:
+        assert abs(error_after(error, t, W, gain, reach)) <= abs(error)
+
+
+def test_feedback_within_the_sole_is_a_task_with_these_gains():
+    """c'' = ω² (c - p - (1 + k/ω) ε) is e'' + (ω + k) e' + ω k e = 0."""
+    k, rng = 4.0, np.random.default_rng(2)
+    c, c_dot, r, r_dot, p = rng.normal(size=(5, 2))
+    error = dcm_of(c, c_dot, W) - dcm_of(r, r_dot, W)
+    ours = W**2 * (c - p - (1 + k / W) * error)
+    e, e_dot = r - c, r_dot - c_dot
+    assert ours == pytest.approx(W**2 * (r - p) + (W + k) * e_dot + W * k * e)
+
+
+def test_a_phase_takes_as_long_as_the_component_needs():
+    """A foot that lands 30 ms early or late changes how long the weight shifts."""
+    phase = Phase(0.15, np.array([0.48, -0.08]), np.array([0.74, 0.08]))
+    last = phase.end + np.array([0.03, -0.02])
+    for duration in (0.12, 0.15, 0.18):
+        there = phase._replace(duration=duration).first_dcm(last, W)
+        found = in_step(phase, last, there, W, (0.075, 0.3))
+        assert found.duration == pytest.approx(duration, abs=0.6 * 0.225 / 200)
+        assert np.array_equal(found.end, phase.end)
+        # What lies beside the way changes little: the nearest point counts.
+        along = there - phase._replace(duration=duration - 1e-3).first_dcm(last, W)
+        beside = 0.02 * np.array([-along[1], along[0]]) / np.linalg.norm(along)
+        found = in_step(phase, last, there + beside, W, (0.075, 0.3))
+        assert found.duration == pytest.approx(duration, abs=0.01)
+    far = in_step(phase, last, phase.start - 10.0, W, (0.075, 0.3))
+    assert far.duration == 0.3

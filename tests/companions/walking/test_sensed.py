@@ -1,0 +1,183 @@
+"""Contacts begin and end when that is felt."""
+
+import numpy as np
+import pytest
+
+from hsp_control import load_experiment
+from hsp_control.common.exceptions import HspControlError, PlanError
+from hsp_control.companions.walking import Sensed, SensedContact
+from hsp_control.control.measurement import Measurement
+from hsp_control.robot.integrators import Rk4
+from hsp_control.simulation import simulate
+from hsp_control.simulation.plants import RigidContact, RigidContacts
+from hsp_control.trajectories.switch import Switch
+
+pytest.importorskip("example_robot_data")
+SWING, FOOT = "whole_body/solo12_swing", "FL_FOOT"
+UNSCHEDULED = ("contacts.front_left.schedule=null", "tasks.foot.schedule=null")
+
+
+def told(rule, *overrides):
+    """Return the experiment of a foot that is sensed, and what runs."""
+    plan = f"plan={{type: sensed, contacts: {{front_left: {rule}}}}}"
+    experiment = load_experiment(SWING, *UNSCHEDULED, plan, *overrides)
+    return experiment, experiment.scenario.plan.begin(experiment.controller)
+
+
+def feel(experiment, running, t, force):
+    """Tell a force, and return the contact's and the task's switches."""
+    q, v = experiment.q0, np.zeros(experiment.robot.nv)
+    wrenches = {} if force is None else {FOOT: np.array([0, 0, force, 0, 0, 0.0])}
+    running.update(Measurement(0, t, q, v, wrenches=wrenches))
+    contacts = {each.name: each for each in experiment.controller.contacts}
+    tasks = {each.name: each for each in experiment.controller.tasks}
+    return contacts["front_left"].schedule, tasks["foot"].schedule
+
+
+def test_it_bears_when_it_is_pressed_and_its_force_rises():
+    experiment, running = told("{force: 3, task: foot, ramp: 0.2}")
+    contact, task = feel(experiment, running, 0.0, 0.0)
+    assert isinstance(contact, Switch)
+    assert not contact.is_on
+    assert task.is_on
+    contact, task = feel(experiment, running, 0.1, 2.9)
+    assert not contact.active(0.1)
+    contact, task = feel(experiment, running, 0.2, 3.0)
+    assert contact.active(0.2)
+    assert not task.active(0.2)
+    assert contact.weight(0.2) == 0.0
+    assert 0.0 < contact.weight(0.3) < contact.weight(0.4) == 1.0
+    channels = running.log_channels()
+    assert channels["plan.front_left.bears"].value == 1.0
+    assert channels["plan.front_left.felt"].value == 3.0
+    assert channels["plan.front_left.events"].value == 1.0
+
+
+def test_it_ends_when_the_ground_is_gone_but_not_at_once():
+    experiment, running = told("{force: 4, patience: 0.02, task: foot, starts: true}")
+    contact, task = feel(experiment, running, 0.0, 0.0)  # nothing is measured yet
+    assert contact.is_on
+    assert not task.is_on
+    for k in range(1, 30):
+        contact, task = feel(experiment, running, 0.001 * k, 1.1)
+        assert contact.is_on
+    for k in range(30, 50):
+        contact, task = feel(experiment, running, 0.001 * k, 0.9)  # below a quarter
+        assert contact.is_on, k
+    contact, task = feel(experiment, running, 0.051, 0.9)
+    assert not contact.is_on
+    assert contact.weight(0.061) == pytest.approx(0.5)  # it fades as long again
+    assert task.weight(0.061) == 0.0
+    assert not contact.active(0.0711)
+    assert task.weight(0.0711) == 1.0
+
+
+def test_what_is_not_wanted_fades_and_returns_only_when_it_is():
+    experiment, running = told(
+        "{force: 2, wanted: [[null, 1], [2, null]], ramp: 0.1, starts: true, "
+        "task: foot}"
+    )
+    contact, task = feel(experiment, running, 0.5, 9.0)
+    assert contact.is_on
+    contact, task = feel(experiment, running, 1.0, 9.0)
+    assert contact.weight(1.05) == pytest.approx(0.5)
+    assert contact.active(1.09)
+    assert task.weight(1.09) == 0.0
+    contact, task = feel(experiment, running, 1.05, 9.0)
+    assert task.weight(1.09) == 0.0
+    contact, task = feel(experiment, running, 1.11, 9.0)
+    assert not contact.active(1.11)
+    assert task.is_on
+    contact, task = feel(experiment, running, 1.5, 9.0)
+    assert not contact.active(1.5)
+    contact, task = feel(experiment, running, 2.0, 9.0)
+    assert contact.active(2.0)
+    assert not task.is_on
+
+
+def test_height_is_enough():
+    experiment, running = told("{height: 0.02}")
+    contact, _ = feel(experiment, running, 0.0, None)
+    assert contact.is_on  # it stands on the ground, 0.0165 m
+    experiment, running = told("{height: 0.01}")
+    contact, _ = feel(experiment, running, 0.0, None)
+    assert not contact.is_on
+    height = running.log_channels()["plan.front_left.height"].value
+    assert height == pytest.approx(0.0165, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("height", "force", "bears"),
+    [(0.02, 2.9, False), (0.01, 3.0, False), (0.02, 3.0, True)],
+)
+def test_with_height_and_force_both_must_be_felt(height, force, bears):
+    experiment, running = told(f"{{force: 3, height: {height}}}")
+    contact, _ = feel(experiment, running, 0.0, force)  # it stands at 0.0165 m
+    assert contact.is_on == bears
+
+
+def test_a_force_that_nothing_measures_is_said():
+    experiment, running = told("{force: 3}")
+    with pytest.raises(PlanError, match=r"plan.contacts.front_left.force: nothing mea"):
+        feel(experiment, running, 0.0, None)
+
+
+@pytest.mark.parametrize(
+    ("rule", "message"),
+    [
+        ("{}", "give force or height: what tells that it bears"),
+        ("{height: 0.1, release: 2}", "release is a force; give force, too"),
+        ("{force: 2, release: 2}", "release is 2 N; must be below force = 2 N"),
+        ("{force: 2, wanted: [[2, 1]]}", "the interval from 2 to 1 s is empty"),
+        ("{force: 2, task: fot}", "no task 'fot'; did you mean 'foot'"),
+    ],
+)
+def test_what_does_not_fit_is_said(rule, message):
+    with pytest.raises(HspControlError, match=message):
+        told(rule)
+
+
+def test_schedules_and_unknown_contacts_are_refused():
+    sensed = Sensed([SensedContact(2.0, name="front_left")])
+    experiment = load_experiment(SWING)
+    scenario = experiment.scenario
+    given = (*scenario.tasks.values(),), (*scenario.contacts.values(),)
+    with pytest.raises(PlanError, match=r"plan.contacts.front_left: the contact has a"):
+        sensed.parts(experiment.robot, *given)
+    with pytest.raises(PlanError, match=r"no contact 'front_lft'; did you mean"):
+        Sensed([SensedContact(2.0, name="front_lft")]).parts(experiment.robot, *given)
+
+
+def stood(plant, *overrides, duration):
+    """Return a run of Solo, whose front left foot is sensed, on rigid contacts."""
+    experiment, _ = told("{force: 2, starts: true, ramp: 0.05}", *overrides)
+    return simulate(
+        experiment.controller, experiment.q0, duration=duration,
+        control_period=0.002, log_period=0.002, integrator=Rk4(step=0.002),
+        plant=plant, plan=experiment.scenario.plan,
+    )  # fmt: skip
+
+
+def test_on_rigid_contacts_it_follows_what_the_plant_does():
+    """The plant's contact goes and comes back; the controller feels both."""
+    feet = ("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT")
+    plant = RigidContacts(
+        [
+            RigidContact(foot, kind="point", on=[[None, 0.1], [0.2, None]])
+            if foot == FOOT
+            else RigidContact(foot, kind="point")
+            for foot in feet
+        ]
+    )
+    run = stood(plant, duration=0.3)
+    bears, t = run["plan.front_left.bears"], run.t
+    assert bears[t < 0.1].all()
+    gone = t[np.flatnonzero(np.diff(bears) < 0)[0] + 1]
+    assert 0.1 + 0.015 < gone < 0.1 + 0.03  # its patience
+    back = t[np.flatnonzero(np.diff(bears) > 0)[0] + 1]
+    assert 0.2 <= back < 0.29  # when it has turned from a pull to a push
+    weight = run["contact.front_left.weight"]
+    assert weight[np.flatnonzero(t >= back + 0.05)] == pytest.approx(1.0)
+    faded = gone + 0.02  # its patience again
+    assert weight[(t > faded) & (t < back)] == pytest.approx(0.0)
+    assert run["plan.front_left.felt"][-1] > 2.0

@@ -1,0 +1,143 @@
+"""A trot is a value; what does not fit it is said before the first swing."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hsp_control import Limits, Robot, load_experiment
+from hsp_control.common.exceptions import HspControlError, PlanError
+from hsp_control.companions.walking import Trot
+from hsp_control.companions.walking.quadruped import BANDWIDTH
+from hsp_control.constraints.contacts import BallContact, SurfaceContact
+from hsp_control.tasks import CenterOfMass
+from hsp_control.trajectories import Hold, Stops
+from hsp_control.trajectories.switch import Switch
+
+pytest.importorskip("example_robot_data")
+TROT = "whole_body/solo12_trot"
+FEET = [
+    BallContact(frame, radius=0.0165)
+    for frame in ("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT")
+]
+
+
+@pytest.fixture(scope="module")
+def solo() -> Robot:
+    return Robot.load("solo12")
+
+
+def test_it_adds_what_it_needs(solo):
+    own = CenterOfMass(axes="xy", priority=3)
+    made = Trot(speed=0.3).parts(solo, [own], FEET)
+    tasks = {task.name: task for task in made.tasks}
+    assert set(tasks) == {
+        "center_of_mass", "height", "trunk", *(foot.frame for foot in FEET),
+    }  # fmt: skip
+    assert tasks["center_of_mass"].priority == 3
+    assert tasks["center_of_mass"].trajectory.dimension == 2
+    assert tasks["height"].trajectory.dimension == 1
+    assert all(isinstance(each.schedule, Switch) for each in made.contacts)
+
+
+@pytest.mark.parametrize(
+    ("trot", "tasks", "contacts", "message"),
+    [
+        (Trot(), [], [], "^plan: a quadruped trots on four feet; there are 0 .declare"),
+        (
+            Trot(),
+            [],
+            FEET[:3],
+            "^plan: a quadruped trots on four feet; there are 3 .FL",
+        ),
+        (
+            Trot(feet=["FL_FOO"]),
+            [],
+            FEET,
+            "no contact 'FL_FOO'; did you mean 'FL_FOOT'",
+        ),
+        (
+            Trot(),
+            [],
+            [*FEET[:3], SurfaceContact("HR_FOOT", length=0.1, width=0.1)],
+            "^plan: contact 'HR_FOOT' is a surface; a quadruped trots on feet of type",
+        ),
+        (
+            Trot(),
+            [CenterOfMass()],
+            FEET,
+            "^tasks.center_of_mass: its axes are 'xyz'; the plan needs 'xy'",
+        ),
+        (
+            Trot(),
+            [],
+            [*FEET[:3], BallContact("HR_FOOT", radius=0.0165, normal=[1, 0, 0])],
+            r"^plan: contact 'HR_FOOT' has the normal \[1.0, 0.0, 0.0\]; a quadrup",
+        ),
+    ],
+)
+def test_what_does_not_fit_is_said(solo, trot, tasks, contacts, message):
+    with pytest.raises(HspControlError, match=message):
+        trot.parts(solo, tasks, contacts)
+
+
+def test_a_leg_needs_three_joints(solo):
+    with pytest.raises(PlanError, match=r"^plan: the leg of 'FL_FOOT' has 2 joints"):
+        Trot().parts(Robot.load("solo8"), [], FEET)
+    trunk = BallContact("base_link", radius=0.0165)
+    with pytest.raises(PlanError, match=r"^plan: the leg of 'base_link' has 0 joints"):
+        Trot().parts(solo, [], [*FEET[:3], trunk])
+
+
+def test_barriers_let_legs_swing():
+    """What is given stays; what changes later keeps it."""
+    controller = load_experiment(TROT).controller
+    assert controller.limits.bandwidth == BANDWIDTH
+    controller.at(0.1).ramp(0.0).limits(Limits(velocity=0.5))
+    controller.compute(0.2, controller.robot.home(), np.zeros(controller.robot.nv))
+    assert controller.limits.bandwidth == pytest.approx(BANDWIDTH, rel=1e-12)
+    assert (
+        load_experiment(TROT, "limits={bandwidth: 7}").controller.limits.bandwidth == 7
+    )
+    assert load_experiment(TROT, "limits=none").controller.limits is None
+
+
+def test_an_arm_cannot_trot():
+    with pytest.raises(PlanError, match=r"^plan: panda cannot trot: it has no free-fl"):
+        Trot().parts(Robot.load("panda"), [], [])
+
+
+def test_what_the_robot_cannot_do_is_said_before_it_runs():
+    with pytest.raises(PlanError, match=r"plan: at 3 m/s a foot is 0.525 m before and"):
+        load_experiment(TROT, "plan.speed=3")
+    with pytest.raises(PlanError, match=r"at 0.3 m/s and 9 rad/s a foot is 0.374 m"):
+        load_experiment(TROT, "plan.turn=9")
+    with pytest.raises(PlanError, match=r"lift is 0.5 m, but the hip of 'front_left' "):
+        load_experiment(TROT, "plan.lift=0.5")
+    shared = "contacts.hind_right.frame=HL_FOOT"
+    with pytest.raises(PlanError, match=r"plan: the feet do not stand at the four cor"):
+        load_experiment(TROT, shared)
+
+
+def test_the_velocity_may_change_and_ends():
+    stops = Stops(waypoints=[[0, 0, 0], [0.2, 0, 0.1]], times=[1.0, 2.0])
+    trot = Trot(velocity=stops, until=5.0)
+    assert trot.velocity_at(3.0) == (0.2, 0.0, 0.1)
+    assert trot.velocity_at(5.0).is_zero
+    with pytest.raises(PlanError, match=r"give either velocity or speed, not both"):
+        replace(trot, speed=0.2)
+    with pytest.raises(PlanError, match=r"velocity has dimension 1; needs 3"):
+        Trot(velocity=Hold([0.1]))
+    with pytest.raises(PlanError, match=r"contact_force is 0.25 robot weights; must"):
+        Trot(contact_force=0.25)
+
+
+def test_a_recorded_velocity_is_read_with_the_configuration(tmp_path):
+    record = tmp_path / "driven.jsonl"
+    record.write_text('{"at": 0.1, "value": [0.2, 0, 0]}\n', encoding="utf-8")
+    given = f"plan.velocity={{type: stream, source: {record}}}"
+    plan = load_experiment(TROT, "plan.speed=0", given).scenario.plan
+    (message,) = plan.velocity.messages
+    assert message["value"] == [0.2, 0.0, 0.0]
+    with pytest.raises(HspControlError, match=r"plan.velocity.source: .*absent.jsonl"):
+        load_experiment(TROT, "plan.speed=0", given.replace("driven", "absent"))

@@ -1,0 +1,137 @@
+"""Solo takes some diagonal steps and stands: on MuJoCo, as its configuration says."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from hsp_control import Experiment, Rollout, Stream, TargetPosture, load_experiment
+from hsp_control.companions.walking import Trot
+from hsp_control.play import Session
+from hsp_control.play.playable import playable
+
+pytest.importorskip("example_robot_data")
+pytest.importorskip("mujoco")
+pytestmark = pytest.mark.slow
+
+
+@cache
+def trot() -> Rollout:
+    settings = ("plan.until=1", "simulation.duration=3", "simulation.log_period=0.005")
+    return load_experiment("whole_body/solo12_trot", *settings).run()
+
+
+def test_it_trots_and_stands_again():
+    run = trot()
+    assert run.status == "completed"
+    assert run["plan.phase"][-1] == 0
+    assert run["plan.steps"][-1] >= 4
+    assert 0.1 < run.q[-1, 0] < 0.4
+    assert np.abs(run.q[:, 2] - run.q[0, 2]).max() < 0.02
+    assert (run["status"] < 3).all()
+
+
+def test_diagonal_feet_swing_together_and_the_others_bear():
+    run = trot()
+    for phase, swinging in ((2, ("FL_FOOT", "HR_FOOT")), (3, ("FR_FOOT", "HL_FOOT"))):
+        middle = run["plan.phase"] == phase
+        assert middle.any()
+        for foot in ("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT"):
+            force = run[f"plant.contact.{foot}.force"][middle, 2]
+            aloft = (force == 0.0).mean()
+            assert (aloft > 0.7) if foot in swinging else (aloft < 0.1)
+
+
+@pytest.mark.system
+def test_it_returns_to_its_line_after_a_push():
+    """Across it; what it loses along it, it does not make up for."""
+    push = "{frame: base_link, force: [-4, 8, 0], start: 1, duration: 0.1}"
+    settings = f"plant.pushes=[{push}]", "plan.until=4.4", "simulation.duration=4.8"
+    run = load_experiment("whole_body/solo12_trot", *settings).run()
+    assert run.status == "completed"
+    beside = run.q[:, 1]
+    assert beside.max() > 0.12  # farther than the reference lets it go
+    assert np.abs(beside[run.t > 4.2]).max() < 0.03
+    fast = (run.t > 2.5) & (run.t < 3.5)
+    assert np.ptp(run.q[fast, 0]) == pytest.approx(0.3, abs=0.05)
+
+
+def test_a_robot_that_is_nowhere_named_trots_within_its_limits():
+    """Go1 with nothing but defaults: barriers of 10 1/s would make it fall at 0.9 s."""
+    feet = ["FL_foot", "FR_foot", "RL_foot", "RR_foot"]
+    ball = {"shape": {"type": "sphere", "radius": 0.02}}
+    given = {
+        "robot": {"name": "go1"},
+        "start": {"ground": 0},
+        "contacts": {f: {"type": "ball", "frame": f, "radius": 0.02} for f in feet},
+        "plan": {"type": "trot", "speed": 0.4},
+        "null_space": {"fields": [{"type": "target_posture", "target": "start"}]},
+        "simulation": {"duration": 1.6, "control_period": 0.001},
+        "plant": {"type": "mujoco", "contacts": dict.fromkeys(feet, ball)},
+    }
+    run = load_experiment(given).run()
+    assert run.status == "completed"
+    assert (run["status"] < 3).all()
+    assert (run["position_excess"] == 0.0).all()
+    assert run.q[-1, 0] > 0.2
+
+
+def test_feet_that_find_no_ground_are_named_where_it_falls():
+    run = load_experiment("whole_body/solo12_trot", "plant={type: rigid_body}").run()
+    assert run.status == "stopped"
+    message = str(run.meta["message"])
+    assert message.startswith("the robot falls: at t = ")
+    assert "; no ground was ever felt at front_left, front_right, hind_" in message
+
+
+def test_its_velocity_changes_no_faster_than_it_may():
+    run = trot()
+    rates = np.diff(run["plan.velocity"], axis=0) / np.diff(run.t)[:, None]
+    assert np.abs(rates).max() < 0.5 * (1.0 + 1e-6)
+    assert run["plan.velocity"][:, 0].max() == pytest.approx(0.3, abs=0.12)
+
+
+@pytest.mark.system
+def test_a_streamed_velocity_is_followed_and_repeated_from_the_log(tmp_path):
+    velocity = Stream(acceleration=2.0)
+    given = load_experiment("whole_body/solo12_trot").scenario
+    experiment = Experiment(
+        given.robot,
+        [],
+        TargetPosture(),
+        start=given.start,
+        contacts=list(given.contacts.values()),
+        limits=given.limits,
+        plan=Trot(velocity=velocity),
+        plant=given.plant,
+        simulation=replace(given.simulation, duration=1.5),
+    )
+
+    def drive(recorder):
+        if recorder.count == 20:
+            velocity.send([0.2, 0.0, 0.0])
+        if recorder.count == 90:
+            velocity.send([0.0, 0.0, 0.0])
+
+    run = experiment.run(on_row=drive)
+    assert (run["plan.phase"][:20] == 0).all()  # it stands until it is told
+    assert run["plan.velocity"].max() > 0.1
+    again = load_experiment(run.save(tmp_path / "trot.npz")).run()
+    for name in run.columns:
+        assert np.array_equal(run[name], again[name], equal_nan=True), name
+
+
+@pytest.mark.system
+def test_it_trots_where_it_can_be_touched():
+    session = Session(playable("whole_body/solo12_trot"))
+    while session.t < 0.4:
+        session.advance()
+        assert not session.over
+    run = session.rollout()
+    assert run["plan.phase"][-1] == 2
+    untouched = trot()
+    rows = run.t.searchsorted(0.3)
+    same = untouched.t.searchsorted(run.t[rows])
+    assert untouched.t[same] == pytest.approx(run.t[rows])
+    assert run.q[rows] == pytest.approx(untouched.q[same], abs=1e-12)

@@ -1,0 +1,262 @@
+"""A walk is a value; what does not fit it is said before the first step."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from hsp_control import Controller, FramePose, Gains, Robot, load_experiment
+from hsp_control.common.exceptions import FallError, HspControlError, PlanError
+from hsp_control.companions.walking import Walk
+from hsp_control.companions.walking.foot import Foot
+from hsp_control.constraints.contacts import BallContact, SurfaceContact
+from hsp_control.control.falling import FallDetector
+from hsp_control.control.measurement import Measurement
+from hsp_control.tasks import CenterOfMass
+from hsp_control.trajectories import Hold, Schedule, Stops
+from hsp_control.trajectories.switch import Switch
+
+pytest.importorskip("example_robot_data")
+WALK = "whole_body/talos_walk"
+SOLE = {"length": 0.16, "width": 0.1}
+FEET = [
+    SurfaceContact(f"{side}_sole_link", name=f"{side}_foot", **SOLE)
+    for side in ("left", "right")
+]
+
+
+@pytest.fixture(scope="module")
+def talos() -> Robot:
+    return load_experiment(WALK).robot
+
+
+def test_it_adds_what_it_needs_and_keeps_what_is_given(talos):
+    own = FramePose(
+        "left_sole_link", gains=Gains(natural_frequency=33.0), name="left_foot"
+    )
+    made = Walk(speed=0.3).parts(talos, [own], FEET)
+    tasks = {task.name: task for task in made.tasks}
+    assert set(tasks) == {"center_of_mass", "trunk", "left_foot", "right_foot"}
+    assert tasks["left_foot"].gains == own.gains
+    assert isinstance(tasks["left_foot"].schedule, Switch)
+    assert tasks["trunk"].frame == "base_link"
+    assert [contact.name for contact in made.contacts] == ["left_foot", "right_foot"]
+    assert all(isinstance(contact.schedule, Switch) for contact in made.contacts)
+
+
+@pytest.mark.parametrize(
+    ("walk", "tasks", "contacts", "message"),
+    [
+        (Walk(), [], [], "^plan: a biped walks on two feet; there are 0 .declare cont"),
+        (Walk(), [], FEET[:1], r"^plan: a biped walks on two feet; there are 1 \(left"),
+        (
+            Walk(),
+            [],
+            [*FEET, SurfaceContact("base_link", name="seat", **SOLE)],
+            r"there are 3 \(.*\); name two with feet$",
+        ),
+        (Walk(feet=["left_foot", "rigt"]), [], FEET, "no contact 'rigt'.* to walk on"),
+        (
+            Walk(),
+            [],
+            [FEET[0], BallContact("right_sole_link", radius=0.1)],
+            "^plan: contact 'right_sole_link' is a ball; a biped walks on flat soles",
+        ),
+        (
+            Walk(),
+            [],
+            [FEET[0], replace(FEET[1], schedule=Schedule([(0, 9)]))],
+            "^contacts.right_foot: it has a schedule, but the plan switches it",
+        ),
+        (
+            Walk(),
+            [CenterOfMass(name="trunk")],
+            FEET,
+            "^tasks.trunk: it is a center_of_mass; the plan needs a frame_orientation",
+        ),
+        (
+            Walk(),
+            [FramePose("base_link", name="left_foot")],
+            FEET,
+            "^tasks.left_foot: its frame is 'base_link'; the foot's is 'left_sole",
+        ),
+        (
+            Walk(),
+            [CenterOfMass(schedule=Schedule([(0, 9)]))],
+            FEET,
+            "^tasks.center_of_mass: it has a schedule, but the plan says when",
+        ),
+        (Walk(trunk="base_lnk"), [], FEET, "^plan.trunk: no frame 'base_lnk'; did you"),
+    ],
+)  # fmt: skip
+def test_what_does_not_fit_is_said(talos, walk, tasks, contacts, message):
+    with pytest.raises(HspControlError, match=message):
+        walk.parts(talos, tasks, contacts)
+
+
+def test_a_leg_of_five_joints_cannot_walk(talos):
+    """As that of Unitree's H1, or of Talos without the joint that rolls its ankle."""
+    locked = {"leg_left_6_joint": 0.0}
+    robot = Robot.load("talos", locked=locked)
+    with pytest.raises(
+        PlanError, match=r"^plan: the leg of 'left_foot' has 5 joints; a sole that is"
+    ):
+        Walk().parts(robot, [], FEET)
+
+
+def test_an_arm_cannot_walk():
+    with pytest.raises(
+        PlanError, match=r"^plan: panda cannot walk: it has no free-fly"
+    ):
+        Walk().parts(Robot.load("panda"), [], [])
+
+
+def test_a_velocity_is_given_once_and_has_three_numbers():
+    with pytest.raises(
+        PlanError, match=r"^Walk: give either velocity or turn, not both$"
+    ):
+        Walk(turn=0.1, velocity=Hold([0.1, 0.0, 0.0]))
+    with pytest.raises(PlanError, match=r"^Walk: velocity has dimension 2; needs 3"):
+        Walk(velocity=Hold([0.1, 0.0]))
+    stops = Stops(waypoints=[[0, 0, 0], [0.2, 0, 0.1]], times=[1.0, 2.0])
+    assert Walk(velocity=stops).velocity_at(3.0) == (0.2, 0.0, 0.1)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        (
+            ["plan.speed=1.2"],
+            "talos_walk.yaml:12: plan: 1.2 m/s with 0.75 s per step are strides of "
+            "0.9 m; the legs of talos reach 0.715 m. Walk slower",
+        ),
+        (
+            ["plan.crouch=0.9"],
+            "plan: crouch is 0.9 m; the centre of mass is only 0.877",
+        ),
+        (
+            ["start.joints={leg_left_5_joint: -0.5}"],
+            "plan: the sole of 'left_foot' does not lie on flat ground at the start",
+        ),
+        (
+            ["contacts.left_foot.width=0.2", "contacts.right_foot.width=0.2"],
+            "plan: the feet 'left_foot' and 'right_foot' stand 0.17 m apart; their "
+            "soles are 0.2 m wide and would meet",
+        ),
+    ],
+)
+def test_what_the_robot_cannot_do_is_said_before_it_runs(overrides, message):
+    with pytest.raises(HspControlError) as caught:
+        load_experiment(WALK, *overrides)
+    assert message in str(caught.value)
+
+
+def test_a_controller_of_other_parts_is_refused(talos):
+    experiment = load_experiment("whole_body/talos_circle")
+    with pytest.raises(PlanError, match="has no task 'left_foot': make it of the plan"):
+        Walk().begin(experiment.controller)
+
+
+def test_falls_are_found(talos):
+    q = talos.home()
+    start = talos.state(0.0, q, np.zeros(talos.nv))
+    feet = ("left_sole_link", "right_sole_link")
+    detector = FallDetector("base_link", feet, start)
+    detector.check(start)
+
+    def moved(step):
+        return talos.state(3.2, talos.integrate(q, step), np.zeros(talos.nv))
+
+    tilted, step = 0.9, np.zeros(talos.nv)
+    step[4] = tilted
+    with pytest.raises(FallError, match=r"t = 3.200 s base_link is tilted by 52° \(at"):
+        detector.check(moved(step))
+    step[4] = 0.7
+    detector.check(moved(step))
+    step[4] = tilted  # the tilt counts from the start
+    leaning = moved(step)
+    FallDetector("base_link", feet, leaning).check(leaning)
+    knees = np.zeros(talos.nv)
+    for side in ("left", "right"):
+        detector.check(moved(knees))  # on one leg it stands, above the lower foot
+        for joint, angle in ((3, -1.2), (4, 2.2), (5, -1.0)):
+            knees[talos.velocity_index(f"leg_{side}_{joint}_joint")] = angle
+    with pytest.raises(FallError, match=r"its centre of mass is at \d+ % of its first"):
+        detector.check(moved(knees))
+
+
+@pytest.mark.parametrize("heading", [0.0, 1.0, np.pi, -3.1])
+def test_a_walk_may_begin_in_any_direction(talos, heading):
+    """Also backwards, where the yaw of one foot is π, and that of the other -π."""
+    experiment = load_experiment(WALK)
+    step = np.zeros(talos.nv)
+    step[5] = heading
+    robot = experiment.robot
+    state = robot.state(0.0, robot.integrate(experiment.q0, step), np.zeros(robot.nv))
+    running = experiment.scenario.plan.begin(experiment.controller)
+    running.update(Measurement(0, 0.0, state.q, state.v))
+    trunk = {task.name: task for task in experiment.controller.tasks}["trunk"]
+    frame = state.frame("base_link")
+    assert trunk.followed.sample(0.0).rotation == pytest.approx(frame.rotation)
+    target = running.log_channels()["plan.footstep"].value
+    ahead = frame.rotation.T @ (np.array([*target[:2], 0.0]) - state.q[:3])
+    assert ahead[0] > 0.1
+    assert abs(target[2] - heading) % (2 * np.pi) == pytest.approx(0.0, abs=1e-3)
+
+
+def test_a_footstep_is_the_middle_of_a_sole(talos):
+    """Wherever the frame's origin is: also beside it, as on a narrow ankle."""
+    frame = SurfaceContact("left_sole_link", **SOLE, center=[0.02, 0.01, 0.0])
+    given = {"left_foot": replace(frame, name="left_foot"), "right_foot": FEET[1]}
+    made = Walk().parts(talos, [], list(given.values()))
+    controller = Controller(talos, made.tasks, contacts=made.contacts)
+    foot, turned = Foot("left_foot", controller), np.zeros(talos.nv)
+    turned[5] = 0.6
+    q = talos.integrate(talos.home(), turned)
+    foot.begin(talos.state(0.0, q, np.zeros(talos.nv)), 0.6)
+    assert foot.corners(1.0).mean(axis=0) == pytest.approx(foot.place.point)
+    origin = foot.origin_of(foot.place)
+    state = talos.state(0.0, q, np.zeros(talos.nv))
+    assert origin.point == pytest.approx(state.position("left_sole_link")[:2])
+
+
+GIVEN = "plan={type: walk, footsteps: %s}"
+
+
+def test_footsteps_are_taken_from_the_middle_between_the_feet():
+    rows = [[0.2, 0.085, 0.0], [0.4, -0.085, 0.2], [0.4, 0.085, 0.2]]
+    experiment = load_experiment(WALK, GIVEN % rows)
+    running = experiment.scenario.plan.begin(experiment.controller)
+    running.start(experiment.robot.state(0.0, experiment.q0, experiment.v0))
+    planner, places = running._planner, running._places
+    assert planner.first_side(0.0, 0) == 1.0
+    assert planner.sets_out(0.0, 2)
+    assert not planner.sets_out(0.0, 3)
+    middle = running._middle()
+    point = places[1.0].point
+    given = (0.0, 0, running._now, 1.0, places, 0.5, point, running._lead)
+    preview = planner.look_ahead(*given)
+    assert preview.target.point - middle == pytest.approx([0.2, 0.085], abs=1e-6)
+    assert preview.swings.count(True) == 3
+    for before, after in pairwise(preview.phases):
+        assert np.array_equal(after.start, before.end)
+    # The weight ends between the last two steps.
+    assert preview.phases[-1].end - middle == pytest.approx([0.4, 0.0], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        (
+            "[[0.2, 0.085, 0], [1.2, -0.085, 0]]",
+            r"footsteps\[1\] is 1 m ahead and 0.17 m beside the standing foot; talos r",
+        ),
+        ("[[0.2, -0.085, 0]]", r"footsteps\[0\] is 0.2 m ahead and -?0(.0\d+)? m besi"),
+        ("[[0.2, 0.085]]", "footsteps"),
+        ("[[0.2, 0.085, 0]], speed: 0.2", "give either footsteps or speed, not both"),
+    ],
+)
+def test_footsteps_that_legs_do_not_reach_are_said(rows, message):
+    with pytest.raises(HspControlError, match=message):
+        load_experiment(WALK, GIVEN % rows)
