@@ -60,7 +60,7 @@ true state. The inertias of the plant's bodies are in the log's `meta`, key `pla
 
 `sensors: {imu: base_link}` is an inertial measurement unit at a frame, with noise and biases that
 walk: `imu: {frame: base_link, gyroscope_noise: 1.7e-4, ...}`. It reports the mean angular velocity
-and specific force of each period, for `estimators` ([estimation](estimation.md)); q and v stay as
+and specific force of each period, for `estimators` ([estimation](companions/estimation.md)); q and v stay as
 they are.
 
 Frames named in `contacts` touch MuJoCo's ground, with a given shape or with the link's

@@ -107,7 +107,7 @@ def main() -> None:
 
 
 def draw_sweep() -> None:
-    """Draw what the sweep of docs/sweeps.md finds."""
+    """Draw what the sweep of docs/companions/sweeps.md finds."""
     found = hsp.sweeps.sweep(
         "panda_obstacle",
         {

@@ -1,7 +1,7 @@
 """A simulated robot on ROS 2: ``python -m hsp_control.companions.ros2.robot``.
 
 It publishes its states and takes efforts as a robot with ros2_control does; see
-docs/ros2.md.
+docs/companions/ros2.md.
 """
 
 import argparse

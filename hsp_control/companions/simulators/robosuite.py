@@ -32,7 +32,7 @@ try:
     from robosuite.controllers.parts.arm.osc import OperationalSpaceController
 except ImportError as error:
     raise ControllerError(
-        f"robosuite cannot be imported ({error}); docs/simulators.md says how to "
+        f"robosuite cannot be imported ({error}); docs/companions/simulators.md says how to "
         "install it"
     ) from error
 

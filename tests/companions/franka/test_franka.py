@@ -325,7 +325,7 @@ def test_the_command_line_drives_the_arm(
 
 
 def test_the_page_is_true(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    text = (ROOT / "docs" / "franka.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs/companions/franka.md").read_text(encoding="utf-8")
     assert table() in text
     told = dict(re.findall(r"^\| `(\w+)` \|.*\| ([^|]*)\|$", text, re.MULTILINE))
     fields = FrankaSettings("a").all_fields()

@@ -454,7 +454,7 @@ except franka.NetworkException as error:
 @pytest.mark.slow
 def test_the_example_in_the_documentation_runs(tmp_path: Path) -> None:
     """As a user does it: the command, the example, Ctrl-C, and the log."""
-    page = Path(__file__).parents[2] / "docs" / "franka_box.md"
+    page = Path(__file__).parents[3] / "docs/companions/franka_box.md"
     example = page.read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]
     assert len(example.strip().splitlines()) <= 14
     host, log = next(addresses()), tmp_path / "example.npz"

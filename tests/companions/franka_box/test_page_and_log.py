@@ -24,7 +24,7 @@ from hsp_control.companions.franka_box import Arm, Box, generators, reflexes
 from hsp_control.companions.franka_box.log import BoxLog
 from hsp_control.live.simulated_robot import sampled
 
-PAGE = (Path(__file__).parents[3] / "docs" / "franka_box.md").read_text("utf-8")
+PAGE = (Path(__file__).parents[3] / "docs/companions/franka_box.md").read_text("utf-8")
 
 
 def test_the_errors_of_the_page_are_those_that_the_box_has() -> None:

@@ -208,7 +208,7 @@ def test_servos_may_be_switched_off(tmp_path: Path) -> None:
 
 
 def test_what_the_page_shows_runs() -> None:
-    text = (ROOT / "docs" / "simulators.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs/companions/simulators.md").read_text(encoding="utf-8")
     _, snippet = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     space: dict[str, Any] = {}
     exec(compile(snippet, "simulators.md", "exec"), space)

@@ -232,7 +232,7 @@ def test_a_base_that_moves_is_refused() -> None:
 
 
 def test_what_the_page_shows_runs() -> None:
-    page = Path(__file__).parents[2] / "docs" / "simulators.md"
+    page = Path(__file__).parents[3] / "docs/companions/simulators.md"
     text = page.read_text(encoding="utf-8")
     snippet, _ = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     space: dict[str, Any] = {}

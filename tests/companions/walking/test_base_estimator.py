@@ -11,7 +11,7 @@ from hsp_control.common.exceptions import (
     HspControlError,
     SimulationError,
 )
-from hsp_control.companions.walking.estimation import BaseEstimator
+from hsp_control.companions.walking import BaseEstimator
 from hsp_control.companions.walking.estimation.invariant_filter import ROTATION
 from hsp_control.control.measurement import Inertial
 from hsp_control.control.plan import Plan, RunningPlan

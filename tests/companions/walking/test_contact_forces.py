@@ -7,7 +7,7 @@ import pytest
 
 from hsp_control import Controller, JointPosture, load_experiment
 from hsp_control.common.exceptions import EstimationError
-from hsp_control.companions.walking.estimation import ContactForces
+from hsp_control.companions.walking import ContactForces
 from hsp_control.control.measurement import Measurement
 from hsp_control.simulation import simulate
 from hsp_control.simulation.plants import RigidContact, RigidContacts

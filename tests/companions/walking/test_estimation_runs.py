@@ -66,7 +66,7 @@ def test_solo_trots_on_an_estimated_base_and_again_the_same(tmp_path):
 
 
 def test_the_page_s_yaml_runs():
-    text = (ROOT / "docs" / "estimation.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs/companions/estimation.md").read_text(encoding="utf-8")
     (given,) = re.findall(r"^```yaml\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     data = yaml.safe_load(given)
     data["simulation"]["duration"] = 0.05

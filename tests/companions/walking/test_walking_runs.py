@@ -182,7 +182,7 @@ def test_a_push_that_one_sole_does_not_hold_is_held_by_both():
 
 
 def test_the_page_s_yaml_and_python_run():
-    text = (ROOT / "docs" / "plans.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs/companions/walking.md").read_text(encoding="utf-8")
     yaml_text, felt = re.findall(r"^```yaml\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     (snippet,) = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     assert len(yaml_text.splitlines()) <= 10

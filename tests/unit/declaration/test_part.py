@@ -265,6 +265,7 @@ class Entry:
     """An entry point that declares its class when it is loaded."""
 
     value = "package:Plugged"
+    module = "package"
 
     def __init__(self, name: str, load: Callable[[], Any]) -> None:
         self.name, self.load = name, load

@@ -1,11 +1,11 @@
 """Compare this law with TSID while Talos stands and walks under the same plan.
 
-    .venv-peers/bin/python benchmarks/walking_side_by_side.py
+    .venv-peers/bin/python benchmarks/companions/walking_side_by_side.py
 
 Both stand in the same closed loop on MuJoCo: the plan gets the measurement of the
 period, writes references and switches contacts, and the controller follows. Times of a
 step are taken in one run, of all controllers in turn at each of its states. Writes a
-section of docs/plans.md.
+section of docs/companions/walking.md.
 """
 
 # ruff: noqa: E402
@@ -17,13 +17,16 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 
 import argparse
 import importlib
+import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 from time import perf_counter_ns
 from typing import Any
 
 import numpy as np
+sys.path.append(str(Path(__file__).parents[1]))
 from marked_sections import DOCS, replace_section
 from timing import Compute
 from walking import PUSH, WALK
@@ -35,7 +38,7 @@ from hsp_control.control.measurement import Measurement
 from hsp_control.simulation.plants import SampledPlant
 
 PERIOD = 1e-3
-SECTION = "benchmarks/walking_side_by_side.py"
+SECTION = "benchmarks/companions/walking_side_by_side.py"
 LAW = "this law"
 WEIGHTS = (1e-2, 1e-3)  # of TSID's posture
 FELL = 20.0  # joint speed at which a run is over [rad/s]
@@ -340,7 +343,7 @@ def main() -> None:
     )
     print(table)
     if not options.dry:
-        replace_section(DOCS / "plans.md", SECTION, text)
+        replace_section(DOCS / "companions/walking.md", SECTION, text)
 
 
 if __name__ == "__main__":

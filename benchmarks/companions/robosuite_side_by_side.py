@@ -1,24 +1,28 @@
 """robosuite's OSC_POSE and this law's HSP_POSE in robosuite's own environment.
 
     make sims    # makes .venv-sims
-    .venv-sims/bin/python benchmarks/robosuite_side_by_side.py
+    .venv-sims/bin/python benchmarks/companions/robosuite_side_by_side.py
 
 A Panda in the environment Lift, 500 steps of the simulation a second, goals as absolute
 poses. Circle: 0.1 m at 2 rad/s, turning by ±0.3 rad about the vertical, five turns. Set
 point: 5 cm aside, 5 cm up and 0.2 rad, at once. Both controllers have the gains of
 OSC_POSE (kp = 150, critically damped), and its attraction to the first posture. Writes
-a table into docs/simulators.md.
+a table into docs/companions/simulators.md.
 """
 
+# ruff: noqa: E402
 import logging
+import sys
 from collections.abc import Callable, Iterator
 from itertools import chain
+from pathlib import Path
 from time import perf_counter_ns
 from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 import robosuite
+sys.path.append(str(Path(__file__).parents[1]))
 from marked_sections import DOCS, replace_section
 
 import hsp_control.companions.simulators.robosuite  # noqa: F401  it registers HSP_POSE
@@ -278,7 +282,7 @@ def main() -> None:
             print(row, end="", flush=True)
             lines.append(row)
         section = f"robosuite_side_by_side.py, {name}"
-        replace_section(DOCS / "simulators.md", section, "".join(lines))
+        replace_section(DOCS / "companions/simulators.md", section, "".join(lines))
 
 
 if __name__ == "__main__":
