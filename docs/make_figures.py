@@ -135,7 +135,7 @@ def draw_sweep() -> None:
 
 def draw_walk(left: Axes, right: Axes) -> None:
     """Draw arms that swing by a field while Talos walks, and e_N in each phase."""
-    plain = hsp.load_experiment("whole_body/talos_walk")
+    plain = hsp.load_experiment("walking/talos_walk")
     joints = [plain.robot.velocity_index(f"arm_{s}_4_joint") for s in ("left", "right")]
     nv, rate, follows = plain.robot.nv, 2.0 * np.pi / 1.5, 6.0
     amplitudes, weights = np.zeros(nv), np.ones(nv)
@@ -148,7 +148,7 @@ def draw_walk(left: Axes, right: Axes) -> None:
         "rates": [rate] * nv,
     }
     run = hsp.load_experiment(
-        "whole_body/talos_walk",
+        "walking/talos_walk",
         f"null_space.fields.0.displacement={json.dumps(swing)}",
         f"null_space.fields.0.weights={weights.tolist()}",
         "simulation.log_period=0.002",

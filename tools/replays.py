@@ -25,8 +25,8 @@ REPLAYS: dict[str, dict[str, dict[str, object]]] = {
     "dual_panda": {"with the field": {}, "without": NO_FIELD},
     "tiago_reach": {"with the field": {}, "without": NO_FIELD},
     "whole_body/talos_circle": {},
-    "whole_body/talos_walk": {},
-    "whole_body/solo12_trot": {},
+    "walking/talos_walk": {},
+    "walking/solo12_trot": {},
 }
 """What is shown, and the runs that are compared in it: changes of the null space."""
 

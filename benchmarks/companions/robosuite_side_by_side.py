@@ -10,7 +10,6 @@ OSC_POSE (kp = 150, critically damped), and its attraction to the first posture.
 a table into docs/companions/simulators.md.
 """
 
-# ruff: noqa: E402
 import logging
 import sys
 from collections.abc import Callable, Iterator
@@ -22,6 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 import robosuite
+
 sys.path.append(str(Path(__file__).parents[1]))
 from marked_sections import DOCS, replace_section
 

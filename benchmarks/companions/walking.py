@@ -3,7 +3,7 @@
     .venv/bin/python benchmarks/companions/walking.py [--estimated] [part of a case's name ...]
 
 Prints one line for each case: whether it stood at the end, how far it came, and how
-well the plan was followed. Each case is ``whole_body/talos_walk`` with other values;
+well the plan was followed. Each case is ``walking/talos_walk`` with other values;
 ``--estimated`` with an estimated base, from a noisy inertial measurement unit and noisy
 encoders.
 """
@@ -18,7 +18,7 @@ import numpy as np
 from hsp_control import Rollout, load_experiment
 from hsp_control.common.exceptions import SimulationError
 
-WALK = "whole_body/talos_walk"
+WALK = "walking/talos_walk"
 PUSH = 200.0
 """Force of a push [N], for a tenth of a second."""
 ESTIMATED = {

@@ -26,6 +26,7 @@ from time import perf_counter_ns
 from typing import Any
 
 import numpy as np
+
 sys.path.append(str(Path(__file__).parents[1]))
 from marked_sections import DOCS, replace_section
 from timing import Compute

@@ -67,7 +67,9 @@ def test_the_page_of_compliance_is_true() -> None:
     )
 
 
-@pytest.mark.parametrize("page", ["companions/sweeps", "latency", "robustness", "streams"])
+@pytest.mark.parametrize(
+    "page", ["companions/sweeps", "latency", "robustness", "streams"]
+)
 def test_the_pages_python_runs_and_their_commands_exist(page: str) -> None:
     text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
     (snippet,) = blocks(text, "python")
@@ -137,9 +139,11 @@ def test_every_command_of_a_page_can_be_given(page: str) -> None:
 
 def test_pages_have_commands() -> None:
     """The test above looks at what a reader would type."""
-    assert {"docs/view.md", "docs/companions/franka.md", "docs/tutorial/ten_minutes.md"} <= set(
-        PAGES
-    )
+    assert {
+        "docs/view.md",
+        "docs/companions/franka.md",
+        "docs/tutorial/ten_minutes.md",
+    } <= set(PAGES)
     assert commands("```sh\nhsp run a.yaml --set x='[1, 2]'  # why\n```") == [
         ["run", "a.yaml", "--set", "x=[1, 2]"]
     ]

@@ -557,7 +557,7 @@ def test_the_operational_space_law_keeps_the_tasks_and_not_the_field(
 
 def test_a_robot_that_walks_can_be_pulled_but_not_led(tmp_path: Path) -> None:
     """The feet and the trunk are the plan's; its run is that of `simulate`."""
-    session = Session(playable("whole_body/talos_walk"))
+    session = Session(playable("walking/talos_walk"))
     assert [*session.handles.targets] == ["posture"]
     go(session, 0.5)
     log = session.rollout()

@@ -89,9 +89,12 @@ def command_line() -> argparse.ArgumentParser:
     add_page(view)
     add_strict(view)
 
-    plot = _command(commands, "plot", "draw the figures of a log or a sweep")
+    plot = _command(commands, "plot", "draw the figures of a log")
     plot.add_argument(
-        "log", type=Path, metavar="LOG", help="written by hsp run (.npz) or hsp sweep"
+        "log",
+        type=Path,
+        metavar="LOG",
+        help="written by hsp run",
     )
     plot.add_argument("--out", type=Path, metavar="DIR", help="default: beside the log")
     plot.add_argument(

@@ -12,7 +12,8 @@ def _add_options(model: argparse.ArgumentParser) -> None:
     model.add_argument(
         "address",
         metavar="ADDRESS",
-        help="of the control box, with settings as behind franka:// (docs/companions/franka.md)",
+        help="of the control box, with settings as behind franka:// "
+        "(docs/companions/franka.md)",
     )
     model.add_argument("urdf", type=Path, metavar="FILE", help="the URDF to write")
     like = model.add_argument(

@@ -1,7 +1,7 @@
-"""Robots, simulated robots, targets and watchers on ROS 2's topics: docs/companions/ros2.md.
+"""Robots, simulated robots, targets and watchers on ROS 2's topics.
 
-Messages go over DDS as ROS 2 itself sends them, without ROS 2. Only `address`,
-`installed` and `backend` may be imported without Cyclone DDS, which the extra
+See docs/companions/ros2.md. Messages go over DDS as ROS 2 itself sends them, without
+ROS 2. Only `address`, `installed` and `backend` may be imported without Cyclone DDS, which the extra
 `hsp_control[ros2]` brings.
 """
 

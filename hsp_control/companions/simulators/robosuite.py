@@ -32,8 +32,8 @@ try:
     from robosuite.controllers.parts.arm.osc import OperationalSpaceController
 except ImportError as error:
     raise ControllerError(
-        f"robosuite cannot be imported ({error}); docs/companions/simulators.md says how to "
-        "install it"
+        f"robosuite cannot be imported ({error}); docs/companions/simulators.md says "
+        "how to install it"
     ) from error
 
 TYPE = "HSP_POSE"

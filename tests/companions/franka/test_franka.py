@@ -295,8 +295,10 @@ def test_the_arm_has_seven_joints_and_a_millisecond() -> None:
 def test_the_command_line_drives_the_arm(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    entry = EntryPoint("franka", "franka_arms:connect_patiently", backends.GROUP)
-    monkeypatch.setattr(backends, "entry_points", lambda group: [entry])
+    entry = EntryPoint(
+        "franka", "franka_arms:connect_patiently", "hsp_control.hardware"
+    )
+    monkeypatch.setattr(backends, "entry_points", lambda group: {"franka": entry})
     later = PUSH | {"start": 0.9}
     experiment = circle(plant={"type": "rigid_body", "pushes": [later]})
     file = tmp_path / "circle.yaml"

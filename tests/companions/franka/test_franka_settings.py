@@ -12,7 +12,6 @@ from hsp_control.common.exceptions import LiveError
 from hsp_control.companions.franka import FrankaSettings, Load, connect
 from hsp_control.companions.franka.layouts import Error
 from hsp_control.companions.franka.reflexes import MODES, REFLEXES, explained
-from hsp_control.live import backends
 
 pylibfranka = pytest.importorskip("pylibfranka")
 
@@ -103,5 +102,6 @@ def test_every_error_is_explained_as_its_message_spells_it(error: Error) -> None
 def test_the_package_offers_the_arm() -> None:
     with (ROOT / "pyproject.toml").open("rb") as file:
         points = tomllib.load(file)["project"]["entry-points"]
-    point = EntryPoint("franka", points[backends.GROUP]["franka"], backends.GROUP)
+    group = "hsp_control.hardware"
+    point = EntryPoint("franka", points[group]["franka"], group)
     assert point.load() is connect

@@ -17,8 +17,8 @@ from live_rigs import watched as watched_robot
 from ros2_rigs import DOMAIN, client, fresh
 
 from hsp_control import load_experiment
-from hsp_control.companions.ros2 import robot as ros2_robot
 from hsp_control.cli.live_experiment import simulated_robot
+from hsp_control.companions.ros2 import robot as ros2_robot
 from hsp_control.companions.ros2.hardware import Ros2Hardware
 from hsp_control.companions.ros2.watch import Watched
 from hsp_control.control.compensation import Command

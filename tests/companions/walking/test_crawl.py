@@ -8,7 +8,7 @@ from hsp_control.companions.walking import Crawl
 from hsp_control.constraints.contacts import BallContact, SurfaceContact
 
 pytest.importorskip("example_robot_data")
-CRAWL = "whole_body/solo12_trot"
+CRAWL = "walking/solo12_trot"
 NAMES = ("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT")
 FEET = [BallContact(name, radius=0.0165) for name in NAMES]
 

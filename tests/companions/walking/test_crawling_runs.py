@@ -24,7 +24,7 @@ def crawl() -> Rollout:
     """Return a crawl of some steps, until it stands again."""
     plan = "plan={type: crawl, speed: 0.06, until: 0.7}"
     settings = plan, "simulation.duration=5.4", "simulation.log_period=0.005"
-    return load_experiment("whole_body/solo12_trot", *settings).run()
+    return load_experiment("walking/solo12_trot", *settings).run()
 
 
 def test_it_crawls_and_stands_again():
@@ -73,7 +73,7 @@ def test_it_could_stop_at_any_time():
 def test_a_velocity_in_time_is_followed_as_far_as_the_legs_reach():
     velocity = "{type: hold, point: [0.5, 0.1, 0]}"
     plan = f"plan={{type: crawl, acceleration: 1, velocity: {velocity}}}"
-    settings = "whole_body/solo12_trot", plan, "simulation.duration=1"
+    settings = "walking/solo12_trot", plan, "simulation.duration=1"
     experiment = load_experiment(*settings)
     run = experiment.run()
     robot = experiment.robot
@@ -97,7 +97,7 @@ def test_it_goes_up_a_step_of_two_centimetres():
         "plan.until=2.2",
         "simulation.duration=3.4",
     )
-    run = load_experiment("whole_body/solo12_trot", *settings).run()
+    run = load_experiment("walking/solo12_trot", *settings).run()
     assert run.status == "completed"
     assert run["plan.phase"][-1] == 0
     assert np.abs(run.v[-1]).max() < 0.5

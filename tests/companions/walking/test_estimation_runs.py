@@ -25,7 +25,7 @@ def largest(run, name):
 def test_talos_takes_a_step_on_an_estimated_base():
     """One key turns it on; nothing else of the configuration changes."""
     given = ("plan.steps=1", "simulation.duration=2.2")
-    run = load_experiment("whole_body/talos_walk", "estimators.base=true", *given).run()
+    run = load_experiment("walking/talos_walk", "estimators.base=true", *given).run()
     assert run.status == "completed"
     assert run["plan.steps"][-1] == 1
     assert run["plan.phase"][-1] > 1
@@ -52,7 +52,7 @@ def test_solo_trots_on_an_estimated_base_and_again_the_same(tmp_path):
         return tau
 
     with patch.object(Command, "effort", spy):
-        run = load_experiment("whole_body/solo12_trot", *given).run()
+        run = load_experiment("walking/solo12_trot", *given).run()
     assert run.status == "completed"
     assert run["plan.steps"][-1] >= 3
     assert largest(run, "velocity_error") < 0.08

@@ -20,7 +20,7 @@ FRAMES = {1.0: "left_sole_link", -1.0: "right_sole_link"}
 @pytest.fixture(scope="module")
 def talos():
     """Talos, one foot ahead and turned, and what its legs do."""
-    experiment = load_experiment("whole_body/talos_walk")
+    experiment = load_experiment("walking/talos_walk")
     robot, step = experiment.robot, np.zeros(experiment.robot.nv)
     for joint, angle in (("left_1", 0.3), ("left_3", -0.4), ("right_3", 0.3)):
         step[robot.velocity_index(f"leg_{joint}_joint")] = angle

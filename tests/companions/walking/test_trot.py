@@ -15,7 +15,7 @@ from hsp_control.trajectories import Hold, Stops
 from hsp_control.trajectories.switch import Switch
 
 pytest.importorskip("example_robot_data")
-TROT = "whole_body/solo12_trot"
+TROT = "walking/solo12_trot"
 FEET = [
     BallContact(frame, radius=0.0165)
     for frame in ("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT")

@@ -19,7 +19,7 @@ pytestmark = pytest.mark.slow
 @cache
 def trot() -> Rollout:
     settings = ("plan.until=1", "simulation.duration=3", "simulation.log_period=0.005")
-    return load_experiment("whole_body/solo12_trot", *settings).run()
+    return load_experiment("walking/solo12_trot", *settings).run()
 
 
 def test_it_trots_and_stands_again():
@@ -48,7 +48,7 @@ def test_it_returns_to_its_line_after_a_push():
     """Across it; what it loses along it, it does not make up for."""
     push = "{frame: base_link, force: [-4, 8, 0], start: 1, duration: 0.1}"
     settings = f"plant.pushes=[{push}]", "plan.until=4.4", "simulation.duration=4.8"
-    run = load_experiment("whole_body/solo12_trot", *settings).run()
+    run = load_experiment("walking/solo12_trot", *settings).run()
     assert run.status == "completed"
     beside = run.q[:, 1]
     assert beside.max() > 0.12  # farther than the reference lets it go
@@ -78,7 +78,7 @@ def test_a_robot_that_is_nowhere_named_trots_within_its_limits():
 
 
 def test_feet_that_find_no_ground_are_named_where_it_falls():
-    run = load_experiment("whole_body/solo12_trot", "plant={type: rigid_body}").run()
+    run = load_experiment("walking/solo12_trot", "plant={type: rigid_body}").run()
     assert run.status == "stopped"
     message = str(run.meta["message"])
     assert message.startswith("the robot falls: at t = ")
@@ -95,7 +95,7 @@ def test_its_velocity_changes_no_faster_than_it_may():
 @pytest.mark.system
 def test_a_streamed_velocity_is_followed_and_repeated_from_the_log(tmp_path):
     velocity = Stream(acceleration=2.0)
-    given = load_experiment("whole_body/solo12_trot").scenario
+    given = load_experiment("walking/solo12_trot").scenario
     experiment = Experiment(
         given.robot,
         [],
@@ -124,7 +124,7 @@ def test_a_streamed_velocity_is_followed_and_repeated_from_the_log(tmp_path):
 
 @pytest.mark.system
 def test_it_trots_where_it_can_be_touched():
-    session = Session(playable("whole_body/solo12_trot"))
+    session = Session(playable("walking/solo12_trot"))
     while session.t < 0.4:
         session.advance()
         assert not session.over

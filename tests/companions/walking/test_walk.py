@@ -18,7 +18,7 @@ from hsp_control.trajectories import Hold, Schedule, Stops
 from hsp_control.trajectories.switch import Switch
 
 pytest.importorskip("example_robot_data")
-WALK = "whole_body/talos_walk"
+WALK = "walking/talos_walk"
 SOLE = {"length": 0.16, "width": 0.1}
 FEET = [
     SurfaceContact(f"{side}_sole_link", name=f"{side}_foot", **SOLE)

@@ -40,7 +40,7 @@ def walk() -> Rollout:
         "simulation.duration=4.2",
         "simulation.log_period=0.002",
     )
-    return load_experiment("whole_body/talos_walk", *settings).run()
+    return load_experiment("walking/talos_walk", *settings).run()
 
 
 def test_it_walks_and_stands_again():
@@ -133,7 +133,7 @@ def test_arms_swing_by_a_field():
 
 def test_a_switch_compiles_nothing():
     """All combinations of contacts are compiled before the run, as they are known."""
-    experiment = load_experiment("whole_body/talos_walk", "simulation.duration=1.2")
+    experiment = load_experiment("walking/talos_walk", "simulation.duration=1.2")
     with patch.object(ActiveStack, "__init__", side_effect=AssertionError):
         run = experiment.run()
     assert run["plan.phase"][-1] == 2
@@ -141,7 +141,7 @@ def test_a_switch_compiles_nothing():
 
 def test_the_same_run_again_is_the_same_to_the_bit(tmp_path):
     settings = ("plan.steps=1", "simulation.duration=0.2")
-    first = load_experiment("whole_body/talos_walk", *settings).run()
+    first = load_experiment("walking/talos_walk", *settings).run()
     again = load_experiment(first.save(tmp_path / "walk.npz")).run()
     for name in first.columns:
         assert np.array_equal(first[name], again[name], equal_nan=True), name
@@ -151,7 +151,7 @@ def test_the_same_run_again_is_the_same_to_the_bit(tmp_path):
 def test_a_push_that_fells_is_said():
     push = "{frame: torso_2_link, force: [0, 900, 0], start: 0.1, duration: 0.3}"
     settings = (f"plant.pushes=[{push}]", "simulation.duration=3")
-    run = load_experiment("whole_body/talos_walk", *settings).run()
+    run = load_experiment("walking/talos_walk", *settings).run()
     assert run.status == "stopped"
     assert run.meta["message"].startswith("the robot falls: at t = ")
     assert run.t[-1] < 2.0
@@ -162,7 +162,7 @@ def test_a_push_that_one_sole_does_not_hold_is_held_by_both():
     """To the left, just before the right foot swings, which cannot step across."""
     push = "{frame: torso_2_link, force: [0, 200, 0], start: 1.62, duration: 0.1}"
     settings = (f"plant.pushes=[{push}]", "simulation.duration=4.1")
-    run = load_experiment("whole_body/talos_walk", *settings).run()
+    run = load_experiment("walking/talos_walk", *settings).run()
     assert run.status == "completed"
     phase, t = run["plan.phase"], run.t
     begins = t[np.flatnonzero(np.diff(phase)) + 1]
@@ -205,9 +205,7 @@ def test_it_walks_on_footsteps_that_are_given():
     """A step to the left ahead, and the other foot beside it."""
     rows = "[[0.15, 0.1, 0.1], [0.15, -0.08, 0.1]]"
     plan = f"plan={{type: walk, footsteps: {rows}}}"
-    run = load_experiment(
-        "whole_body/talos_walk", plan, "simulation.duration=4.2"
-    ).run()
+    run = load_experiment("walking/talos_walk", plan, "simulation.duration=4.2").run()
     assert run.status == "completed"
     assert run["plan.steps"][-1] == 2
     assert run["plan.phase"][-1] == 0
@@ -224,7 +222,7 @@ def lighter() -> Rollout:
     """Return a walk of G1, which has a third of Talos' mass, and soles 5 cm wide."""
     settings = "plan.speed=0.4", "plan.steps=2", "simulation.duration=5"
     return load_experiment(
-        "whole_body/g1_walk", *settings, "simulation.log_period=0.005"
+        "walking/g1_walk", *settings, "simulation.log_period=0.005"
     ).run()
 
 

@@ -294,6 +294,6 @@ def test_a_missing_engine_is_found_before_anything_is_compiled(
 
     monkeypatch.setattr(adapters, "adapter", compile_none)
     monkeypatch.setitem(sys.modules, "mujoco", None)
-    message = "whole_body/talos_walk.yaml:23: plant: the plant cannot be made: a MuJoCo"
+    message = "walking/talos_walk.yaml:23: plant: the plant cannot be made: a MuJoCo"
     with pytest.raises(HspControlError, match=re.escape(message)):
-        load_experiment("whole_body/talos_walk")
+        load_experiment("walking/talos_walk")

@@ -43,7 +43,7 @@ BRIEF = ("live.stop.coming_to_rest=0", "simulation.log_period=0.001")
 
 @cache
 def trotting(*overrides: str) -> Experiment:
-    return hsp.load_experiment("whole_body/solo12_trot", *overrides)
+    return hsp.load_experiment("walking/solo12_trot", *overrides)
 
 
 class Watched(InProcessRobot):
@@ -91,7 +91,7 @@ def test_a_live_plan_does_what_the_simulation_does(tmp_path: Path) -> None:
     experiment = trotting(*brief)
     report, _ = live(experiment, tmp_path / "trot.journal", duration=0.6)
     log = hsp.Rollout.load(tmp_path / "trot.journal")
-    run = hsp.load_experiment("whole_body/solo12_trot", *brief).run()
+    run = hsp.load_experiment("walking/solo12_trot", *brief).run()
     count = int((log["live.phase"] == Phase.RUNNING).sum())
     assert 598 <= count <= 600
     for name in ("q", "v", "tau", "plan.phase", "plan.velocity", "estimate.base"):
@@ -143,7 +143,7 @@ def test_a_regular_end_lets_the_plan_come_to_rest(by: str) -> None:
     ],
 )
 def test_a_walk_that_is_stopped_brings_its_feet_together(plan: str) -> None:
-    experiment = hsp.load_experiment("whole_body/talos_walk", plan)
+    experiment = hsp.load_experiment("walking/talos_walk", plan)
     report, robot = live(experiment, duration=2.0)
     assert report.ended == "completed", report.reason
     assert report.at_rest

@@ -1,0 +1,72 @@
+"""The core alone: a copy of the checkout without what stands in `companions`."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from places import ROOT
+
+import hsp_control as hsp
+
+COPIED = ("hsp_control", "tests")
+TIME_LIMIT = 1200.0  # s; only ends what hangs
+BESIDE = ("pyproject.toml", "README.md", "configs", "docs", "examples", "robots")
+
+
+def without_companions(folder: str, names: list[str]) -> set[str]:
+    """Of a folder called companions only what makes it a package remains."""
+    if Path(folder).name == "companions":
+        return set(names) - {"__init__.py"}
+    return {"companions"} & set(names) if Path(folder).name == "tests" else set()
+
+
+@pytest.fixture(scope="module")
+def core(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """With the kernels that are compiled already."""
+    core = tmp_path_factory.mktemp("core")
+    for name in COPIED:
+        shutil.copytree(ROOT / name, core / name, ignore=without_companions)
+    for name in BESIDE:
+        (core / name).symlink_to(ROOT / name)
+    return core
+
+
+def run(core: Path, *command: str) -> str:
+    """Return what a command prints, which runs with the copy's package."""
+    environment = {**os.environ, "PYTHONPATH": str(core), "PYTHONWARNINGS": ""}
+    done = subprocess.run(
+        [sys.executable, "-m", *command],
+        cwd=core,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=TIME_LIMIT,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-4000:]
+    return done.stdout
+
+
+def test_the_quick_tests_pass(core: Path) -> None:
+    chosen = "not slow and not process and not browser"
+    told = run(core, "pytest", "tests/unit", "-m", chosen, "-p", "no:randomly", "-x")
+    assert " passed" in told
+    assert "failed" not in told
+
+
+@pytest.mark.parametrize("name", ["paper/4_moving_obstacle", "panda_obstacle"])
+def test_the_demo_runs_as_before(core: Path, name: str) -> None:
+    run(core, "hsp_control", "run", name, "--out", "out", "--no-view")
+    (log,) = (core / "out").glob(f"{Path(name).name}.npz")
+    here = hsp.load_experiment(name).run()
+    there = hsp.Rollout.load(log)
+    assert (there.tau == here.tau).all()
+
+
+def test_what_is_gone_is_not_known(core: Path) -> None:
+    told = run(core, "hsp_control", "--help")
+    assert "export" in told
+    assert not {"sweep", "franka-box", "franka-model"} & set(told.split())
