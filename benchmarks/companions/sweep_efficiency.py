@@ -1,6 +1,6 @@
 """Measure the parallel efficiency of a sweep on two cores.
 
-    .venv/bin/python benchmarks/companions/sweep_efficiency.py [--rounds N] [--samples N]
+    python benchmarks/companions/sweep_efficiency.py [--rounds N] [--samples N]
 
 Runs the same sweep with one worker and with two, in turns, start of the workers
 included. By wall time the efficiency is T1/(2 T2). On a machine with other load this is

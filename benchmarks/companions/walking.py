@@ -1,6 +1,6 @@
 """Talos walks on MuJoCo: far, fast, turning, pushed, with other masses and friction.
 
-    .venv/bin/python benchmarks/companions/walking.py [--estimated] [part of a case's name ...]
+    python benchmarks/companions/walking.py [--estimated] [part of a case's name ...]
 
 Prints one line for each case: whether it stood at the end, how far it came, and how
 well the plan was followed. Each case is ``walking/talos_walk`` with other values;
