@@ -50,6 +50,7 @@ def run(core: Path, *command: str) -> str:
     return done.stdout
 
 
+@pytest.mark.timeout(TIME_LIMIT)
 def test_the_quick_tests_pass(core: Path) -> None:
     chosen = "not slow and not process and not browser"
     told = run(
