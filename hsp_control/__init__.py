@@ -158,7 +158,7 @@ def _hint(name: str) -> str:
 def _companions() -> list[str]:
     """Return the names of the companions that are there."""
     folder = Path(__file__).parent / "companions"
-    return [each.parent.name for each in folder.glob("*/__init__.py")]
+    return sorted(each.parent.name for each in folder.glob("*/__init__.py"))
 
 
 def __dir__() -> list[str]:

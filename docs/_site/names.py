@@ -12,8 +12,12 @@ from prose import plain
 
 import hsp_control
 
-_SPACES = {**hsp_control._NAMESPACES, "control": "control", "geometry": "geometry"}
-"""The namespaces, and two rooms whose classes are at the top."""
+_SPACES = {
+    **hsp_control._NAMESPACES,
+    **{"control": "control", "geometry": "geometry"},
+    **{name: f"companions.{name}" for name in hsp_control._companions()},
+}
+"""The namespaces, two rooms whose classes are at the top, and the companions."""
 
 
 def names_page() -> str:
@@ -67,7 +71,7 @@ def _public(module: ModuleType) -> dict[str, Any]:
     """Return a namespace's own classes and functions, in alphabetical order."""
     is_room = hasattr(module, "__path__")  # whose public names come from its files
     found = {}
-    for name in sorted(getattr(module, "__all__", None) or vars(module)):
+    for name in getattr(module, "__all__", None) or dir(module):
         value = getattr(module, name)
         home = getattr(value, "__module__", "")
         ours = home.startswith("hsp_control") if is_room else home == module.__name__

@@ -30,18 +30,20 @@ def _is_there(entry: EntryPoint) -> bool:
     return not is_ours(entry) or any(file.is_file() for file in files)
 
 
-def at_first_use(package: str, names: Mapping[str, str]) -> Callable[[str], Any]:
-    """Return a package's ``__getattr__``, which imports names when they are used.
+def at_first_use(
+    package: str, names: Mapping[str, str]
+) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+    """Return a package's ``__getattr__`` and ``__dir__``: names are imported when used.
 
     Args:
         package: Its ``__name__``.
         names: Its modules, each with the public names that it has, between spaces.
     """
+    homes = {name: module for module, there in names.items() for name in there.split()}
 
     def attribute(name: str) -> Any:
-        for module, there in names.items():
-            if name in there.split():
-                return getattr(import_module(f"{package}.{module}"), name)
-        raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        if name not in homes:
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        return getattr(import_module(f"{package}.{homes[name]}"), name)
 
-    return attribute
+    return attribute, lambda: sorted(homes)

@@ -8,7 +8,7 @@ if TYPE_CHECKING:  # for type checkers; a help text must not import what is slow
     from .film import FilmStyle as FilmStyle
     from .film import export_film as export_film
 
-__getattr__ = at_first_use(
+__getattr__, __dir__ = at_first_use(
     __name__,
     {
         "film": "FilmStyle export_film",

@@ -10,7 +10,7 @@ if TYPE_CHECKING:  # for type checkers; a help text must not import what is slow
     from .settings import FrankaSettings as FrankaSettings
     from .settings import Load as Load
 
-__getattr__ = at_first_use(
+__getattr__, __dir__ = at_first_use(
     __name__,
     {
         "connecting": "connect",

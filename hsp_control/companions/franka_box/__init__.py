@@ -10,7 +10,7 @@ if TYPE_CHECKING:  # for type checkers; a help text must not import what is slow
     from .server import DEADLINE as DEADLINE
     from .server import Server as Server
 
-__getattr__ = at_first_use(
+__getattr__, __dir__ = at_first_use(
     __name__,
     {
         "arm": "Arm",

@@ -7,7 +7,7 @@ from hsp_control.common.entry_points import at_first_use
 if TYPE_CHECKING:  # for type checkers; a help text must not import what is slow
     from .log import log_to_rerun as log_to_rerun
 
-__getattr__ = at_first_use(
+__getattr__, __dir__ = at_first_use(
     __name__,
     {
         "log": "log_to_rerun",

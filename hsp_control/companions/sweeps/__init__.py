@@ -18,7 +18,7 @@ if TYPE_CHECKING:  # for type checkers; a help text must not import what is slow
     from .sensitivity import sensitivity as sensitivity
     from .sweeping import sweep as sweep
 
-__getattr__ = at_first_use(
+__getattr__, __dir__ = at_first_use(
     __name__,
     {
         "distributions": "Choices Distribution Integers LogUniform Normal Uniform",
