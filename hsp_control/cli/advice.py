@@ -36,10 +36,6 @@ def start_advice(experiment: Experiment, damped: str = "") -> Iterator[str]:
     """Yield lines about a start that is singular, in collision or cannot be held.
 
     Where it is singular or in collision, a better one follows.
-
-    Args:
-        experiment: The experiment.
-        damped: The tasks that are singular at the start, as the law found; empty: none.
     """
     robot, null_space = experiment.robot, experiment.scenario.null_space
     if damped:

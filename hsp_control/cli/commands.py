@@ -133,11 +133,7 @@ def _tell_json(rollout: Rollout, log: Path, stopwatch: Stopwatch) -> None:
 
 
 def _saved_elsewhere(rollout: Rollout, log: Path, error: LogError) -> Path:
-    """Save a log in a temporary folder, so that hours of computation are not lost.
-
-    Raises:
-        LogError: The first error, if this fails, too.
-    """
+    """Save a log in a temporary folder, so that hours of computation are not lost."""
     try:
         elsewhere = rollout.save(Path(tempfile.mkdtemp(prefix="hsp-")) / log.name)
     except (LogError, OSError):

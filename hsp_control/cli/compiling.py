@@ -11,11 +11,7 @@ from hsp_control.common import kernels
 
 @contextmanager
 def compiling_told(tell: Callable[[str], object]) -> Iterator[None]:
-    """Tell how many kernels are compiled, at the beginning and the end of each.
-
-    Args:
-        tell: Is given the line.
-    """
+    """Tell how many kernels are compiled, at the beginning and the end of each."""
     done = 0
 
     def tell_it() -> None:
@@ -37,11 +33,7 @@ def compiling_told(tell: Callable[[str], object]) -> Iterator[None]:
 
 @contextmanager
 def compiling_shown(console: Console) -> Iterator[None]:
-    """Show a line with the number of compiled kernels for as long as it takes.
-
-    Args:
-        console: Where to show it; only a terminal shows it.
-    """
+    """Show a line with the number of compiled kernels for as long as it takes."""
     status = console.status("")
     depth = 0
 

@@ -30,11 +30,7 @@ errors = Console(stderr=True, highlight=False)
 
 @contextmanager
 def working(what: str) -> Iterator[None]:
-    """Show on a terminal what is being done, and for how long, as long as it takes.
-
-    Args:
-        what: What is being done, as in "drawing". Within it nothing may be printed.
-    """
+    """Show on a terminal what is being done, and for how long, as long as it takes."""
     columns = SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
     with Progress(
         *columns,

@@ -84,11 +84,7 @@ def _wrapped(text: str, first: str, rest: str) -> list[str]:
 
 
 def _arguments(texts: list[str]) -> dict[str, str]:
-    """Return the arguments of a xacro file.
-
-    Raises:
-        ModelError: If one has not the form ``name:=value``.
-    """
+    """Return the arguments of a xacro file."""
     arguments = {}
     for text in texts:
         name, separator, value = text.partition(":=")

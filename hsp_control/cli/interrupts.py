@@ -36,11 +36,7 @@ class DeferredInterrupt:
         self._patience.daemon = True
 
     def check(self) -> None:
-        """Raise `KeyboardInterrupt` if Ctrl-C has come.
-
-        Raises:
-            KeyboardInterrupt: In the first call after a Ctrl-C.
-        """
+        """Raise `KeyboardInterrupt` if Ctrl-C has come."""
         if self.requested:
             self.requested = False
             self._patience.cancel()

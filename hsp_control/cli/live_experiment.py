@@ -18,23 +18,14 @@ def live_period(experiment: Experiment) -> float:
 
 
 def check_live(experiment: Experiment) -> None:
-    """Check that a live loop can hold the robot.
-
-    Raises:
-        LiveError: If it has a floating base that nothing holds.
-    """
+    """Check that a live loop can hold the robot."""
     contacts = experiment.controller.contacts
     with within("live"):
         check_held(experiment.robot, contacts, experiment.scenario.live)
 
 
 def simulated_robot(experiment: Experiment) -> SimulatedRobot:
-    """Return the experiment's plant as a robot with a watchdog and a safe stop.
-
-    Raises:
-        LiveError: If it has a floating base that nothing holds, or a setting is
-            invalid.
-    """
+    """Return the experiment's plant as a robot with a watchdog and a safe stop."""
     period, live = live_period(experiment), experiment.scenario.live
     check_live(experiment)
     return SimulatedRobot(

@@ -12,12 +12,7 @@ from hsp_control.robot.description.sources import is_path
 
 
 def load(options: argparse.Namespace, *overrides: str) -> Experiment:
-    """Return the experiment of a command's configuration, with its ``--strict``.
-
-    Args:
-        options: Of the command line.
-        overrides: Values to change after those of ``--set``.
-    """
+    """Return the experiment of a command's configuration, with its ``--strict``."""
     return build(read(options, *overrides))
 
 
@@ -37,10 +32,6 @@ def robot_access(name: str, options: argparse.Namespace) -> Access:
     """Return which files a command may read that is given a robot, not a configuration.
 
     Strict reading reads beside the robot's file; a name allows no folder.
-
-    Args:
-        name: The robot's name, or the path of its file.
-        options: Of the command line.
     """
     if not (options.strict or options.allow):
         return ANYWHERE

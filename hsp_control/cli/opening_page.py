@@ -30,14 +30,7 @@ class OpeningPage:
         announce: Callable[[str], object],
         say: Callable[[str], object],
     ) -> None:
-        """Keep what it takes.
-
-        Args:
-            url: The page's address.
-            options: The command's, of which ``browser`` says whether to open one.
-            announce: Prints the address.
-            say: Sets the page's status line; "" hides it.
-        """
+        """Keep what it takes."""
         assert url is not None
         self.opened = False
         self._url, self._browser = url, options.browser
@@ -92,20 +85,12 @@ def status_line(transport: Transport) -> Callable[[str], object]:
 
 
 def draw_empty(transport: Transport, title: str) -> None:
-    """Show a title on an empty stage, before the robot is loaded.
-
-    Raises:
-        ViewerError: If the server has ended.
-    """
+    """Show a title on an empty stage, before the robot is loaded."""
     transport.send([*draw_background(ViewSettings()), set_caption(title, [])])
 
 
 def draw_before(viewer: Viewer, loaded: LoadedScenario) -> None:
-    """Show the robot at its start, and the scene, before a controller is composed.
-
-    Raises:
-        ViewerError: If the server has ended.
-    """
+    """Show the robot at its start, and the scene, before a controller is composed."""
     viewer.draw_scene(loaded.scene, title=loaded.scenario.title or None)
     try:
         start = loaded.start()

@@ -30,13 +30,7 @@ class PageProcess:
     """
 
     def __init__(self, *, port: int | None, host: str, held: bool) -> None:
-        """Prepare the process; entering the context starts it.
-
-        Args:
-            port: The page's port; None: a free one.
-            host: The page's address.
-            held: Whether somebody must hold a key.
-        """
+        """Prepare the process; entering the context starts it."""
         self.held = held
         self.channel, self._there = channel_pair()
         self.url = ""
@@ -48,11 +42,7 @@ class PageProcess:
         }
 
     def __enter__(self) -> Self:
-        """Start the process, and wait for the page's address.
-
-        Raises:
-            ViewerError: If it does not start; it has said why, or takes too long.
-        """
+        """Start the process, and wait for the page's address."""
         self._process = subprocess.Popen(
             [sys.executable, "-m", "hsp_control.cli.live_page"],
             stdin=subprocess.PIPE,
@@ -78,11 +68,7 @@ class PageProcess:
         self.close()
 
     def prepare(self, scenario: Scenario) -> None:
-        """Let it draw the robot and the scene of a configuration.
-
-        Args:
-            scenario: The configuration.
-        """
+        """Let it draw the robot and the scene of a configuration."""
         config = plain_data(scenario, defaults=True)
         self._say({"prepare": without_sources(config)})
 
@@ -91,12 +77,7 @@ class PageProcess:
         self._say({"status": text})
 
     def begin(self, experiment: Experiment, journal: Path) -> None:
-        """Let it draw the loop: what it needs is compiled.
-
-        Args:
-            experiment: What the loop controls.
-            journal: The loop's journal; an old one is removed.
-        """
+        """Let it draw the loop: what it needs is compiled."""
         journal.unlink(missing_ok=True)  # of another run
         self._say(
             {

@@ -46,18 +46,7 @@ class RobotProcess:
         log: str | Path | None = None,
         log_period: float = 0.01,
     ) -> None:
-        """Prepare the process; entering the context starts it.
-
-        Args:
-            experiment: Defines the plant, its start, and in its section ``live`` the
-                effort interface, the watchdog and the safe stop.
-            faults: Faults to inject into packets, in both directions.
-            log: The journal of the robot's true states.
-            log_period: Time between two rows of the log [s].
-
-        Raises:
-            LiveError: If the robot has a floating base that nothing holds.
-        """
+        """Prepare the process; entering the context starts it."""
         check_live(experiment)
         faults = faults or Faults()
         period = live_period(experiment)
@@ -88,14 +77,7 @@ class RobotProcess:
         self.close()
 
     def start(self, timeout: float = 180.0) -> None:
-        """Start the process, and wait until it is ready.
-
-        Args:
-            timeout: Longest time to wait [s]; kernels may have to be compiled.
-
-        Raises:
-            HardwareError: If the process ends before, or takes longer.
-        """
+        """Start the process, and wait until it is ready."""
         command = [sys.executable, "-m", "hsp_control.cli.simulated_robot"]
         self.process = subprocess.Popen(
             command,
@@ -120,16 +102,7 @@ class RobotProcess:
             raise HardwareError(f"the simulated robot {fault}")
 
     def wait(self, timeout: float = 15.0) -> dict[str, Any] | None:
-        """Wait until the robot has stopped and its process has ended.
-
-        Args:
-            timeout: Longest time to wait [s], then the process is killed; a safe stop
-                takes 3 s at most.
-
-        Returns:
-            The robot's report: ``phase``, ``reason``, ``speed``, ``link``, ...; None if
-            the process was killed.
-        """
+        """Wait until the robot has stopped and its process has ended."""
         if self.process is None:
             return None
         end = monotonic() + timeout

@@ -21,15 +21,6 @@ def begun_where_it_is(
     """Return the experiment with the robot's configuration as its start.
 
     What is relative to the start (``origin: start``) then does not pull at the robot.
-
-    Args:
-        experiment: The experiment as its configuration says it.
-        options: Of the command line: the configuration and its overrides.
-        q: The robot's configuration, shape (nq,).
-
-    Raises:
-        HardwareError: If the robot is far from the configuration's start.
-        LimitError: If it is outside the controller's limits.
     """
     distances = np.abs(experiment.robot.difference(experiment.q0, q))
     worst = int(np.argmax(distances))

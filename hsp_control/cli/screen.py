@@ -45,11 +45,6 @@ class Screen:
 
         The page opens when a kernel has to be compiled, or when `begin` is called. If
         that fails, print why and yield None.
-
-        Args:
-            loaded: What will run.
-            options: The command's.
-            announce: Prints the page's address.
         """
         view = loaded.scenario.view.all_fields()
         with ExitStack() as stack:
@@ -82,11 +77,7 @@ class Screen:
             self._live.on_row(recorder)
 
     def finish(self, rollout: Rollout) -> None:
-        """Show the whole run until the user closes the view.
-
-        Raises:
-            ViewerError: If the server has ended.
-        """
+        """Show the whole run until the user closes the view."""
         if self._live is not None:
             self._live.finish(rollout)
             attend(self._viewer, opened=self._page.opened)
@@ -97,12 +88,7 @@ def _say_without(error: ViewerError) -> None:
 
 
 def show_logs(options: argparse.Namespace) -> None:
-    """Play logs until the user closes the view.
-
-    Raises:
-        LogError: If a log cannot be read.
-        ViewerError: See `view_logs`.
-    """
+    """Play logs until the user closes the view."""
     with ExitStack() as stack:
         server = stack.enter_context(closing(Server(options.port)))
         draw_empty(server, ", ".join(log.stem for log in options.logs))
@@ -131,10 +117,6 @@ def attend(viewer: Viewer, *, opened: bool) -> None:
 
     In a terminal: until Enter or Ctrl-C. Without a terminal: until the page is closed,
     if a browser was opened; otherwise return at once.
-
-    Args:
-        viewer: The view.
-        opened: Whether a browser was opened.
     """
     with suppress(KeyboardInterrupt):
         if sys.stdin is not None and sys.stdin.isatty():

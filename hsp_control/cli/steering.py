@@ -44,13 +44,6 @@ def steering_page(
     """Yield the page, if there is to be one; it shows the robot and the scene.
 
     It opens when a kernel has to be compiled, or when `let_steer` is called.
-
-    Args:
-        options: The command's.
-        scenario: What will run.
-
-    Raises:
-        ViewerError: If it does not start.
     """
     if options.steer is None:
         yield None
@@ -78,15 +71,6 @@ def let_steer(
 
     With a dead-man's key it returns when the key is held for the first time, or when
     the operator stops.
-
-    Args:
-        steering: The page.
-        experiment: What the loop controls.
-        requests: Where the page's stop goes.
-        journal: The loop's journal.
-
-    Raises:
-        ViewerError: If the page's process ends before its key was ever held.
     """
     controller, period = experiment.controller, live_period(experiment)
     controller.compute(0.0, experiment.q0, experiment.v0)

@@ -67,19 +67,7 @@ class ActiveStack:
         gain: Array,
         threshold: float,
     ) -> None:
-        """Stack the rows; the state decides which base motions the contacts permit.
-
-        Args:
-            state: The state that every step reads.
-            support: The active contacts, with their forces.
-            levels: The tasks of each level, the highest priority first.
-            feedback: The feedback of each task, by key; every step reads these arrays.
-            base: Indices of the degrees of freedom without a motor.
-            metric: The metric.
-            field: The field.
-            gain: K_N; every step reads this array.
-            threshold: Singular value below which the inverse is bounded.
-        """
+        """Stack the rows; the state decides which base motions the contacts permit."""
         robot: Robot = state.robot
         self.support = support
         self.contacts = support.contacts
@@ -151,11 +139,7 @@ class ActiveStack:
         self.term_samples: tuple[FieldSample, ...] = ()
 
     def resolve(self, t: float) -> Outcome:
-        """Resolve contacts, tasks and field at the state; `resolution` has the results.
-
-        Args:
-            t: The time of the state [s].
-        """
+        """Resolve contacts, tasks and field at the state, into `resolution`."""
         code = 0.0
         for call in self.calls:
             code = call(t)

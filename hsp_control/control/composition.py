@@ -21,11 +21,7 @@ Base = Literal["flying", "driven"]
 
 
 def check_kind(what: str, value: object, kind: type) -> None:
-    """Check that an argument is of the right kind.
-
-    Raises:
-        ControllerError: Contains the value.
-    """
+    """Check that an argument is of the right kind."""
     if isinstance(value, kind):
         return
     if kind is Task and isinstance(value, list | tuple):
@@ -36,11 +32,7 @@ def check_kind(what: str, value: object, kind: type) -> None:
 
 
 def check_tasks(tasks: Sequence[Task], robot: Robot) -> None:
-    """Check that there are tasks, that their names differ, and that no level is large.
-
-    Raises:
-        ControllerError: Names the task or the level.
-    """
+    """Check that there are tasks of different names, and that no level is large."""
     if not tasks:
         raise ControllerError("a controller needs at least one task")
     names = [task.name for task in tasks]
@@ -80,14 +72,6 @@ def checked_gain(gain: ArrayLike, robot: Robot, metric: Metric) -> Array:
     does, since then V' = -2 K_N V, and other gains are refused. A diagonal of positive
     numbers is not enough: over the mass matrix some let e_N grow at some
     configurations.
-
-    Args:
-        gain: K_N: a scalar, shape (nv,) or (nv, nv) [1/s].
-        robot: The robot.
-        metric: The metric W.
-
-    Raises:
-        GainError: If K_N has another shape, or the null-space error might not decay.
     """
     K_N = as_matrix(as_gain(gain, "null_space_gain"), robot.nv, "null_space_gain")
     if metric.form == VARYING:
@@ -113,12 +97,7 @@ def checked_gain(gain: ArrayLike, robot: Robot, metric: Metric) -> Array:
 
 
 def check_support(robot: Robot, contacts: Sequence[Contact], base: Base | None) -> None:
-    """Check that contacts and ``base`` are given exactly where the robot needs them.
-
-    Raises:
-        ContactError: If a floating base has neither, a fixed base has a ``base``, or
-            two contacts have one name.
-    """
+    """Check that contacts and ``base`` are given exactly where the robot needs them."""
     if base not in {None, "flying", "driven"}:
         raise ContactError(f"base is {base!r}; needs 'flying', 'driven' or None")
     if not robot.unactuated and base is not None:

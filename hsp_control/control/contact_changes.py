@@ -41,22 +41,13 @@ class ChangeForce(Change, type="force"):
     """The new command, with as many coordinates as the old one."""
 
     def placed(self, start: Start, setup: Setup) -> Self:
-        """Return the change, checked where the robot is.
-
-        Raises:
-            ContactError: If the contact cannot exert the force.
-        """
+        """Return the change, checked where the robot is."""
         contact = setup.contact(self.contact).contact
         replace(contact, force=self.force).placed(start)
         return self
 
     def apply(self, setup: Setup) -> Setup:
-        """Return the setup with the force; see `Change.apply`.
-
-        Raises:
-            ContactError: If the contact has no commanded force, or one with another
-                number of coordinates.
-        """
+        """Return the setup with the force; see `Change.apply`."""
         planned = setup.contact(self.contact)
         contact = planned.contact
         old, new = contact.force, self.force

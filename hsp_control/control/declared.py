@@ -124,12 +124,7 @@ class Declared:
         )
 
     def placed(self, start: Start) -> Setup:
-        """Return the setup with all parts placed where the robot starts.
-
-        Raises:
-            HspControlError: If a part does not fit the robot; the message contains its
-                key path.
-        """
+        """Return the setup with all parts placed where the robot starts."""
         robot = self.robot
         tasks = []
         for task in self.tasks:
@@ -177,11 +172,7 @@ class Declared:
 
 
 def _refuse_streams(field: NullSpaceField) -> None:
-    """Raise for a field that a stream leads from the start: only a change's is logged.
-
-    Raises:
-        FieldError: If there is one.
-    """
+    """Raise for a field that a stream leads: only that of a change is logged."""
     if any(True for _ in parts_within(field, Streamed)):
         raise FieldError(
             "a stream cannot lead a field from the start; while the controller runs, "

@@ -39,11 +39,7 @@ def flow_of(
 def raise_not_finite(
     active: ActiveStack, state: RobotState, field: NullSpaceField, metric: Metric
 ) -> NoReturn:
-    """Say what made a step's effort NaN or infinite.
-
-    Raises:
-        NonFiniteError: Names the first part that is not finite.
-    """
+    """Say what made a step's effort NaN or infinite."""
     part = active.not_finite()
     if part is not None:
         raise NonFiniteError(

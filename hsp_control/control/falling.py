@@ -22,23 +22,13 @@ class FallDetector:
     """
 
     def __init__(self, trunk: str, feet: tuple[str, ...], state: RobotState) -> None:
-        """Set what to compare with.
-
-        Args:
-            trunk: The frame that tilts.
-            feet: The frames of the feet.
-            state: The state in which the robot stands.
-        """
+        """Set what to compare with."""
         self.trunk, self._feet = trunk, feet
         self._up: Array = state.frame(trunk).rotation.T @ np.array([0.0, 0.0, 1.0])
         self._height = self._height_of(state)
 
     def check(self, state: RobotState) -> None:
-        """Check that the robot does not fall.
-
-        Raises:
-            FallError: If it does; says when, and how far it has tilted or sunk.
-        """
+        """Check that the robot does not fall."""
         up = float((state.frame(self.trunk).rotation @ self._up)[2])
         tilt = acos(min(max(up, -1.0), 1.0))
         if tilt > MAX_TILT:

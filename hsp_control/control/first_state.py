@@ -29,13 +29,6 @@ def check_angles(robot: Robot, q: Array) -> None:
     """Check that no angle is so far beyond its joint's range that it is in degrees.
 
     Joints without limits, continuous ones and sliding ones are not looked at.
-
-    Args:
-        robot: The robot.
-        q: Configuration, shape (nq,).
-
-    Raises:
-        ConfigurationError: Names the joint, its angle and its range.
     """
     lower, upper = robot.position_limits()
     angles = robot.joint_positions(q)
@@ -57,12 +50,6 @@ def warn_of_jump(robot: Robot, q: Array, v: Array, tau: Array) -> None:
     start in motion is not known, and it is not looked at: that of the paper's runs lies
     on the trajectory, with its velocity. Nor is a floating base, which contacts hold,
     nor a joint without an effort limit.
-
-    Args:
-        robot: The robot.
-        q: Configuration of the start, shape (nq,).
-        v: Velocity of the start, shape (nv,).
-        tau: The first effort, shape (nv,) [N·m or N].
     """
     if robot.unactuated or (np.abs(v) > REST).any():
         return
@@ -89,11 +76,6 @@ def warn_of_slow_efforts(robot: Robot, q: Array, limits: RobotLimits | None) -> 
 
     A joint alone, that turns at its speed limit from where the robot starts, feels a
     sine of gravity. A floating base is not looked at.
-
-    Args:
-        robot: The robot.
-        q: Configuration of the start, shape (nq,).
-        limits: The limits; None: there are none.
     """
     if limits is None or robot.unactuated:
         return

@@ -35,11 +35,7 @@ class GainsInForce:
         self._waiting: dict[int, Array] = {}
 
     def plan(self, setup: Setup, t: float) -> bool:
-        """Follow a setup from now on; t is the present time [s].
-
-        Returns:
-            Whether one of the tasks has become another: it has to be compiled again.
-        """
+        """Follow a setup from now on; t is the present time [s]."""
         tasks = {each.key: each.task for each in setup.tasks}
         exchanged = any(
             self._tasks.get(key, task) is not task for key, task in tasks.items()
@@ -80,13 +76,7 @@ class GainsInForce:
         return self._changing or bool(self._waiting)
 
     def wait(self, active: ActiveStack, t: float, period: float) -> None:
-        """Let changes of impedances wait where they would add energy.
-
-        Args:
-            active: What was resolved in this step.
-            t: The present time [s].
-            period: Time until the next step [s].
-        """
+        """Let changes of impedances wait where they would add energy."""
         for each in self._setup.tasks:
             changes = each.key in self._waiting or changes_impedance(
                 each.task, each.gains

@@ -18,17 +18,7 @@ from hsp_control.tasks.compliant_task import impedance_of
 
 
 def check_held(old: Setup, new: Setup, state: RobotState, period: float) -> None:
-    """Check what a change of the setup makes of gains, where the robot is now.
-
-    Args:
-        old: The setup without the change.
-        new: The setup with it.
-        state: The present state: an impedance gives other gains at each.
-        period: The period for which efforts are held [s].
-
-    Raises:
-        UnstableRateError: If the gains that follow make the loop unstable.
-    """
+    """Check what a change of the setup makes of gains, where the robot is now."""
     before = {each.key: each.gains.target for each in old.tasks}
     for each in new.tasks:
         if not np.array_equal(each.gains.target, before.get(each.key, ())):
@@ -72,13 +62,7 @@ def _check_task(planned: PlannedTask, state: RobotState, period: float) -> None:
 
 
 def held_radius(Kp: Array, Kv: Array, period: float) -> float:
-    """Return the spectral radius of x'' = -Kp x - Kv x', held for a period.
-
-    Args:
-        Kp: Shape (m, m) [1/s²].
-        Kv: Shape (m, m) [1/s].
-        period: h [s].
-    """
+    """Return the spectral radius of x'' = -Kp x - Kv x', held for a period."""
     one, h = np.eye(len(Kp)), period
     transition = np.block(
         [

@@ -63,15 +63,7 @@ class Mixture:
         setup: Setup,
         threshold: float,
     ) -> None:
-        """Allocate.
-
-        Args:
-            state: The state that every step reads.
-            actuation: What delivers the results.
-            gains: The gains in force.
-            setup: The setup.
-            threshold: Singular value below which an inverse is bounded.
-        """
+        """Allocate."""
         self._state, self._actuation = state, actuation
         self._gains, self._threshold = gains, threshold
         self._stacks: dict[tuple[frozenset[int], frozenset[int]], ActiveStack] = {}
@@ -83,12 +75,7 @@ class Mixture:
         self.plan(setup, exchanged=False)
 
     def plan(self, setup: Setup, *, exchanged: bool) -> None:
-        """Follow a setup from now on; what stays the same is not compiled again.
-
-        Args:
-            setup: The setup.
-            exchanged: Whether one of the tasks has become another.
-        """
+        """Follow a setup from now on; what stays the same is not compiled again."""
         field = setup.field
         if exchanged or field != self.field:
             self._stacks.clear()
@@ -103,11 +90,7 @@ class Mixture:
         self.active = None
 
     def resolve(self, t: float) -> Outcome:
-        """Resolve the law for each set of tasks that counts; return the worst outcome.
-
-        Args:
-            t: The time of the state [s].
-        """
+        """Resolve the law for each set of tasks that counts: the worst outcome."""
         tasks = [(each.weight(t), each) for each in self._fading]
         contacts = [(each.share(t), each) for each in self._setup.contacts]
         coming = sorted(
@@ -147,10 +130,6 @@ class Mixture:
 
         While one set of limits follows another, it is the mixture of the steps within
         each of them.
-
-        Args:
-            modifier: Changes the law's acceleration before the limits are applied;
-                None: nothing does.
         """
         actuation, sets = self._actuation, self._actuation.sets
         single = len(self._parts) == len(sets) == 1
@@ -196,12 +175,7 @@ class Mixture:
         self._actuation.prepare(self._state, stack.resolution, stack.support)
 
     def stack_at(self, t: float, off: Set[int] = frozenset()) -> ActiveStack:
-        """Return the stack of the contacts that bear at a time, without some tasks.
-
-        Args:
-            t: The time [s].
-            off: The keys of the tasks that do not count.
-        """
+        """Return the stack of the contacts that bear at a time, without some tasks."""
         bearing = [each for each in self._setup.contacts if each.active(t)]
         return self._stack(bearing, off)
 

@@ -61,10 +61,6 @@ def mean_of(
 
     The bounds on efforts and accelerations are linear in them. Where one of them is
     inf, so is the mean. Distances are those of all sets.
-
-    Args:
-        sets: Each set of limits, None for none, with its share.
-        robot: The robot.
     """
     if len(sets) == 1:
         return sets[0][0]

@@ -35,9 +35,5 @@ class ReadOnly(Generic[Value]):
 def read_only(
     instead: str = "build another one",
 ) -> Callable[[Callable[[Any], Value]], ReadOnly[Value]]:
-    """Return a decorator for a read-only property.
-
-    Args:
-        instead: What to do instead of assigning it, for the error message.
-    """
+    """Return a decorator for a read-only property."""
     return lambda get: ReadOnly(get, instead)

@@ -49,10 +49,6 @@ class PlannedTask:
         A task without a ramp that begins where a contact ends moves what the contact
         kept at rest. So it counts before, in proportion as the contact does not; and so
         does one that ends where a contact begins.
-
-        Args:
-            t: The time [s].
-            edges: When the contacts are lifted, shortly before or after t [s].
         """
         now, schedule = self.weight(t), self.task.schedule
         if schedule is None or schedule.ramp or 0.0 < now < 1.0:
@@ -142,31 +138,19 @@ class Setup:
         )
 
     def task(self, name: str) -> PlannedTask:
-        """Return the task that has a name, after all changes so far.
-
-        Raises:
-            ControllerError: If there is none.
-        """
+        """Return the task that has a name, after all changes so far."""
         present = [each for each in self.tasks if each.presence.target == 1.0]
         return _found("task", name, {each.task.name: each for each in present})
 
     def present_task(self, name: str, t: float) -> PlannedTask:
-        """Return the task of a name that counts at time t [s], or is to come.
-
-        Raises:
-            ControllerError: If there is none.
-        """
+        """Return the task of a name that counts at time t [s], or is to come."""
         for each in self.tasks:
             if each.task.name == name and each.presence.at(t) > 0.0:
                 return each
         return self.task(name)
 
     def contact(self, name: str) -> PlannedContact:
-        """Return the contact that has a name.
-
-        Raises:
-            ControllerError: If there is none.
-        """
+        """Return the contact that has a name."""
         there = {each.contact.name: each for each in self.contacts}
         return _found("contact", name, there)
 

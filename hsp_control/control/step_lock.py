@@ -27,11 +27,7 @@ class StepLock:
         self.holders = holders
 
     def wait(self) -> None:
-        """Take the lock after another thread.
-
-        Raises:
-            ControllerError: If this thread itself has it.
-        """
+        """Take the lock after another thread."""
         frame: FrameType | None = sys._getframe(1)
         if frame is not None and frame.f_code is _ENTER:
             frame = frame.f_back

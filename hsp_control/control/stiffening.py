@@ -33,20 +33,7 @@ def next_numbers(
     t: float,
     period: float,
 ) -> Array | None:
-    """Return the numbers of an impedance for the next period.
-
-    Args:
-        now: The numbers in force, shape (2 m + 2, m); see `Impedance.numbers`.
-        planned: Those that were planned.
-        mobility: Λ⁻¹, shape (m, m).
-        e: Error, shape (m,).
-        e_dot: Its rate, shape (m,) [1/s].
-        t: Time [s].
-        period: Time until the next effort [s].
-
-    Returns:
-        The numbers, or None if they are as planned.
-    """
+    """Return the numbers of an impedance for the next period."""
     then = planned.at(t + period)
     step = then - now
     if not np.allclose(now, planned.at(t), rtol=1e-4, atol=1e-9):  # it has waited

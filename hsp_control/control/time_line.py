@@ -28,11 +28,7 @@ class TimeLine:
 
     @classmethod
     def of(cls, setup: Setup, made: Sequence[Change]) -> "TimeLine":
-        """Place changes in a setup.
-
-        Raises:
-            HspControlError: If a change does not fit; the message contains its index.
-        """
+        """Place changes in a setup."""
         # In order of time: a change may refer to what an earlier one has made.
         later, placed = setup, []
         for k in sorted(range(len(made)), key=lambda k: made[k].at):
@@ -47,16 +43,7 @@ class TimeLine:
         return _applied(self.open, self.settled)
 
     def with_change(self, change: Change, here: Start | None) -> "TimeLine":
-        """Return the time line with one more change.
-
-        Args:
-            change: The change.
-            here: Where the robot is, for what is relative in it; None before a run,
-                which may start anywhere.
-
-        Raises:
-            HspControlError: If the change does not fit.
-        """
+        """Return the time line with one more change."""
         earlier = [each for each in self.open if each.at <= change.at]
         placed = change.placed(here or self.start, _applied(earlier, self.settled))
         opened = sorted((*self.open, placed), key=lambda each: each.at)

@@ -50,11 +50,7 @@ def find_browser() -> str | None:
 
 @contextmanager
 def headless_browser() -> Iterator["Browser"]:
-    """Start a browser without a window.
-
-    Raises:
-        ExportError: If playwright or a browser is missing, or the browser fails.
-    """
+    """Start a browser without a window."""
     try:
         from playwright.sync_api import Error, sync_playwright
     except ImportError:
@@ -86,13 +82,7 @@ def headless_browser() -> Iterator["Browser"]:
 
 
 def open_page(browser: "Browser", file: Path, size: tuple[int, int]) -> "Page":
-    """Open an exported page and wait until it shows its scene.
-
-    Args:
-        browser: See `headless_browser`.
-        file: The page's file.
-        size: Width and height of the viewport [pixels].
-    """
+    """Open an exported page and wait until it shows its scene."""
     page = browser.new_page(viewport={"width": size[0], "height": size[1]})
     page.goto(file.resolve().as_uri())
     page.wait_for_selector(

@@ -31,11 +31,7 @@ FORMATS = {
 
 
 def find_ffmpeg() -> str:
-    """Return the path of ffmpeg: the system's, or else that of imageio-ffmpeg.
-
-    Raises:
-        ExportError: If neither is installed.
-    """
+    """Return the path of ffmpeg: the system's, or else that of imageio-ffmpeg."""
     found = shutil.which("ffmpeg")
     if found:
         return found
@@ -59,13 +55,6 @@ def encoder(path: Path, frame_rate: float) -> Iterator[Callable[[bytes], None]]:
     """Yield a function that appends one image, a PNG file, to the film.
 
     The film is renamed to ``path`` once it is complete.
-
-    Args:
-        path: The film's file; its extension, one of `FORMATS`, selects the format.
-        frame_rate: Images per second [Hz].
-
-    Raises:
-        ExportError: If ffmpeg is missing or fails, or the file cannot be written.
     """
     ffmpeg = find_ffmpeg()
     part = path.with_name(f".{path.name}.part")

@@ -37,16 +37,7 @@ _SHOW = """(time) => {
 
 
 def frame_times(span: tuple[float, float], frame_rate: float, speed: float) -> Array:
-    """Return the times of the run that a film shows [s], shape (N,), from its start on.
-
-    Args:
-        span: The first and the last time that may be shown [s].
-        frame_rate: Images per second [Hz].
-        speed: Seconds of the run per second of the film.
-
-    Raises:
-        ExportError: If they are more than 100 000.
-    """
+    """Return the times of the run that a film shows [s], shape (N,)."""
     start, end = span
     count = int((end - start) * frame_rate / speed + 1e-9) + 1
     if count > _MAX_FRAMES:
@@ -60,14 +51,7 @@ def frame_times(span: tuple[float, float], frame_rate: float, speed: float) -> A
 def screenshots(
     page: "Page", times: Array, *, plots: bool, caption: bool
 ) -> Iterator[bytes]:
-    """Yield screenshots at given times, as PNG files.
-
-    Args:
-        page: An exported page that shows its scene.
-        times: The times of the run [s], shape (N,).
-        plots: Whether the plots are shown.
-        caption: Whether title, clock and legend are shown.
-    """
+    """Yield screenshots at given times, as PNG files."""
     page.evaluate(_PREPARE, {"plots": plots, "caption": caption})
     page.evaluate(_SHOW, float(times[0]))  # sizes change in the next frame
     camera = page.context.new_cdp_session(page)

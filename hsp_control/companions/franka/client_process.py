@@ -30,11 +30,7 @@ class ClientProcess:
     """
 
     def __init__(self) -> None:
-        """Start the process.
-
-        Raises:
-            HardwareError: If pylibfranka is not installed.
-        """
+        """Start the process."""
         if importlib.util.find_spec("pylibfranka") is None:
             raise HardwareError(f"a Franka arm needs pylibfranka: {INSTALL}")
         self._link, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -52,11 +48,7 @@ class ClientProcess:
         self.fault: str | None = None
 
     def ask(self, message: bytes) -> None:
-        """Send a request.
-
-        Raises:
-            HardwareError: If the process has ended, or said that it cannot go on.
-        """
+        """Send a request."""
         if self.fault is None:
             try:
                 self._link.send(message)
@@ -67,11 +59,7 @@ class ClientProcess:
         self.waiting = True
 
     def receive(self, timeout: float) -> bytes | None:
-        """Return the answer to the request; None if it does not come in time [s].
-
-        Raises:
-            HardwareError: If the answer is an error, or the process has ended.
-        """
+        """Return the answer to the request; None if it does not come in time [s]."""
         if self.fault is None:
             if not select([self._link], [], [], timeout)[0]:
                 return None
@@ -89,11 +77,7 @@ class ClientProcess:
         raise HardwareError(self.fault)
 
     def asked(self, message: bytes, timeout: float) -> Any:
-        """Send a request and return the text that answers it, from JSON.
-
-        Raises:
-            HardwareError: If there is no answer in time [s], or it is an error.
-        """
+        """Send a request and return the text that answers it, from JSON."""
         self.ask(message)
         answer = self.receive(timeout)
         if answer is None:

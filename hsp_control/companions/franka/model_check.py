@@ -49,14 +49,7 @@ class ModelDifference:
         )
 
     def check(self, total_mass: float) -> None:
-        """Check that the loop may start with these models.
-
-        Args:
-            total_mass: What hangs on the flange as the robot knows it [kg].
-
-        Raises:
-            HardwareError: If they differ too much.
-        """
+        """Check that the loop may start with these models."""
         least, most = FREQUENCIES
         if self.gravity > GRAVITY or self.slowest < least or self.fastest > most:
             raise HardwareError(
@@ -77,14 +70,7 @@ def postures(robot: Robot) -> Array:
 def difference(
     robot: Robot, q: Array, masses: Array, gravities: Array
 ) -> ModelDifference:
-    """Compare the controller's model with M and g of the robot.
-
-    Args:
-        robot: The controller's model.
-        q: Postures, shape (n, 7).
-        masses: The robot's M(q), shape (n, 7, 7).
-        gravities: The robot's g(q), shape (n, 7).
-    """
+    """Compare the controller's model with M and g of the robot."""
     rest = np.zeros(robot.nv)
     own = np.array([robot.inverse_dynamics(each, rest, rest) for each in q])
     worst = np.abs(own - gravities)

@@ -28,9 +28,6 @@ def robot_urdf(address: str) -> str:
 
     A box serves one client, and may take a moment to notice that the last one has gone:
     for two seconds this asks again.
-
-    Raises:
-        HardwareError: If the control box cannot be reached or does not answer.
     """
     end = monotonic() + _OTHER_CLIENT
     while True:

@@ -139,12 +139,7 @@ MODES: dict[str, str] = {
 
 
 def explained(kind: str, text: str) -> str:
-    """Return the message of an exception of libfranka, with what it means.
-
-    Args:
-        kind: The name of the exception's class.
-        text: Its message.
-    """
+    """Return the message of an exception of libfranka, with what it means."""
     first, *rest = (line.strip() for line in text.strip().splitlines() or [""])
     plain = first.removeprefix("libfranka: ").removeprefix("libfranka robot: ")
     # A message spells two of them otherwise: tau_J_..., and ..._invalid_frame_flag.

@@ -24,15 +24,6 @@ def own_model(urdf: str, carried: dict[str, Any], tool: list[float]) -> str:
 
     Two links are added to the flange: ``carried`` has the mass of end effector and
     load, ``end_effector`` is the frame that Desk knows.
-
-    Args:
-        urdf: The robot's own description of its arm.
-        carried: ``mass`` [kg], ``center`` [m] and ``inertia`` [kg m²] of end effector
-            and load in the flange's frame.
-        tool: Placement of the end effector in the flange, 16 numbers, column by column.
-
-    Raises:
-        ModelError: If the text is no description of a Franka arm.
     """
     top = _parsed(urdf)
     _carry(top, _flange(top), carried)
@@ -47,14 +38,6 @@ def calibrated(urdf: str, carried: dict[str, Any], like: Robot) -> str:
     Names, frames and shapes are those of `like`, so that configurations for it can be
     used. Links beyond the flange lose their masses to ``carried``, and the fingers
     stay closed.
-
-    Args:
-        urdf: The robot's own description of its arm.
-        carried: As for `own_model`.
-        like: A robot with the same seven joints.
-
-    Raises:
-        ModelError: If it has other joints.
     """
     own, top = _parsed(urdf), read_urdf(like.source)
     names = list(like.dof_names)
@@ -95,11 +78,7 @@ def _text(top: Element) -> str:
 
 
 def _named(top: Element, tag: str, name: str) -> Element:
-    """Return the link or joint whose name ends so: ``link3``, ``fr3_link3``.
-
-    Raises:
-        ModelError: If there is none.
-    """
+    """Return the link or joint whose name ends so: ``link3``, ``fr3_link3``."""
     for each in top.findall(tag):
         own = each.get("name", "")
         if own == name or own.endswith(f"_{name}"):

@@ -63,13 +63,7 @@ class Connection:
     """
 
     def __init__(self, tcp: socket.socket, peer: tuple[str, int], host: str) -> None:
-        """Take over an accepted socket.
-
-        Args:
-            tcp: The socket.
-            peer: Address and port of the client.
-            host: The box's own address.
-        """
+        """Take over an accepted socket."""
         tcp.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         tcp.setblocking(False)
         self.tcp, self.name = tcp, f"{peer[0]}:{peer[1]}"
@@ -83,11 +77,7 @@ class Connection:
         self.outdated = self.late = self.malformed = 0
 
     def requests(self) -> Iterator[Request]:
-        """Yield the complete requests that have arrived; answer the first by itself.
-
-        Raises:
-            ConnectionEnd: If the client has gone, or what it sends is no request.
-        """
+        """Yield the complete requests that have arrived; answer the first by itself."""
         try:
             received = self.tcp.recv(_MOST)
         except BlockingIOError:
@@ -110,11 +100,7 @@ class Connection:
                 self._connect(Request(command, number, payload))
 
     def respond(self, data: bytes) -> None:
-        """Send responses.
-
-        Raises:
-            ConnectionEnd: If the client has gone, or does not read them.
-        """
+        """Send responses."""
         try:
             self.tcp.sendall(data)
         except OSError as error:
@@ -130,13 +116,7 @@ class Connection:
             return
 
     def command(self, number: int, deadline: float) -> np.void | None:
-        """Return the command for a state, if it has arrived in time.
-
-        Args:
-            number: Number of the state.
-            deadline: Longest time from the sending of the state to the arrival of its
-                command at the kernel [s].
-        """
+        """Return the command for a state, if it has arrived in time."""
         while True:
             try:
                 data, notes, _, address = self.udp.recvmsg(_MOST, 64)
@@ -154,12 +134,7 @@ class Connection:
                 return command
 
     def close(self, *, broken: bool) -> None:
-        """Close the connection.
-
-        Args:
-            broken: Whether to break it instead: a client that waits for a response
-                then fails at once; libfranka waits for ever at a regular end.
-        """
+        """Close the connection."""
         if broken:
             break_off(self.tcp)
         self.tcp.close()
@@ -193,11 +168,7 @@ def break_off(tcp: socket.socket) -> None:
 
 
 def _command(kind: int, size: int) -> Command:
-    """Return the command of a header, if its size is right.
-
-    Raises:
-        ConnectionEnd: If there is no such command, or its size is another.
-    """
+    """Return the command of a header, if its size is right."""
     try:
         command = Command(kind)
     except ValueError:

@@ -35,13 +35,7 @@ class Generator(ABC):
 
     @abstractmethod
     def follow(self, command: np.void, *, first: bool) -> Iterator[Violation]:
-        """Follow a command, and yield what it violates.
-
-        Args:
-            command: The command (`wire.COMMAND`).
-            first: Whether the motion begins with it. A first position is the start
-                from which derivatives are taken, if it is near.
-        """
+        """Follow a command, and yield what it violates."""
 
     @abstractmethod
     def extrapolate(self) -> None:

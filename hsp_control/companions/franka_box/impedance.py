@@ -48,10 +48,6 @@ def of_hand(model: Model, stiffness: Array) -> Impedance:
     with the Jacobian J of the frame in its own axes: K (q_d - q) is Jᵀ K_x times the
     hand's error, to first order. Each axis is critically damped for its own inertia,
     1 / (J M⁻¹ Jᵀ)_ii.
-
-    Args:
-        model: The model at the measured state.
-        stiffness: K_x, shape (6,) [N/m, N·m/rad].
     """
     J = model.stiffness_jacobian()
     mobility = np.einsum("ij,ji->i", J, np.linalg.solve(model.state.mass_matrix, J.T))
@@ -72,11 +68,6 @@ def tracking_effort(model: Model, wanted: Reference, impedance: Impedance) -> Ar
     period h. So it is stable for every K and D at this rate (J. Tan, K. Liu, G. Turk,
     "Stable proportional-derivative controllers", 2011); where an oscillation would take
     about a period h, the arm is softer than K.
-
-    Args:
-        model: The model at the measured state.
-        wanted: The motion.
-        impedance: The spring and the damper.
     """
     state, h, (K, D) = model.state, PERIOD, impedance
     error, rate = wanted.q - state.q, wanted.dq - state.v

@@ -28,12 +28,7 @@ class BoxLog:
     """
 
     def __init__(self, path: Path, experiment: Experiment, box: Box) -> None:
-        """Begin a journal beside the log, and watch the box.
-
-        Raises:
-            LogError: If the name does not end in ``.npz``, or the journal cannot be
-                written.
-        """
+        """Begin a journal beside the log, and watch the box."""
         if path.suffix != ".npz":
             raise LogError(f"--log {path}: the name of a log ends in .npz")
         self.path, self._box = path, box

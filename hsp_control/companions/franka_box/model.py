@@ -48,14 +48,7 @@ class Model:
         self._observer = OBSERVER.begin(robot)
 
     def measure(self, t: float, q: Array, v: Array, tau: Array) -> None:
-        """Move on to a measured state.
-
-        Args:
-            t: Time [s].
-            q: Positions, shape (7,) [rad].
-            v: Velocities, shape (7,) [rad/s].
-            tau: The effort that has acted since the last state, shape (7,) [N·m].
-        """
+        """Move on to a measured state."""
         self.state.update(t, q, v)
         disturbance = self._observer.update(self.state, tau, PERIOD)
         np.negative(disturbance, out=self.external_effort)

@@ -52,13 +52,7 @@ class Readings:
     def set_desired(
         self, model: Model, reference: Reference, hand: HandMotion | None
     ) -> None:
-        """Fill the desired motion, and where the end effector is.
-
-        Args:
-            model: The model at the measured state.
-            reference: The desired motion of the joints.
-            hand: The commanded motion of the hand, if it is what is commanded.
-        """
+        """Fill the desired motion, and where the end effector is."""
         fields = self.fields
         fields["O_T_EE"][:] = _columns(model.O_T_EE)
         fields["q_d"][:], fields["dq_d"][:], fields["ddq_d"][:] = reference
@@ -79,17 +73,7 @@ class Readings:
     def set_measured(
         self, model: Model, tau_J: Array, tau_J_d: Array, thresholds: Thresholds
     ) -> Array:
-        """Fill what is measured, once a period.
-
-        Args:
-            model: The model at the measured state.
-            tau_J: The measured effort, with gravity, shape (7,) [N·m].
-            tau_J_d: The commanded effort, without gravity, shape (7,) [N·m].
-            thresholds: Of contacts and collisions.
-
-        Returns:
-            The estimated external wrench in the base's axes, shape (6,).
-        """
+        """Fill what is measured, once a period."""
         fields, state = self.fields, model.state
         fields["q"][:] = fields["theta"][:] = state.q
         fields["dq"][:] = fields["dtheta"][:] = state.v

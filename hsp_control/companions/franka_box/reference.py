@@ -26,12 +26,7 @@ def as_told(reference: Reference) -> Reference:
 
 
 def to_position(q: Array, before: Reference) -> Reference:
-    """Return the motion that a commanded position continues (backward Euler).
-
-    Args:
-        q: The position, shape (7,) [rad].
-        before: The motion a period before.
-    """
+    """Return the motion that a commanded position continues (backward Euler)."""
     dq = (q - before.q) / PERIOD
     return Reference(q, dq, (dq - before.dq) / PERIOD)
 

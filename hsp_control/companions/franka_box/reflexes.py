@@ -112,14 +112,7 @@ class Thresholds(NamedTuple):
 def measured(
     q: Array, dq: Array, tau_J: Array, limits: ArmLimits
 ) -> Iterator[Violation]:
-    """Yield what a measured state violates: positions, velocities, efforts.
-
-    Args:
-        q: Positions, shape (7,) [rad].
-        dq: Velocities, shape (7,) [rad/s].
-        tau_J: Efforts with gravity, shape (7,) [N·m].
-        limits: The arm's.
-    """
+    """Yield what a measured state violates: positions, velocities, efforts."""
     lowest, highest = limits.velocities(q)
     yield from _outside(
         Error.JOINT_POSITION_LIMITS_VIOLATION, q, limits.lower, limits.upper, "rad"
@@ -131,12 +124,7 @@ def measured(
 
 
 def effort_rate(effort: Array, before: Array) -> Iterator[Violation]:
-    """Yield whether a commanded effort changes too fast (backward Euler).
-
-    Args:
-        effort: The new effort, shape (7,) [N·m].
-        before: The last one as its client was told it, in single precision.
-    """
+    """Yield whether a commanded effort changes too fast (backward Euler)."""
     limit = np.full(JOINTS, EFFORT_RATE)
     yield from _outside(
         Error.CONTROLLER_TORQUE_DISCONTINUITY,
@@ -148,13 +136,7 @@ def effort_rate(effort: Array, before: Array) -> Iterator[Violation]:
 
 
 def start_position(q: Array, at: Array, limits: ArmLimits) -> Iterator[Violation]:
-    """Yield whether a motion starts out of range, or elsewhere than where the arm is.
-
-    Args:
-        q: The first commanded position, shape (7,) [rad].
-        at: Where the arm is held, shape (7,) [rad].
-        limits: The arm's; in a period it must be able to get there.
-    """
+    """Yield whether a motion starts out of range, or where the arm is not."""
     yield from _position(q, limits)
     error = Error.JOINT_POSITION_MOTION_GENERATOR_START_POSE_INVALID
     lowest, highest = limits.velocities(at)
@@ -167,14 +149,7 @@ def commanded_motion(
     limits: ArmLimits,
     errors: tuple[Error, Error, Error] = OF_JOINTS,
 ) -> Iterator[Violation]:
-    """Yield what a commanded motion violates; see `reference.to_position`.
-
-    Args:
-        new: The commanded motion.
-        before: The one a period before.
-        limits: The arm's.
-        errors: What too large velocities, accelerations and jerks are called.
-    """
+    """Yield what a commanded motion violates; see `reference.to_position`."""
     yield from _position(new.q, limits)
     lowest, highest = limits.velocities(before.q)
     velocity, acceleration, jerk = errors
@@ -186,11 +161,7 @@ def commanded_motion(
 
 
 def start_pose(way: HandMotion) -> Iterator[Violation]:
-    """Yield whether a motion starts elsewhere than where the hand is.
-
-    Args:
-        way: The motion to the first commanded pose, within a period.
-    """
+    """Yield whether a motion starts elsewhere than where the hand is."""
     error = Error.CARTESIAN_POSITION_MOTION_GENERATOR_START_POSE_INVALID
     yield from _of_hand(error, PERIOD * way.twist, PERIOD * HAND_VELOCITY, "away")
 
@@ -209,14 +180,7 @@ def commanded_hand(new: HandMotion, before: HandMotion) -> Iterator[Violation]:
 def commanded_elbow(
     speed: float, side: float, actual_side: float, *, first: bool
 ) -> Iterator[Violation]:
-    """Yield whether a commanded elbow is on the other side, or too far away.
-
-    Args:
-        speed: Of joint 3 on the way to it [rad/s].
-        side: The commanded flip direction, 1 or -1.
-        actual_side: That of the arm.
-        first: Whether the motion begins with it.
-    """
+    """Yield whether a commanded elbow is on the other side, or too far away."""
     if side != actual_side:
         yield Violation(
             Error.CARTESIAN_MOTION_GENERATOR_ELBOW_SIGN_INCONSISTENT,
@@ -234,13 +198,7 @@ def commanded_elbow(
 def collisions(
     effort: Array, wrench: Array, thresholds: Thresholds
 ) -> Iterator[Violation]:
-    """Yield whether estimated external efforts are those of a collision.
-
-    Args:
-        effort: Shape (7,) [N·m].
-        wrench: In the base's axes, shape (6,) [N, N·m].
-        thresholds: What the client has set.
-    """
+    """Yield whether estimated external efforts are those of a collision."""
     upper = thresholds.upper_effort
     yield from _outside(
         Error.JOINT_REFLEX, effort, -upper, upper, "N·m of external effort"
@@ -334,16 +292,7 @@ def _outside(
     unit: str,
     of: Sequence[str] = (),
 ) -> Iterator[Violation]:
-    """Yield the value that is farthest outside its range, if one is.
-
-    Args:
-        error: What it is called.
-        values: Shape (n,).
-        lower: Smallest values, shape (n,).
-        upper: Largest values, shape (n,).
-        unit: Unit of the values, and what they are.
-        of: A name for each value; by default they are numbered as joints.
-    """
+    """Yield the value that is farthest outside its range, if one is."""
     excess = np.maximum(values - upper, lower - values)
     worst = int(np.argmax(excess))
     if excess[worst] > 0.0:

@@ -46,13 +46,7 @@ class Requests:
         }
 
     def answer(self, command: Command, number: int, payload: bytes) -> None:
-        """Answer a request, into the box's outbox.
-
-        Args:
-            command: The command; not `Command.CONNECT`.
-            number: Number of the request.
-            payload: Of the size of `REQUESTS`.
-        """
+        """Answer a request, into the box's outbox."""
         outbox = self._box.outbox
         if command is Command.GET_ROBOT_MODEL:
             urdf = self._box.arm.urdf.encode()

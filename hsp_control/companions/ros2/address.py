@@ -29,15 +29,7 @@ class Address(NamedTuple):
 
 
 def parse(address: str, options: Collection[str] = ()) -> Address:
-    """Return what an address says; the domain is ``ROS_DOMAIN_ID``'s, or else 0.
-
-    Args:
-        address: The address, with or without ``ros2://``.
-        options: Which options it may have besides the domain.
-
-    Raises:
-        HardwareError: If a name, an option or the domain is not valid.
-    """
+    """Return what an address says; the domain is ``ROS_DOMAIN_ID``'s, or else 0."""
     address = address.removeprefix(SCHEME)
     where = SCHEME + address
     try:
@@ -62,11 +54,7 @@ def parse(address: str, options: Collection[str] = ()) -> Address:
 
 
 def checked_name(name: str) -> str:
-    """Return a name of ROS 2 with its leading slash.
-
-    Raises:
-        HardwareError: If it is none.
-    """
+    """Return a name of ROS 2 with its leading slash."""
     if not _NAME.fullmatch(name):
         raise HardwareError(
             f"{name!r} is no name of ROS 2; needs letters, digits and '_' between "

@@ -6,11 +6,7 @@ INSTALL = "pip install 'hsp_control[ros2]'"
 
 
 def check_installed() -> None:
-    """Raise if Cyclone DDS cannot be imported.
-
-    Raises:
-        HardwareError: Then; says how to install it.
-    """
+    """Raise if Cyclone DDS cannot be imported."""
     try:
         import cyclonedds.domain  # noqa: F401
     except ImportError as error:

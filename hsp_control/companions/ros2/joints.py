@@ -20,11 +20,7 @@ class Joints:
     """
 
     def __init__(self, robot: Robot) -> None:
-        """Look at the robot.
-
-        Raises:
-            HardwareError: If a joint has several degrees of freedom.
-        """
+        """Look at the robot."""
         if not robot.flat:
             many = next(j for j, model in robot.joints.items() if model.nv > 1)
             raise HardwareError(
@@ -41,13 +37,6 @@ class Joints:
         """Return q, shape (nq,), and v, shape (nv,); None if it has no joint of ours.
 
         Numbers may be NaN: what a state must be, the loop checks.
-
-        Args:
-            message: The message.
-            topic: Where it came from, for messages.
-
-        Raises:
-            HardwareError: If it lacks some joints, or numbers of some.
         """
         if message.name != self._known:
             order = self._found(message.name, topic)
@@ -68,14 +57,7 @@ class Joints:
         return position, v
 
     def message(self, stamp: int, q: Array, v: Array, tau: Array) -> JointState:
-        """Return a state as a message.
-
-        Args:
-            stamp: Its time [ns].
-            q: Configuration, shape (nq,).
-            v: Velocity, shape (nv,).
-            tau: Effort of the motors, shape (nv,).
-        """
+        """Return a state as a message."""
         return JointState(
             Header(Time.of(stamp), ""),
             list(self.names),
@@ -85,15 +67,7 @@ class Joints:
         )
 
     def command_order(self, joints: str | None) -> list[int]:
-        """Return where in v the numbers of a command belong, shape (nv,).
-
-        Args:
-            joints: All joints, in the order of the command, with commas between them;
-                None: the order of v.
-
-        Raises:
-            HardwareError: If they are not all joints, each once.
-        """
+        """Return where in v the numbers of a command belong, shape (nv,)."""
         if joints is None:
             return list(range(len(self.names)))
         given = joints.split(",")

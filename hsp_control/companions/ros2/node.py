@@ -67,11 +67,7 @@ class Node:
     """
 
     def __init__(self, domain: int) -> None:
-        """Join the domain.
-
-        Raises:
-            HardwareError: If that fails, for example because of ``CYCLONEDDS_URI``.
-        """
+        """Join the domain."""
         self.domain = domain
         with _explained(f"cannot join the DDS domain {domain}"):
             self._participant = DomainParticipant(domain)
@@ -151,11 +147,7 @@ class Publisher(_End[M]):
             self._writer = DataWriter(participant, self._topic, qos)
 
     def send(self, message: M) -> None:
-        """Send a message, without waiting.
-
-        Raises:
-            HardwareError: If it cannot be sent.
-        """
+        """Send a message, without waiting."""
         with _explained(f"cannot publish {self.topic}"):
             self._writer.write(message)
 
@@ -206,11 +198,7 @@ class Subscription(_End[M]):
         return self._others(BuiltinTopicDcpsPublication, "publishes")
 
     def wait(self, timeout: float) -> bool:
-        """Wait until something is there to be taken; return whether it is.
-
-        Args:
-            timeout: Longest time to wait [s]; 0: do not wait.
-        """
+        """Wait until something is there to be taken; return whether it is."""
         end = monotonic() + timeout
         while True:
             left = max(end - monotonic(), 0.0)

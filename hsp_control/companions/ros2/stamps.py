@@ -30,11 +30,7 @@ class Stamps:
             self._origin = self.last - round(1e9 * t)
 
     def take(self, stamp: int) -> bool:
-        """Count a state; return False if it is not later than the last one.
-
-        Args:
-            stamp: Its stamp [ns].
-        """
+        """Count a state; return False if it is not later than the last one."""
         if self.last is None:
             self._origin = self.last = stamp
             return True

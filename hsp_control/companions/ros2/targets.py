@@ -22,11 +22,7 @@ _WORLD = "world"
 
 
 def check_address(source: str) -> Address:
-    """Return what an address ``ros2://TOPIC?frame=NAME&domain=N`` says.
-
-    Raises:
-        StreamError: If it is none.
-    """
+    """Return what an address ``ros2://TOPIC?frame=NAME&domain=N`` says."""
     try:
         return parse(source, ("frame",))
     except HardwareError as error:
@@ -39,16 +35,7 @@ def is_local(source: str) -> bool:
 
 
 def opened(source: str, space: Space) -> Callable[["ref[Inbox]"], None]:
-    """Join the domain of an address; return what listens to its topic.
-
-    Args:
-        source: The address.
-        space: What of a pose the stream takes: all, its position or its orientation.
-
-    Raises:
-        StreamError: If the address is wrong, Cyclone DDS is not installed or cannot
-            start, or the stream takes something else.
-    """
+    """Join the domain of an address; return what listens to its topic."""
     address = check_address(source)
     if space.linear not in {0, 3} or not space.width:
         raise StreamError(

@@ -28,15 +28,7 @@ class DaskWorkers:
     """
 
     def __init__(self, address: str) -> None:
-        """Connect to a scheduler.
-
-        Args:
-            address: For example ``tcp://192.168.0.10:8786``; for ``tls://`` the
-                certificates of Dask's configuration are used.
-
-        Raises:
-            SweepError: If no scheduler answers, or Dask is not installed.
-        """
+        """Connect to a scheduler."""
         try:
             self._dask: Any = import_module("distributed")
         except ImportError:
@@ -61,11 +53,7 @@ class DaskWorkers:
         self._client.close()
 
     def map(self, tasks: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str]]:
-        """Yield every task's result as soon as it is available; see `LocalWorkers.map`.
-
-        Raises:
-            SweepError: If the connection to the scheduler is lost.
-        """
+        """Yield each task's result as soon as it is there; see `LocalWorkers.map`."""
         try:
             yield from self._map(iter(tasks))
         except Exception as error:  # connections fail with many kinds of errors

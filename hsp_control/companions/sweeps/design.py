@@ -19,12 +19,7 @@ MAX_RUNS = 1_000_000
 
 
 def chosen_design(design: str | None, samples: int | None) -> Design:
-    """Return the design; by default a grid, or a Latin hypercube if samples are given.
-
-    Raises:
-        SweepError: If there is no such design, or the number of samples is missing,
-            not allowed, or out of range.
-    """
+    """Return the design: by default a grid, with samples a Latin hypercube."""
     if design is None:
         design = "grid" if samples is None else "latin_hypercube"
     if design not in get_args(Design):
@@ -47,18 +42,7 @@ def chosen_design(design: str | None, samples: int | None) -> Design:
 def points(
     factors: Sequence[Factor], design: Design, samples: int | None, seed: int
 ) -> list[tuple[Any, ...]]:
-    """Return every run's values, in the order of the factors.
-
-    Args:
-        factors: The varied parameters.
-        design: See `Design`.
-        samples: The number of runs; None for a grid.
-        seed: Seed of the random numbers; the same seed gives the same runs.
-
-    Raises:
-        SweepError: If a grid contains a distribution or has too many runs, or the seed
-            is negative.
-    """
+    """Return every run's values, in the order of the factors."""
     if design == "grid":
         return _grid(factors)
     if seed < 0:

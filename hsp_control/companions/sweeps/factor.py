@@ -46,17 +46,7 @@ class Factor:
 
 
 def factors(over: Mapping[str, Any] | Iterable[str]) -> tuple[Factor, ...]:
-    """Return the factors of a sweep.
-
-    Args:
-        over: Key paths and their values: texts ``key=values`` as on the command line,
-            or a mapping from key path to such a text, to a sequence of values, or to a
-            `Distribution`.
-
-    Raises:
-        SweepError: If a key path or values cannot be read, a key is given twice, or
-            there is no key.
-    """
+    """Return the factors of a sweep."""
     pairs = over.items() if isinstance(over, Mapping) else map(_split, over)
     found = [_factor(key, spec) for key, spec in pairs]
     if not found:

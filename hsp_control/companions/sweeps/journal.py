@@ -33,12 +33,7 @@ class Journal:
     """
 
     def __init__(self, path: Path) -> None:
-        """Open a journal, or create one.
-
-        Raises:
-            SweepError: If another process has opened it, it is not a journal, or its
-                folder cannot be written.
-        """
+        """Open a journal, or create one."""
         self.path = path
         self.identity: dict[str, Any] | None = None
         self.rows: list[Row] = []

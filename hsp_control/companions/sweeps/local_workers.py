@@ -43,11 +43,7 @@ class LocalWorkers:
     """
 
     def __init__(self, count: int) -> None:
-        """Set the number of processes; they start with the first task.
-
-        Raises:
-            SweepError: If the number is less than 1.
-        """
+        """Set the number of processes; they start with the first task."""
         if count < 1:
             raise SweepError(f"{count} workers; needs at least 1")
         self.count = count
@@ -66,17 +62,7 @@ class LocalWorkers:
                 process.kill()
 
     def map(self, tasks: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str]]:
-        """Yield every task's result as soon as it is available.
-
-        Args:
-            tasks: Runs and their tasks (`Plan.task`).
-
-        Yields:
-            Runs and their results (`read_result`).
-
-        Raises:
-            SweepError: If workers cannot start.
-        """
+        """Yield every task's result as soon as it is available."""
         source = _Shared(iter(tasks))
         done: _Results = queue.SimpleQueue()
         for _ in range(self.count):

@@ -18,11 +18,7 @@ _KEY = b"hsp_control"
 
 
 def require_parquet() -> None:
-    """Check that Parquet files can be written, before hours of computation.
-
-    Raises:
-        SweepError: If pyarrow is not installed.
-    """
+    """Check that Parquet files can be written, before hours of computation."""
     try:
         import pyarrow.parquet  # noqa: F401
     except ImportError:
@@ -34,11 +30,7 @@ def require_parquet() -> None:
 def write_parquet(
     path: Path, columns: Mapping[str, NDArray[Any]], meta: dict[str, Any]
 ) -> Path:
-    """Write columns and metadata; to a temporary file first, which is then renamed.
-
-    Raises:
-        SweepError: If the file cannot be written.
-    """
+    """Write columns and metadata; to a temporary file first, which is then renamed."""
     require_parquet()
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -65,11 +57,7 @@ def write_parquet(
 
 
 def read_parquet(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-    """Return columns and metadata.
-
-    Raises:
-        SweepError: If the file is missing, damaged, or not a sweep.
-    """
+    """Return columns and metadata."""
     require_parquet()
     import pyarrow as pa
     import pyarrow.parquet as pq

@@ -68,9 +68,6 @@ class Plan:
 
         A single run that cannot be built becomes a row with the reason. If none of the
         first runs can be built, the sweep itself is wrong.
-
-        Raises:
-            HspControlError: The error of the first run, if the next runs fail, too.
         """
         first_error: HspControlError | None = None
         for run in range(min(len(self), _TRIALS)):
@@ -84,11 +81,7 @@ class Plan:
         raise first_error
 
     def experiment(self, run: int) -> Experiment:
-        """Return a run's objects.
-
-        Raises:
-            HspControlError: If its configuration is wrong.
-        """
+        """Return a run's objects."""
         return build(document(self.task(run)))
 
     def identity(self, experiment: Experiment) -> dict[str, Any]:
@@ -111,11 +104,7 @@ class Plan:
 
 
 def document(task: str) -> Document:
-    """Return the configuration of a task: the plan's, with the run's values.
-
-    Raises:
-        ConfigError: If a key path leads nowhere.
-    """
+    """Return the configuration of a task: the plan's, with the run's values."""
     parts = json.loads(task)
     found = Document(parts["data"], {}, parts["name"])
     insert(found, parts["changes"])
@@ -123,10 +112,6 @@ def document(task: str) -> Document:
 
 
 def insert(base: Document, changes: Iterable[dict[str, Any]]) -> None:
-    """Set a run's values in a configuration.
-
-    Raises:
-        ConfigError: If a key path leads nowhere.
-    """
+    """Set a run's values in a configuration."""
     for change in changes:
         base.assign(change["keys"], change["value"], change["origin"])

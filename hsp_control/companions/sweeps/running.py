@@ -23,12 +23,6 @@ def run_task(task: str) -> str:
     """Run a task and return its result; no error is raised.
 
     Both are JSON: a worker needs and executes only the code of this package.
-
-    Args:
-        task: See `Plan.task`.
-
-    Returns:
-        The result, for `read_result`.
     """
     start = perf_counter()
     found: dict[str, Measure] = {}

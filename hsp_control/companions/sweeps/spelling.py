@@ -47,9 +47,6 @@ def values(text: str) -> Distribution:
     ``normal:1:0.1:0:2``      the same, truncated to 0 ... 2
     ``integers:0:999``        random integers, both ends included
     ========================= =========================================================
-
-    Raises:
-        SweepError: If the text has none of these forms.
     """
     text = text.strip()
     if not text:

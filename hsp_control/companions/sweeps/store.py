@@ -24,18 +24,7 @@ class Store:
     def __init__(
         self, plan: Plan, identity: dict[str, Any], out: Path | None, *, fresh: bool
     ) -> None:
-        """Read the rows that the files already contain.
-
-        Args:
-            plan: The planned runs.
-            identity: See `Plan.identity`.
-            out: The sweep's file; None: rows are only kept in memory.
-            fresh: Start again, and overwrite the files.
-
-        Raises:
-            SweepError: If the files belong to another sweep, are in use, or cannot be
-                written.
-        """
+        """Read the rows that the files already contain."""
         self.rows: dict[int, Row] = {}
         self._described: dict[str, Measure] = {}
         self._plan, self._identity, self._out = plan, identity, out
@@ -68,11 +57,7 @@ class Store:
             self._journal.add(row, found)
 
     def close(self) -> Sweep:
-        """Write all finished rows to the file, and return the sweep.
-
-        Raises:
-            SweepError: If the file cannot be written; the journal is then kept.
-        """
+        """Write all finished rows to the file, and return the sweep."""
         sweep = Sweep.collect(
             self._plan, self._identity, self.rows.values(), self._described
         )

@@ -21,17 +21,7 @@ def composed(
     contacts: Sequence[Contact],
     feet: Collection[str],
 ) -> PlanParts:
-    """Return the parts of a controller whose references and contacts a plan feeds.
-
-    Args:
-        own: The tasks that the plan needs; the task of a foot has its name.
-        tasks: The tasks that are given; they replace those of the same name.
-        contacts: The contacts that are given.
-        feet: The names of the contacts that the plan switches.
-
-    Raises:
-        PlanError: If a task or a contact does not fit the plan.
-    """
+    """Return the parts of a controller whose references and contacts a plan feeds."""
     given = {task.name: task for task in tasks}
     made, fed = [], []
     for needed in own:
@@ -52,16 +42,7 @@ def composed(
 
 
 def _followed(task: Task, needed: TrackingTask, swings: bool) -> Task:
-    """Return a task whose reference, and if it swings its presence, is the plan's.
-
-    Args:
-        task: The task, perhaps one that was given.
-        needed: What the plan would take.
-        swings: Whether it counts only while a foot swings.
-
-    Raises:
-        PlanError: If the task is another one.
-    """
+    """Return a task whose reference, and if it swings its presence, is the plan's."""
     if type(task) is not type(needed):
         raise PlanError(
             f"it is a {task.yaml_type}; the plan needs a {needed.yaml_type} of this "

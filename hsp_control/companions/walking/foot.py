@@ -37,11 +37,7 @@ class Foot(Switched):
     """
 
     def __init__(self, name: str, controller: Controller) -> None:
-        """Find its parts in a controller.
-
-        Raises:
-            PlanError: If the controller is not made of the plan's parts.
-        """
+        """Find its parts in a controller."""
         self.name = name
         contact = {each.name: each for each in controller.contacts}[name]
         task = {each.name: each for each in controller.tasks}[name]
@@ -64,16 +60,7 @@ class Foot(Switched):
         self._points: Array = contact.points
 
     def begin(self, state: RobotState, heading: float) -> None:
-        """Stand where the robot is.
-
-        Args:
-            state: The state.
-            heading: The yaw of the robot; that of the foot counts from it, so that no
-                full turn is between the feet [rad].
-
-        Raises:
-            PlanError: If its sole is not flat on the ground.
-        """
+        """Stand where the robot is."""
         self.reset()
         self.swing: Swing | None = None
         here = state.frame(self.frame)

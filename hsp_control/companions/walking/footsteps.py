@@ -83,12 +83,6 @@ class Stance(NamedTuple):
         The middle between the feet goes on by the velocity, and the foot stands beside
         it; never nearer to the standing foot than the feet are wide, nor farther than
         the legs reach.
-
-        Args:
-            standing: The standing foot.
-            side: 1 if the left foot swings, -1 for the right one.
-            velocity: That of the body.
-            duration: From one touchdown to the next [s].
         """
         turn = velocity.turn * duration
         middle = standing.ahead(0.0, 0.5 * side * self.width)

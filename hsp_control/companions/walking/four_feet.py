@@ -54,11 +54,7 @@ class PointFoot(Switched):
     """
 
     def __init__(self, name: str, controller: Controller) -> None:
-        """Find its parts in a controller.
-
-        Raises:
-            PlanError: If the controller is not made of the plan's parts.
-        """
+        """Find its parts in a controller."""
         self.name = name
         contact = {each.name: each for each in controller.contacts}[name]
         task = {each.name: each for each in controller.tasks}.get(name)
@@ -110,15 +106,7 @@ class RunningQuadruped(RunningPlan):
     """What it does; "standing" in each gait."""
 
     def __init__(self, plan: QuadrupedPlan, controller: Controller) -> None:
-        """Find the references and the switches.
-
-        Args:
-            plan: The plan.
-            controller: A controller that is made of its parts.
-
-        Raises:
-            PlanError: If the controller is made of other parts.
-        """
+        """Find the references and the switches."""
         super().__init__(plan)
         self.gait = plan
         self._controller = controller
@@ -178,11 +166,7 @@ class RunningQuadruped(RunningPlan):
         self._begun = True
 
     def _corners(self) -> tuple[PointFoot, PointFoot, PointFoot, PointFoot]:
-        """Return the feet: front left and right, hind left and right.
-
-        Raises:
-            PlanError: If the feet do not stand at the corners of a body.
-        """
+        """Return the feet: front left and right, hind left and right."""
         corners: dict[tuple[bool, bool], PointFoot] = {}
         for foot in self._feet:
             corners[bool(foot.offset[0] > 0.0), bool(foot.offset[1] > 0.0)] = foot
@@ -203,13 +187,6 @@ class RunningQuadruped(RunningPlan):
 
         A velocity that is a function of time is not checked: it is followed as far as
         the legs reach (`_wanted`).
-
-        Args:
-            state: The state in which the robot stands.
-            time: How long a foot moves to one side of its hip [s].
-
-        Raises:
-            PlanError: If they are not.
         """
         self._stride_time = time
         for foot in self._feet:
@@ -238,11 +215,7 @@ class RunningQuadruped(RunningPlan):
 
     @abstractmethod
     def _start_gait(self, state: RobotState) -> None:
-        """Begin the gait, after all else.
-
-        Raises:
-            PlanError: If the robot cannot follow it.
-        """
+        """Begin the gait, after all else."""
 
     @abstractmethod
     def _combinations(self) -> Sequence[Sequence[PointFoot]]:

@@ -28,17 +28,7 @@ class GivenSteps(StepPlanner):
         robot: str,
         places: Mapping[float, Footstep],
     ) -> None:
-        """Set the steps.
-
-        Args:
-            walk: The plan, with its footsteps.
-            stance: How the feet stand beside each other.
-            robot: The name of the robot, for the message.
-            places: Where the feet stand, by side.
-
-        Raises:
-            PlanError: If the legs do not reach a step from the one before.
-        """
+        """Set the steps."""
         super().__init__(walk, stance, robot)
         assert walk.footsteps is not None
         self._side = 1.0 if walk.first == "left" else -1.0

@@ -75,14 +75,7 @@ class Reaction(NamedTuple):
 
 
 def reaction_of(points: Array, start: float, step: float, frequency: float) -> Reaction:
-    """Return the reaction whose repellent point moves from point to point.
-
-    Args:
-        points: δ, shape (n, k) [m].
-        start: When it is at the first of them [s].
-        step: The time from one to the next [s].
-        frequency: ω [1/s].
-    """
+    """Return the reaction whose repellent point moves from point to point."""
     decay = float(np.exp(-frequency * step))
     m = np.diff(points, axis=0) / (frequency * step)
     # What each interval adds at its own beginning, exact for lines.
@@ -98,13 +91,7 @@ class LegReaction:
     def __init__(
         self, controller: Controller, trunk: str, frames: dict[float, str]
     ) -> None:
-        """Set the robot.
-
-        Args:
-            controller: The controller, whose metric moves the robot.
-            trunk: The frame of the trunk.
-            frames: The frames of the feet, by side.
-        """
+        """Set the robot."""
         self._metric, self._trunk, self._frames = controller.metric, trunk, frames
         self._sample = MetricSample.allocate(controller.robot.nv)
         self._first: dict[float, Array] = {}
@@ -113,14 +100,7 @@ class LegReaction:
     def begin(
         self, state: RobotState, yaw: float, duration: float, frequency: float
     ) -> None:
-        """Take both legs as they are, before the first step.
-
-        Args:
-            state: The state.
-            yaw: That of the feet [rad].
-            duration: How long swings take as they are planned [s].
-            frequency: ω [1/s].
-        """
+        """Take both legs as they are, before the first step."""
         self._frequency = frequency
         for side in self._frames:
             self.lifts(state, side, yaw)
@@ -135,13 +115,7 @@ class LegReaction:
         self._later = reaction_of(later, 0.0, step, frequency).shift(0.0)
 
     def lifts(self, state: RobotState, side: float, yaw: float) -> None:
-        """Take a leg as it is for where its swings begin.
-
-        Args:
-            state: The state.
-            side: 1 for the left leg, -1 for the right one.
-            yaw: That of the other foot, which stands [rad].
-        """
+        """Take a leg as it is for where its swings begin."""
         self._first[side] = self._gain(state, side, yaw)
 
     def lands(self, state: RobotState, side: float, yaw: float) -> None:
@@ -149,13 +123,7 @@ class LegReaction:
         self._last[side] = self._gain(state, side, yaw)
 
     def lead(self, side: float, standing: Footstep, way: Array) -> Array:
-        """Return η where a planned swing begins, shape (2,) [m].
-
-        Args:
-            side: 1 if the left foot swings, -1 for the right one.
-            standing: Where the other one stands.
-            way: How far the foot goes, and how high it is lifted, shape (3,) [m].
-        """
+        """Return η where a planned swing begins, shape (2,) [m]."""
         turned = _turn(standing.yaw)
         local, first = way @ turned, self._first[side]
         own = first @ (self._share * local)
@@ -163,14 +131,7 @@ class LegReaction:
         return np.asarray(turned[:2, :2] @ own)
 
     def of(self, swing: Swing, t: float, side: float, standing: Footstep) -> Reaction:
-        """Return the reaction of a swing from a time on.
-
-        Args:
-            swing: The swing.
-            t: From when on [s].
-            side: 1 if the left foot swings, -1 for the right one.
-            standing: Where the other one stands.
-        """
+        """Return the reaction of a swing from a time on."""
         times, step = _times(t, max(swing.end, t + 1e-3))
         shares = (times - swing.start)[:, None] / (swing.end - swing.start)
         turned = _turn(standing.yaw)

@@ -8,11 +8,7 @@ from hsp_control.robot import Robot, RobotState
 
 
 def root_frame(robot: Robot) -> str:
-    """Return the body that the free-flyer root moves.
-
-    Raises:
-        PlanError: If there is none.
-    """
+    """Return the body that the free-flyer root moves."""
     for frame in robot.model.frames:
         if frame.parentJoint == 1 and frame.type == pin.FrameType.BODY:
             return str(frame.name)
@@ -35,10 +31,6 @@ def leg_length(robot: Robot, foot: str) -> float:
     """Return how far a foot can be from the first joint of its leg [m].
 
     The sum of the distances from joint to joint: no leg reaches farther.
-
-    Args:
-        robot: The robot.
-        foot: The frame of the foot.
     """
     model = robot.model
     frame = model.frames[robot.frame_id(foot)]
@@ -49,11 +41,6 @@ def leg_length(robot: Robot, foot: str) -> float:
 
 
 def hip_height(state: RobotState, foot: str) -> float:
-    """Return the height of the first joint of a leg above its foot [m].
-
-    Args:
-        state: The state.
-        foot: The frame of the foot.
-    """
+    """Return the height of the first joint of a leg above its foot [m]."""
     hip = state.data.oMi[leg_joints(state.robot, foot)[0]].translation[2]
     return float(hip - state.position(foot)[2])

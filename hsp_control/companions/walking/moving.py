@@ -44,11 +44,7 @@ class MovingPlan(Plan):
             )
 
     def begun(self) -> Self:
-        """Return the plan for a run, which begins without velocity.
-
-        Raises:
-            PlanError: If the velocity has not three numbers.
-        """
+        """Return the plan for a run, which begins without velocity."""
         if self.velocity is None:
             return self
         with within("velocity"):

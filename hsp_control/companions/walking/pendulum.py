@@ -57,13 +57,7 @@ class Phase(NamedTuple):
         return self.start + share * (self.end - self.start)
 
     def dcm(self, first: Array, t: float, frequency: float) -> Array:
-        """Return ξ(t), t in s from the start of the phase, without what moves beside.
-
-        Args:
-            first: ξ(0), shape (2,) [m].
-            t: Time, within the phase [s].
-            frequency: ω [1/s].
-        """
+        """Return ξ(t), t [s] since the phase began, without what moves beside."""
         m = (self.end - self.start) / (frequency * self.duration)
         at = self.start + (t / self.duration) * (self.end - self.start)
         own = first - self.lead
@@ -82,12 +76,7 @@ def dcm_of(position: Array, velocity: Array, frequency: float) -> Array:
 
 
 def plan_dcm(phases: Sequence[Phase], frequency: float) -> list[Array]:
-    """Return ξ at the start of each phase; at the end of the last ξ is p, at rest.
-
-    Args:
-        phases: The phases, in order of time.
-        frequency: ω [1/s].
-    """
+    """Return ξ at the start of each phase; at the end of the last ξ is p, at rest."""
     last, starts = phases[-1].end, list[Array]()
     for phase in reversed(phases):
         last = phase.first_dcm(last, frequency)
@@ -102,13 +91,6 @@ def in_step(
 
     A foot that lands early or late leaves the DCM beside its plan, but on its way: by
     a duration that is as much longer or shorter the plan is in step again.
-
-    Args:
-        phase: The phase.
-        last: ξ(T), which is to be reached at its end, shape (2,) [m].
-        dcm: ξ where it begins, shape (2,) [m].
-        frequency: ω [1/s].
-        bounds: The shortest and the longest duration [s].
     """
     T = np.linspace(*bounds, _DURATIONS)[:, None]
     m = (phase.end - phase.start) / (frequency * T)
@@ -128,13 +110,6 @@ def error_after(
 
     which decays as exp(-k t) while |ε| ≤ r / (1 + k/ω), decreases while |ε| < r, and
     grows beyond: then only a step can help.
-
-    Args:
-        error: ε [m].
-        t: The time [s].
-        frequency: ω [1/s].
-        gain: k [1/s].
-        reach: r, how far the repellent point can be displaced [m].
     """
     size, sign = abs(error), 1.0 if error >= 0.0 else -1.0
     linear = reach / (1.0 + gain / frequency)

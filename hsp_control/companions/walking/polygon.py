@@ -11,9 +11,6 @@ def convex_hull(points: Array) -> Array:
     """Return the corners of the convex hull, anticlockwise, shape (m, 2).
 
     Andrew's monotone chain (1979).
-
-    Args:
-        points: Points that are not on one line, shape (k, 2) [m].
     """
     ordered = sorted(map(tuple, points.tolist()))
     lower, upper = _chain(ordered), _chain(ordered[::-1])
@@ -21,12 +18,7 @@ def convex_hull(points: Array) -> Array:
 
 
 def nearest_inside(corners: Array, point: Array) -> Array:
-    """Return the point of a convex polygon that is nearest to a point, shape (2,).
-
-    Args:
-        corners: The corners, anticlockwise, shape (m, 2) [m].
-        point: The point, shape (2,) [m].
-    """
+    """Return the point of a convex polygon that is nearest to a point, shape (2,)."""
     edges = np.roll(corners, -1, axis=0) - corners
     to_point = point - corners
     if (edges[:, 0] * to_point[:, 1] - edges[:, 1] * to_point[:, 0] >= 0.0).all():
@@ -39,13 +31,7 @@ def nearest_inside(corners: Array, point: Array) -> Array:
 
 
 def last_inside(corners: Array, start: Array, end: Array) -> Array:
-    """Return the last point of a way that is in a convex polygon, shape (2,).
-
-    Args:
-        corners: The corners, anticlockwise, shape (m, 2) [m].
-        start: Where the way begins, in the polygon, shape (2,) [m].
-        end: Where it ends, shape (2,) [m].
-    """
+    """Return the last point of a way that is in a convex polygon, shape (2,)."""
     edges = np.roll(corners, -1, axis=0) - corners
     way, away = end - start, start - corners
     # How far each edge is to the right of the start, and how fast the way goes there.

@@ -68,25 +68,14 @@ class PushRecovery:
         self._shift = shift_gain(frequency, walk.double_support)
 
     def holds(self, plan: PlannedSwing, soles: Array) -> bool:
-        """Return whether soles hold a push that one sole and a step do not.
-
-        Args:
-            plan: The swing that is to begin.
-            soles: The corners of both soles, shape (m, 2) [m].
-        """
+        """Return whether soles hold a push that one sole and a step do not."""
         swing = self._walk.swing
         window = _SHORTEST * swing, _LONGEST * swing
         left = self._best_step(plan, swing, window).left
         return self._is_too_far(plan, left) and _is_within(soles, plan.dcm)
 
     def step(self, plan: PlannedSwing, swing: Swing, t: float) -> Adjustment | None:
-        """Return where and when a foot that swings is to land; None if as it does.
-
-        Args:
-            plan: The swing as it was planned.
-            swing: The swing as it is, after earlier adjustments.
-            t: The present time [s].
-        """
+        """Return where and when a foot that swings is to land; None if as it does."""
         remaining = swing.end - t
         if remaining < _COMMITTED:
             return None
@@ -115,13 +104,7 @@ class PushRecovery:
     def _best_step(
         self, plan: PlannedSwing, planned: float, window: tuple[float, float]
     ) -> Adjustment:
-        """Return where and when the swing foot is to land.
-
-        Args:
-            plan: The swing as it was planned.
-            planned: The time until the foot was to land [s].
-            window: The earliest and the latest touchdown from now [s].
-        """
+        """Return where and when the swing foot is to land."""
         standing = plan.standing.place
         return adjust(
             plan.target,
@@ -134,12 +117,7 @@ class PushRecovery:
         )
 
     def _dcm_after(self, plan: PlannedSwing, T: float) -> Array:
-        """Return what ξ will be, with feedback within the sole, shape (2,) [m].
-
-        Args:
-            plan: The swing as it was planned.
-            T: Time from now, at most until touchdown [s].
-        """
+        """Return what ξ will be, with feedback within the sole, shape (2,) [m]."""
         walk, frequency, place = self._walk, self._frequency, plan.standing.place
         error = place.local(place.point + plan.dcm - plan.wanted)
         left = [

@@ -53,14 +53,7 @@ class Quintic(NamedTuple):
 
 
 def to_rest(now: Motion, target: ArrayLike, start: float, duration: float) -> Quintic:
-    """Return the quintic from a motion to rest at a target, C² at its start.
-
-    Args:
-        now: x, x' and x'' at the start, shape (n,) each.
-        target: Where it comes to rest, shape (n,).
-        start: t0 [s].
-        duration: T > 0 [s].
-    """
+    """Return the quintic from a motion to rest at a target, C² at its start."""
     T = duration
     x, v, a = (np.asarray(each, dtype=float) for each in now)
     # What is missing at the end in x, T x' and T² x''.

@@ -48,12 +48,7 @@ class Adjustment(NamedTuple):
 
 
 def shift_gain(frequency: float, double_support: float) -> float:
-    """Return s: how far the divergent component shifts with the step.
-
-    Args:
-        frequency: ω [1/s].
-        double_support: D, the duration of the double support that follows [s].
-    """
+    """Return s: how far the divergent component shifts with the step."""
     x = frequency * double_support
     return (1.0 - exp(-x)) / x if x > 1e-9 else 1.0
 
@@ -67,17 +62,7 @@ def adjust(
     shift: float,
     allowed: Callable[[Footstep], Footstep],
 ) -> Adjustment:
-    """Return where and when the foot is to land.
-
-    Args:
-        planned: u0, where the plan has it.
-        remaining: T0, the time until then [s].
-        window: The earliest and the latest touchdown from now [s].
-        dcm_at: ξ(T) for a time T from now [s], shape (2,) [m].
-        wanted: ξ0, what the planned step needs, shape (2,) [m].
-        shift: s; see `shift_gain`.
-        allowed: The nearest place that the legs reach.
-    """
+    """Return where and when the foot is to land."""
     times = np.append(np.linspace(*window, _TIMES), remaining)
     best, least = Adjustment(planned, remaining, np.zeros(2)), np.inf
     share = WEIGHT_DCM * shift / (1.0 + WEIGHT_DCM * shift * shift)

@@ -61,16 +61,7 @@ class StepPlanner:
     """
 
     def __init__(self, walk: BipedPlan, stance: Stance, robot: str) -> None:
-        """Set the walk, and how the feet stand.
-
-        Args:
-            walk: The plan.
-            stance: How the feet stand beside each other.
-            robot: The name of the robot, for the message.
-
-        Raises:
-            PlanError: If a stride is longer than the legs reach.
-        """
+        """Set the walk, and how the feet stand."""
         self._walk, self._stance = walk, stance
         self.stopping = False
         self.period = walk.swing + walk.double_support
@@ -100,19 +91,7 @@ class StepPlanner:
         point: Array,
         lead: Callable[[float, Mapping[float, Footstep], Footstep], Array],
     ) -> Preview:
-        """Return what is to come, from a phase on two feet on.
-
-        Args:
-            t: The present time [s].
-            taken: How many steps were taken.
-            velocity: The velocity of the step before.
-            side: 1 if the left foot swings next, -1 for the right one.
-            places: Where the feet stand, by side.
-            shift: How long the weight takes to shift to the standing foot [s].
-            point: Where the repellent point is, shape (2,) [m].
-            lead: What `Phase.lead` is for the foot of a side, where the feet stand, and
-                where it goes.
-        """
+        """Return what is to come, from a phase on two feet on."""
         walk, places = self._walk, dict(places)
         phases, swings = list[Phase](), list[bool]()
         first: Next | None = None
@@ -156,28 +135,14 @@ class StepPlanner:
         side: float,
         places: Mapping[float, Footstep],
     ) -> Next:
-        """Return the next step.
-
-        Args:
-            velocity: The velocity of the step before.
-            t: The present time [s].
-            taken: How many steps were taken before it.
-            side: 1 if the left foot swings, -1 for the right one.
-            places: Where the feet stand, by side.
-        """
+        """Return the next step."""
         velocity = self._next_velocity(velocity, t, taken)
         target = self._stance.next(places[-side], side, velocity, self.period)
         stands = velocity.is_zero and _beside(places[side], target)
         return Next(velocity, None if stands else target)
 
     def _next_velocity(self, now: Velocity, t: float, taken: int) -> Velocity:
-        """Return the velocity of a step, as near to what is wanted as it may be.
-
-        Args:
-            now: The velocity of the step before.
-            t: The present time [s].
-            taken: How many steps were taken before it.
-        """
+        """Return the velocity of a step, as near to what is wanted as it may be."""
         wanted = self.wanted(t, taken)
         largest = self._walk.acceleration * self.period
         bounds = largest, largest, largest / max(0.5 * self._stance.width, 0.1)
@@ -185,16 +150,7 @@ class StepPlanner:
 
 
 def stance_of(feet: Mapping[float, Foot], state: RobotState, crouch: float) -> Stance:
-    """Return how the feet of a biped stand, and how far its legs reach.
-
-    Args:
-        feet: The feet, by side.
-        state: The state in which the robot stands.
-        crouch: How far the centre of mass is lowered [m].
-
-    Raises:
-        PlanError: If the feet are so near that they would meet.
-    """
+    """Return how the feet of a biped stand, and how far its legs reach."""
     left, right = feet[1.0], feet[-1.0]
     width = float(right.place.local(left.place.point)[1])
     soles = 0.5 * (left.sole_width + right.sole_width)

@@ -40,19 +40,7 @@ class Swing:
         lift: float,
         descent: float = DESCENT,
     ) -> None:
-        """Plan the motion.
-
-        Args:
-            t: When it begins [s].
-            duration: How long it takes [s].
-            position: Where the foot's frame is, shape (3,) [m].
-            rotation: Its orientation, shape (3, 3).
-            target: Where the foot is to stand.
-            goal: Its orientation there, flat on the ground, shape (3, 3).
-            height: The height of its frame when it stands [m].
-            lift: How high it is lifted [m].
-            descent: How fast it goes on down without ground [m/s].
-        """
+        """Plan the motion."""
         self._descent = descent
         self.start, self.end, self.target = t, t + duration, target
         self._rotation, self._axis = rotation.copy(), np.zeros(3)
@@ -78,14 +66,7 @@ class Swing:
     def redirect(
         self, t: float, target: Footstep, end: float, *, rises: bool = True
     ) -> None:
-        """Go on to another place, of the same yaw, and touch at another time.
-
-        Args:
-            t: The present time [s].
-            target: Where the foot is to stand.
-            end: When it is to touch [s].
-            rises: Whether it still rises to its full height, if there is time.
-        """
+        """Go on to another place, of the same yaw, and touch at another time."""
         along, vertical = self._along.sample(t), self._vertical(t)
         self.target, self.end = target, end
         until = self.start + APPROACH * (end - self.start)

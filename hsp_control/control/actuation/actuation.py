@@ -106,13 +106,7 @@ class Actuation:
     def __init__(
         self, robot: Robot, planned: PlannedLimits, base: Sequence[int] = ()
     ) -> None:
-        """Allocate.
-
-        Args:
-            robot: The robot.
-            planned: Its limits.
-            base: Indices of the degrees of freedom without a motor.
-        """
+        """Allocate."""
         nv = robot.nv
         self._robot = robot
         self.base: Indices = np.array(base, dtype=np.int64)
@@ -234,13 +228,7 @@ class Actuation:
         self.enforce(last)
 
     def applied(self, state: RobotState, tau: Array, period: float) -> None:
-        """Record the effort that is sent now, for the limits on effort rate and speed.
-
-        Args:
-            state: The state at which it was computed.
-            tau: Effort, shape (nv,) [N·m or N].
-            period: Time until the next effort [s].
-        """
+        """Record the effort that is sent now, for the limits on its rate and on speed."""
         self.period = period
         if not self._limits_anything:
             return
@@ -253,10 +241,6 @@ class Actuation:
         """Return calls of the time that do what `applied` does of the effort M a + N.
 
         The period is that of the last `applied`.
-
-        Args:
-            state: The robot's state, with its effort; the calls read it each time.
-            a: The acceleration, shape (nv,); this array, too.
         """
         if not self._limits_anything:
             return []
@@ -295,17 +279,7 @@ class Actuation:
         support: Support,
         offset: Array | None = None,
     ) -> Delivered:
-        """Return efforts and forces for the acceleration nearest to the law's.
-
-        Args:
-            state: The robot's state.
-            a: The law's acceleration, shape (nv,).
-            violated: What `checks` found, without the law's code.
-            resolution: The resolved law, with its levels in order of priority.
-            support: The forces of the active contacts; updated here.
-            offset: Effort besides M a + N, for friction for example, shape (nv,)
-                [N·m or N]; None: none. The limits hold for the sum.
-        """
+        """Return efforts and forces for the acceleration nearest to the law's."""
         violated //= FLAGS
         wanted = state.effort  # M a + N
         unsupported = self.is_direct(support)
@@ -341,12 +315,6 @@ class Actuation:
         The last one returns a sum, see `CODES`: 0 if the law is exact and a and the
         effort without contacts are within their bounds. If they are not, and a QP is
         all that is needed then, it is solved at once; `limited` has the result.
-
-        Args:
-            state: The robot's state; the calls read it each time.
-            a: The acceleration, shape (nv,); this array, too.
-            resolution: The law.
-            support: The forces of the active contacts.
         """
         calls = self._compile_checks(state, a, resolution.code)
         limit = self._limit_if_violated(state, resolution, support)
@@ -436,17 +404,7 @@ class Actuation:
         support: Support,
         barriers: Barriers,
     ) -> Delivered:
-        """Return the nearest to what the law wants within the limits.
-
-        Args:
-            state: The robot's state.
-            wanted: The effort without contact forces, shape (nv,) [N·m or N].
-            a: The law's acceleration, shape (nv,).
-            redistribute: Whether other contact forces can be enough.
-            resolution: The resolved law.
-            support: The forces of the active contacts, with those of minimum norm.
-            barriers: The rows of the barriers.
-        """
+        """Return the nearest to what the law wants within the limits."""
         step = self._step
         if step is None or resolution is not self._resolution:
             step = self._step_of(state, resolution, support)

@@ -25,11 +25,7 @@ class CommandedForces:
     """
 
     def __init__(self, planned: PlannedContact) -> None:
-        """Follow the command of a contact.
-
-        Args:
-            planned: The contact, which has a command.
-        """
+        """Follow the command of a contact."""
         contact = planned.contact
         assert contact.force is not None
         self._contact, self._offset = contact, planned.force_offset
@@ -48,14 +44,7 @@ class CommandedForces:
     def write(
         self, state: RobotState, weight: float, resolution: Resolution, out: Array
     ) -> None:
-        """Write f_ref.
-
-        Args:
-            state: The robot's state.
-            weight: How much the contact bears, in [0, 1].
-            resolution: The resolved law, which says how the robot is to move.
-            out: Written: f_ref in the axes of the contact, shape (3 k,) [N].
-        """
+        """Write f_ref."""
         self._follow(state.t)
         command = self._command.position.copy()
         command[self._normal] = max(command[self._normal] + self._offset[0], 0.0)
@@ -83,10 +72,6 @@ def intended_velocity(state: RobotState, resolution: Resolution) -> Array:
     """Return v + e_N + J# e', shape (nv,): the velocity once both errors are zero.
 
     Measurement noise cancels in it, and a hand that sticks is pushed where it is to go.
-
-    Args:
-        state: The robot's state.
-        resolution: The resolved law, with the error rates e' of all rows.
     """
     problem = resolution.problem
     L, J = problem.metric.L, problem.task.jacobian

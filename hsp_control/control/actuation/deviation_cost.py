@@ -112,14 +112,7 @@ class Directions(NamedTuple):
 
     @classmethod
     def of(cls, resolution: Resolution, supported: bool, size: float) -> Self:
-        """Allocate for a law.
-
-        Args:
-            resolution: The law, with its levels and its metric.
-            supported: Whether the first level is that of the contacts; it costs as much
-                as the one below, where it may move at all.
-            size: The robot's size [m].
-        """
+        """Allocate for a law."""
         J = resolution.problem.task.jacobian
         m, n = J.shape
         every = len(resolution.ends)

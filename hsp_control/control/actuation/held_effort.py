@@ -71,14 +71,7 @@ class HeldEffort:
         self._expect = IdentityCache(self.expect)
 
     def sent(self, t: float, v: Array, a: Array, period: float) -> None:
-        """Record that the effort of an acceleration is held from now on.
-
-        Args:
-            t: The time [s].
-            v: The velocity, shape (nv,).
-            a: The acceleration, shape (nv,).
-            period: How long the effort is held [s].
-        """
+        """Record that the effort of an acceleration is held from now on."""
         self._timing[1] = period
         self._expect.get(v, a)(t)
 

@@ -71,18 +71,7 @@ class LimitedStep:
         weight: float,
         capacity: int,
     ) -> None:
-        """Allocate.
-
-        Args:
-            state: The robot's state; each step reads its mass matrix.
-            resolution: The law, with its levels in order of priority.
-            support: The forces of the active contacts.
-            bounds: The bounds on acceleration and effort; each step reads these arrays.
-            base: Indices of the degrees of freedom without a motor.
-            limited: Those with a limit on their effort.
-            weight: The robot's weight [N].
-            capacity: How many rows of barriers there is room for.
-        """
+        """Allocate."""
         n, p = state.robot.nv, support.size
         held = sum(contact.rows for contact in support.contacts)
         self.capacity = capacity
@@ -160,11 +149,6 @@ class LimitedStep:
         """Return a call that writes the nearest, as `solve`, if ``found[1]`` is not 0.
 
         It returns ``found[0]``, plus the `Status` if the QP was solved.
-
-        Args:
-            acceleration: The law's acceleration, shape (nv,); this array.
-            effort: The effort for it, shape (nv,) [N·m or N]; this array.
-            found: What was found about them, shape (2,); this array.
         """
         return only_if([*self._input(acceleration, effort), self._nearest], found)
 
@@ -191,18 +175,7 @@ class LimitedStep:
         redistribute: bool,
         barriers: Barriers,
     ) -> tuple[Status | None, float]:
-        """Write the nearest to what the law wants to `result`.
-
-        Args:
-            acceleration: The law's acceleration, shape (nv,).
-            effort: The effort for it without contact forces, shape (nv,) [N·m or N].
-            redistribute: Whether forces alone can be enough.
-            barriers: The rows of the barriers.
-
-        Returns:
-            The status, None if the solver found nothing; and the largest violation of a
-            relaxed limit [rad/s² or m/s²].
-        """
+        """Write the nearest to what the law wants to `result`."""
         by_forces, nearest = self._calls.get(acceleration, effort)
         where = {}
         if barriers or self._used:

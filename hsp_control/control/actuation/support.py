@@ -52,13 +52,7 @@ class Support:
     def __init__(
         self, contacts: Sequence[PlannedContact], robot: Robot, weight: float
     ) -> None:
-        """Allocate for contacts of a robot.
-
-        Args:
-            contacts: The active contacts.
-            robot: The robot.
-            weight: The robot's weight [N].
-        """
+        """Allocate for contacts of a robot."""
         nv = robot.nv
         self.contacts = tuple(each.contact for each in contacts)
         counts = [len(contact.points) for contact in self.contacts]
@@ -103,12 +97,7 @@ class Support:
         self._solve = IdentityCache(self._bind_solve)
 
     def update(self, state: RobotState, resolution: Resolution) -> None:
-        """Compute the map, the positions, the bounds of schedules, and the commands.
-
-        Args:
-            state: The robot's state.
-            resolution: The law, resolved there.
-        """
+        """Compute the map, the positions, the bounds of schedules, and the commands."""
         for write in self._maps.get(state):
             write(state.t)
         for planned, columns, full in self._scheduled:
@@ -130,16 +119,7 @@ class Support:
         return in_order(calls)
 
     def minimum_norm_forces(self, base: Indices, wanted: Array) -> tuple[Array, Array]:
-        """Return the forces of minimum Σ (f - f_ref)²/e, and the remaining effort.
-
-        Args:
-            base: Indices of the degrees of freedom without a motor.
-            wanted: The effort without contacts, shape (nv,) [N·m or N].
-
-        Returns:
-            The forces, shape (size,) [N], and the effort that remains for the motors,
-            shape (nv,) [N·m or N]; both are overwritten by the next call.
-        """
+        """Return the forces of minimum Σ (f - f_ref)²/e, and the remaining effort."""
         self._wanted[:] = wanted
         self._solve.get(base)()
         return self.forces, self._tau

@@ -5,11 +5,7 @@ from hsp_control.robot import Robot
 
 
 def check_fixed_base(robot: Robot) -> None:
-    """Check that a motor moves every degree of freedom of the robot.
-
-    Raises:
-        CompensationError: If the robot has a free-flyer root.
-    """
+    """Check that a motor moves every degree of freedom of the robot."""
     if robot.unactuated:
         raise CompensationError(
             f"{robot.name} has a free-flyer root, and its contact forces are not "

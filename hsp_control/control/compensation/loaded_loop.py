@@ -65,21 +65,7 @@ def loaded_loop(
     sensor_delay: int,
     compensation: Compensation,
 ) -> LoadedLoop | None:
-    """Return the loop of the whole robot at a state.
-
-    Args:
-        controller: The controller.
-        state: The state, at rest.
-        plant: The robot that moves; its joints are those of the controller's.
-        period: The control period h [s].
-        effort_delay: Delay of efforts, in periods.
-        sensor_delay: Delay of measurements, in periods.
-        compensation: The compensators.
-
-    Returns:
-        None if the robot equals its model, is singular at the state, has a floating
-        base, or its null space is not controlled: the loop is another one then.
-    """
+    """Return the loop of the whole robot at a state."""
     robot = controller.robot
     M = state.mass_matrix
     others = plant.state(state.t, state.q, state.v).mass_matrix - M

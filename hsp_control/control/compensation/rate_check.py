@@ -69,14 +69,6 @@ def check_rate(
     """Check that the loop is stable at its rate.
 
     The arguments are those of `rate_findings`.
-
-    Returns:
-        The violations of the design rules.
-
-    Raises:
-        UnstableRateError: If the loop is unstable; with the gain that is too large, and
-            values that make the loop stable.
-        CompensationError: If the velocity filter's cut-off is too high for the rate.
     """
     found = rate_findings(
         controller,
@@ -104,22 +96,7 @@ def rate_findings(
     sensor_delay: int | None = None,
     plant: Robot | None = None,
 ) -> list[RateFinding]:
-    """Return the problems of each task and of the null space at a control rate.
-
-    Args:
-        controller: The controller.
-        q: Configuration at which the field's slope, and the gains that an impedance
-            gives, are computed, shape (nq,).
-        period: The control period h [s].
-        compensation: The compensators; None: none.
-        effort_delay: Delay of efforts, in periods; None: the predictor's setting.
-        sensor_delay: Delay of measurements, in periods; None: the predictor's setting.
-        plant: The robot that moves, if it is known to differ from the model: with a
-            payload, for example; None: the model.
-
-    Raises:
-        CompensationError: If the velocity filter's cut-off is too high for the rate.
-    """
+    """Return the problems of each task and of the null space at a control rate."""
     compensation = Compensation() if compensation is None else compensation
     if compensation.velocity_filter is not None:
         with within("compensation", "velocity_filter"):
@@ -367,11 +344,7 @@ def _stabilising_changes(
     rule: float,
     null_space: tuple[Array, Array] | None,
 ) -> tuple[list[str], list[str]]:
-    """Return changes of single settings, each of which makes the loop stable.
-
-    Returns:
-        Those that also keep to the rule, and those that just make it stable.
-    """
+    """Return changes of single settings, each of which makes the loop stable."""
 
     def gains(s: float) -> LinearLoop:
         if null_space is None:

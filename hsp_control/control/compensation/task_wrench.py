@@ -21,12 +21,6 @@ def task_wrench(
     If r = Jᵀf then this is f. Whatever else r is, f is the force that moves the task as
     r does. J̄ = M⁻¹JᵀΛ is bounded near singularities as the law's own pseudo-inverse is:
     a force along a lost direction, which the joints do not feel, is taken for zero.
-
-    Args:
-        task: The task, placed.
-        state: The state at which r was estimated.
-        disturbance: r, shape (nv,) [N·m or N].
-        threshold: Singular value of J in the metric M below which J̄ is bounded.
     """
     J = task.evaluate(state, feedback=task.feedback()).jacobian
     m, nv = J.shape

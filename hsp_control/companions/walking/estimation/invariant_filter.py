@@ -92,16 +92,7 @@ class InvariantFilter:
         densities: Densities,
         gravity: Array,
     ) -> None:
-        """Begin at an estimate without points, and without biases.
-
-        Args:
-            rotation: R̂, shape (3, 3).
-            velocity: v̂, shape (3,) [m/s].
-            position: p̂, shape (3,) [m].
-            covariance: P of (ξ_R, ξ_v, ξ_p, ζ_g, ζ_a), shape (15, 15).
-            densities: The noise.
-            gravity: g, shape (3,) [m/s²].
-        """
+        """Begin at an estimate without points, and without biases."""
         self.rotation: Array = rotation.copy()
         self.velocity: Array = velocity.copy()
         self.position: Array = position.copy()
@@ -115,13 +106,7 @@ class InvariantFilter:
     # -- prediction -------------------------------------------------------------------
 
     def predict(self, angular_velocity: Array, specific_force: Array, h: float) -> None:
-        """Go on by a period, driven by what the unit reports of it.
-
-        Args:
-            angular_velocity: ω, shape (3,) [rad/s].
-            specific_force: f, shape (3,) [m/s²].
-            h: The period [s].
-        """
+        """Go on by a period, driven by what the unit reports of it."""
         turn, R = h * (angular_velocity - self.gyroscope_bias), self.rotation
         force = R @ (specific_force - self.accelerometer_bias)
         left, step = np.zeros((3, 3)), np.zeros((3, 3))
@@ -170,11 +155,7 @@ class InvariantFilter:
     # -- points -----------------------------------------------------------------------
 
     def move(self, displacements: Array) -> None:
-        """Move the points by what is known of them, such as rolling.
-
-        Args:
-            displacements: Of each point in the world, shape (n, 3) [m].
-        """
+        """Move the points by what is known of them, such as rolling."""
         self.points = self.points + displacements
 
     def add(self, names: Sequence[PointName], seen: Array, noise: Array) -> None:
@@ -182,11 +163,6 @@ class InvariantFilter:
 
         Their errors are those of the unit's place, and of what was seen:
         ξ_d = ξ_p + R̂ n.
-
-        Args:
-            names: Their names.
-            seen: Where they are, from the unit and in its axes, shape (k, 3) [m].
-            noise: The covariance of all that, in these axes, shape (3 k, 3 k) [m²].
         """
         size, k = len(self.covariance), len(names)
         grow = np.zeros((size + 3 * k, size))
@@ -209,12 +185,7 @@ class InvariantFilter:
     # -- correction -------------------------------------------------------------------
 
     def correct(self, seen: Array, noise: Array) -> None:
-        """Correct the estimate by where the kinematics see all points.
-
-        Args:
-            seen: Where they are, from the unit and in its axes, shape (n, 3) [m].
-            noise: The covariance of that, in these axes, shape (3 n, 3 n) [m²].
-        """
+        """Correct the estimate by where the kinematics see all points."""
         if not self.names:
             return
         innovation = (seen @ self.rotation.T + self.position - self.points).ravel()
@@ -236,11 +207,7 @@ class InvariantFilter:
         return H
 
     def retract(self, error: Array) -> None:
-        """Replace X̂ by exp(ξ) X̂, and b̂ by b̂ + ζ.
-
-        Args:
-            error: (ξ_R, ξ_v, ξ_p, ζ_g, ζ_a, ξ_d1, ...), shape (15 + 3 n,).
-        """
+        """Replace X̂ by exp(ξ) X̂, and b̂ by b̂ + ζ."""
         turn, left = np.zeros((3, 3)), np.zeros((3, 3))
         axis = np.ascontiguousarray(error[ROTATION])
         exp3(axis, turn)
@@ -265,12 +232,7 @@ def orthonormal(R: Array) -> Array:
 
 
 def turned_covariance(R: Array, covariance: Array) -> Array:
-    """Return the covariance of points in other axes, shape (3 k, 3 k).
-
-    Args:
-        R: The rotation to these axes, shape (3, 3).
-        covariance: That of the points, shape (3 k, 3 k).
-    """
+    """Return the covariance of points in other axes, shape (3 k, 3 k)."""
     k = len(covariance) // 3
     blocks = covariance.reshape(k, 3, k, 3)
     turned = np.einsum("ij,ajbl,ml->aibm", R, blocks, R)

@@ -77,11 +77,6 @@ def rolled(contact: Contact, angular_velocity: Array, h: float) -> Array:
     """Return how far the points of a contact roll on in a period, shape (3,) [m].
 
     The centre of a ball of radius r moves with ω × r n; other contacts do not roll.
-
-    Args:
-        contact: The contact.
-        angular_velocity: ω of its frame, world axes, shape (3,) [rad/s].
-        h: The period [s].
     """
     if not isinstance(contact, BallContact):
         return np.zeros(3)
