@@ -228,7 +228,7 @@ class Actuation:
         self.enforce(last)
 
     def applied(self, state: RobotState, tau: Array, period: float) -> None:
-        """Record the effort that is sent now, for the limits on its rate and on speed."""
+        """Record the effort that is sent now: its rate and the speed are limited."""
         self.period = period
         if not self._limits_anything:
             return
