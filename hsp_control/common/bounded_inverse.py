@@ -20,13 +20,8 @@ def bounded_inverse(B: Array, threshold: float, Q: Array, X: Array) -> bool:
 
     q(x) = 1/x for x ≥ threshold² and (2 - x/threshold²)/threshold² below it: exactly
     the pseudo-inverse while every singular value of B is above the threshold,
-    continuously differentiable, and bounded: ‖B#‖ ≤ 1.09/threshold.
-
-    Args:
-        B: Shape (m, n), m ≤ n.
-        threshold: Singular value below which damping starts.
-        Q: Rows that span those of B, shape (m, n).
-        X: Shape (m, m).
+    continuously differentiable, and bounded: ‖B#‖ ≤ 1.09/threshold. B has the shape
+    (m, n), m ≤ n; the rows of Q (m, n) span those of B; X has the shape (m, m).
     """
     # The spectrum is computed only where cheaper bounds cannot decide.
     bound = orthonormalise_rows(B, Q, X)

@@ -63,12 +63,7 @@ def is_compiled(function: Callable[..., Any]) -> bool:
 
 
 def callback(signature: Any, function: Callable[..., Any]) -> Any:
-    """Return a function compiled at once, for calls by its ``address``.
-
-    Args:
-        signature: Its types, as ``types.float64(types.int64)``.
-        function: The function.
-    """
+    """Return a function of these types, compiled now, for calls by its ``address``."""
     from numba.core.ccallback import CFunc
 
     from hsp_control.common.kernel_cache import Kept

@@ -167,7 +167,7 @@ def gram(A: Array, B: Array, symmetric: bool, out: Array) -> None:
 
 @kernel
 def orthonormalise_rows(J: Array, Q: Array, X: Array) -> float:
-    """Write a lower triangular X, and Q = X J with orthonormal rows, for m ≤ n.
+    """Write a lower triangular X (m, m), and Q = X J (m, n) with orthonormal rows.
 
     Modified Gram-Schmidt: each row is normalised, then its component is subtracted from
     the rows after it. X goes through the same steps. If a row loses nine tenths of its
@@ -175,14 +175,8 @@ def orthonormalise_rows(J: Array, Q: Array, X: Array) -> float:
     et al. 2005), so that Q is orthonormal to rounding. A row that becomes zero leaves
     zeros in Q and X.
 
-    Args:
-        J: Shape (m, n).
-        Q: Shape (m, n).
-        X: Shape (m, m) or larger.
-
-    Returns:
-        1/‖X‖_F, a lower bound of J's smallest singular value, too small by a factor of
-        √m at most; 0 if a row became zero, inf without rows.
+    Returns 1/‖X‖_F, a lower bound of J's smallest singular value, too small by a factor
+    of √m at most; 0 if a row became zero, inf without rows.
     """
     m, n = J.shape
     for j in range(m):
@@ -227,16 +221,10 @@ def _project_out_row(Q: Array, X: Array, j: int) -> float:
 
 @kernel
 def triangularise_rows(Y: Array) -> float:
-    """Overwrite the lower triangle of Y with that of Y H, which is zero elsewhere.
+    """Overwrite the lower triangle of Y (m, n), m ≤ n, with Y H's; return det(Y Yᵀ).
 
-    H is orthogonal, a product of Householder's reflections: the triangle has Y's
-    singular values. The rest of Y is used.
-
-    Args:
-        Y: Shape (m, n), m ≤ n, of any rank.
-
-    Returns:
-        det(Y Yᵀ).
+    H is orthogonal, a product of Householder's reflections: Y H is zero elsewhere, and
+    has Y's singular values. The rest of Y is used.
     """
     m, n = Y.shape
     product = 1.0
@@ -288,16 +276,12 @@ def smallest_singular_value_bound(X: Array) -> float:
 
 @kernel
 def orthogonalise_rows(Y: Array, U: Array) -> None:
-    """Overwrite Y with U Y, whose rows are orthogonal; U is orthogonal.
+    """Overwrite Y (m, n) with U Y, whose rows are orthogonal; U (m, m) is orthogonal.
 
     One-sided Jacobi, in rounds of pairs that share no row, on several of which a
     processor works at a time. The norms of the new rows are the singular values of Y;
     small ones have high relative accuracy (Demmel and Veselić 1992). Y may be
-    rank-deficient.
-
-    Args:
-        Y: Shape (m, n).
-        U: Shape (m, m); shape (0, m) if only the singular values are needed.
+    rank-deficient. A U of shape (0, m) is not written.
     """
     m = Y.shape[0]
     for i in range(m):

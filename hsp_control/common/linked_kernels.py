@@ -182,14 +182,7 @@ def _flags(dispatcher: Any) -> _Flags:
 
 
 def compile_callable(own: Any, function: Callable[..., Any], args: Any, to: Any) -> Any:
-    """Return what Numba makes of a function that is called by its address.
-
-    Args:
-        own: Numba's compiler of the function.
-        function: The function.
-        args: The types of its arguments.
-        to: The type that it returns.
-    """
+    """Return what Numba makes of a function that is called by its address."""
     flags = cast("Any", compiler).Flags()
     own.targetdescr.options.parse_as_flags(flags, own.targetoptions)
     target = _target.target_context
@@ -209,12 +202,7 @@ def compile_callable(own: Any, function: Callable[..., Any], args: Any, to: Any)
 
 
 def linked(function: Callable[..., Any], options: dict[str, Any]) -> Any:
-    """Return Numba's dispatcher of a function, for calls by other compiled functions.
-
-    Args:
-        function: The function.
-        options: Numba's options.
-    """
+    """Return Numba's dispatcher of a function, for calls by compiled functions."""
     dispatcher: Any = cast("Any", numba).jit(
         **options, no_cpython_wrapper=True, no_cfunc_wrapper=True
     )(function)

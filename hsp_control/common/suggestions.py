@@ -34,12 +34,7 @@ def did_you_mean(word: str, options: Iterable[str]) -> str:
 
 
 def listing(options: Iterable[str], limit: int = 12) -> str:
-    """Return ``a, b, c``, or ``a, b, c, ... (37 in all)`` if the list is long.
-
-    Args:
-        options: The names, in the order in which they are listed.
-        limit: How many names are written out.
-    """
+    """Return ``a, b, c``, or ``a, b, c, ... (37 in all)`` if the list is long."""
     names = list(options)
     if len(names) <= limit:
         return ", ".join(names)

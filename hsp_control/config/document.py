@@ -36,13 +36,7 @@ class Document:
     def __init__(
         self, data: dict[str, Any], marks: dict[KeyPath, Mark], name: str
     ) -> None:
-        """Keep a copy of the data.
-
-        Args:
-            data: The plain data.
-            marks: The place of each key path in the text; empty if there is no text.
-            name: The file's path, for messages.
-        """
+        """Keep a copy of the data."""
         self.name = name
         self.access = ANYWHERE
         self.packages: frozenset[str] | None = None
@@ -51,11 +45,7 @@ class Document:
 
     @classmethod
     def read(cls, path: str | PathLike[str]) -> "Document":
-        """Read a YAML file.
-
-        Raises:
-            ConfigError: If it cannot be read, or is not a mapping in plain YAML.
-        """
+        """Read a YAML file."""
         name = fspath(path)
         try:
             with Path(name).open("rb") as file:
@@ -74,15 +64,7 @@ class Document:
 
     @classmethod
     def parse(cls, text: str, name: str = "<string>") -> "Document":
-        """Parse a YAML text.
-
-        Args:
-            text: The text.
-            name: The file's path, for messages.
-
-        Raises:
-            ConfigError: If it is not a mapping in plain YAML.
-        """
+        """Parse a YAML text."""
         if len(text) > MAX_SIZE:
             raise located(name, _TOO_LARGE)
         try:
@@ -106,10 +88,6 @@ class Document:
         The value is YAML. Missing keys are created, and the schema then checks them;
         missing list entries are an error. Keys that contain a dot need quotes:
         ``frames.'a.b'.parent=x``.
-
-        Raises:
-            ConfigError: If the assignment has another form, or its key path leads
-                nowhere.
         """
         origin = shortened(f"--set {' '.join(assignment.split())}", _LONGEST_ORIGIN)
         try:
@@ -122,16 +100,7 @@ class Document:
         self.assign(keys, value, origin)
 
     def assign(self, keys: list[str], value: Any, origin: str) -> KeyPath:
-        """Set the value at a key path, and return the key path.
-
-        Args:
-            keys: The parts of the key path, as text; see `override`.
-            value: The new value, plain data.
-            origin: What messages about the value say instead of file and line.
-
-        Raises:
-            ConfigError: If the key path leads nowhere.
-        """
+        """Set the value at a key path; ``origin`` is its place in messages."""
         try:
             path = assign(self._data, keys, value)
         except ValueError as error:
@@ -181,15 +150,11 @@ class Document:
     def at(self, *path: str | int) -> Iterator[None]:
         """Add the location of a key path to errors that are raised inside the block.
 
-        An error keeps its class. An error that has a location already keeps it, so of
-        nested blocks the innermost one counts. A key path that the error has itself
-        (see `hsp_control.declaration.located.within`) continues the given one::
+        An error that has a location already keeps it: the innermost block counts. A key
+        path that the error has itself continues the given one::
 
             with document.at("tasks", "hand"), within("frame"):
                 robot.frame_id("panda_hnad")  # FrameNotFoundError: panda.yaml:7: ...
-
-        Raises:
-            HspControlError: The error that was raised inside, with the location.
         """
         try:
             yield

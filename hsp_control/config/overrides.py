@@ -13,14 +13,6 @@ def assign(data: dict[str, Any], keys: list[str], value: Any) -> KeyPath:
 
     Missing keys of mappings are created (also in a mapping that was left empty); the
     schema then checks them. List entries are given by number and must exist.
-
-    Args:
-        data: The data; changed in place.
-        keys: The parts of the key path, as text.
-        value: The new value.
-
-    Raises:
-        ValueError: If the key path leads nowhere; the data is then unchanged.
     """
     if len(keys) > MAX_DEPTH:
         raise ValueError(f"nested deeper than {MAX_DEPTH} levels")
@@ -39,11 +31,7 @@ def assign(data: dict[str, Any], keys: list[str], value: Any) -> KeyPath:
 
 
 def _place(holder: Any, key: str, path: KeyPath) -> str | int:
-    """Return ``key`` for a mapping, or the number of the entry for a list.
-
-    Raises:
-        ValueError: If the holder, the value at ``path``, has no such key or entry.
-    """
+    """Return ``key`` for a mapping, or the number of the entry for a list."""
     if isinstance(holder, dict):
         return key
     if not isinstance(holder, list):

@@ -23,13 +23,7 @@ _ENTRIES = 20
 
 
 def validate(document: Document, part: type[Value]) -> Value:
-    """Return the document as a part.
-
-    Raises:
-        HspControlError: If it does not follow the declaration of the part. The message
-            describes the first mistake in the order of the file, then up to five
-            others, a line each.
-    """
+    """Return the document as a part; an error names up to six mistakes in order."""
     admitted: AbstractContextManager[None] = nullcontext()
     if document.packages is not None:
         admitted = only_packages(*document.packages)

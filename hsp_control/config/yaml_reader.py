@@ -30,11 +30,7 @@ class Mark(NamedTuple):
 
 
 def read_yaml(text: str) -> tuple[Any, dict[KeyPath, Mark]]:
-    """Return the plain data of a text, and the mark of every key path in it.
-
-    Raises:
-        YamlError: If the text is not YAML, or holds more than plain data.
-    """
+    """Return the plain data of a text, and the mark of every key path in it."""
     root = _compose(text)
     if root is None:
         return None, {(): Mark(1, 1)}

@@ -130,11 +130,7 @@ def _is_known(reference: Any, handler: GetJsonSchemaHandler) -> bool:
 
 
 def _check_complete(type_name: str, member: type[Declared]) -> None:
-    """Check that a class implements what its family asks for.
-
-    Raises:
-        ConfigError: If it does not.
-    """
+    """Check that a class implements what its family asks for."""
     missing = sorted(getattr(member, "__abstractmethods__", ()))
     if missing:
         raise ConfigError(

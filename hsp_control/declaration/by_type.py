@@ -65,11 +65,7 @@ class ByType:
         return self._distinct(tuple(value))
 
     def _distinct(self, parts: tuple[Declared, ...]) -> tuple[Declared, ...]:
-        """Return parts of the family.
-
-        Raises:
-            ValueError: If one is of another family, or two are of one type.
-        """
+        """Return parts of the family."""
         assert self.base.family is not None
         for part in parts:
             if not isinstance(part, self.base):

@@ -59,14 +59,7 @@ class Finding(NamedTuple):
 def findings(
     document: Source, expected: Shape, errors: Sequence[Pending], path: KeyPath = ()
 ) -> list[Finding]:
-    """Return one finding for each mistake at ``path`` or below it.
-
-    Args:
-        document: The validated document.
-        expected: The allowed types at ``path``.
-        errors: The errors there and below.
-        path: The key path.
-    """
+    """Return one finding for each mistake at ``path`` or below it."""
     found = [_here(path, expected, error) for ahead, error in errors if not ahead]
     below: dict[str | int, list[Pending]] = defaultdict(list)
     for ahead, error in errors:

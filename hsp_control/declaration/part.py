@@ -62,17 +62,7 @@ class Part(Declared):
         error: type[HspControlError] | None = None,
         **arguments: Any,
     ) -> None:
-        """Make the class a value class, and register it with its family.
-
-        Args:
-            family: For the base class of a family: its name.
-            type: For a member of a family: what YAML calls it.
-            error: The class of the errors about its fields; inherited by default.
-            **arguments: For other base classes.
-
-        Raises:
-            TypeError: If the class has an ``__init__``, which would not be called.
-        """
+        """Make the class a value class, and register it with its family."""
         super().__init_subclass__(**arguments)
         if "__init__" in vars(cls):
             raise TypeError(
@@ -237,11 +227,7 @@ def _completed(check: Callable[[Any], None]) -> Callable[[Any], None]:
 
 
 def _refuse_assignment(self: Part, name: str, value: object) -> NoReturn:
-    """Raise: a value does not change.
-
-    Raises:
-        ImmutableError: Always.
-    """
+    """Raise: a value does not change."""
     raise ImmutableError(
         f"{type(self).__name__}.{name} cannot be assigned: parts never change; make "
         f"another with dataclasses.replace(part, {name}=...)"
@@ -249,11 +235,7 @@ def _refuse_assignment(self: Part, name: str, value: object) -> NoReturn:
 
 
 def _refuse_deletion(self: Part, name: str) -> NoReturn:
-    """Raise: a value does not change.
-
-    Raises:
-        ImmutableError: Always.
-    """
+    """Raise: a value does not change."""
     raise ImmutableError(f"{type(self).__name__}.{name} cannot be deleted")
 
 

@@ -78,11 +78,7 @@ class ReadOnlyDict(dict[Any, Any]):
     """A mapping that cannot be changed."""
 
     def _refuse(self, *_: Any, **__: Any) -> NoReturn:
-        """Raise: a value does not change.
-
-        Raises:
-            ImmutableError: Always.
-        """
+        """Raise: a value does not change."""
         raise ImmutableError("the mappings of a part cannot be changed")
 
     __setitem__ = __delitem__ = _refuse
@@ -156,11 +152,7 @@ class OrInstance(ArrayField):
 
 
 def read_only(value: Any) -> Array:
-    """Return a read-only copy, as doubles.
-
-    Raises:
-        ValueError: If rows have different lengths.
-    """
+    """Return a read-only copy, as doubles."""
     if isinstance(value, list):
         sizes = {len(row) for row in value if isinstance(row, list)}
         if len(sizes) > 1:

@@ -34,13 +34,10 @@ def body_geometry(shape: BodyShape) -> Any:
 
 
 def enclosing_ellipsoid_capsule(ellipsoid: Any) -> tuple[pin.SE3, float, float]:
-    """Return the smallest capsule around one of Coal's ellipsoids.
+    """Return pose (axis along z), radius and length of an ellipsoid's least capsule.
 
     With semi-axes a ≥ b ≥ c, it lies along the first, with the radius b and the length
     2 (a - b): at its ends the ellipsoid is more curved than a sphere of radius b.
-
-    Returns:
-        The pose of the capsule's middle, with its axis along z; its radius and length.
     """
     radii = np.asarray(ellipsoid.radii, dtype=float)
     shortest, middle, longest = np.argsort(radii, kind="stable")

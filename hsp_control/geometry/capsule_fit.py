@@ -9,16 +9,11 @@ from hsp_control.common.arrays import Array
 
 
 def enclosing_capsule(points: Array) -> tuple[Array, Array, float]:
-    """Return the ends and the radius of a small capsule that contains all points.
+    """Return the ends (3,) and the radius [m] of a small capsule around points (k, 3).
 
     The direction and the offset of its axis minimise the volume, by a local search from
-    each of the three principal axes. For a given axis the segment is the shortest.
-
-    Args:
-        points: Shape (k, 3) [m].
-
-    Returns:
-        (first end (3,), second end (3,), radius) [m]; for a sphere the ends are equal.
+    each of the three principal axes. For a given axis the segment is the shortest; the
+    ends of a sphere are equal.
     """
     from scipy.optimize import minimize  # here: SciPy takes long to import
 
@@ -61,11 +56,7 @@ def _volume(
 def _segment(
     points: Array, anchor: Array, direction: Array
 ) -> tuple[float, float, float]:
-    """Return the shortest segment on an axis whose capsule contains the points.
-
-    Returns:
-        (low, high, radius): the ends of the segment along the axis, and the radius.
-    """
+    """Return (low, high, radius) of the shortest capsule that contains the points."""
     along = (points - anchor) @ direction
     across = np.linalg.norm(points - anchor - np.outer(along, direction), axis=1)
     radius = float(across.max())

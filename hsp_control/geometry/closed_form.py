@@ -72,15 +72,7 @@ class ClosedFormDistances:
         pairs: Indices,
         places: Indices,
     ) -> None:
-        """Allocate the arrays.
-
-        Args:
-            robot: The robot.
-            links: Shapes of its links.
-            obstacles: The obstacles.
-            pairs: Indices into links followed by obstacles, shape (k, 2).
-            places: Index of each pair among all pairs of the `Proximity`, shape (k,).
-        """
+        """Allocate; ``places`` are the pairs' indices among all of the `Proximity`."""
         self._pairs, self._places = pairs, places
         used = np.unique(pairs)
         self._motion = np.zeros((len(obstacles), MOTION_SIZE))
@@ -164,14 +156,9 @@ class ClosedFormDistances:
         gradient: Array,
         rate: Array,
     ) -> None:
-        """Write Σ b'(d_k) ∇d_k and its exact rate, after `measure` at the same state.
+        """Write Σ b'(d_k) ∇d_k (nv,) and its exact rate, after `measure` at this state.
 
-        Args:
-            state: The robot's state.
-            slopes: b'(d_k) of all pairs of the `Proximity`.
-            curvatures: b''(d_k) of all pairs of the `Proximity`.
-            gradient: Is overwritten with the sum, shape (nv,).
-            rate: Is overwritten with the rate of the sum, shape (nv,).
+        The slopes b' and the curvatures b'' are those of all pairs of the `Proximity`.
         """
         self._derivatives.get(state, slopes, curvatures, gradient, rate)()
 

@@ -88,13 +88,7 @@ class CoalDistances:
         return first, second, result.normal
 
     def add_gradient(self, state: RobotState, slopes: Array, gradient: Array) -> None:
-        """Add Σ b'(d_k) ∇d_k to ``gradient``, after `measure` at the same state.
-
-        Args:
-            state: The robot's state.
-            slopes: b'(d_k) of all pairs of the `Proximity`; pairs with 0 are skipped.
-            gradient: The sum is added to it, shape (nv,).
-        """
+        """Add Σ b'(d_k) ∇d_k, shape (nv,), after `measure` at the same state."""
         own = slopes[self.places]
         J = state.world.jacobian
         for k in np.flatnonzero(own).tolist():

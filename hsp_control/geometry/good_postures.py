@@ -76,11 +76,6 @@ class PostureSearch:
 
         If the shapes of the links cannot be read, a warning is logged, and collisions
         do not count.
-
-        Args:
-            robot: The robot.
-            rows: What the tasks track; it decides which postures are regular.
-            obstacles: What the robot must not touch, where it is at the time 0.
         """
         self.robot = robot
         self._state = robot.state(0.0, robot.home(), np.zeros(robot.nv))
@@ -120,13 +115,10 @@ class PostureSearch:
         return Judgement(q, regularity, distance, pair, spare > 0.0, eccentricity)
 
     def overlap(self, q: Array) -> tuple[float, str]:
-        """Return how deep links and obstacles overlap at a configuration, and which.
+        """Return how deep [m] links and obstacles overlap, and the pair ``a to b``.
 
         Capsules are larger than the links; so what overlaps as capsules is measured
         again with the convex hulls of the links.
-
-        Returns:
-            The depth [m], 0 if nothing overlaps, and the pair, ``a to b``.
         """
         rough = self._proximity
         if rough is None:
@@ -152,14 +144,7 @@ class PostureSearch:
         return max(-distance, 0.0), pair
 
     def find(self, least: float) -> Judgement:
-        """Return a good posture near the middle, with as few joints away as possible.
-
-        Args:
-            least: Smallest singular value that counts as regular.
-
-        Raises:
-            ConfigurationError: If none is found; the message says how near it came.
-        """
+        """Return a good posture near the middle, with few joints away from it."""
         seen = [self.judge(self._at(x)) for x in self._displacements()]
         good, needed = self._qualified(seen, least)
         if not good:
@@ -182,16 +167,7 @@ class PostureSearch:
         return f"{{joints: [{', '.join(f'{x:.3f}' for x in positions)}]}}"
 
     def find_with(self, target: Target, least: float) -> Judgement:
-        """Return a good posture at which a frame is at a target.
-
-        Args:
-            target: Where the frame shall be.
-            least: Smallest singular value that counts as regular.
-
-        Raises:
-            ConfigurationError: If none is found; the message says how near it came.
-            FrameNotFoundError: If there is no such frame.
-        """
+        """Return a good posture at which a frame is at a target."""
         self.robot.frame_id(target.frame)
         bounds = self._lower, self._upper
         found = [

@@ -63,7 +63,8 @@ class LinkShape:
 def link_shapes(robot: Robot, proxy: Proxy = "capsules") -> list[LinkShape]:
     """Return the shapes of the robot's links; they are found once for each robot.
 
-    A robot without collision geometry gets capsules between its joints, and a warning.
+    A robot without collision geometry gets capsules between its joints, and a warning;
+    meshes that do not exist are left out, with a warning.
 
     Args:
         robot: The robot.
@@ -72,12 +73,6 @@ def link_shapes(robot: Robot, proxy: Proxy = "capsules") -> list[LinkShape]:
             for spheres. ``spheres``: spheres along these capsules; gradients are
             smooth for all convex obstacles. ``hulls``, ``meshes``: the robot's own
             collision geometry, as convex hulls or as it is.
-
-    Meshes that do not exist are left out, with a warning.
-
-    Raises:
-        ModelError: If a collision mesh cannot be read, none exists and no other shape
-            is left, or the proxy is unknown.
     """
     if proxy not in get_args(Proxy):
         raise ModelError(f"proxy {proxy!r} is not one of {', '.join(get_args(Proxy))}")
@@ -172,11 +167,7 @@ def _shapes_of_urdf(robot: Robot, part: Part) -> list[LinkShape]:
 def _locate_meshes(xml: Element, source: RobotSource) -> dict[str, str]:
     """Put the path of each collision mesh into a URDF; delete those that do not exist.
 
-    Returns:
-        For each link without one of its meshes: the name of the first one.
-
-    Raises:
-        ModelError: If a mesh exists, but cannot be used.
+    Returns the name of the first missing mesh of each link that lacks one.
     """
     missing: dict[str, str] = {}
     for link in xml.iter("link"):
@@ -199,11 +190,7 @@ def _locate_meshes(xml: Element, source: RobotSource) -> dict[str, str]:
 def _report_missing(
     robot: Robot, part: Part, missing: Mapping[str, str], left: int
 ) -> None:
-    """Warn of meshes that do not exist, once for each robot.
-
-    Raises:
-        ModelError: If no other shape is left.
-    """
+    """Warn of meshes that do not exist, once for each robot."""
     name = next(iter(missing.values()))
     hint = mesh_files.where_to_put(name)
     if not left:
@@ -358,11 +345,7 @@ def _hull(geometry: Any) -> Any:
 
 
 def _placement_along(first: Array, second: Array) -> tuple[pin.SE3, float]:
-    """Return the placement half-way between two points, its z axis along their line.
-
-    Returns:
-        The placement, and the distance of the points [m].
-    """
+    """Return the pose half-way between points, z along them, and their distance."""
     line = second - first
     length = float(np.linalg.norm(line))
     if length == 0.0:

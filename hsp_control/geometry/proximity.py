@@ -38,18 +38,7 @@ class Proximity:
         obstacles: Sequence[Obstacle],
         pairs: Sequence[tuple[int, int]],
     ) -> None:
-        """Set up the pairs.
-
-        Args:
-            robot: The robot.
-            links: Shapes of its links.
-            obstacles: The obstacles.
-            pairs: Indices into links followed by obstacles; the first of a pair is a
-                link. Repeated pairs count once.
-
-        Raises:
-            FieldError: If there is no pair.
-        """
+        """Set up the pairs (link, other), indices into links and then obstacles."""
         if not pairs:
             raise FieldError("there are no pairs of shapes to keep apart")
         # (i, j) and (j, i) are one pair, as in Pinocchio.
@@ -96,23 +85,16 @@ class Proximity:
         return state.stamp, count
 
     def witness(self, k: int) -> tuple[Array, Array, Array]:
-        """Return the nearest points of the k-th pair, after `measure`.
+        """Return the k-th pair's nearest points [m] and normal from first to second.
 
-        Returns:
-            The points on the first and on the second shape [m], and the unit normal
-            from the first to the second; in world axes, shape (3,) each.
+        All are in world axes; `measure` has been called.
         """
         computed_by, own = self._computed_by[k]
         assert computed_by is not None
         return computed_by.witness(own)
 
     def gradient(self, state: RobotState, slopes: Array) -> Array:
-        """Return Σ slopes_k ∇d_k, shape (nv,); pairs with slope 0 are skipped.
-
-        Args:
-            state: The robot's state.
-            slopes: ∂f/∂d_k, shape (k,).
-        """
+        """Return Σ slopes_k ∇d_k, shape (nv,); pairs with slope 0 are skipped."""
         self.measure(state)
         result, rate = np.zeros(self.robot.nv), np.zeros(self.robot.nv)
         if self.closed_form is not None:

@@ -28,12 +28,7 @@ from hsp_control.trajectories.streams.stream import Streamed
 
 
 def _in_space(center: Trajectory) -> Trajectory:
-    """Return the trajectory of a point in the world.
-
-    Raises:
-        SceneError: If it is relative to a start, a stream that does not run, or its
-            dimension is not 3.
-    """
+    """Return the trajectory of a point in the world."""
     if _streamed(center):
         return center
     try:
@@ -46,12 +41,7 @@ def _in_space(center: Trajectory) -> Trajectory:
 
 
 def _streamed(trajectory: Part) -> bool:
-    """Return whether a trajectory has a stream, which then runs already.
-
-    Raises:
-        SceneError: If it does not run: a scene is no part of a run, and has no memory
-            of one. A change while the controller runs is one, see `MoveObstacle`.
-    """
+    """Return whether a trajectory has a stream, which then runs already."""
     streams = list(parts_within(trajectory, Streamed))
     if not all(stream.is_placed for stream in streams):
         raise SceneError(

@@ -13,9 +13,6 @@ def self_pairs(robot: Robot, links: Sequence[LinkShape]) -> list[tuple[int, int]
 
     Pairs on one joint or on neighbouring joints are left out, since they always touch,
     and so are pairs that the robot's SRDF or MuJoCo model disables.
-
-    Raises:
-        ModelError: If the SRDF cannot be read.
     """
     disabled = _disabled(robot)
     parents = list(robot.model.parents)

@@ -14,11 +14,9 @@ _DOUBTFUL = 1e5
 
 
 def worst_condition(robot: Robot) -> tuple[float, str]:
-    """Return the largest condition number of M at home and at random configurations.
+    """Return M's largest condition number, and the dof that moves most without inertia.
 
-    Returns:
-        The number, inf where M is not positive definite, and the degree of freedom
-        that moves most in the direction of the smallest eigenvalue.
+    At home and at random configurations; inf where M is not positive definite.
     """
     rng, rest = np.random.default_rng(0), np.zeros(robot.nv)
     worst, which = 0.0, 0

@@ -10,11 +10,7 @@ from hsp_control.robot import Robot
 
 
 def check_self_collisions(robot: Robot) -> Iterator[Finding]:
-    """Yield the pairs of links whose capsules overlap at the home posture.
-
-    Raises:
-        ModelError: If a mesh cannot be read, or none exists and no shape is left.
-    """
+    """Yield the pairs of links whose capsules overlap at the home posture."""
     shapes = link_shapes(robot)
     pairs = self_pairs(robot, shapes)
     if not pairs:

@@ -10,13 +10,7 @@ from hsp_control.robot import Robot
 
 
 def too_weak(robot: Robot, q: Array, limits: Array) -> Iterator[tuple[str, str]]:
-    """Yield the joints that cannot hold the robot at a configuration, and why.
-
-    Args:
-        robot: The robot, with a fixed base.
-        q: The configuration, shape (nq,).
-        limits: Effort limits, shape (nv,) [N·m or N]; inf: none.
-    """
+    """Yield the joints that cannot hold the robot at a configuration, and why."""
     rest = np.zeros(robot.nv)
     static = np.abs(robot.inverse_dynamics(q, rest, rest))
     for k in np.flatnonzero(static > limits):

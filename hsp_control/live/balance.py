@@ -37,13 +37,7 @@ class Balance:
 def balance_of(
     robot: Robot, contacts: Sequence[Contact], state: RobotState
 ) -> Balance | None:
-    """Return what watches a robot's balance; None if its base is fixed.
-
-    Args:
-        robot: The robot.
-        contacts: Its feet.
-        state: The state in which it stands.
-    """
+    """Return what watches a robot's balance; None if its base is fixed."""
     if not robot.unactuated:
         return None
     base = next(

@@ -32,12 +32,7 @@ class BearingFeet:
     """
 
     def __init__(self, robot: Robot, contacts: Sequence[Contact]) -> None:
-        """Set the robot and its contacts, all of which bear.
-
-        Args:
-            robot: The robot; one with a fixed base needs no feet.
-            contacts: The controller's contacts; those on steep planes do not carry.
-        """
+        """Set the robot and its contacts, all of which bear."""
         self._robot = robot
         self._all = tuple(c for c in contacts if c.axes[2, 2] >= _STEEPEST)
         self._base = list(robot.unactuated)
@@ -63,15 +58,7 @@ class BearingFeet:
         self.contacts = ()
 
     def joint_effort(self, state: RobotState, force: Array) -> Array:
-        """Return the efforts that exert a generalized force with the feet's help.
-
-        Args:
-            state: The state.
-            force: x, shape (nv,).
-
-        Returns:
-            tau, shape (nv,), with zeros where there is no motor.
-        """
+        """Return the efforts (nv,) that exert x (nv,) with the feet's help."""
         if not self._base:
             return force
         effort = force.copy()

@@ -19,24 +19,13 @@ class DeadReckoning:
     """
 
     def __init__(self, robot: Robot, period: float) -> None:
-        """Allocate the state.
-
-        Args:
-            robot: The model.
-            period: Length of a period [s].
-        """
+        """Allocate the state."""
         self._robot, self._period = robot, period
         self.state = RobotState(robot)
         self.predicted_for = 0.0
 
     def correct(self, t: float, q: Array, v: Array) -> None:
-        """Set the state to a measurement.
-
-        Args:
-            t: Time [s].
-            q: Configuration, shape (nq,).
-            v: Velocity, shape (nv,).
-        """
+        """Set the state to a measurement."""
         self.state.update(t, q, v)
         self.predicted_for = 0.0
 

@@ -19,14 +19,7 @@ class EffortCheck:
     def __init__(
         self, robot: Robot, settings: LiveSettings, period: float, effort: Array
     ) -> None:
-        """Read the limits.
-
-        Args:
-            robot: The robot's own model.
-            settings: Its limits, and whether it compensates gravity.
-            period: Time between two efforts [s].
-            effort: Limits of the efforts, shape (nv,).
-        """
+        """Read the limits."""
         self._names = robot.dof_names
         # The controller's limits may be lower, and may grow while it runs.
         upper = np.maximum(effort, settings.effort_limits(robot))
@@ -38,13 +31,7 @@ class EffortCheck:
         self._speed = speed * (1.0 + settings.velocity_margin)
 
     def fault(self, effort: Array, before: Array | None, gravity: Array) -> str | None:
-        """Return why an effort is not accepted, or None.
-
-        Args:
-            effort: The effort as received.
-            before: The effort in force, shape (nv,); None: the brakes hold the robot.
-            gravity: g(q) of the robot, shape (nv,).
-        """
+        """Return why an effort is not accepted; ``before`` is None under the brakes."""
         if np.shape(effort) != gravity.shape:
             return f"an effort has shape {np.shape(effort)}; needs {gravity.shape}"
         if not np.isfinite(effort).all():
@@ -70,11 +57,7 @@ class EffortCheck:
         return None
 
     def too_fast(self, v: Array) -> str | None:
-        """Return which joint exceeds its speed limit, or None.
-
-        Args:
-            v: True velocity, shape (nv,).
-        """
+        """Return which joint exceeds its speed limit, or None."""
         i = int((np.abs(v) - self._speed).argmax())
         if abs(v[i]) <= self._speed[i]:
             return None

@@ -30,11 +30,7 @@ class Faults:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Check the probabilities and the delay.
-
-        Raises:
-            LiveError: If a value is out of range.
-        """
+        """Check the probabilities and the delay."""
         for name in _KINDS:
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise LiveError(
@@ -86,12 +82,7 @@ class FaultInjector:
     """
 
     def __init__(self, faults: Faults, stream: int = 0) -> None:
-        """Seed the random numbers.
-
-        Args:
-            faults: The probabilities.
-            stream: Stream of random numbers; each sender has its own.
-        """
+        """Seed the random numbers."""
         self._faults = faults
         self._rng = np.random.default_rng((faults.seed, stream))
         self._cumulative = np.cumsum([getattr(faults, kind) for kind in _KINDS])

@@ -24,25 +24,14 @@ class FrozenState:
     """
 
     def __init__(self, robot: Robot, period: float, tolerated: int) -> None:
-        """Allocate.
-
-        Args:
-            robot: The model.
-            period: Length of a period [s].
-            tolerated: Number of periods that a state may stay the same.
-        """
+        """Allocate."""
         self._robot, self._tolerated = robot, tolerated
         self._reckoning = DeadReckoning(robot, period)
         self._last: Measurement | None = None
         self._same = 0
 
     def fault(self, measurement: Measurement, applied: Array) -> str | None:
-        """Return why a new measurement cannot be the robot's state, or None.
-
-        Args:
-            measurement: The measurement.
-            applied: The effort of the motors since the last one, shape (nv,).
-        """
+        """Return why a new measurement cannot be the robot's state, or None."""
         last, self._last = self._last, measurement
         if last is None or not (
             np.array_equal(measurement.q, last.q)

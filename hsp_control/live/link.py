@@ -193,12 +193,7 @@ class AgeEstimator:
         self._end = -np.inf
 
     def age(self, arrival: float, stamp: float) -> float:
-        """Return a packet's age [s].
-
-        Args:
-            arrival: When it arrived, by this end's clock [s].
-            stamp: When it was sent, by the sender's clock [s].
-        """
+        """Return a packet's age [s]."""
         if arrival > self._end:
             self._smallest_before, self._smallest = self._smallest, np.inf
             self._end = arrival + self._window

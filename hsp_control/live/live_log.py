@@ -63,17 +63,7 @@ class LiveLog:
         scene: Scene | None = None,
         meta: Mapping[str, Any] | None = None,
     ) -> None:
-        """Create the journal.
-
-        Args:
-            path: The journal.
-            controller: The controller whose tasks and fields are logged.
-            scene: Obstacles to log.
-            meta: JSON data of the log.
-
-        Raises:
-            LogError: If it cannot be written.
-        """
+        """Create the journal."""
         self.path = path
         self._recorder = Recorder(controller, scene or Scene(), 1)
         self._meta = dict(meta or {})
@@ -93,11 +83,7 @@ class LiveLog:
         self._recorder.plan = plan
 
     def add(self, row: Row) -> None:
-        """Write a row if it is later than the last one.
-
-        Raises:
-            LogError: If it cannot be written.
-        """
+        """Write a row if it is later than the last one."""
         if not row.state.t > self._last_t:
             return
         try:
@@ -111,16 +97,7 @@ class LiveLog:
             self._recorder.clear()
 
     def end(self, status: str, message: str, **meta: Any) -> None:
-        """Write how the run ended, and close the file.
-
-        Args:
-            status: ``completed``, ``interrupted`` or ``stopped``.
-            message: Why it ended.
-            **meta: Further JSON data.
-
-        Raises:
-            LogError: If it cannot be written.
-        """
+        """Write how the run ended, and close the file."""
         try:
             came = self._recorder.repeatable()
             self._journal.write_end(status, message, **came, **meta)
@@ -150,18 +127,7 @@ class LoopLog:
         scene: Scene | None,
         meta: Mapping[str, Any],
     ) -> None:
-        """Create the journal, if there is a path.
-
-        Args:
-            path: The journal; None: no log.
-            period: Time between two rows [s].
-            chain: Computes the efforts that are logged.
-            scene: Obstacles to log.
-            meta: JSON data of the log.
-
-        Raises:
-            LogError: If it cannot be written.
-        """
+        """Create the journal, if there is a path."""
         self._chain, self._period = chain, period
         self._log: LiveLog | None = None
         self._next, self._phase = -inf, Phase.WAITING
@@ -181,18 +147,7 @@ class LoopLog:
         *,
         last: bool,
     ) -> None:
-        """Write a row if one is due.
-
-        Args:
-            phase: The loop's phase.
-            reader: The state.
-            limiter: The efforts.
-            response: Response time of this period [s].
-            last: Whether this is the last period, which is always logged.
-
-        Raises:
-            LogError: If it cannot be written; later calls then do nothing.
-        """
+        """Write a row if one is due."""
         measurement, state = reader.measurement, reader.state
         if self._log is None or self._failed:
             return
@@ -245,11 +200,7 @@ class LoopLog:
         return Row(state, self._output(phase, state), limiter.applied, log_channels)
 
     def end(self, report: LoopReport) -> None:
-        """Write how the loop ended, and close the journal, if there is one.
-
-        Raises:
-            LogError: If it cannot be written.
-        """
+        """Write how the loop ended, and close the journal, if there is one."""
         if self._log is None:
             return
         deadlines = report.deadlines

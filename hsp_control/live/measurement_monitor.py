@@ -23,15 +23,7 @@ class MeasurementMonitor:
         settings: LiveSettings,
         period: float,
     ) -> None:
-        """Read the limits.
-
-        Args:
-            robot: The model.
-            limits: The controller's limits; None: those of the robot's model.
-            settings: Margins beyond the limits, greatest age and number of missing
-                states.
-            period: Time between two measurements [s].
-        """
+        """Read the limits."""
         self._robot, self._settings, self._period = robot, settings, period
         self._own = own_limits(robot) if limits is None else None
         self.last: Measurement | None = None

@@ -44,20 +44,7 @@ class OneRun:
         end: float,
         balance: Balance | None = None,
     ) -> None:
-        """Connect the parts.
-
-        Args:
-            chain: Computes the efforts.
-            hardware: The robot.
-            reader: Reads its states; it has the first one.
-            limiter: Limits the efforts.
-            safe_stop: Ends the run.
-            log: The log.
-            requests: The operator's requests.
-            settings: What is tolerated.
-            end: The controller's time at which the run is complete [s].
-            balance: Tells whether a robot with a floating base falls.
-        """
+        """Connect the parts."""
         self.chain, self.hardware, self.reader = chain, hardware, reader
         self.balance = balance
         self.limiter, self.safe_stop, self.log = limiter, safe_stop, log
@@ -73,11 +60,7 @@ class OneRun:
         self.later = ""
 
     def run(self, on_period: Callable[[float], object] | None) -> None:
-        """Run period after period until the safe stop is complete.
-
-        Args:
-            on_period: Called with the controller's time [s] in the rest of a period.
-        """
+        """Run period after period until the safe stop is complete."""
         self.reader.start()
         self.limiter.reset(self.reader.state.q)
         while not self.done:
@@ -233,11 +216,7 @@ class OneRun:
             self.fail(error)
 
     def send(self, before: Array) -> None:
-        """Send the limited effort, unless the state is unknown (fail-silent).
-
-        Args:
-            before: What was sent before, shape (nv,).
-        """
+        """Send the limited effort, unless the state is unknown (fail-silent)."""
         if self.silent:
             return
         try:

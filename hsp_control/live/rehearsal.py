@@ -22,13 +22,6 @@ def rehearse(
 
     Each set of tasks and contacts has native calls of its own. Their kernels may not be
     compiled in the loop: a robot waits some milliseconds for an effort, no seconds.
-
-    Args:
-        controller: The controller.
-        start: Start of the loop [s].
-        end: Its end [s], or infinity.
-        q: The robot's configuration, shape (nq,).
-        v: Its velocity, shape (nv,).
     """
     times = sorted({t for t in _instants(controller) if start < t <= end and t < inf})
     if not times:

@@ -17,14 +17,7 @@ class RobotClock:
     def __init__(
         self, start_time: float, period: float, tolerated: int, start_periods: float
     ) -> None:
-        """Begin with the next measurement.
-
-        Args:
-            start_time: The controller's time at the next measurement [s].
-            period: Time between two measurements [s].
-            tolerated: Tolerated number of periods without a step of the clock.
-            start_periods: The same, before its first step.
-        """
+        """Begin with the next measurement."""
         self._start_time, self._period = start_time, period
         self._tolerated, self._start_periods = tolerated, start_periods
         self.restart()

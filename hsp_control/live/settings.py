@@ -138,17 +138,7 @@ class LiveSettings(Part, error=LiveError):
 def check_held(
     robot: Robot, contacts: Sequence[Contact], settings: LiveSettings
 ) -> None:
-    """Check that the robot can be held where it is: by its base, or on its contacts.
-
-    Args:
-        robot: The robot.
-        contacts: The controller's contacts.
-        settings: Whether the robot compensates gravity, which no floating base does.
-
-    Raises:
-        LiveError: If it has a floating base and no contacts, or is said to compensate
-            gravity.
-    """
+    """Check that the robot can be held where it is: by its base, or on its contacts."""
     if not robot.unactuated:
         return
     if not contacts:

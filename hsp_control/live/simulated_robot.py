@@ -215,14 +215,6 @@ def sampled(plant: Plant, integrator: Integrator, period: float) -> SampledPlant
 
     A continuous plant is integrated by the integrator. An adaptive one may take any
     time, so one Runge-Kutta step per period replaces it.
-
-    Args:
-        plant: The plant.
-        integrator: The integrator of a continuous plant.
-        period: Length of a period [s].
-
-    Raises:
-        LiveError: If the plant is neither continuous nor sampled.
     """
     if isinstance(plant, ContinuousPlant):
         adaptive = integrator.longest_step is None

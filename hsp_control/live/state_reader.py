@@ -41,16 +41,7 @@ class StateReader:
         clock: Callable[[], float],
         start_time: float = 0.0,
     ) -> None:
-        """Allocate.
-
-        Args:
-            robot: The model.
-            limits: The controller's limits; None: those of the robot's model.
-            hardware: The robot.
-            settings: Faults that are tolerated.
-            clock: A monotonic clock [s].
-            start_time: The controller's time at the first state [s].
-        """
+        """Allocate."""
         self._hardware, self._settings, self._clock = hardware, settings, clock
         self._robot, self._period = robot, hardware.period
         self._monitor = MeasurementMonitor(robot, limits, settings, self._period)
@@ -81,11 +72,7 @@ class StateReader:
         return self._reckoning.predicted_for
 
     def wait_for_first(self) -> Measurement:
-        """Wait for the first state, and return it.
-
-        Raises:
-            HardwareError: If none arrives in time, or the robot cannot be started.
-        """
+        """Wait for the first state, and return it."""
         end = self._clock() + self._settings.start_timeout
         while (left := end - self._clock()) > 0.0:
             raw = self._hardware.read(left)
@@ -113,12 +100,7 @@ class StateReader:
         self._due = self._last_arrival + (1.0 + _READ_MARGIN) * self._period
 
     def read(self, applied: Array, limits: RobotLimits | None) -> None:
-        """Read the period's measurement; predict the state if there is none.
-
-        Args:
-            applied: The effort that the motors apply, shape (nv,).
-            limits: The controller's limits of now; None: those of the robot's model.
-        """
+        """Read the period's measurement; predict the state if there is none."""
         self._monitor.follow(limits)
         self.fault = self.error = self.measurement = None
         new = self._newest(applied)

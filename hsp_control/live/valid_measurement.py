@@ -26,16 +26,7 @@ _RESOLUTION = 1e-3
 
 
 def valid_measurement(raw: object, robot: Robot, period: float) -> Measurement:
-    """Return a measurement of plain types, finite, in arrays that nobody else writes.
-
-    Args:
-        raw: What `Hardware.read` returned, not None.
-        robot: The model.
-        period: Time between two measurements [s].
-
-    Raises:
-        HardwareError: If it is not a valid state of the robot; with the reason.
-    """
+    """Return a measurement of finite plain types in arrays that nobody else writes."""
     if not isinstance(raw, Measurement):
         raise HardwareError(
             f"read returned an object of type {type(raw).__name__}; needs a "

@@ -30,15 +30,7 @@ class CentroidalMotion:
     def __init__(
         self, model: pin.Model, data: pin.Data, q: Array, v: Array, stamp: Indices
     ) -> None:
-        """Allocate the arrays; `compute` computes them at the values of q and v then.
-
-        Args:
-            model: The model.
-            data: Its data.
-            q: Configuration, shape (nq,); the array is kept.
-            v: Velocity, shape (nv,); the array is kept.
-            stamp: Changes with q and v, shape (1,); the array is kept.
-        """
+        """Allocate the arrays; `compute` takes the values that q and v have then."""
         # Pinocchio allocates these results at the first call; take views after it.
         pin.computeCentroidalMapTimeVariation(model, data, q, v)
         self.mass: float = pin.computeTotalMass(model)

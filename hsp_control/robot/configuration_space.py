@@ -259,17 +259,7 @@ def _dof_names(joints: Mapping[str, Any]) -> tuple[str, ...]:
 def as_numbers(
     vector: ArrayLike, size: int, what: str, space: ConfigurationSpace
 ) -> Array:
-    """Return numbers as doubles of shape (size,).
-
-    Args:
-        vector: The numbers.
-        size: How many they must be.
-        what: Their name, for messages.
-        space: The robot, for messages.
-
-    Raises:
-        ShapeError: If they are no real numbers, or have another shape.
-    """
+    """Return numbers as doubles (size,); ``what`` is their name in messages."""
     try:
         array = np.asarray(vector)
         if array.dtype.kind not in "fiu" and array.size:
@@ -306,14 +296,7 @@ def _check_vector(
 def joint_displacements(
     q: Array, reference: Array, single_dof_joints: Indices, out: Array
 ) -> None:
-    """Write q ⊖ reference for single-dof joints; continuous joints are within ±π.
-
-    Args:
-        q: Configuration, shape (nq,).
-        reference: The other configuration, shape (nq,).
-        single_dof_joints: See `ConfigurationSpace`, shape (k, 3).
-        out: Displacements, shape (nv,); entries of other joints are not changed.
-    """
+    """Write q ⊖ reference for single-dof joints; continuous joints are within ±π."""
     for k in range(single_dof_joints.shape[0]):
         i, at, size = (
             single_dof_joints[k, 0],

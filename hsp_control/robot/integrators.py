@@ -313,21 +313,7 @@ def _next_stage(
     q: Array,
     v: Array,
 ) -> None:
-    """Write the point that the slopes of a stage lead to, and its slope of δ.
-
-    Args:
-        stage: Which slopes, from 0.
-        fraction: For how much of the step.
-        h: The step [s], shape (1,).
-        D: Slopes of δ, shape (4, nv).
-        A: Slopes of v, shape (4, nv).
-        a: The slope of v at this stage, shape (nv,).
-        base: q where δ = 0, shape (nq,); empty if q is no vector.
-        v0: v at the beginning, shape (nv,).
-        delta: Written, shape (nv,).
-        q: Written, shape (nq,), unless it is empty.
-        v: Written, shape (nv,).
-    """
+    """Write the point (δ, q, v) where a stage's slopes lead, and its slope of δ."""
     for i in range(v.shape[0]):
         A[stage, i] = a[i]
         delta[i] = fraction * h[0] * D[stage, i]

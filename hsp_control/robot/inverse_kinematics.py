@@ -64,15 +64,7 @@ def reach(
     error e of position and rotation vector in world axes, and a λ that falls with e. In
     the null space of J it goes towards the preferred configuration. A joint at a limit
     that would go beyond it takes no part in a step. The result depends on the arguments
-    only.
-
-    Args:
-        robot: The robot; every joint has one degree of freedom.
-        target: The target.
-        q: Where the search begins, shape (nq,).
-        preferred: The preferred displacement from neutral, shape (nv,) [rad or m].
-        lower: Smallest displacement from neutral, shape (nv,) [rad or m].
-        upper: Largest displacement from neutral, shape (nv,) [rad or m].
+    only. ``preferred``, ``lower`` and ``upper`` are displacements from neutral, (nv,).
     """
     neutral, state = robot.neutral(), RobotState(robot)
     rest, unit = np.zeros(robot.nv), np.eye(target.rows)

@@ -114,15 +114,7 @@ class FrameKinematics:
     def __init__(
         self, model: pin.Model, data: pin.Data, v: Array, stamp: Indices, index: int
     ) -> None:
-        """Allocate the arrays; `compute` fills them.
-
-        Args:
-            model: The model.
-            data: Its data, with the joints' placements and Jacobians.
-            v: The velocity, shape (nv,); the array is kept.
-            stamp: A number that changes when data and v do, shape (1,).
-            index: Index of the frame in the model.
-        """
+        """Allocate the arrays; `compute` fills them."""
         nv, frame = model.nv, model.frames[index]
         joint = data.oMi[frame.parentJoint]  # its arrays are views of data
         self.motion = motion = FrameMotion.allocate(nv)
@@ -250,9 +242,6 @@ def joint_placements(data: pin.Data) -> Array:
 
     A row is R, column by column, followed by the origin [m]. The view relies on how
     Pinocchio stores its placements: one after the other in memory.
-
-    Raises:
-        ModelError: If this version of Pinocchio stores them in another way.
     """
     first, address = data.oMi[0].rotation, "__array_interface__"
     turns = [getattr(M.rotation, address)["data"][0] for M in data.oMi]

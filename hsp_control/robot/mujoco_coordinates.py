@@ -85,11 +85,7 @@ class Joint:
 
 
 def joints_of(robot: Robot) -> list[Joint]:
-    """Return the robot's joints in Pinocchio's order, including mimic joints.
-
-    Raises:
-        ModelError: If MuJoCo has no joint of that kind.
-    """
+    """Return the robot's joints in Pinocchio's order, including mimic joints."""
     model = robot.model
     found: list[Joint] = []
     for index in range(1, model.njoints):

@@ -33,15 +33,7 @@ class NativeMove(partial[float]):
         unit_blocks: Indices,
         stamp: Indices,
     ) -> Self:
-        """Put the calls' rows together.
-
-        Args:
-            calls: The calls.
-            q: Where the configuration is kept, shape (nq,).
-            v: Where the velocity is kept, shape (nv,).
-            unit_blocks: (start, size) of what is of norm 1 in q, shape (blocks, 2).
-            stamp: Counted up, shape (1,).
-        """
+        """Put the calls' rows together."""
         move = cls(_entry(), *table(calls), q, v, unit_blocks, stamp)
         move.calls = calls
         return move

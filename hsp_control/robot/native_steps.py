@@ -12,15 +12,7 @@ _count = kernel(number_of_steps)
 def make_steps(
     calls: Indices, when: Array, interval: Array, longest: float, h: Array
 ) -> None:
-    """Divide an interval into equal steps, and make the calls of each.
-
-    Args:
-        calls: The calls of a step, each of its first instant [s]; see `native.table`.
-        when: Their windows.
-        interval: Its beginning and its end [s], shape (2,).
-        longest: The longest step [s].
-        h: Written: the step [s], shape (1,).
-    """
+    """Divide an interval into equal steps [s], and make the calls of each."""
     t, duration = interval[0], interval[1] - interval[0]
     steps = _count(duration, longest)
     h[0] = duration / steps

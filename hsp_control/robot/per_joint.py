@@ -20,15 +20,7 @@ def joint_dofs(robot: Robot) -> NDArray[np.bool_]:
 
 
 def per_dof(robot: Robot, value: ArrayLike) -> Array:
-    """Return a setting for each degree of freedom, shape (nv,).
-
-    Args:
-        robot: The robot.
-        value: One number for all single-dof joints (the others get 0), or shape (nv,).
-
-    Raises:
-        SimulationError: If the shape is wrong.
-    """
+    """Return a setting for each dof (nv,); one number is for all single-dof joints."""
     array = np.asarray(value, dtype=float)
     if array.shape not in ((), (robot.nv,)):
         raise SimulationError(

@@ -82,14 +82,7 @@ class ControlChain(Generic[Source_co]):
         plan: Plan | None = None,
         estimators: Sequence[Estimator] = (),
     ) -> None:
-        """Set the parts.
-
-        Args:
-            command: What computes the efforts; its controller is made of the plan's
-                parts.
-            plan: What writes references and switches contacts.
-            estimators: What completes each measurement.
-        """
+        """Set the parts."""
         self.command = command
         self._plan, self._estimators = plan, tuple(estimators)
         self._feels = bool(getattr(command, "feels_contacts", False))
@@ -106,16 +99,8 @@ class ControlChain(Generic[Source_co]):
     def begin(self, inertial: Inertial | None, state: RobotState | None = None) -> None:
         """Begin a run: nothing is remembered of an earlier one.
 
-        Args:
-            inertial: A reading of the robot's inertial measurement unit, which says
-                where that is; None: there is no unit.
-            state: Where the robot is, so that the plan starts now; None: it starts
-                with the first effort.
-
-        Raises:
-            PlanError: If the controller has other parts than the plan, or the robot
-                cannot follow the plan from there.
-            EstimationError: If what an estimator needs is missing.
+        ``inertial``, a reading of the inertial measurement unit, says where that is. A
+        plan starts at ``state``; without one it starts with the first effort.
         """
         controller = self.command.controller
         if self._plan is not None:
@@ -126,18 +111,7 @@ class ControlChain(Generic[Source_co]):
             self.plan.start(state)
 
     def effort(self, measured: Measurement, period: float) -> Array:
-        """Return the effort to send now, shape (nv,); once a period, in order of time.
-
-        Args:
-            measured: What is measured.
-            period: Time until the next effort [s].
-
-        Raises:
-            EstimationError: If what an estimator needs is not measured.
-            PlanError: If what the plan needs is not measured.
-            FallError: If the plan finds that the robot falls.
-            HspControlError: If the measurement is not a valid state of the robot.
-        """
+        """Return the effort (nv,) to send now; once a period, in order of time."""
         for each in self._estimating:
             measured = each.update(measured)
         if self.plan is not None:
@@ -150,12 +124,7 @@ class ControlChain(Generic[Source_co]):
         return tau
 
     def log_channels(self, q: Array, v: Array) -> Mapping[str, LogChannel]:
-        """Return what the command, the plan and the estimators log, by name.
-
-        Args:
-            q: The true configuration, shape (nq,), for the errors of estimates.
-            v: The true velocity, shape (nv,).
-        """
+        """Return what is logged, estimates with their errors from the true q and v."""
         channels = self.command.log_channels()
         if self.plan is not None:
             channels = {**channels, **self.plan.log_channels()}

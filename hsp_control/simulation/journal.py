@@ -45,11 +45,7 @@ class JournalWriter:
     """
 
     def __init__(self, path: Path) -> None:
-        """Begin a journal; an existing file is overwritten.
-
-        Raises:
-            LogError: If the file cannot be written.
-        """
+        """Begin a journal; an existing file is overwritten."""
         self.path = path
         self._shapes: dict[str, tuple[int, ...]] = {}
         try:
@@ -68,30 +64,18 @@ class JournalWriter:
     def write_heading(
         self, columns: Mapping[str, Array], meta: Mapping[str, Any]
     ) -> None:
-        """Write a heading for the next rows.
-
-        Raises:
-            LogError: If it cannot be written.
-        """
+        """Write a heading for the next rows."""
         shapes = {name: a.shape[1:] for name, a in columns.items()}
         self._frame(HEADING, _json({"columns": shapes, "meta": meta}))
         self._shapes = shapes  # only now: Ctrl-C may cut the heading short
 
     def write_row(self, columns: Mapping[str, Array]) -> None:
-        """Write the first row of columns that fit the last heading.
-
-        Raises:
-            LogError: If it cannot be written.
-        """
+        """Write the first row of columns that fit the last heading."""
         row = np.concatenate([columns[name][0].ravel() for name in self._shapes])
         self._frame(ROW, row.astype("<f8").tobytes())
 
     def write_end(self, status: str, message: str, **meta: Any) -> None:
-        """Write how the run ended, and meta data that replaces the heading's.
-
-        Raises:
-            LogError: If it cannot be written.
-        """
+        """Write how the run ended, and meta data that replaces the heading's."""
         self._frame(END, _json({"status": status, "message": message, **meta}))
 
     def close(self) -> None:
@@ -124,11 +108,7 @@ class JournalWriter:
 
 
 def is_journal(path: Path) -> bool:
-    """Return whether a file is a journal, by its content, not by its name.
-
-    Raises:
-        OSError: If it cannot be read.
-    """
+    """Return whether a file is a journal, by its content, not by its name."""
     with path.open("rb") as file:
         return file.read(len(MAGIC)) == MAGIC
 
@@ -137,9 +117,6 @@ def read_journal(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
     """Return the columns and the meta data of a journal, up to an incomplete frame.
 
     Where a column was added later or was narrower, earlier rows hold NaN.
-
-    Raises:
-        LogError: If the first heading is incomplete.
     """
     meta: dict[str, Any] = {}
     parts: list[_Part] = []

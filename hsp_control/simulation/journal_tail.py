@@ -46,11 +46,7 @@ class JournalTail:
         return "status" in self.meta and self.meta["status"] != "running"
 
     def read(self) -> int:
-        """Read the frames that have come; return how many rows there are of them.
-
-        Raises:
-            LogError: If it is no journal, or cannot be read.
-        """
+        """Read the frames that have come; return how many rows there are of them."""
         before = self.count
         try:
             data = self._new_bytes()

@@ -39,13 +39,7 @@ class LimitExcess:
         self.position, self.velocity = np.zeros(robot.nv), np.zeros(robot.nv)
 
     def see(self, limits: RobotLimits | None, q: Array, v: Array) -> None:
-        """See a true state.
-
-        Args:
-            limits: The limits that are in force; None: there are none.
-            q: Configuration, shape (nq,).
-            v: Velocity, shape (nv,).
-        """
+        """See a true state."""
         if limits is not None:
             _see(*self._arguments(limits, q, v))
 

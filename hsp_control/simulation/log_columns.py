@@ -21,11 +21,7 @@ class LogColumns:
     """
 
     def __init__(self, capacity: int) -> None:
-        """Begin without columns.
-
-        Args:
-            capacity: The largest number of rows.
-        """
+        """Begin without columns."""
         self.arrays: dict[str, Array] = {}
         self.descriptions: dict[str, dict[str, str]] = {}
         self.count = 0
@@ -34,18 +30,7 @@ class LogColumns:
     def add(
         self, name: str, shape: tuple[int, ...], unit: str, meaning: str, **more: str
     ) -> None:
-        """Add a column if it does not exist.
-
-        Args:
-            name: Its name.
-            shape: The shape of a row.
-            unit: Its unit.
-            meaning: What it is.
-            **more: Further entries of its description.
-
-        Raises:
-            SimulationError: If the log would be too large to be loaded.
-        """
+        """Add a column if it does not exist."""
         if name in self.arrays:
             return
         self._size += 8 * self._capacity * math.prod(shape)

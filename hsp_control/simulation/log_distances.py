@@ -42,12 +42,7 @@ def logged_distances(rollout: Rollout) -> list[LoggedDistance]:
 
 
 def distance_label(meta: Mapping[str, Any], name: str) -> str:
-    """Return what a distance measures.
-
-    Args:
-        meta: The log's meta data.
-        name: The field's name.
-    """
+    """Return what a distance measures."""
     center = _center_of(meta, name)
     return f"joint to centre of {center}" if center else name.replace("_", " ")
 

@@ -120,13 +120,7 @@ def joint_names(rollout: Rollout) -> list[str]:
 
 
 def joint_positions(rollout: Rollout, *, absolute: bool = True) -> tuple[Array, str]:
-    """Return the joints' unwrapped positions, shape (N, nv), and their description.
-
-    Args:
-        rollout: The log.
-        absolute: Whether to return absolute angles theta_i = q_1 + ... + q_i for a
-            robot that the literature describes by those.
-    """
+    """Return the joints' unwrapped positions (N, nv), and which angles they are."""
     positions = rollout["joint_positions"]
     if absolute and rollout.meta["robot"].get("joint_coordinates") == "absolute":
         return np.cumsum(positions, axis=1), "absolute joint angle"
@@ -199,13 +193,7 @@ def column_unit(rollout: Rollout, name: str) -> str:
 def chosen_rows(
     rollout: Rollout, count: int = 8, times: Sequence[float] | None = None
 ) -> list[int]:
-    """Return the rows of movie frames, in order and without repetition.
-
-    Args:
-        rollout: The log.
-        count: How many, evenly spaced from the first row to the last.
-        times: Times [s] to take instead; the nearest rows are taken.
-    """
+    """Return the rows of movie frames, in order and without repetition."""
     t = rollout.t
     if times is None:
         rows = np.linspace(0, len(t) - 1, min(count, len(t))).round().astype(int)

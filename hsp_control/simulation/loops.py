@@ -54,19 +54,7 @@ def continuous_loop(
     q: Array,
     v: Array,
 ) -> Iterator[Instant]:
-    """Yield the instants of a loop without sampling, as in the proofs.
-
-    Args:
-        controller: The controller.
-        plant: The plant.
-        integrator: Integrates the plant, with the law in its stages.
-        times: When to yield an instant [s], increasing.
-        q: Start configuration, shape (nq,).
-        v: Start velocity, shape (nv,).
-
-    Raises:
-        SimulationError: If the motion diverges.
-    """
+    """Yield the instants of a loop without sampling, as in the proofs."""
     state = controller.state
     controller.restart()
 
@@ -91,21 +79,7 @@ def sampled_loop(
     q: Array,
     v: Array,
 ) -> Iterator[Instant]:
-    """Yield the instants of a loop that holds each effort for a control period.
-
-    Args:
-        chain: What computes the efforts; it has begun.
-        plant: The plant.
-        periods: How many control periods are between two of the times.
-        times: When to yield an instant [s], increasing.
-        q: Start configuration, shape (nq,).
-        v: Start velocity, shape (nv,).
-
-    Raises:
-        EstimationError: If what an estimator needs is not measured.
-        FallError: If the plan finds that the robot falls.
-        SimulationError: If the motion diverges.
-    """
+    """Yield the instants of a loop that holds each effort for a control period."""
     plant.reset(times[0], q, v)
     command, excess = chain.command, LimitExcess(plant.robot)
     controller = command.controller

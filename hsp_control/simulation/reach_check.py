@@ -63,12 +63,6 @@ def out_of_reach(
     Positions and poses of frames are looked at, by inverse kinematics within the
     robot's position limits, each task by itself: of robots with a fixed base and joints
     of one degree of freedom, and of targets that are known before the run.
-
-    Args:
-        robot: The robot.
-        tasks: The placed tasks.
-        q0: The start, shape (nq,).
-        duration: Length of the run [s].
     """
     if robot.unactuated or robot.nq != robot.nv:
         return

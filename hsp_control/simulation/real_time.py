@@ -13,10 +13,6 @@ def in_real_time(
     """Return what `simulate` calls after every row, so that it waits for the clock.
 
     A simulation that is slower than real time does not wait.
-
-    Args:
-        period: Time between two rows [s].
-        on_row: What is called besides; None: nothing.
     """
     rows, begin = count(), monotonic()
 

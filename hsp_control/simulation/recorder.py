@@ -49,17 +49,7 @@ class Recorder:
         rows: int,
         plan: RunningPlan | None = None,
     ) -> None:
-        """Allocate all columns.
-
-        Args:
-            controller: The controller; its tasks and fields may change during the run.
-            scene: Obstacles to log.
-            rows: The largest number of rows.
-            plan: What the robot follows; its streams are recorded.
-
-        Raises:
-            SimulationError: If the log would be too large to be loaded.
-        """
+        """Allocate all columns."""
         self._controller = controller
         self.plan = plan
         self._scene = scene
@@ -112,15 +102,7 @@ class Recorder:
         tau: Array,
         log_channels: Mapping[str, LogChannel],
     ) -> None:
-        """Append a row.
-
-        Args:
-            state: The true state.
-            output: The controller's output for that state; None: none, and the columns
-                of the law hold NaN in this row.
-            tau: The commanded effort, computed from the measured state, shape (nv,).
-            log_channels: Further columns by name, of the plant and the compensation.
-        """
+        """Append a row."""
         i, columns = self._columns.count, self._columns.arrays
         robot = self._controller.robot
         settled = self._controller.settled
@@ -211,13 +193,7 @@ class Recorder:
         self._columns.clear()
 
     def rollout(self, status: str, message: str, **meta: Any) -> Rollout:
-        """Return the rows recorded so far as a rollout.
-
-        Args:
-            status: How the run ended; see `Rollout.status`.
-            message: Why it ended.
-            **meta: JSON data to add to the rollout's meta data.
-        """
+        """Return the rows recorded so far as a rollout."""
         columns = self._columns.rows()
         complete_columns(columns, continuous_dofs(self._controller.robot))
         return Rollout(columns, self.meta(status, message, **meta))

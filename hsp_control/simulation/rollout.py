@@ -193,11 +193,7 @@ class Rollout:
 
 
 def _read_npz(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
-    """Return the columns and the meta data of an ``.npz``.
-
-    Raises:
-        LogError: If it has no meta data.
-    """
+    """Return the columns and the meta data of an ``.npz``."""
     with path.open("rb") as file:
         if not zipfile.is_zipfile(file):
             raise zipfile.BadZipFile("no archive")
@@ -227,10 +223,6 @@ def complete_columns(columns: Mapping[str, Array], continuous: Sequence[int]) ->
     Positions of continuous joints pass ±π without a jump. For a task that was added
     during the run, the earlier rows get its first reference and position, because what
     is drawn must be finite. Its errors stay NaN there.
-
-    Args:
-        columns: The columns by name, N rows each.
-        continuous: The dofs of continuous joints.
     """
     positions, dofs = columns["joint_positions"], list(continuous)
     positions[:, dofs] = np.unwrap(positions[:, dofs], axis=0)
@@ -247,10 +239,6 @@ def without_absurd_rows(
     """Return the columns without rows that cannot be drawn; the message counts them.
 
     A row that a loop wrote of an absurd state must not make its journal useless.
-
-    Args:
-        columns: The columns by name, N rows each.
-        meta: The meta data.
     """
     kept = _drawable_rows(columns)
     if kept.all():

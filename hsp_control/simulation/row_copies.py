@@ -15,12 +15,7 @@ class RowCopies:
     """
 
     def __init__(self, pairs: Iterable[tuple[Array, Array]]) -> None:
-        """Bind the arrays.
-
-        Args:
-            pairs: Arrays, shape (k,), and the column of each, shape (rows, k). Both are
-                packed, and stay where they are.
-        """
+        """Bind the arrays."""
         copies = [bind(_copy, *pair, timed=True) for pair in pairs]
         self._write = merged(CallSequence(*copies))
 

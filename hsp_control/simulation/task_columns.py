@@ -35,12 +35,7 @@ class TaskColumns:
     """
 
     def __init__(self, controller: Controller, columns: LogColumns) -> None:
-        """Add the columns of the tasks that there are now.
-
-        Args:
-            controller: The controller.
-            columns: Where they are added.
-        """
+        """Add the columns of the tasks that there are now."""
         self._controller, self._columns = controller, columns
         self.logged: dict[str, Task] = {}
         self._levels: dict[str, int] = {}

@@ -57,13 +57,8 @@ def unreached(
     A target is out of reach, of this robot within its limits, if an error stays that
     the law would remove: it rests, and the law is damped at a singularity or a limit
     binds. What friction or a load leaves, where the law is exact, is not meant; nor is
-    a target that moves on while the robot follows as near as it can.
-
-    Args:
-        columns: Rows of a log.
-        tasks: What the log's meta data say of its tasks.
-        moved: When each part of an error moved last [s], kept from these rows to the
-            next ones; None: these are all.
+    a target that moves on while the robot follows as near as it can. ``moved``, when
+    each part of an error moved last [s], is kept from these rows to the next ones.
     """
     moved = {} if moved is None else moved
     times, none = columns["t"], np.zeros(len(columns["t"]))

@@ -32,11 +32,7 @@ from hsp_control.trajectories.schedule import Schedule
 
 
 def _direction(vector: Array) -> Array:
-    """Return a vector that has a direction.
-
-    Raises:
-        ContactError: If it is zero, or so long that its length overflows.
-    """
+    """Return a vector that has a direction."""
     with np.errstate(over="ignore"):
         length = float(np.linalg.norm(vector))
     if not 0.0 < length < np.inf:
@@ -109,12 +105,7 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
         return self
 
     def _check_command(self, force: CommandedForce, state: RobotState) -> None:
-        """Check that the commanded force is possible, as it is at the start.
-
-        Raises:
-            ContactError: If the contact has too few points for it, or it pulls or lies
-                outside the friction pyramid.
-        """
+        """Check that the commanded force is possible, as it is at the start."""
         if force.dimension == WRENCH and len(self.points) < 3:
             raise ContactError(
                 f"it has 6 coordinates; a contact of type {self.yaml_type} exerts no "

@@ -40,14 +40,7 @@ class PointContact(Contact, type="point"):
 def point_rows(
     contact: Contact, frame: FrameKinematics, out: Array, out_dot: Array
 ) -> Callable[[], object]:
-    """Return the call that writes the velocity rows of a contact's first point.
-
-    Args:
-        contact: The contact.
-        frame: The motion of its frame.
-        out: Written: J of the point, shape (3, nv).
-        out_dot: Written: J', shape (3, nv).
-    """
+    """Return the call that writes J and J' (3, nv) of a contact's first point."""
     point, shift = np.array(contact.points[0]), np.array(contact.shift)
     return bind(_point_velocity_rows, frame.motion, point, shift, out, out_dot)
 
@@ -56,18 +49,11 @@ def point_rows(
 def _point_velocity_rows(
     frame: FrameMotion, point: Array, shift: Array, out: Array, out_dot: Array
 ) -> None:
-    """Write the velocity rows of a point, and their rate, from those of a frame.
+    """Write a point's velocity rows (3, nv), and their rate, from those of a frame.
 
     With l and w the frame's linear and angular rows and the arm r = R p + s, whose
     shift s does not turn: l + w × r, and its rate l' + w' × r + w × r', where
-    r' = ω × R p.
-
-    Args:
-        frame: The frame's motion, in world axes.
-        point: p, in the frame, shape (3,) [m].
-        shift: s, in world axes, shape (3,) [m].
-        out: The point's rows, shape (3, nv).
-        out_dot: Their rate, shape (3, nv).
+    r' = ω × R p. p is in the frame, s in world axes [m].
     """
     J, J_dot, R, _, velocity = frame
     x = R[0, 0] * point[0] + R[0, 1] * point[1] + R[0, 2] * point[2]

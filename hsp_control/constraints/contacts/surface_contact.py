@@ -19,11 +19,7 @@ from hsp_control.tasks.task import copy_rows
 
 
 def _surface(corners: Array) -> Array:
-    """Return corners that span a surface.
-
-    Raises:
-        ContactError: If they are fewer than three, or on one line.
-    """
+    """Return corners that span a surface."""
     spread = corners - corners.mean(axis=0)
     if np.linalg.matrix_rank(spread, tol=1e-6) < 2:
         raise ContactError(

@@ -22,13 +22,7 @@ class UnactuatedRows:
     """
 
     def __init__(self, robot: Robot, base: Indices, count: int) -> None:
-        """Create the rows.
-
-        Args:
-            robot: The robot.
-            base: Indices of the base's degrees of freedom.
-            count: How many base motions the contacts permit.
-        """
+        """Create the rows."""
         self.name = "unactuated"
         self.robot = robot
         self.rows = count
@@ -55,12 +49,7 @@ class UnactuatedRows:
 
 
 def unactuated_count(jacobian: Array, base: Indices) -> int:
-    """Return how many base motions the contacts permit.
-
-    Args:
-        jacobian: Stacked rows of the contacts, shape (m, nv).
-        base: Indices of the base's degrees of freedom.
-    """
+    """Return how many base motions the contacts' stacked rows (m, nv) permit."""
     if not len(jacobian):
         return len(base)
     values = np.linalg.svd(jacobian[:, base], compute_uv=False)

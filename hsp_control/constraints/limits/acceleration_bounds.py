@@ -152,15 +152,12 @@ def violated_limits(
     disturbance: Array,
     bounds: Bounds,
 ) -> int:
-    """Write the acceleration bounds, and return which bounds a and tau violate.
+    """Write the bounds; return whether a and tau violate `MOTION`, `EFFORT` or the sum.
 
     The robot accelerates by a plus the disturbance, the acceleration that something
     else is known to cause, shape (nv,); so the bounds on a are moved by it. It makes a
     bound narrower by no more than the speed's barrier permits at rest, so that a push
     that ends does no harm. See `acceleration_bounds` for the other arguments.
-
-    Returns:
-        0 for none, `MOTION`, `EFFORT`, or the sum of both.
     """
     acceleration_bounds(
         q, v, where, limits, error, drift, steady, bounds.a_lower, bounds.a_upper

@@ -157,11 +157,7 @@ class Limits(Part, error=LimitError):
             return read_only(by_dof(getattr(self, field), robot.nv))
 
     def _positions(self, robot: Robot) -> tuple[Array, Array, Array]:
-        """Return lower and upper joint positions and their margin, shape (nv,).
-
-        Raises:
-            LimitError: If the limits do not fit the robot, or leave no room.
-        """
+        """Return lower and upper joint positions and their margin, shape (nv,)."""
         if isinstance(self.position, PositionRange | PositionsByJoint):
             lower, upper = self.position.of(robot)
         elif self.position == "robot":

@@ -86,17 +86,7 @@ joints, or numbers for all."""
 
 
 def maximum(value: Maximum, own: Array, robot: Robot) -> Array:
-    """Return a maximum effort or speed, shape (nv,); inf where there is none.
-
-    Args:
-        value: The maximum.
-        own: The robot's own, as in its model, shape (nv,).
-        robot: The robot.
-
-    Raises:
-        LimitError: If it does not fit the robot.
-        JointNotFoundError: If a joint does not exist.
-    """
+    """Return a maximum effort or speed (nv,), of the robot's own; inf for none."""
     if isinstance(value, Scaled | ByJoint):
         return value.of(_own_limit(own, robot), robot)
     if isinstance(value, str):

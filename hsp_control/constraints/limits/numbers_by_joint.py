@@ -59,17 +59,7 @@ def by_dof(
     none: float = np.inf,
     error: type[HspControlError] = LimitError,
 ) -> Array:
-    """Return numbers as an array of shape (nv,).
-
-    Args:
-        numbers: One number, or nv numbers.
-        nv: The robot's degrees of freedom.
-        none: What None stands for.
-        error: What is raised.
-
-    Raises:
-        HspControlError: If there are neither one nor nv numbers.
-    """
+    """Return one number or nv as an array (nv,); ``none`` is what None stands for."""
     array = np.array(numbers, dtype=float)  # None becomes NaN
     array[np.isnan(array)] = none
     if array.ndim and array.shape != (nv,):

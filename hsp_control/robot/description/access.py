@@ -39,16 +39,7 @@ class Access:
         )
 
     def check(self, path: Path, what: str) -> None:
-        """Check that a path is allowed.
-
-        Args:
-            path: The file; a relative path is relative to the working folder.
-            what: What names the file, for the message: ``robot`` or
-                ``link 'hand': mesh``.
-
-        Raises:
-            AccessError: If the file is outside the allowed folders.
-        """
+        """Check that a path is allowed."""
         if self.allows(path):
             return
         real = _resolved(path)

@@ -33,16 +33,7 @@ class Part:
 
 
 def combine(parts: Sequence[tuple[Part, pin.Model]]) -> pin.Model:
-    """Return one model that contains all robots.
-
-    Args:
-        parts: For each robot its part and its own model.
-
-    Raises:
-        ModelError: If there are fewer than two robots, two have the same prefix, one is
-            already a combination, their gravity differs, or one has mimic joints
-            (Pinocchio cannot append those).
-    """
+    """Return one model that contains all robots, which have no mimic joints."""
     prefixes = [part.prefix for part, _ in parts]
     if len(parts) < 2 or len(set(prefixes)) < len(prefixes):
         raise ModelError(

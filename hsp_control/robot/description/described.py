@@ -41,12 +41,7 @@ def described_names() -> tuple[str, ...]:
 
 
 def find_described(name: str) -> Described:
-    """Return the files of a robot; its repository is cloned if it is not yet there.
-
-    Raises:
-        RobotNotFoundError: If the package is not installed, has no such robot, or
-            cannot clone its repository.
-    """
+    """Return the files of a robot; its repository is cloned if it is not yet there."""
     if find_spec(PACKAGE) is None:
         raise RobotNotFoundError(
             f"robot {name!r} is described by the package {PACKAGE}: "

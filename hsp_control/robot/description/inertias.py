@@ -87,17 +87,11 @@ def is_possible(tensor: Array) -> bool:
 
 
 def nearest_possible(tensor: Array) -> Array:
-    """Return the inertia of a body that is nearest in its second moments.
+    """Return the inertia (3, 3) of a body that is nearest in its second moments.
 
     The nearest matrix has the same axes, so that only the second moments σ about them
     are projected: onto the cone σᵢ ≥ FLOOR Σⱼ σⱼ. With σ = A⁻¹ μ and A = 1 - FLOOR 11ᵀ
-    this is a problem of non-negative least squares in μ.
-
-    Args:
-        tensor: About the centre of mass, shape (3, 3) [kg·m²].
-
-    Returns:
-        The tensor itself if a body can have it.
+    this is a problem of non-negative least squares in μ. What a body can have stays.
     """
     if is_possible(tensor):
         return tensor

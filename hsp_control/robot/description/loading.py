@@ -57,21 +57,6 @@ def load_model(
     """Return the Pinocchio model of a robot, built from its URDF.
 
     Joints that mimic a locked joint are locked with it.
-
-    Args:
-        source: Where the robot comes from.
-        settings: How it is loaded; its name is not used. None: as the source says.
-        gravity: Acceleration of gravity in the world [m/s²], shape (3,); None: -9.81
-            along z.
-
-    Raises:
-        ModelError: If the URDF is invalid, a joint cannot be locked, a tool frame's
-            name exists already, a joint's limits are reversed, or the mass matrix is
-            singular.
-        RobotNotFoundError: If the URDF cannot be read.
-        AccessError: If the URDF names a file that the source's access does not allow.
-        JointNotFoundError: If a joint to lock does not exist.
-        FrameNotFoundError: If a tool frame's parent does not exist.
     """
     if settings is None:
         settings = RobotDescription(source.name)
@@ -88,13 +73,7 @@ def completed(
     tool_frames: Mapping[str, ToolFrame],
     gravity: ArrayLike | None,
 ) -> pin.Model:
-    """Return a checked model, with frames and gravity of one's own.
-
-    Raises:
-        ModelError: If a tool frame's name exists already, a joint's limits are
-            reversed, or the mass matrix is singular.
-        FrameNotFoundError: If a tool frame's parent does not exist.
-    """
+    """Return a checked model, with frames and gravity of one's own."""
     for name, tool in tool_frames.items():
         _add_frame(model, name, tool)
     if gravity is not None:
@@ -210,12 +189,8 @@ def _parse(source: RobotSource, settings: RobotDescription | PlacedRobot) -> pin
 def parser_text(xml: Element, *unused: str) -> str:
     """Return the text of a URDF for the parser, without what it does not need.
 
-    The tree is changed, too.
-
-    Args:
-        xml: The URDF.
-        unused: Elements of links that are deleted, such as ``visual``: their faults are
-            no business of who reads the rest.
+    The tree is changed, too: ``unused`` elements of links, such as ``visual``, are
+    deleted, because their faults are no business of who reads the rest.
     """
     for link in xml.iter("link"):
         for element in [each for each in link if each.tag in unused]:

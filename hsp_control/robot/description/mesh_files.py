@@ -79,18 +79,7 @@ def where_to_put(name: str) -> str:
 
 
 def check_mesh_name(source: RobotSource, name: str, what: str, access: Access) -> None:
-    """Check that a file that a URDF names may be read, and the files it refers to.
-
-    Args:
-        source: The robot.
-        name: The file name in the URDF, a path or a URL (``package://``, ...).
-        what: What names the file, for messages.
-        access: Which files may be read.
-
-    Raises:
-        AccessError: If a file is outside the allowed folders, or its format can refer
-            to other files in a way that is not checked.
-    """
+    """Check that a file that a URDF names may be read, and the files it refers to."""
     if not access.strict:
         return
     places = candidates(source, name)
@@ -105,11 +94,7 @@ def check_mesh_name(source: RobotSource, name: str, what: str, access: Access) -
 
 
 def check_references(file: Path, what: str, access: Access) -> None:
-    """Check that all files that a mesh file refers to may be read.
-
-    Raises:
-        AccessError: If one may not, or if the references of this format are not known.
-    """
+    """Check that all files that a mesh file refers to may be read."""
     if not access.strict:
         return
     if file.suffix.lower() not in CHECKED:

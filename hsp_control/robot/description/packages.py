@@ -8,13 +8,7 @@ from hsp_control.robot.description.xml_files import XmlError, read_xml
 
 
 def package_folders(package: str, folders: Iterable[Path]) -> list[Path]:
-    """Return the folders that may be a package; the first existing one is meant.
-
-    Args:
-        package: The package's name.
-        folders: Where to look, before the folders of ROS_PACKAGE_PATH and
-            AMENT_PREFIX_PATH: in each of them, and whether it is the package itself.
-    """
+    """Return the folders that may be a package; the first existing one is meant."""
     places = [*folders, *_of_environment()]
     return [
         *(place / package for place in places),

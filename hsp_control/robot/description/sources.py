@@ -91,19 +91,7 @@ def find_robot(
 ) -> RobotSource:
     """Find a bundled robot, one of an installed package, or a URDF or xacro file.
 
-    Args:
-        name: For example ``"panda"``, ``"talos_arm"``, ``"gen3_description"`` or
-            ``"my_arm/arm.urdf"``. A name with a path separator, or with the ending of a
-            URDF or xacro file, is a path.
-        access: Which files may be read: a URDF given by path, and its meshes.
-        xacro_args: Arguments of a xacro file, by name.
-
-    Raises:
-        RobotNotFoundError: If there is no such robot; the message suggests the nearest.
-        AccessError: If the path is not allowed, or reading is strict and the robot is a
-            xacro file or one of robot_descriptions.
-        ModelError: If a xacro file cannot be expanded, or arguments are given for a
-            robot that is none.
+    A name with a path separator, or with the ending of a URDF or xacro file, is a path.
     """
     text = os.fspath(name)
     if is_path(text):
@@ -142,13 +130,7 @@ def find_description(
     access: Access = ANYWHERE,
     xacro_args: Mapping[str, str] | None = None,
 ) -> RobotSource:
-    """Find a robot of the package robot_descriptions, such as ``gen3_description``.
-
-    Raises:
-        RobotNotFoundError: If there is none.
-        AccessError: If reading is strict: the package clones repositories.
-        ModelError: If it cannot be expanded; see `find_robot`.
-    """
+    """Find a robot of the package robot_descriptions, such as ``gen3_description``."""
     if access.strict:
         raise AccessError(
             f"robot {name!r}: strict reading allows no robot of robot_descriptions, "

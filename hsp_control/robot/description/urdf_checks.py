@@ -58,14 +58,7 @@ _WITH_AXIS = {"revolute", "continuous", "prismatic"}
 
 
 def read_urdf(source: RobotSource) -> Element:
-    """Return the top element of a URDF that is safe to pass to any parser.
-
-    Its numbers are written so that all parsers read them.
-
-    Raises:
-        RobotNotFoundError, ModelError: See `parse_urdf`.
-        ModelError: If an element is wrong; the message says where.
-    """
+    """Return the top element of a URDF that any parser can read."""
     robot = parse_urdf(source)
     for where, problem in problems(robot):
         raise ModelError(f"{source.urdf}: {where}: {problem}")
@@ -77,12 +70,7 @@ def read_urdf(source: RobotSource) -> Element:
 
 
 def parse_urdf(source: RobotSource) -> Element:
-    """Return the top element of a URDF whose elements are not yet checked.
-
-    Raises:
-        RobotNotFoundError: If the file cannot be read.
-        ModelError: If the file is not XML, not a URDF, or too large.
-    """
+    """Return the top element of a URDF whose elements are not yet checked."""
     urdf = source.urdf
     try:
         if source.expanded is None:

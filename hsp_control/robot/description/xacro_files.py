@@ -61,18 +61,7 @@ def expand(
     package_dirs: Sequence[Path],
     defaults: Mapping[str, str] | None = None,
 ) -> str:
-    """Return the URDF that a xacro file makes.
-
-    Args:
-        file: The xacro file.
-        arguments: Its arguments, by name; others have their defaults.
-        package_dirs: Where ``$(find package)`` looks, see `package_folders`.
-        defaults: Arguments where `arguments` have none; the file need not have them.
-
-    Raises:
-        ModelError: If the package xacro is not installed, cannot expand the file, or
-            the file has no such argument.
-    """
+    """Return the URDF that a xacro file makes."""
     try:
         import xacro  # type: ignore[import-not-found,import-untyped,unused-ignore]
         from xacro import (  # type: ignore[import-not-found,import-untyped,unused-ignore]

@@ -9,9 +9,8 @@ from hsp_control.control.log_channel import LogChannel
 def contact_channels(wrenches: Mapping[str, Array]) -> dict[str, LogChannel]:
     """Return ``plant.contact.<name>.force`` and ``.moment`` for each contact.
 
-    Args:
-        wrenches: Wrench of the world on the robot by contact, shape (6,): force and
-            moment in world axes, the moment about the origin of the contact's frame.
+    A wrench (6,) of the world on the robot is force and moment in world axes, about the
+    origin of the contact's frame.
     """
     channels: dict[str, LogChannel] = {}
     for name, wrench in wrenches.items():

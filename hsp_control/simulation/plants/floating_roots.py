@@ -21,11 +21,7 @@ class FloatingRoots:
                 self._unactuated[joint.idx_v : joint.idx_v + 6] = True
 
     def remove_effort(self, t: float, tau: Array) -> Array:
-        """Return an effort, shape (nv,), with zeros for the roots.
-
-        Raises:
-            SimulationError: If the effort on a root at time t [s] is not negligible.
-        """
+        """Return an effort, shape (nv,), with zeros for the roots."""
         largest = float(np.abs(tau[self._unactuated]).max(initial=0.0))
         if largest > MAX_ROOT_EFFORT:
             raise SimulationError(

@@ -67,11 +67,7 @@ class Pushes:
     """
 
     def __init__(self, robot: Robot, pushes: Sequence[Push] = ()) -> None:
-        """Set the robot and the pushes.
-
-        Raises:
-            FrameNotFoundError: If the robot lacks a frame.
-        """
+        """Set the robot and the pushes."""
         self.robot = robot
         self.pushes = tuple(pushes)
         self.spring: Spring | None = None

@@ -20,18 +20,7 @@ _MAX_FILES = 200
 
 
 def compile_mjcf(path: Path, access: Access) -> Any:
-    """Return the ``mujoco.MjModel`` of an MJCF file.
-
-    Args:
-        path: The file.
-        access: Which files may be read: it, and those that it names.
-
-    Raises:
-        RobotNotFoundError: If there is no such file, or it cannot be read.
-        AccessError: If it, or a file that it names, is not allowed.
-        ModelError: If it is no MJCF, MuJoCo rejects it, it is too large, or MuJoCo is
-            not installed.
-    """
+    """Return the ``mujoco.MjModel`` of an MJCF file."""
     access.check(path, "mjcf")
     if not path.is_file():
         near = sorted(file.name for file in path.parent.glob("*.xml"))
@@ -69,11 +58,7 @@ def _read(path: Path) -> Element:
 
 
 def _check_access(path: Path, top: Element, access: Access) -> None:
-    """Check every file that an MJCF names, also in the files that it includes.
-
-    Raises:
-        AccessError: If one is not allowed, or an element runs code or makes copies.
-    """
+    """Check every file that an MJCF names, also in the files that it includes."""
     pending, checked = [(path, top)], 0
     while pending:
         file, root = pending.pop()

@@ -36,11 +36,7 @@ def pose(position: Array, wxyz: Array) -> pin.SE3:
 
 
 def build_model(selection: Selection) -> pin.Model:
-    """Return the Pinocchio model, with a frame for each body, joint and site.
-
-    Raises:
-        ModelError: If two joints or frames would have the same name.
-    """
+    """Return the Pinocchio model, with a frame for each body, joint and site."""
     return _Builder(selection).model
 
 

@@ -28,15 +28,7 @@ _log = logging.getLogger(__name__)
 def load_mjcf(
     description: RobotDescription, access: Access
 ) -> tuple[pin.Model, RobotSource]:
-    """Return the Pinocchio model of a description with an MJCF, and its source.
-
-    Raises:
-        RobotNotFoundError: If the MJCF cannot be read.
-        AccessError: If it, or a file that it names, is not allowed.
-        ModelError: If MuJoCo rejects it, or what `load_selection` raises.
-        FrameNotFoundError: If the root or a tool frame's parent does not exist.
-        JointNotFoundError: If a joint does not exist or is not below the root.
-    """
+    """Return the Pinocchio model of a description with an MJCF, and its source."""
     assert description.mjcf is not None
     file = Path(description.mjcf)
     with within("mjcf"):
@@ -59,20 +51,7 @@ def load_selection(
     file: Path | None = None,
     access: Access = ANYWHERE,
 ) -> tuple[pin.Model, RobotSource]:
-    """Return the Pinocchio model of a robot in a MuJoCo scene, and its source.
-
-    Args:
-        selection: The robot.
-        tool_frames: Frames to add, by name.
-        gravity: Acceleration of gravity [m/s²], shape (3,); None: the scene's.
-        file: The MJCF that the scene was compiled from, if it was a file.
-        access: Which files that one may name.
-
-    Raises:
-        ModelError: If two joints or frames would have the same name, or the mass
-            matrix is singular.
-        FrameNotFoundError: If a tool frame's parent does not exist.
-    """
+    """Return the Pinocchio model of a robot in a MuJoCo scene, and its source."""
     model = build_model(selection)
     name = model.name if selection.root else _name_of_scene(selection, file)
     floating = any(joint.shortname() == "JointModelFreeFlyer" for joint in model.joints)

@@ -30,11 +30,7 @@ class Saturation(Drive, type="saturation"):
         return lambda tau: (np.clip(tau, -limit, limit), 0.0)
 
     def _limit(self, robot: Robot) -> Array:
-        """Return the limits, shape (nv,), with 0 for none.
-
-        Raises:
-            SimulationError: If they do not fit the robot, or its model has none.
-        """
+        """Return the limits, shape (nv,), with 0 for none."""
         if not isinstance(self.limit, str):
             return per_dof(robot, self.limit)
         own = np.asarray(robot.model.upperEffortLimit, dtype=float)

@@ -15,9 +15,5 @@ class MotorInertia(ModelChange):
     """Rotor inertia times gear ratio squared [kg·m² or kg], one number or nv."""
 
     def apply(self, model: pin.Model, robot: Robot, seed: int) -> None:
-        """Add the inertia.
-
-        Raises:
-            SimulationError: If it does not fit the robot.
-        """
+        """Add the inertia."""
         model.armature += per_dof(robot, self.inertia)

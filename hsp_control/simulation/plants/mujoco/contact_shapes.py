@@ -26,11 +26,7 @@ _MIN_HALF_HEIGHT = 1e-3
 
 
 def supported_shape(shape: Shape) -> Shape:
-    """Return a shape that MuJoCo has.
-
-    Raises:
-        ValueError: If it has none such.
-    """
+    """Return a shape that MuJoCo has."""
     if not isinstance(shape, Sphere | Capsule | Cylinder | Box):
         raise ValueError(
             f"{shape.yaml_type} is not possible here; needs a sphere, capsule, "
@@ -85,13 +81,7 @@ class Geom:
 
 
 def geoms_of(robot: Robot, contact: ContactShape) -> list[Geom]:
-    """Return the geoms of a contact, placed in the frame of its joint.
-
-    Raises:
-        FrameNotFoundError: If the robot has no such frame.
-        SimulationError: If the frame is fixed to the world, or no shape is given and
-            its links have no geometry.
-    """
+    """Return the geoms of a contact, placed in the frame of its joint."""
     frame = robot.model.frames[robot.frame_id(contact.frame)]
     if frame.parentJoint == 0:
         raise SimulationError("it is fixed to the world and never moves")
@@ -109,13 +99,7 @@ def geoms_of(robot: Robot, contact: ContactShape) -> list[Geom]:
 
 
 def geom_of(geometry: Any, place: pin.SE3, frame: pin.SE3 | None = None) -> Geom:
-    """Return the geom of Coal's geometry at a placement.
-
-    Args:
-        geometry: A primitive; or a mesh, if there is a frame.
-        place: Its placement.
-        frame: The placement of the frame in whose axes a mesh has a box.
-    """
+    """Return the geom of Coal's geometry, a mesh as a box in the axes of ``frame``."""
     if isinstance(geometry, coal.Sphere):
         return Geom("sphere", (geometry.radius,), place)
     if isinstance(geometry, coal.Box):

@@ -49,18 +49,7 @@ def write_mjcf(
     ground: Ground,
     solids: Sequence[Solid] = (),
 ) -> str:
-    """Return the MJCF text.
-
-    Args:
-        robot: The robot.
-        joints: Its joints.
-        integrator: MuJoCo's name of it.
-        joint_limits: Whether MuJoCo keeps joints within the model's position limits.
-        friction: Friction of the joints.
-        geoms: Geoms with their names to fix to the joints, by index of the joint.
-        ground: The ground; it is written only if there are geoms.
-        solids: The other things that geoms can touch.
-    """
+    """Return the MJCF text."""
     root = Element("mujoco", model=robot.name)
     SubElement(root, "compiler", angle="radian", autolimits="false")
     options = {

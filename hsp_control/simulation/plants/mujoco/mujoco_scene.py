@@ -31,11 +31,7 @@ class MujocoScene(PlantPart, type="mujoco_scene"):
     error."""
 
     def __post_init__(self) -> None:
-        """Check that the scene is left as it is.
-
-        Raises:
-            SimulationError: If another robot, or other inertias, are asked for.
-        """
+        """Check that the scene is left as it is."""
         own = {"robot", "inertias", "payload", "motor_inertia"}
         if given := own & {*self.changed_fields()}:
             raise SimulationError(

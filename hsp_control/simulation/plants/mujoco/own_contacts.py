@@ -14,17 +14,9 @@ _DEEP = 1e-3
 
 
 def own_overlaps(robot: Robot, model: Any, data: Any) -> dict[str, float]:
-    """Return which parts of a robot overlap, such as ``base and link1``.
+    """Return how deep [m] parts of a robot overlap, by ``base and link1``.
 
     Parts are what its joints move, and what they are mounted on.
-
-    Args:
-        robot: The robot.
-        model: MuJoCo's model.
-        data: MuJoCo's data, after ``mj_forward``.
-
-    Returns:
-        The depth of each pair of bodies [m].
     """
     names = Names(model)
     joints = [names.joints.index(name) for name in robot.joints]

@@ -149,12 +149,7 @@ class MujocoPlant(SampledPlant):
         self.coordinates.to_mujoco(q, v, self.data.qpos, self.data.qvel)
 
     def advance(self, t: float, end: float, tau: Array) -> tuple[Array, Array]:
-        """Step MuJoCo from t to ``end``; see `SampledPlant.advance`.
-
-        Raises:
-            SimulationError: If the effort pushes a root, which has no motor, or the
-                motion diverges.
-        """
+        """Step MuJoCo from t to ``end``; see `SampledPlant.advance`."""
         data = self.data
         motors = self._roots.remove_effort(t, tau)
         steps = number_of_steps(end - t, self.timestep)

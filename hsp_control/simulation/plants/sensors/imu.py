@@ -74,14 +74,7 @@ class RunningImu:
     def __init__(
         self, imu: Imu, robot: Robot, frame: int, random: np.random.Generator
     ) -> None:
-        """Draw the biases.
-
-        Args:
-            imu: The unit.
-            robot: The simulated robot.
-            frame: The index of its frame.
-            random: The random numbers of this run.
-        """
+        """Draw the biases."""
         self._imu, self._model, self._frame = imu, robot.model, frame
         self._data = robot.model.createData()
         self._random = random
