@@ -95,17 +95,11 @@ def table(calls: Sequence[NativeCall]) -> tuple[Indices, Array]:
 
 
 class Timed(NamedTuple):
-    """A call and when it is made.
+    """A call and when it is made."""
 
-    Attributes:
-        call: The call; a native one in a `sequence`.
-        start: Start of its window of time [s].
-        end: End of its window [s].
-    """
-
-    call: Any
-    start: float = FOREVER[0]
-    end: float = FOREVER[1]
+    call: Any  # the call; a native one in a `sequence`
+    start: float = FOREVER[0]  # start of its window of time [s]
+    end: float = FOREVER[1]  # end of its window [s]
 
 
 def bind(

@@ -26,19 +26,15 @@ class Document:
 
     A key path is a tuple: ``("tasks", 0, "frame")`` for what the user writes as
     ``tasks.0.frame``. All errors have the form ``file:line: key.path: what is wrong``.
-
-    Attributes:
-        name: The file's path as it was given, for messages.
-        access: Which files the configuration may name.
-        packages: The packages whose types it may name, besides our own; None: all.
     """
 
     def __init__(
         self, data: dict[str, Any], marks: dict[KeyPath, Mark], name: str
     ) -> None:
         """Keep a copy of the data."""
-        self.name = name
-        self.access = ANYWHERE
+        self.name = name  # the file's path as it was given, for messages
+        self.access = ANYWHERE  # which files the configuration may name
+        # the packages whose types it may name, besides our own; None: all
         self.packages: frozenset[str] | None = None
         self._data = deepcopy(data)
         self._origins: dict[KeyPath, Mark | str] = dict(marks)

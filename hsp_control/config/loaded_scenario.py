@@ -15,19 +15,12 @@ from hsp_control.robot import Robot
 
 
 class LoadedScenario(NamedTuple):
-    """A checked configuration, with its robot and its scene.
+    """A checked configuration, with its robot and its scene."""
 
-    Attributes:
-        document: The configuration as it was read; it locates errors.
-        scenario: The configuration, checked.
-        robot: The robot.
-        scene: Its obstacles.
-    """
-
-    document: Document
-    scenario: Scenario
-    robot: Robot
-    scene: Scene
+    document: Document  # the configuration as it was read; it locates errors
+    scenario: Scenario  # the configuration, checked
+    robot: Robot  # the robot
+    scene: Scene  # its obstacles
 
     def start(self) -> Array:
         """Return the start configuration (nq,); home where it has to be found."""

@@ -11,20 +11,14 @@ TAG = "tag:yaml.org,2002:"
 
 
 class Scalar(NamedTuple):
-    """One kind of scalar.
+    """One kind of scalar."""
 
-    Attributes:
-        name: Its name in messages.
-        convert: Converts its text to its value; raises ValueError if it cannot.
-        pattern: Regular expression of its text without quotes; None if only a tag
-            selects it.
-        first: The characters that it can begin with; an empty string if the scalar can
-            be empty.
-    """
-
-    name: str
+    name: str  # its name in messages
+    # converts its text to its value; raises ValueError if it cannot
     convert: Callable[[str], Any]
+    # regular expression of its text without quotes; None if only a tag selects it
     pattern: str | None = None
+    # the characters that it can begin with; an empty string if the scalar can be empty
     first: tuple[str, ...] = ()
 
 

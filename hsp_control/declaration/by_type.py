@@ -100,16 +100,12 @@ def as_entry(part: Declared) -> Any:
 
 
 class _Entry:
-    """What YAML may say after a type.
-
-    Attributes:
-        member: The class of the type.
-        first: The name of its first field; None if it has none.
-    """
+    """What YAML may say after a type."""
 
     def __init__(self, member: type[Declared]) -> None:
         """Set the member."""
-        self.member = member
+        self.member = member  # the class of the type
+        # the name of its first field; None if it has none
         self.first = next(iter(member.__pydantic_fields__), None)  # type: ignore[attr-defined]
 
     def field(self) -> Any:

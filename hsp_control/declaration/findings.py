@@ -37,23 +37,17 @@ class Source(Protocol):
 
 
 class Finding(NamedTuple):
-    """One mistake.
+    """One mistake."""
 
-    Attributes:
-        path: The key path that the user wrote; for a missing key, that of the mapping
-            without it.
-        kind: ``mismatch`` for a wrong type, ``misspelt_tag`` for a misspelt
-            discriminator key, otherwise pydantic's name for the error.
-        value: The wrong value or key; for missing keys, their list.
-        expected: The allowed types there; for keys, those of their mapping.
-        error: Pydantic's own error.
-    """
-
+    # the key path that the user wrote; for a missing key, that of the mapping without
+    # it
     path: KeyPath
+    # ``mismatch`` for a wrong type, ``misspelt_tag`` for a misspelt discriminator key,
+    # otherwise pydantic's name for the error
     kind: str
-    value: Any
-    expected: Shape
-    error: ErrorDetails
+    value: Any  # the wrong value or key; for missing keys, their list
+    expected: Shape  # the allowed types there; for keys, those of their mapping
+    error: ErrorDetails  # pydantic's own error
 
 
 def findings(

@@ -46,11 +46,7 @@ def as_error(finding: Finding, cls: type[Declared]) -> HspControlError:
 
 
 class Carrier(ValueError):
-    """Carries an error that is no `ValueError` through pydantic, which collects those.
-
-    Attributes:
-        error: The error.
-    """
+    """Carries an error that is no `ValueError` through pydantic."""
 
     def __init__(self, error: HspControlError) -> None:
         """Carry an error."""

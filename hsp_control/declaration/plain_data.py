@@ -19,7 +19,7 @@ _SIMPLE = bool, int, float, str, type(None)
 
 
 def plain_data(value: Any, *, defaults: bool = False) -> Any:
-    """Return a value as mappings, lists, numbers and text; or what differs from defaults."""
+    """Return a value as mappings, lists, numbers and text, with defaults or without."""
     if isinstance(value, _SIMPLE):
         return value
     if isinstance(value, np.ndarray | np.generic):

@@ -95,21 +95,16 @@ Axes = Annotated[str, AfterValidator(_distinct_axes)]
 
 
 class ArrayField:
-    """The validation of a field that holds an array, or another thing made of a list.
-
-    Attributes:
-        items: What pydantic checks first, such as nested lists of numbers.
-        convert: Makes the array of them, and may check more.
-        none: What plain data say for None.
-    """
+    """The validation of a field that holds an array, or what a list makes."""
 
     def __init__(
         self, items: Any, convert: Callable[[Any], object], none: str | None = None
     ) -> None:
         """Set all."""
+        # what pydantic checks first, such as nested lists of numbers
         self.items = items
-        self.convert = convert
-        self.none = none
+        self.convert = convert  # makes the array of them, and may check more
+        self.none = none  # what plain data say for None
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
@@ -129,15 +124,12 @@ class OrInstance(ArrayField):
 
     As an annotation: ``Annotated[str | Obstacle, OrInstance(Name, Obstacle)]``. Schemas
     and messages mention only what YAML says.
-
-    Attributes:
-        instance_of: The class.
     """
 
     def __init__(self, items: Any, instance_of: type) -> None:
         """Set the type of YAML and the class."""
         super().__init__(items, lambda value: value)
-        self.instance_of = instance_of
+        self.instance_of = instance_of  # the class
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler

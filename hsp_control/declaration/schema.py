@@ -21,16 +21,12 @@ _BY_TYPE = _Discriminator("type")
 
 
 class Shape(NamedTuple):
-    """The types that a value may have.
+    """The types that a value may have."""
 
-    Attributes:
-        options: The types; ``Any`` for a type whose inside is not known.
-        metadata: Pydantic's constraints beside the type: bounds, discriminators.
-        tag: The key whose value chose this type among others, if one did.
-    """
-
-    options: tuple[Any, ...]
+    options: tuple[Any, ...]  # the types; ``Any`` for a type whose inside is not known
+    # pydantic's constraints beside the type: bounds, discriminators
     metadata: tuple[Any, ...] = ()
+    # the key whose value chose this type among others, if one did
     tag: str | None = None
 
     @property

@@ -58,11 +58,7 @@ def has_closed_form(first: LinkShape, second: LinkShape | Obstacle) -> bool:
 
 
 class ClosedFormDistances:
-    """Distances in closed form at one state, and weighted sums of their gradients.
-
-    Attributes:
-        measurements: Number of calls of `measure`, at any state, shape (1,).
-    """
+    """Distances in closed form at one state, and weighted sums of their gradients."""
 
     def __init__(
         self,
@@ -107,6 +103,7 @@ class ClosedFormDistances:
         self._segments = np.zeros((len(rows), 2, 3))
         self._cores = np.zeros((len(pairs), 3, 3))
         self._scratch = np.zeros((40, 3))
+        # number of calls of `measure`, at any state, shape (1,)
         self.measurements: Indices = np.zeros(1, dtype=np.int64)
         self._plans = IdentityCache(self._plan)
         self._derivatives = IdentityCache(self.derivatives)
@@ -211,22 +208,16 @@ def _obstacle(shape: Shape) -> tuple[int, list[float]]:
 
 
 class _Bodies(NamedTuple):
-    """Links, then obstacles.
+    """Links, then obstacles."""
 
-    Attributes:
-        kinds: Kind, joint (-1 - k for the k-th obstacle), and where the columns of the
-            joint begin and end, shape (n, 4).
-        sizes: Segment and radius, or half sizes, in the body's own frame, shape (n, 7).
-        motion: Placement and velocity of the obstacles, see `Obstacle.follow`.
-        columns: The columns of the joints' Jacobian that move each link.
-        dofs: The indices in v of these columns.
-    """
-
+    # kind, joint (-1 - k for the k-th obstacle), and where the columns of the joint
+    # begin and end, shape (n, 4)
     kinds: Indices
+    # segment and radius, or half sizes, in the body's own frame, shape (n, 7)
     sizes: Array
-    motion: Array
-    columns: Indices
-    dofs: Indices
+    motion: Array  # placement and velocity of the obstacles, see `Obstacle.follow`
+    columns: Indices  # the columns of the joints' Jacobian that move each link
+    dofs: Indices  # the indices in v of these columns
 
 
 @kernel

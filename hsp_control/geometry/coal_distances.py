@@ -18,11 +18,7 @@ GJK_TOLERANCE = 1e-10
 
 
 class CoalDistances:
-    """Distances by Coal at one state, and weighted sums of their gradients.
-
-    Attributes:
-        places: Index of each pair in the `Proximity`, shape (k,).
-    """
+    """Distances by Coal at one state, and weighted sums of their gradients."""
 
     def __init__(
         self,
@@ -35,6 +31,7 @@ class CoalDistances:
         """Create the geometry; see `ClosedFormDistances` for the arguments."""
         self._robot, self._obstacles = robot, tuple(obstacles)
         self._first_obstacle = len(links)
+        # index of each pair in the `Proximity`, shape (k,)
         self._pairs, self.places = pairs, places
         self._geometry = pin.GeometryModel()
         for i, link in enumerate(links):

@@ -40,34 +40,20 @@ Rows = tuple[str, tuple[int, ...]]
 
 
 class Judgement(NamedTuple):
-    """What counts for a posture.
+    """What counts for a posture."""
 
-    Attributes:
-        q: The configuration, shape (nq,).
-        regularity: The smallest singular value of the tasks' stacked Jacobian.
-        distance: The smallest distance of links and obstacles [m]; inf: there are none.
-        pair: The two that are at this distance.
-        clear: Whether no links overlap, and no obstacle is near.
-        eccentricity: Distance from the middle: root mean square over the joints, 1 at
-            the limits.
-    """
-
-    q: Array
-    regularity: float
+    q: Array  # the configuration, shape (nq,)
+    regularity: float  # the smallest singular value of the tasks' stacked Jacobian
+    # the smallest distance of links and obstacles [m]; inf: there are none
     distance: float
-    pair: str
-    clear: bool
+    pair: str  # the two that are at this distance
+    clear: bool  # whether no links overlap, and no obstacle is near
+    # distance from the middle: root mean square over the joints, 1 at the limits
     eccentricity: float
 
 
 class PostureSearch:
-    """Judges postures of one robot, and finds a good one.
-
-    Attributes:
-        robot: The robot, with a fixed base.
-        middle: Displacement from neutral of the middle of the limits, shape (nv,); of a
-            joint without limits: of home.
-    """
+    """Judges postures of one robot, and finds a good one."""
 
     def __init__(
         self, robot: Robot, rows: Sequence[Rows], obstacles: Sequence[Obstacle] = ()
@@ -77,7 +63,7 @@ class PostureSearch:
         If the shapes of the links cannot be read, a warning is logged, and collisions
         do not count.
         """
-        self.robot = robot
+        self.robot = robot  # the robot, with a fixed base
         self._state = robot.state(0.0, robot.home(), np.zeros(robot.nv))
         self._rows = tuple(rows)
         lower, upper = robot.position_limits()
@@ -85,6 +71,8 @@ class PostureSearch:
         home = robot.joint_positions(robot.home())
         half = np.full(robot.nv, np.pi)
         half[bounded] = 0.5 * (upper[bounded] - lower[bounded])
+        # displacement from neutral of the middle of the limits, shape (nv,); of a joint
+        # without limits: of home
         self.middle: Array = home.copy()
         self.middle[bounded] = 0.5 * (lower[bounded] + upper[bounded])
         self._half = half

@@ -45,19 +45,12 @@ _found: "WeakKeyDictionary[Robot, dict[Proxy, tuple[LinkShape, ...]]]" = (
 
 @dataclass(frozen=True)
 class LinkShape:
-    """A shape fixed to a joint.
+    """A shape fixed to a joint."""
 
-    Attributes:
-        link: Name of the link, for SRDF files and messages.
-        joint: Index of the joint that it is fixed to; 0 is the world.
-        placement: Its placement in the joint's frame.
-        geometry: Coal's geometry.
-    """
-
-    link: str
-    joint: int
-    placement: pin.SE3
-    geometry: Any
+    link: str  # name of the link, for SRDF files and messages
+    joint: int  # index of the joint that it is fixed to; 0 is the world
+    placement: pin.SE3  # its placement in the joint's frame
+    geometry: Any  # coal's geometry
 
 
 def link_shapes(robot: Robot, proxy: Proxy = "capsules") -> list[LinkShape]:

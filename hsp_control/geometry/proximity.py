@@ -20,15 +20,6 @@ class Proximity:
     the unit vector from the second point to the first; an obstacle has J_2 = 0. Pairs
     of spheres and capsules have a closed form, and so have a sphere and a box, cylinder
     or half-space; the rate of their gradient is exact. Coal computes all others.
-
-    Attributes:
-        robot: The robot.
-        links: Shapes of its links.
-        obstacles: The obstacles.
-        pairs: Indices into links followed by obstacles.
-        distances: At the last `measure`, shape (k,) [m]; negative if shapes overlap.
-        closed_form: The pairs that have a closed form, or None.
-        coal: The other pairs, or None.
     """
 
     def __init__(
@@ -44,15 +35,17 @@ class Proximity:
         # (i, j) and (j, i) are one pair, as in Pinocchio.
         pairs = list({frozenset(pair): pair for pair in pairs}.values())
         self.robot = robot
-        self.links = tuple(links)
+        self.links = tuple(links)  # shapes of its links
         self.obstacles = tuple(obstacles)
-        self.pairs = tuple(pairs)
+        self.pairs = tuple(pairs)  # indices into links followed by obstacles
+        # at the last `measure`, shape (k,) [m]; negative if shapes overlap
         self.distances: Array = np.zeros(len(pairs))
         items: list[LinkShape | Obstacle] = [*links, *obstacles]
         closed = np.array([has_closed_form(links[i], items[j]) for i, j in pairs])
         index = np.array(pairs, dtype=np.int64)
+        # the pairs that have a closed form, or None
         self.closed_form: ClosedFormDistances | None = None
-        self.coal: CoalDistances | None = None
+        self.coal: CoalDistances | None = None  # the other pairs, or None
         if closed.any():
             places = np.flatnonzero(closed)
             self.closed_form = ClosedFormDistances(

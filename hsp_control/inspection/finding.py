@@ -10,21 +10,13 @@ note is good to know."""
 
 @dataclass(frozen=True)
 class Finding:
-    """Something odd in a robot's description.
+    """Something odd in a robot's description."""
 
-    Attributes:
-        severity: How bad it is.
-        check: Which check found it, such as ``inertia``.
-        element: The link, joint, file or pair of links that it is about.
-        message: What is odd, with the value.
-        cure: What would be right, or what to do; empty if nothing is to be done.
-    """
-
-    severity: Severity
-    check: str
-    element: str
-    message: str
-    cure: str = ""
+    severity: Severity  # how bad it is
+    check: str  # which check found it, such as ``inertia``
+    element: str  # the link, joint, file or pair of links that it is about
+    message: str  # what is odd, with the value
+    cure: str = ""  # what would be right, or what to do; empty if nothing is to be done
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""

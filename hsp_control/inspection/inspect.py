@@ -26,17 +26,11 @@ from hsp_control.robot.description.urdf_checks import parse_urdf
 
 @dataclass(frozen=True)
 class Inspection:
-    """What was found about a robot.
+    """What was found about a robot."""
 
-    Attributes:
-        source: Where the robot comes from.
-        findings: What is odd, errors first.
-        facts: What can be said about it in general: names and texts.
-    """
-
-    source: RobotSource
-    findings: tuple[Finding, ...]
-    facts: Mapping[str, str]
+    source: RobotSource  # where the robot comes from
+    findings: tuple[Finding, ...]  # what is odd, errors first
+    facts: Mapping[str, str]  # what can be said about it in general: names and texts
 
     @property
     def loads(self) -> bool:

@@ -14,16 +14,12 @@ _ROOT = 1
 
 
 class Balance:
-    """Compares tilt and height with those of the start; see `FallDetector`.
-
-    Attributes:
-        lost: Whether the robot has fallen.
-    """
+    """Compares tilt and height with those of the start; see `FallDetector`."""
 
     def __init__(self, detector: FallDetector) -> None:
         """Set what detects a fall."""
         self._detector = detector
-        self.lost = False
+        self.lost = False  # whether the robot has fallen
 
     def fault(self, state: RobotState) -> str | None:
         """Return why the robot is falling, or None."""

@@ -26,9 +26,6 @@ class BearingFeet:
     J v = 0, these efforts do the work of x: vᵀ Sᵀ tau = vᵀ x.
 
     Without motors in six rows, and without a foot that bears, nothing holds the robot.
-
-    Attributes:
-        contacts: The contacts that bear now.
     """
 
     def __init__(self, robot: Robot, contacts: Sequence[Contact]) -> None:
@@ -36,7 +33,7 @@ class BearingFeet:
         self._robot = robot
         self._all = tuple(c for c in contacts if c.axes[2, 2] >= _STEEPEST)
         self._base = list(robot.unactuated)
-        self.contacts = self._all
+        self.contacts = self._all  # the contacts that bear now
 
     @property
     def hold(self) -> bool:

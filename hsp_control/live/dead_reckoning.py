@@ -12,17 +12,13 @@ class DeadReckoning:
 
     Of a robot with a floating base the velocity is kept: nobody knows what its feet
     push meanwhile, and without them the model would fall.
-
-    Attributes:
-        state: The state, measured or predicted.
-        predicted_for: Time since the last measurement [s].
     """
 
     def __init__(self, robot: Robot, period: float) -> None:
         """Allocate the state."""
         self._robot, self._period = robot, period
-        self.state = RobotState(robot)
-        self.predicted_for = 0.0
+        self.state = RobotState(robot)  # the state, measured or predicted
+        self.predicted_for = 0.0  # time since the last measurement [s]
 
     def correct(self, t: float, q: Array, v: Array) -> None:
         """Set the state to a measurement."""

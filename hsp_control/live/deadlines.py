@@ -11,19 +11,12 @@ CAPACITY = 600_000
 
 
 class Quantiles(NamedTuple):
-    """Quantiles of a distribution of times [s].
+    """Quantiles of a distribution of times [s]."""
 
-    Attributes:
-        median: 50 % quantile.
-        p99: 99 % quantile.
-        p999: 99.9 % quantile.
-        worst: Maximum.
-    """
-
-    median: float
-    p99: float
-    p999: float
-    worst: float
+    median: float  # 50 % quantile
+    p99: float  # 99 % quantile
+    p999: float  # 99.9 % quantile
+    worst: float  # maximum
 
     @classmethod
     def of(cls, times: Array) -> Self:

@@ -16,13 +16,7 @@ _SURE = 5
 
 
 class EffortLimiter:
-    """Converts an effort into the value that is sent, within effort and rate limits.
-
-    Attributes:
-        sent: The value sent last, shape (nv,): tau, or tau - g(q).
-        applied: The effort that the motors then apply, shape (nv,): tau.
-        gravity: g(q) at the last configuration, shape (nv,).
-    """
+    """Converts an effort into the value that is sent, within effort and rate limits."""
 
     def __init__(
         self,
@@ -39,8 +33,11 @@ class EffortLimiter:
         # The controller's limits may fall while it runs: efforts follow by their rate.
         self._largest = np.maximum(self._upper, settings.effort_limits(robot))
         self._step = settings.rate_limits(robot) * period
+        # the value sent last, shape (nv,): tau, or tau - g(q)
         self.sent: Array = np.zeros(robot.nv)
+        # the effort that the motors then apply, shape (nv,): tau
         self.applied: Array = np.zeros(robot.nv)
+        # g(q) at the last configuration, shape (nv,)
         self.gravity: Array = np.zeros(robot.nv)
         # What the robot may have, at least and at most; and before the last effort.
         self._least: Array = np.zeros(robot.nv)

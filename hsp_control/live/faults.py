@@ -75,11 +75,7 @@ _KINDS = ("late", "lost", "duplicated", "corrupted")
 
 
 class FaultInjector:
-    """Applies `Faults` to packets.
-
-    Attributes:
-        injected: Number of injected faults of each kind.
-    """
+    """Applies `Faults` to packets."""
 
     def __init__(self, faults: Faults, stream: int = 0) -> None:
         """Seed the random numbers."""
@@ -87,6 +83,7 @@ class FaultInjector:
         self._rng = np.random.default_rng((faults.seed, stream))
         self._cumulative = np.cumsum([getattr(faults, kind) for kind in _KINDS])
         self._waiting: list[tuple[int, bytes]] = []
+        # number of injected faults of each kind
         self.injected: Counter[str] = Counter(dict.fromkeys(_KINDS, 0))
 
     def apply(self, data: bytes) -> list[bytes]:

@@ -34,27 +34,16 @@ CHANNEL_INFO = {
 
 
 class Row(NamedTuple):
-    """One row of the log; see `Recorder.record`.
+    """One row of the log; see `Recorder.record`."""
 
-    Attributes:
-        state: The state.
-        output: The controller's output for it, or None.
-        tau: The effort of the motors, shape (nv,).
-        log_channels: Further values to log, by name.
-    """
-
-    state: RobotState
-    output: ControlOutput | None
-    tau: Array
-    log_channels: Mapping[str, LogChannel]
+    state: RobotState  # the state
+    output: ControlOutput | None  # the controller's output for it, or None
+    tau: Array  # the effort of the motors, shape (nv,)
+    log_channels: Mapping[str, LogChannel]  # further values to log, by name
 
 
 class LiveLog:
-    """Writes rows to a journal; each is passed to the operating system at once.
-
-    Attributes:
-        path: The journal.
-    """
+    """Writes rows to a journal; each is passed to the operating system at once."""
 
     def __init__(
         self,
@@ -64,7 +53,7 @@ class LiveLog:
         meta: Mapping[str, Any] | None = None,
     ) -> None:
         """Create the journal."""
-        self.path = path
+        self.path = path  # the journal
         self._recorder = Recorder(controller, scene or Scene(), 1)
         self._meta = dict(meta or {})
         self._last_t = -inf
@@ -112,12 +101,7 @@ class LiveLog:
 
 
 class LoopLog:
-    """Selects what a loop logs: rows on a time grid, and each change of the phase.
-
-    Attributes:
-        path: The journal; None without a log.
-        controller_failed: Whether the controller has raised; it is not called again.
-    """
+    """Selects what a loop logs: rows on a time grid, and each change of the phase."""
 
     def __init__(
         self,
@@ -133,7 +117,9 @@ class LoopLog:
         self._next, self._phase = -inf, Phase.WAITING
         self._failed = False
         self._excess = LimitExcess(chain.command.controller.robot)
+        # the journal; None without a log
         self.path = None if path is None else Path(path)
+        # whether the controller has raised; it is not called again
         self.controller_failed = False
         if self.path is not None:
             self._log = LiveLog(self.path, chain.command.controller, scene, meta)

@@ -10,11 +10,7 @@ from hsp_control.robot import Robot
 
 
 class MeasurementMonitor:
-    """Returns what is wrong with a measurement: a reason to stop, or None.
-
-    Attributes:
-        last: The last valid measurement.
-    """
+    """Returns what is wrong with a measurement: a reason to stop, or None."""
 
     def __init__(
         self,
@@ -26,7 +22,7 @@ class MeasurementMonitor:
         """Read the limits."""
         self._robot, self._settings, self._period = robot, settings, period
         self._own = own_limits(robot) if limits is None else None
-        self.last: Measurement | None = None
+        self.last: Measurement | None = None  # the last valid measurement
         self._read(limits)
 
     def follow(self, limits: RobotLimits | None) -> None:

@@ -20,16 +20,7 @@ from hsp_control.simulation.control_chain import ControlChain, EffortSource
 
 
 class OneRun:
-    """One run of a loop, whose parts are ready; `run`, then `finish`. Neither raises.
-
-    Attributes:
-        phase: Running, damping or holding.
-        ending: How it will end, and why, once the plan has brought the robot to rest.
-        asked_at: When that was asked for [s].
-        silent: Whether it stopped sending efforts.
-        abandoned: Whether the operator did not wait for the safe stop.
-        later: The first fault in the safe stop, "" without one.
-    """
+    """One run of a loop whose parts are ready: `run`, then `finish`; none raises."""
 
     def __init__(
         self,
@@ -50,14 +41,16 @@ class OneRun:
         self.limiter, self.safe_stop, self.log = limiter, safe_stop, log
         self.requests, self.settings, self.end = requests, settings, end
         self.period = hardware.period
-        self.phase = Phase.RUNNING
+        self.phase = Phase.RUNNING  # running, damping or holding
         self.ended: Ended = "completed"
         self.reason = ""
         self.error: Exception | None = None
+        # how it will end, and why, once the plan has brought the robot to rest
         self.ending: tuple[Ended, str] | None = None
-        self.asked_at = 0.0
+        self.asked_at = 0.0  # when that was asked for [s]
+        # whether it stopped sending efforts
         self.silent = self.done = self.abandoned = False
-        self.later = ""
+        self.later = ""  # the first fault in the safe stop, "" without one
 
     def run(self, on_period: Callable[[float], object] | None) -> None:
         """Run period after period until the safe stop is complete."""

@@ -21,16 +21,7 @@ _READ_MARGIN = 0.5
 
 
 class StateReader:
-    """Reads measurements in real time, and checks them.
-
-    Attributes:
-        measurement: The new, valid measurement of this period, or None.
-        fault: Why the robot must be stopped, or None.
-        error: What the hardware raised, or None.
-        connection_lost: Whether no state can arrive any more.
-        arrival: When this period's state arrived, by the loop's clock [s].
-        deadlines: Response times and deadline misses.
-    """
+    """Reads measurements in real time, and checks them."""
 
     def __init__(
         self,
@@ -54,11 +45,14 @@ class StateReader:
             settings.start_timeout / self._period,
         )
         self._missing = 0
+        # the new, valid measurement of this period, or None
         self.measurement: Measurement | None = None
-        self.fault: str | None = None
-        self.error: Exception | None = None
-        self.connection_lost = False
+        self.fault: str | None = None  # why the robot must be stopped, or None
+        self.error: Exception | None = None  # what the hardware raised, or None
+        self.connection_lost = False  # whether no state can arrive any more
+        # when this period's state arrived, by the loop's clock [s]
         self.arrival = self._last_arrival = self._due = clock()
+        # response times and deadline misses
         self.deadlines = Deadlines(hardware.period)
 
     @property

@@ -13,19 +13,7 @@ from hsp_control.robot.pinocchio_calls import bind_pinocchio
 
 
 class CentroidalMotion:
-    """Centre of mass and centroidal angular momentum of a robot, in world axes.
-
-    Attributes:
-        compute: Updates the attributes below to the state, if they are not up to date.
-        mass: Total mass [kg].
-        position: The centre of mass c [m], shape (3,).
-        velocity: c' = J v [m/s], shape (3,).
-        jacobian: J, shape (3, nv).
-        jacobian_dot: J' = dJ/dt along v, exact, shape (3, nv).
-        momentum_matrix: A, where A v is the angular momentum about c [kg·m²/s], shape
-            (3, nv).
-        momentum_matrix_dot: A' = dA/dt along v, exact, shape (3, nv).
-    """
+    """Centre of mass and centroidal angular momentum of a robot, in world axes."""
 
     def __init__(
         self, model: pin.Model, data: pin.Data, q: Array, v: Array, stamp: Indices
@@ -33,12 +21,15 @@ class CentroidalMotion:
         """Allocate the arrays; `compute` takes the values that q and v have then."""
         # Pinocchio allocates these results at the first call; take views after it.
         pin.computeCentroidalMapTimeVariation(model, data, q, v)
-        self.mass: float = pin.computeTotalMass(model)
-        self.position: Array = data.com[0]
-        self.velocity: Array = np.zeros(3)
-        self.jacobian: Array = np.zeros((3, model.nv))
+        self.mass: float = pin.computeTotalMass(model)  # total mass [kg]
+        self.position: Array = data.com[0]  # the centre of mass c [m], shape (3,)
+        self.velocity: Array = np.zeros(3)  # c' = J v [m/s], shape (3,)
+        self.jacobian: Array = np.zeros((3, model.nv))  # J, shape (3, nv)
+        # J' = dJ/dt along v, exact, shape (3, nv)
         self.jacobian_dot: Array = np.zeros((3, model.nv))
+        # A, where A v is the angular momentum about c [kg·m²/s], shape (3, nv)
         self.momentum_matrix: Array = np.zeros((3, model.nv))
+        # A' = dA/dt along v, exact, shape (3, nv)
         self.momentum_matrix_dot: Array = np.zeros((3, model.nv))
         momentum = bind_pinocchio("centroidal", model, data, q, v)
         extract = bind(
@@ -53,6 +44,7 @@ class CentroidalMotion:
             self.momentum_matrix,
             self.momentum_matrix_dot,
         )
+        # updates the attributes below to the state, if they are not up to date
         self.compute: Callable[[], object] = once([momentum, extract], stamp)
 
 

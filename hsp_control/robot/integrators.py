@@ -414,15 +414,11 @@ def _of_new_arrays(robot: Robot, bind_dynamics: Bind) -> Dynamics:
 
 
 class _Trial:
-    """An equation that returns NaN where it fails, so that SciPy rejects the step.
-
-    Attributes:
-        failure: The last error, or None.
-    """
+    """An equation that returns NaN where it fails, so that SciPy rejects the step."""
 
     def __init__(self, equation: Equation) -> None:
         self.equation = equation
-        self.failure: Exception | None = None
+        self.failure: Exception | None = None  # the last error, or None
 
     def __call__(self, t: float, y: Array) -> Array:
         if np.isfinite(y).all():

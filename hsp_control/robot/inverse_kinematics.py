@@ -20,29 +20,19 @@ _STILL = 1e-3
 
 
 class Target(NamedTuple):
-    """Where a frame shall be.
+    """Where a frame shall be."""
 
-    Attributes:
-        frame: Name of the frame.
-        place: Its placement in the world; only the position counts for three rows.
-        rows: 3 for its position, 6 for its pose.
-    """
-
-    frame: str
+    frame: str  # name of the frame
+    # its placement in the world; only the position counts for three rows
     place: pin.SE3
-    rows: int
+    rows: int  # 3 for its position, 6 for its pose
 
 
 class Reached(NamedTuple):
-    """A configuration that inverse kinematics found.
+    """A configuration that inverse kinematics found."""
 
-    Attributes:
-        q: The configuration, shape (nq,).
-        error: Distance from the target: the norm of e [m and rad].
-    """
-
-    q: Array
-    error: float
+    q: Array  # the configuration, shape (nq,)
+    error: float  # distance from the target: the norm of e [m and rad]
 
     @property
     def converged(self) -> bool:

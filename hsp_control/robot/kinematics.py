@@ -18,21 +18,14 @@ class FrameMotion(NamedTuple):
 
     In the axes of the frame that it is relative to: the world's, unless said otherwise.
     Linear rows come before angular rows.
-
-    Attributes:
-        jacobian: J, where J v = (velocity of the origin, angular velocity), shape
-            (6, nv).
-        jacobian_dot: J' = dJ/dt along v, exact, shape (6, nv).
-        rotation: Rotation matrix from the frame's axes, shape (3, 3).
-        position: The frame's origin [m], shape (3,).
-        velocity: J v, shape (6,) [m/s, rad/s].
     """
 
+    # J, where J v = (velocity of the origin, angular velocity), shape (6, nv)
     jacobian: Array
-    jacobian_dot: Array
-    rotation: Array
-    position: Array
-    velocity: Array
+    jacobian_dot: Array  # J' = dJ/dt along v, exact, shape (6, nv)
+    rotation: Array  # rotation matrix from the frame's axes, shape (3, 3)
+    position: Array  # the frame's origin [m], shape (3,)
+    velocity: Array  # J v, shape (6,) [m/s, rad/s]
 
     @classmethod
     def allocate(cls, nv: int) -> "FrameMotion":
@@ -42,62 +35,34 @@ class FrameMotion(NamedTuple):
 
 
 class WorldKinematics(NamedTuple):
-    """Placements and Jacobians of all joints, from which distances are computed.
+    """Placements and Jacobians of all joints, from which distances are computed."""
 
-    Attributes:
-        placements: Placements of the joints, shape (njoints, 12): see
-            `joint_placements`.
-        jacobian: Pinocchio's J, in world axes at the world's origin, shape
-            (6, nvExtended): see `joint_support`.
-        jacobian_dot: Its time derivative, shape (6, nvExtended).
-        v: The velocity, shape (nv,).
-    """
-
+    # placements of the joints, shape (njoints, 12): see `joint_placements`
     placements: Array
+    # pinocchio's J, in world axes at the world's origin, shape (6, nvExtended): see
+    # `joint_support`
     jacobian: Array
-    jacobian_dot: Array
-    v: Array
+    jacobian_dot: Array  # its time derivative, shape (6, nvExtended)
+    v: Array  # the velocity, shape (nv,)
 
 
 class _Carrier(NamedTuple):
-    """The joint that carries a frame.
+    """The joint that carries a frame."""
 
-    Attributes:
-        J_world: The Jacobian of all joints at the world's origin, (6, nv_extended).
-        J_world_dot: Its rate.
-        R_joint: Rotation of the joint, shape (3, 3).
-        p_joint: Origin of the joint [m], shape (3,).
-        R_local: Rotation of the frame in the joint, shape (3, 3).
-        p_local: Origin of the frame in the joint [m], shape (3,).
-        columns: The columns of J_world that move the joint.
-        dofs: The indices in v of these columns.
-    """
-
-    J_world: Array
-    J_world_dot: Array
-    R_joint: Array
-    p_joint: Array
-    R_local: Array
-    p_local: Array
-    columns: Indices
-    dofs: Indices
+    J_world: Array  # the Jacobian of all joints at the world's origin, (6, nv_extended)
+    J_world_dot: Array  # its rate
+    R_joint: Array  # rotation of the joint, shape (3, 3)
+    p_joint: Array  # origin of the joint [m], shape (3,)
+    R_local: Array  # rotation of the frame in the joint, shape (3, 3)
+    p_local: Array  # origin of the frame in the joint [m], shape (3,)
+    columns: Indices  # the columns of J_world that move the joint
+    dofs: Indices  # the indices in v of these columns
 
 
 class FrameKinematics:
     """Placement and motion of a frame, in world axes, linear rows before angular rows.
 
     This is Pinocchio's LOCAL_WORLD_ALIGNED.
-
-    Attributes:
-        compute: Updates the attributes below to the state, if they are not up to date.
-        motion: The first five of them, as a record.
-        rotation: Rotation matrix from frame axes to world axes, shape (3, 3).
-        position: The frame's origin in the world [m], shape (3,).
-        jacobian: J, where J v = (velocity of the origin, angular velocity), shape
-            (6, nv).
-        jacobian_dot: J' = dJ/dt along v, exact, shape (6, nv).
-        velocity: J v, shape (6,) [m/s, rad/s].
-        drift: J' v, shape (6,) [m/s², rad/s²]: the classical acceleration for v' = 0.
     """
 
     __slots__ = (
@@ -117,10 +82,14 @@ class FrameKinematics:
         """Allocate the arrays; `compute` fills them."""
         nv, frame = model.nv, model.frames[index]
         joint = data.oMi[frame.parentJoint]  # its arrays are views of data
+        # the first five of them, as a record
         self.motion = motion = FrameMotion.allocate(nv)
+        # J, where J v = (velocity of the origin, angular velocity), and J', (6, nv)
         self.jacobian, self.jacobian_dot = motion.jacobian, motion.jacobian_dot
+        # from frame to world axes, shape (3, 3), and the frame's origin [m], (3,)
         self.rotation, self.position = motion.rotation, motion.position
-        self.velocity = motion.velocity
+        self.velocity = motion.velocity  # J v, shape (6,) [m/s, rad/s]
+        # J' v, shape (6,) [m/s², rad/s²]: the classical acceleration for v' = 0
         self.drift: Array = np.zeros(6)
         carrier = _Carrier(
             matrix_view(data.J),
@@ -131,6 +100,7 @@ class FrameKinematics:
             frame.placement.translation.copy(),
             *joint_support(model, frame.parentJoint),
         )
+        # updates the attributes below to the state, if they are not up to date
         self.compute: Callable[[], object] = bind(
             frame_kinematics,
             stamp,

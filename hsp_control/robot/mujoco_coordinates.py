@@ -52,29 +52,17 @@ _KINDS = {
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint of the Pinocchio model, with what MuJoCo needs of it.
+    """A joint of the Pinocchio model, with what MuJoCo needs of it."""
 
-    Attributes:
-        name: Its name.
-        index: Its index in the Pinocchio model.
-        kind: One of the constants above.
-        q: Index in q where its configuration (a mimic joint: its leader's) begins.
-        v: Index in v where its velocity (a mimic joint: its leader's) begins.
-        axis: The axis of a hinge or a slide, shape (3,).
-        leader: The joint that it mimics, if any.
-        scaling: Factor in position = scaling · leader's position + offset.
-        offset: Offset in that formula [rad or m].
-    """
-
-    name: str
-    index: int
-    kind: str
-    q: int
-    v: int
-    axis: Array
-    leader: "Joint | None" = None
-    scaling: float = 1.0
-    offset: float = 0.0
+    name: str  # its name
+    index: int  # its index in the Pinocchio model
+    kind: str  # one of the constants above
+    q: int  # index in q where its configuration (a mimic joint: its leader's) begins
+    v: int  # index in v where its velocity (a mimic joint: its leader's) begins
+    axis: Array  # the axis of a hinge or a slide, shape (3,)
+    leader: "Joint | None" = None  # the joint that it mimics, if any
+    scaling: float = 1.0  # factor in position = scaling · leader's position + offset
+    offset: float = 0.0  # offset in that formula [rad or m]
 
     @property
     def mujoco_names(self) -> tuple[str, ...]:

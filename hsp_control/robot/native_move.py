@@ -17,12 +17,9 @@ class NativeMove(partial[float]):
     """Copies q and v, if they are valid, and makes native calls at the time.
 
     From Python: (t, q, v) ↦ what the last call returned, or `REFUSED`.
-
-    Attributes:
-        calls: The calls, which own the memory of their arguments.
     """
 
-    calls: Sequence[NativeCall]
+    calls: Sequence[NativeCall]  # the calls, which own the memory of their arguments
 
     @classmethod
     def of(

@@ -68,12 +68,7 @@ Source_co = TypeVar("Source_co", bound=EffortSource, covariant=True)
 class ControlChain(Generic[Source_co]):
     """From a measurement to an effort, in simulations and on robots alike.
 
-        measurement → estimators → plan → command → effort
-
-    Attributes:
-        command: What computes the efforts.
-        needs_sensors: Whether more is needed of a measurement than q and v.
-        plan: What runs of the plan; None without one, or before `begin`.
+    measurement → estimators → plan → command → effort
     """
 
     def __init__(
@@ -83,11 +78,13 @@ class ControlChain(Generic[Source_co]):
         estimators: Sequence[Estimator] = (),
     ) -> None:
         """Set the parts."""
-        self.command = command
+        self.command = command  # what computes the efforts
         self._plan, self._estimators = plan, tuple(estimators)
         self._feels = bool(getattr(command, "feels_contacts", False))
+        # whether more is needed of a measurement than q and v
         self.needs_sensors = plan is not None or bool(estimators) or self._feels
         self._estimating: list[RunningEstimator] = []
+        # what runs of the plan; None without one, or before `begin`
         self.plan: RunningPlan | None = None
         self._status = 0.0
 

@@ -13,19 +13,12 @@ ROUNDING = 1e-12
 
 
 class Decay(NamedTuple):
-    """The prediction of ‖e_N‖_W, or the reason why there is none.
+    """The prediction of ‖e_N‖_W, or the reason why there is none."""
 
-    Attributes:
-        slow: Upper bound, shape (N,); None without a prediction.
-        fast: Lower bound, shape (N,); the same array for a scalar gain.
-        gains: The rates of the upper and the lower bound [1/s].
-        why_not: Why there is no prediction; "" if there is one.
-    """
-
-    slow: Array | None
-    fast: Array | None
-    gains: tuple[float, float]
-    why_not: str
+    slow: Array | None  # upper bound, shape (N,); None without a prediction
+    fast: Array | None  # lower bound, shape (N,); the same array for a scalar gain
+    gains: tuple[float, float]  # the rates of the upper and the lower bound [1/s]
+    why_not: str  # why there is no prediction; "" if there is one
 
 
 def predicted_decay(rollout: Rollout) -> Decay:

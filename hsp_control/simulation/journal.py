@@ -38,15 +38,11 @@ HEADING, ROW, END = b"H", b"R", b"E"
 
 
 class JournalWriter:
-    """Writes a journal.
-
-    Attributes:
-        path: The file.
-    """
+    """Writes a journal."""
 
     def __init__(self, path: Path) -> None:
         """Begin a journal; an existing file is overwritten."""
-        self.path = path
+        self.path = path  # the file
         self._shapes: dict[str, tuple[int, ...]] = {}
         try:
             path.parent.mkdir(parents=True, exist_ok=True)

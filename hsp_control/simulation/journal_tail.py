@@ -22,19 +22,14 @@ _KEPT = 1000
 
 
 class JournalTail:
-    """The last rows of a journal that still grows.
-
-    Attributes:
-        path: The journal.
-        meta: The meta data of the last heading; those of the end once it is there.
-        count: The rows that were read.
-    """
+    """The last rows of a journal that still grows."""
 
     def __init__(self, path: Path) -> None:
         """Begin; the file may appear later."""
-        self.path = path
+        self.path = path  # the journal
+        # the meta data of the last heading; those of the end once it is there
         self.meta: dict[str, Any] = {}
-        self.count = 0
+        self.count = 0  # the rows that were read
         self._read = len(MAGIC)
         self._shapes: dict[str, tuple[int, ...]] = {}
         self._next_shapes: dict[str, tuple[int, ...]] | None = None

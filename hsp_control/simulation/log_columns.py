@@ -12,19 +12,15 @@ MAX_SIZE = 2_000_000_000
 
 
 class LogColumns:
-    """Columns for a known number of rows; what is not written is NaN.
-
-    Attributes:
-        arrays: The columns by name; each has a row for every row of the log.
-        descriptions: The unit and the meaning of each, as JSON data.
-        count: How many rows are complete.
-    """
+    """Columns for a known number of rows; what is not written is NaN."""
 
     def __init__(self, capacity: int) -> None:
         """Begin without columns."""
+        # the columns by name; each has a row for every row of the log
         self.arrays: dict[str, Array] = {}
+        # the unit and the meaning of each, as JSON data
         self.descriptions: dict[str, dict[str, str]] = {}
-        self.count = 0
+        self.count = 0  # how many rows are complete
         self._capacity, self._size = capacity, 0
 
     def add(

@@ -13,19 +13,12 @@ from hsp_control.simulation.log_series import distances
 
 
 class LoggedDistance(NamedTuple):
-    """A minimum distance over time.
+    """A minimum distance over time."""
 
-    Attributes:
-        label: What it measures.
-        values: The distance [m], shape (N,).
-        edge: The distance at contact [m]; None if it is not one number.
-        edge_name: What the edge is; "" for zero, which needs no name.
-    """
-
-    label: str
-    values: Array
-    edge: float | None
-    edge_name: str = ""
+    label: str  # what it measures
+    values: Array  # the distance [m], shape (N,)
+    edge: float | None  # the distance at contact [m]; None if it is not one number
+    edge_name: str = ""  # what the edge is; "" for zero, which needs no name
 
 
 def logged_distances(rollout: Rollout) -> list[LoggedDistance]:

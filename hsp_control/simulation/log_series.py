@@ -14,37 +14,25 @@ _EFFORT_UNITS = {"rad": "N·m", "m": "N"}
 
 
 class ErrorPart(NamedTuple):
-    """The components of a task's error that have the same unit.
+    """The components of a task's error that have the same unit."""
 
-    Attributes:
-        label: The task's name, and the name of the part if there are several, or if it
-            has no unit.
-        unit: The components' unit.
-        task: The task's index among the tasks.
-        norm: The components' Euclidean norm at every row, shape (N,).
-    """
-
+    # the task's name, and the name of the part if there are several, or if it has no
+    # unit
     label: str
-    unit: str
-    task: int
-    norm: Array
+    unit: str  # the components' unit
+    task: int  # the task's index among the tasks
+    norm: Array  # the components' Euclidean norm at every row, shape (N,)
 
 
 class TaskPath(NamedTuple):
-    """The path of a point that a task controls.
+    """The path of a point that a task controls."""
 
-    Attributes:
-        name: The task's name.
-        desired: The desired position [m], shape (N, 3); the actual one along world axes
-            that the task does not track.
-        actual: The actual position [m], shape (N, 3).
-        axes: The world axes that the task tracks, such as ``"xy"``.
-    """
-
-    name: str
+    name: str  # the task's name
+    # the desired position [m], shape (N, 3); the actual one along world axes that the
+    # task does not track
     desired: Array
-    actual: Array
-    axes: str
+    actual: Array  # the actual position [m], shape (N, 3)
+    axes: str  # the world axes that the task tracks, such as ``"xy"``
 
 
 def task_names(rollout: Rollout) -> list[str]:

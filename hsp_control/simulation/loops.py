@@ -31,19 +31,12 @@ RUNAWAY_SPEED = 1e4
 
 
 class Instant(NamedTuple):
-    """One instant of the closed loop; the next one overwrites its arrays.
+    """One instant of the closed loop; the next one overwrites its arrays."""
 
-    Attributes:
-        state: The true state.
-        output: The controller's output for the true state.
-        tau: The commanded effort, computed from the measured state, shape (nv,).
-        log_channels: What the command and the plan log, by name.
-    """
-
-    state: RobotState
-    output: ControlOutput
-    tau: Array
-    log_channels: Mapping[str, LogChannel]
+    state: RobotState  # the true state
+    output: ControlOutput  # the controller's output for the true state
+    tau: Array  # the commanded effort, computed from the measured state, shape (nv,)
+    log_channels: Mapping[str, LogChannel]  # what the command and the plan log, by name
 
 
 def continuous_loop(

@@ -20,21 +20,13 @@ _REACHED = 1e-3
 
 
 class OutOfReach(NamedTuple):
-    """A task whose target leaves the reach of its frame.
+    """A task whose target leaves the reach of its frame."""
 
-    Attributes:
-        task: The task's name.
-        first: The first time at which it is out of reach [s].
-        worst: The time at which it is farthest [s].
-        distance: How far from the nearest place it is then [m].
-        turned: Whether the position alone could be reached.
-    """
-
-    task: str
-    first: float
-    worst: float
-    distance: float
-    turned: bool
+    task: str  # the task's name
+    first: float  # the first time at which it is out of reach [s]
+    worst: float  # the time at which it is farthest [s]
+    distance: float  # how far from the nearest place it is then [m]
+    turned: bool  # whether the position alone could be reached
 
     @property
     def message(self) -> str:

@@ -36,11 +36,7 @@ _EFFORT_UNITS = {"rad": "N·m", "m": "N"}
 
 
 class Recorder:
-    """Columns for a known number of rows; an incomplete row is never returned.
-
-    Attributes:
-        plan: What the robot follows; its streams are recorded. None: no plan.
-    """
+    """Columns for a known number of rows; an incomplete row is never returned."""
 
     def __init__(
         self,
@@ -51,6 +47,7 @@ class Recorder:
     ) -> None:
         """Allocate all columns."""
         self._controller = controller
+        # what the robot follows; its streams are recorded. None: no plan
         self.plan = plan
         self._scene = scene
         self._columns = LogColumns(rows)

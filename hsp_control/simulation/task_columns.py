@@ -28,15 +28,12 @@ STREAM_CHANNELS = {
 
 
 class TaskColumns:
-    """The columns of all tasks of a run; a task that is removed keeps its own.
-
-    Attributes:
-        logged: All tasks that there have been, by their names in the log.
-    """
+    """The columns of all tasks of a run; a task that is removed keeps its own."""
 
     def __init__(self, controller: Controller, columns: LogColumns) -> None:
         """Add the columns of the tasks that there are now."""
         self._controller, self._columns = controller, columns
+        # all tasks that there have been, by their names in the log
         self.logged: dict[str, Task] = {}
         self._levels: dict[str, int] = {}
         self._measured: dict[str, tuple[Array, Array]] = {}  # reference, actual

@@ -20,21 +20,16 @@ _LIMITED = 2  # the log's status from which on a limit changes the motion
 
 
 class Unreached(NamedTuple):
-    """A task and the rows in which its target is not reached.
+    """A task and the rows in which its target is not reached."""
 
-    Attributes:
-        task: Its name in the log.
-        far: Where the error is beyond the task's `largest_error` and not out of reach,
-            shape (N,).
-        out: The error that stays where the target is out of reach, else 0, shape (N,)
-            [m or rad]: the first part of the error that is not reached.
-        unit: Of each number of ``out``, shape (N,).
-    """
-
-    task: str
+    task: str  # its name in the log
+    # where the error is beyond the task's `largest_error` and not out of reach, shape
+    # (N,)
     far: NDArray[np.bool_]
+    # the error that stays where the target is out of reach, else 0, shape (N,) [m or
+    # rad]: the first part of the error that is not reached
     out: Array
-    unit: NDArray[np.object_]
+    unit: NDArray[np.object_]  # of each number of ``out``, shape (N,)
 
     def length(self, row: int) -> str:
         """Return the error that stays in a row."""

@@ -14,18 +14,13 @@ class UnactuatedRows:
     line between them; in the air: all six). Nothing can produce an effort along such a
     motion, so the law must not require one. The rows UᵀM are divided by the robot's
     mass, which makes them comparable with those of tasks.
-
-    Attributes:
-        name: Name of these rows in messages.
-        robot: The robot.
-        rows: The number of free base motions.
     """
 
     def __init__(self, robot: Robot, base: Indices, count: int) -> None:
         """Create the rows."""
-        self.name = "unactuated"
+        self.name = "unactuated"  # name of these rows in messages
         self.robot = robot
-        self.rows = count
+        self.rows = count  # the number of free base motions
         self._base = base
         self._mass = sum(inertia.mass for inertia in robot.model.inertias)
 

@@ -23,40 +23,25 @@ MOTION, EFFORT = 1, 2
 
 
 class MotionLimits(NamedTuple):
-    """The limits that the barriers keep, margins included.
+    """The limits that the barriers keep, margins included."""
 
-    Attributes:
-        lower: Lower position limit, shape (nv,) [rad or m].
-        upper: Upper position limit, shape (nv,) [rad or m].
-        velocity: Maximum speed, shape (nv,) [rad/s or m/s].
-        acceleration: Maximum acceleration, shape (nv,) [rad/s² or m/s²].
-        jerk: How fast the acceleration may change: the effort's rate over the joint's
-            largest inertia, shape (nv,) [rad/s³ or m/s³].
-        bandwidth: α of the barriers, shape (1,) [1/s].
-    """
-
-    lower: Array
-    upper: Array
-    velocity: Array
-    acceleration: Array
+    lower: Array  # lower position limit, shape (nv,) [rad or m]
+    upper: Array  # upper position limit, shape (nv,) [rad or m]
+    velocity: Array  # maximum speed, shape (nv,) [rad/s or m/s]
+    acceleration: Array  # maximum acceleration, shape (nv,) [rad/s² or m/s²]
+    # how fast the acceleration may change: the effort's rate over the joint's largest
+    # inertia, shape (nv,) [rad/s³ or m/s³]
     jerk: Array
-    bandwidth: Array
+    bandwidth: Array  # α of the barriers, shape (1,) [1/s]
 
 
 class Bounds(NamedTuple):
-    """Bounds of one step, shape (nv,) each.
+    """Bounds of one step, shape (nv,) each."""
 
-    Attributes:
-        a_lower: Lower bound on the acceleration.
-        a_upper: Upper bound on the acceleration.
-        tau_lower: Lower bound on the effort.
-        tau_upper: Upper bound on the effort.
-    """
-
-    a_lower: Array
-    a_upper: Array
-    tau_lower: Array
-    tau_upper: Array
+    a_lower: Array  # lower bound on the acceleration
+    a_upper: Array  # upper bound on the acceleration
+    tau_lower: Array  # lower bound on the effort
+    tau_upper: Array  # upper bound on the effort
 
 
 @kernel

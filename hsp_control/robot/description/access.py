@@ -16,12 +16,9 @@ from hsp_control.common.resources import bundled
 
 @dataclass(frozen=True)
 class Access:
-    """Which files may be read.
+    """Which files may be read."""
 
-    Attributes:
-        folders: Resolved paths of the allowed folders; None: every file is allowed.
-    """
-
+    # resolved paths of the allowed folders; None: every file is allowed
     folders: tuple[Path, ...] | None = None
 
     @property

@@ -19,17 +19,11 @@ from hsp_control.robot.description.sources import RobotSource
 
 @dataclass(frozen=True)
 class Part:
-    """One robot of a combined robot.
+    """One robot of a combined robot."""
 
-    Attributes:
-        prefix: The names of its joints and frames begin with this, e.g. ``left_``.
-        source: Where the robot comes from.
-        placement: Placement of its root in the world.
-    """
-
-    prefix: str
-    source: RobotSource
-    placement: pin.SE3
+    prefix: str  # the names of its joints and frames begin with this, e.g. ``left_``
+    source: RobotSource  # where the robot comes from
+    placement: pin.SE3  # placement of its root in the world
 
 
 def combine(parts: Sequence[tuple[Part, pin.Model]]) -> pin.Model:

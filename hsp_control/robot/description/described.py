@@ -17,19 +17,12 @@ PACKAGE = "robot_descriptions"
 
 
 class Described(NamedTuple):
-    """Where the files of a robot are.
+    """Where the files of a robot are."""
 
-    Attributes:
-        file: Its URDF, or the xacro file that makes it.
-        xacro_args: Arguments of the xacro file, by name.
-        package_dirs: Folders in which ``package://`` is looked up.
-        srdf: Its SRDF, if it has one.
-    """
-
-    file: Path
-    xacro_args: dict[str, str]
-    package_dirs: tuple[Path, ...]
-    srdf: Path | None
+    file: Path  # its URDF, or the xacro file that makes it
+    xacro_args: dict[str, str]  # arguments of the xacro file, by name
+    package_dirs: tuple[Path, ...]  # folders in which ``package://`` is looked up
+    srdf: Path | None  # its SRDF, if it has one
 
 
 def described_names() -> tuple[str, ...]:

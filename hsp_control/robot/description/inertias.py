@@ -34,19 +34,12 @@ _PLACES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 
 class ImpossibleInertia(NamedTuple):
-    """The inertia of a link that no body can have.
+    """The inertia of a link that no body can have."""
 
-    Attributes:
-        link: Name of the link.
-        element: Its element ``<inertia>``.
-        moments: The principal moments in the file, in ascending order [kg·m²].
-        nearest: The nearest inertia of a body, shape (3, 3) [kg·m²].
-    """
-
-    link: str
-    element: Element
-    moments: Array
-    nearest: Array
+    link: str  # name of the link
+    element: Element  # its element ``<inertia>``
+    moments: Array  # the principal moments in the file, in ascending order [kg·m²]
+    nearest: Array  # the nearest inertia of a body, shape (3, 3) [kg·m²]
 
     @property
     def reason(self) -> str:

@@ -42,45 +42,36 @@ _END_EFFECTORS = {
 
 @dataclass(frozen=True)
 class RobotSource:
-    """Where a robot comes from, and the settings that its folder gives.
+    """Where a robot comes from, and the settings that its folder gives."""
 
-    Attributes:
-        name: Name of a known robot, or the URDF file's name without ``.urdf``.
-        urdf: The URDF file. Of a robot in a MuJoCo model, whose `shapes` are given:
-            the MJCF file, or the model's name if it was compiled in Python.
-        srdf: The SRDF file (reference postures, disabled collision pairs), if any.
-        root: The default root: ``fixed``, ``planar`` or ``free_flyer``.
-        package_dirs: Folders in which ``package://`` is looked up.
-        origin: ``bundled``, ``example-robot-data``, ``robot_descriptions``, ``file``,
-            ``mujoco`` or ``combined``.
-        locked: Joints that are locked by default, name to value [rad or m].
-        end_effector: The frame that tasks use by default, if known.
-        home: Joint values of a good start posture, shape (nv,) [rad or m], if known.
-        posture: Name of the reference posture in the SRDF, if known.
-        joint_coordinates: Which coordinates theta = A q the literature uses for this
-            robot (``absolute`` for the planar arm), if not q.
-        access: Which files its URDF may name.
-        shapes: The shapes of its bodies, if they are not in a URDF.
-        excluded: Pairs of bodies that never collide, besides those of the SRDF.
-        omitted: What the model that it comes from has and the robot lacks, in words.
-        expanded: The URDF that xacro makes of the file; None if the file is the URDF.
-    """
-
-    name: str
+    name: str  # name of a known robot, or the URDF file's name without ``.urdf``
+    # the URDF file. Of a robot in a MuJoCo model, whose `shapes` are given: the MJCF
+    # file, or the model's name if it was compiled in Python
     urdf: Path
+    # the SRDF file (reference postures, disabled collision pairs), if any
     srdf: Path | None = None
-    root: Root = "fixed"
-    package_dirs: tuple[Path, ...] = ()
+    root: Root = "fixed"  # the default root: ``fixed``, ``planar`` or ``free_flyer``
+    package_dirs: tuple[Path, ...] = ()  # folders in which ``package://`` is looked up
+    # ``bundled``, ``example-robot-data``, ``robot_descriptions``, ``file``, ``mujoco``
+    # or ``combined``
     origin: str = "file"
+    # joints that are locked by default, name to value [rad or m]
     locked: Mapping[str, float] = field(default_factory=dict)
-    end_effector: str | None = None
+    end_effector: str | None = None  # the frame that tasks use by default, if known
+    # joint values of a good start posture, shape (nv,) [rad or m], if known
     home: tuple[float, ...] | None = None
-    posture: str | None = None
+    posture: str | None = None  # name of the reference posture in the SRDF, if known
+    # which coordinates theta = A q the literature uses for this robot (``absolute`` for
+    # the planar arm), if not q
     joint_coordinates: str | None = None
-    access: Access = ANYWHERE
+    access: Access = ANYWHERE  # which files its URDF may name
+    # the shapes of its bodies, if they are not in a URDF
     shapes: tuple[BodyShape, ...] | None = field(default=None, repr=False)
+    # pairs of bodies that never collide, besides those of the SRDF
     excluded: frozenset[frozenset[str]] = frozenset()
+    # what the model that it comes from has and the robot lacks, in words
     omitted: tuple[str, ...] = ()
+    # the URDF that xacro makes of the file; None if the file is the URDF
     expanded: str | None = None
 
 

@@ -20,17 +20,12 @@ MAX_DEPTH = 100
 
 
 class XmlError(Exception):
-    """XML that is malformed or not allowed.
-
-    Attributes:
-        line: Line number, from 1; 0 if the whole file is meant.
-        message: What is wrong.
-        column: Column number, from 1; 0 if the whole line is meant.
-    """
+    """XML that is malformed or not allowed."""
 
     def __init__(self, line: int, message: str, column: int = 0) -> None:
         """Store all; the caller adds the name of the file."""
         super().__init__(line, message, column)
+        # line and column from 1; 0 if the whole file or line is meant
         self.line, self.message, self.column = line, message, column
 
     def within(self, file: Path | str) -> str:

@@ -49,11 +49,7 @@ def dofs_of(model: Any, joint: int) -> slice:
 
 
 class _Builder:
-    """Adds the bodies of a scene to a model, from the world outwards.
-
-    Attributes:
-        model: The model.
-    """
+    """Adds the bodies of a scene to a model, from the world outwards."""
 
     def __init__(self, selection: Selection) -> None:
         self._selection, self._scene = selection, selection.model

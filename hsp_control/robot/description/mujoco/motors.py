@@ -11,21 +11,13 @@ from hsp_control.robot.description.mujoco.constants import constants
 
 @dataclass(frozen=True)
 class Motor:
-    """An actuator whose force on one hinge or slide is its control, times a factor.
+    """An actuator whose force on one hinge or slide is its control, times a factor."""
 
-    Attributes:
-        actuator: Its number.
-        control: The address of its control in ``ctrl``.
-        factor: Effort per control: its gain times its gear.
-        lower: Its lowest effort [N·m or N].
-        upper: Its highest effort [N·m or N].
-    """
-
-    actuator: int
-    control: int
-    factor: float
-    lower: float
-    upper: float
+    actuator: int  # its number
+    control: int  # the address of its control in ``ctrl``
+    factor: float  # effort per control: its gain times its gear
+    lower: float  # its lowest effort [N·m or N]
+    upper: float  # its highest effort [N·m or N]
 
 
 def joint_actuators(model: Any) -> dict[int, list[int]]:

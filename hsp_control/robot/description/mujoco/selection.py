@@ -21,25 +21,18 @@ from hsp_control.robot.description.mujoco.names import Names
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """A robot in a MuJoCo scene.
+    """A robot in a MuJoCo scene."""
 
-    Attributes:
-        model: The compiled model of the scene.
-        names: Its names.
-        root: The body whose subtree is the robot; 0: the robot is the whole scene.
-        bodies: The bodies of that subtree, in ascending order.
-        moving: The joints that move, in ascending order: the order of q and v.
-        qpos: The scene's configuration, shape (model.nq,): all other joints are locked
-            there, and the robot's home is there.
-        chosen: Whether that configuration was chosen; otherwise it is the model's own.
-    """
-
-    model: Any
-    names: Names
-    root: int
-    bodies: tuple[int, ...]
+    model: Any  # the compiled model of the scene
+    names: Names  # its names
+    root: int  # the body whose subtree is the robot; 0: the robot is the whole scene
+    bodies: tuple[int, ...]  # the bodies of that subtree, in ascending order
+    # the joints that move, in ascending order: the order of q and v
     moving: tuple[int, ...]
+    # the scene's configuration, shape (model.nq,): all other joints are locked there,
+    # and the robot's home is there
     qpos: Array
+    # whether that configuration was chosen; otherwise it is the model's own
     chosen: bool
 
     @property

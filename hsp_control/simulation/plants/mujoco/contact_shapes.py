@@ -67,17 +67,11 @@ ContactShapes = Annotated[
 
 @dataclass(frozen=True)
 class Geom:
-    """A MuJoCo geom.
+    """A MuJoCo geom."""
 
-    Attributes:
-        type: Its MuJoCo type.
-        size: Its MuJoCo size [m].
-        placement: Its placement in its joint's frame.
-    """
-
-    type: str
-    size: tuple[float, ...]
-    placement: pin.SE3
+    type: str  # its MuJoCo type
+    size: tuple[float, ...]  # its MuJoCo size [m]
+    placement: pin.SE3  # its placement in its joint's frame
 
 
 def geoms_of(robot: Robot, contact: ContactShape) -> list[Geom]:

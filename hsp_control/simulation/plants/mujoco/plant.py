@@ -38,12 +38,6 @@ class MujocoPlant(SampledPlant):
 
     The declared contacts can touch a flat ground and the declared solids; there are no
     other collisions.
-
-    Attributes:
-        mjcf: The model as MJCF text, for MuJoCo's own tools.
-        model: MuJoCo's model.
-        data: MuJoCo's data.
-        coordinates: Converts between Pinocchio's coordinates and MuJoCo's.
     """
 
     def __init__(
@@ -111,6 +105,7 @@ class MujocoPlant(SampledPlant):
                 name = f"{contact.frame}/{len(frame_of_geom)}"
                 geoms.setdefault(joint, []).append((name, geom))
                 frame_of_geom[name] = contact.frame
+        # the model as MJCF text, for MuJoCo's own tools
         self.mjcf = write_mjcf(
             robot,
             joints,
@@ -122,13 +117,15 @@ class MujocoPlant(SampledPlant):
             solids=self.solids,
         )
         try:
+            # MuJoCo's model
             self.model: Any = mujoco.MjModel.from_xml_string(self.mjcf)
         except ValueError as error:
             reason = str(error).strip().splitlines()[0]
             raise SimulationError(f"MuJoCo rejects {robot.name}: {reason}") from error
-        self.data: Any = mujoco.MjData(self.model)
+        self.data: Any = mujoco.MjData(self.model)  # MuJoCo's data
         names = [name for joint in joints for name in joint.mujoco_names]
         made = [self.model.joint(name) for name in names]
+        # converts between Pinocchio's coordinates and MuJoCo's
         self.coordinates = MujocoCoordinates(
             robot,
             joints,

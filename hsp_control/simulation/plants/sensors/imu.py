@@ -63,13 +63,7 @@ class Imu(Sensor, type="imu"):
 
 
 class RunningImu:
-    """An `Imu` in one run.
-
-    Attributes:
-        reading: What it reported last.
-        gyroscope_bias: b_g, shape (3,) [rad/s].
-        accelerometer_bias: b_a, shape (3,) [m/s²].
-    """
+    """An `Imu` in one run."""
 
     def __init__(
         self, imu: Imu, robot: Robot, frame: int, random: np.random.Generator
@@ -78,10 +72,13 @@ class RunningImu:
         self._imu, self._model, self._frame = imu, robot.model, frame
         self._data = robot.model.createData()
         self._random = random
+        # b_g, shape (3,) [rad/s]
         self.gyroscope_bias: Array = imu.gyroscope_bias * random.standard_normal(3)
+        # b_a, shape (3,) [m/s²]
         self.accelerometer_bias: Array = imu.accelerometer_bias * (
             random.standard_normal(3)
         )
+        # what it reported last
         self.reading = Inertial(imu.frame, np.zeros(3), np.zeros(3))
         self._last: tuple[float, Array, Array] | None = None
 
