@@ -1,7 +1,8 @@
-"""MuJoCo as a plant: a physics engine with its own contacts, friction, integrator."""
+"""MuJoCo as a plant: the robot is translated to a MuJoCo model."""
 
 import importlib
 from collections.abc import Mapping, Sequence
+from dataclasses import KW_ONLY
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -11,24 +12,32 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.control.log_channel import LogChannel
 from hsp_control.declaration import within
+from hsp_control.declaration.quantities import Flag, Positive
 from hsp_control.robot import Robot
 from hsp_control.robot.friction import JointFriction
+from hsp_control.robot.integrators import Integrator
 from hsp_control.robot.mujoco_coordinates import MujocoCoordinates, joints_of
 from hsp_control.robot.step_count import number_of_steps
 from hsp_control.simulation.plants.contact_channels import contact_channels
 from hsp_control.simulation.plants.floating_roots import FloatingRoots
 from hsp_control.simulation.plants.json_data import to_json_data
-from hsp_control.simulation.plants.mujoco.contact_shapes import ContactShape, geoms_of
 from hsp_control.simulation.plants.mujoco.engine import (
     check_motion,
     contact_wrenches,
     import_mujoco,
 )
-from hsp_control.simulation.plants.mujoco.ground import Ground
-from hsp_control.simulation.plants.mujoco.mjcf import write_mjcf
-from hsp_control.simulation.plants.mujoco.solids import Solid
+from hsp_control.simulation.plants.mujoco.mjcf import (
+    ContactShape,
+    ContactShapes,
+    Ground,
+    Solid,
+    Solids,
+    geoms_of,
+    write_mjcf,
+)
 from hsp_control.simulation.plants.plant import SampledPlant
 from hsp_control.simulation.plants.push import Push, Pushes
+from hsp_control.simulation.plants.rigid_body import FrictionalPart
 
 MujocoIntegrator = Literal["Euler", "RK4", "implicit", "implicitfast"]
 
@@ -251,3 +260,46 @@ class MujocoPlant(SampledPlant):
             for name, frame in self._origins.items()
         }
         return contact_wrenches(self.model, self.data, self._geoms, origins)
+
+
+class Mujoco(FrictionalPart, type="mujoco"):
+    """MuJoCo, with its own integrator, friction and contacts."""
+
+    _: KW_ONLY
+    timestep: Positive = 0.001
+    """Maximum step of MuJoCo [s]."""
+    integrator: MujocoIntegrator = "implicitfast"
+    """Integrator of MuJoCo [-]."""
+    joint_limits: Flag = True
+    """Whether MuJoCo keeps joints within their limits [-]."""
+    contacts: ContactShapes = ()
+    """Shapes that may touch the ground and the solids, by frame name [-]."""
+    ground: Ground = Ground()
+    """The ground [-]; it exists only if `contacts` has entries."""
+    solids: Solids = ()
+    """Walls, tables, slopes and stairs, by name [-]."""
+
+    @property
+    def longest_step(self) -> float:
+        """The longest step of MuJoCo [s]."""
+        return self.timestep
+
+    def engine(self, robot: Robot, integrator: Integrator) -> MujocoPlant:
+        """Return the plant, which has its own integrator.
+
+        Raises:
+            SimulationError: If MuJoCo is not installed or rejects the model.
+            ModelError: If a joint has no counterpart in MuJoCo.
+            FrameNotFoundError: If a frame does not exist.
+        """
+        return MujocoPlant(
+            robot,
+            timestep=self.timestep,
+            integrator=self.integrator,
+            contacts=self.contacts,
+            ground=self.ground,
+            solids=self.solids,
+            joint_limits=self.joint_limits,
+            friction=self.joint_friction(robot),
+            pushes=self.pushes,
+        )
