@@ -9,11 +9,15 @@ from hsp_control.common.exceptions import HspControlError
 from hsp_control.config.document import Document
 from hsp_control.declaration import Part
 from hsp_control.declaration.families import only_packages
-from hsp_control.declaration.findings import Finding, Pending, findings
 from hsp_control.declaration.located import locate
-from hsp_control.declaration.mistakes import domain_error
+from hsp_control.declaration.mistakes import (
+    Finding,
+    Pending,
+    domain_error,
+    explained,
+    findings,
+)
 from hsp_control.declaration.schema import shape
-from hsp_control.declaration.wording import explained
 
 Value = TypeVar("Value", bound=Part)
 

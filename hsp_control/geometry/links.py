@@ -14,11 +14,11 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ModelError
 from hsp_control.common.suggestions import listing
-from hsp_control.geometry.body_geometry import (
+from hsp_control.geometry.capsule_fit import (
     body_geometry,
+    enclosing_capsule,
     enclosing_ellipsoid_capsule,
 )
-from hsp_control.geometry.capsule_fit import enclosing_capsule
 from hsp_control.geometry.hulls import convex_hull, hull_corners
 from hsp_control.robot import Robot
 from hsp_control.robot.description import mesh_files

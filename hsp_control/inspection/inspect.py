@@ -9,14 +9,17 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.exceptions import ModelError
-from hsp_control.inspection.elements import check_elements
+from hsp_control.inspection.checks import (
+    check_elements,
+    check_home,
+    check_inertias,
+    check_limits,
+    check_mass_matrix,
+    check_meshes,
+    check_self_collisions,
+    worst_condition,
+)
 from hsp_control.inspection.finding import Finding
-from hsp_control.inspection.home import check_home
-from hsp_control.inspection.inertias import check_inertias
-from hsp_control.inspection.limits import check_limits
-from hsp_control.inspection.mass_matrix import check_mass_matrix, worst_condition
-from hsp_control.inspection.meshes import check_meshes
-from hsp_control.inspection.self_collisions import check_self_collisions
 from hsp_control.inspection.strength import check_strength
 from hsp_control.robot import Robot, RobotDescription
 from hsp_control.robot.description.loading import load_model

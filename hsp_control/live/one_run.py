@@ -8,8 +8,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FallError
 from hsp_control.live.balance import Balance
 from hsp_control.live.effort_limiter import EffortLimiter
-from hsp_control.live.failures import described
-from hsp_control.live.hardware import Hardware
+from hsp_control.live.hardware import Hardware, described
 from hsp_control.live.live_log import LoopLog
 from hsp_control.live.operator_requests import OperatorRequests
 from hsp_control.live.report import Ended, LoopReport

@@ -9,7 +9,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LiveError
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import RobotLimits
-from hsp_control.constraints.limits.numbers_by_joint import Positives, by_dof
+from hsp_control.constraints.limits.joint_numbers import Positives, by_dof
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import (
     Count,

@@ -18,9 +18,9 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import ImmutableError, NonFiniteError
 from hsp_control.common.native import NativeCall, once
-from hsp_control.robot.centroidal import CentroidalMotion
 from hsp_control.robot.configuration_space import as_numbers
 from hsp_control.robot.kinematics import (
+    CentroidalMotion,
     FrameKinematics,
     WorldKinematics,
     joint_placements,

@@ -1,9 +1,13 @@
-"""Series for plots, computed from a log: task errors, joint positions, units, names."""
+"""Series for plots, computed from a log: errors, positions, distances, units, names.
+
+A clearance measures between surfaces, which touch at zero. The paper's cost measures
+from joints to an obstacle's centre: a joint is inside a ball below the ball's radius.
+"""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import accumulate
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -188,3 +192,99 @@ def chosen_rows(
     else:
         rows = np.array([np.argmin(np.abs(t - time)) for time in times], dtype=int)
     return [int(row) for row in np.unique(rows)]
+
+
+class LoggedDistance(NamedTuple):
+    """A minimum distance over time."""
+
+    label: str  # what it measures
+    values: Array  # the distance [m], shape (N,)
+    edge: float | None  # the distance at contact [m]; None if it is not one number
+    edge_name: str = ""  # what the edge is; "" for zero, which needs no name
+
+
+def logged_distances(rollout: Rollout) -> list[LoggedDistance]:
+    """Return the minimum distances in a log."""
+    names = distances(rollout)
+    labels = [distance_label(rollout.meta, name) for name in names]
+    found = []
+    for name, label in zip(names, labels, strict=True):
+        unique = label if labels.count(label) == 1 else f"{label} ({name})"
+        edge, edge_name = _edge(rollout.meta, name)
+        values = rollout[f"distance.{name}"]
+        found.append(LoggedDistance(unique, values, edge, edge_name))
+    return found
+
+
+def distance_label(meta: Mapping[str, Any], name: str) -> str:
+    """Return what a distance measures."""
+    center = _center_of(meta, name)
+    return f"joint to centre of {center}" if center else name.replace("_", " ")
+
+
+def _center_of(meta: Mapping[str, Any], name: str) -> str:
+    """Return the obstacle to whose centre a distance leads; "" if to surfaces."""
+    about = meta.get("columns", {}).get(f"distance.{name}", {})
+    return str(about.get("center_of", ""))
+
+
+def _edge(meta: Mapping[str, Any], name: str) -> tuple[float | None, str]:
+    center = _center_of(meta, name)
+    if not center:
+        return 0.0, ""
+    about = meta.get("obstacles", {}).get(center, {})
+    # Only a ball has its surface at one distance from its centre.
+    if about.get("shape") != "Sphere" or about.get("radius") is None:
+        return None, ""
+    radius = float(about["radius"])
+    return radius, f"radius {radius:g} m"
+
+
+ROUNDING = 1e-12
+"""Ratio of ‖e_N(0)‖ to the speeds it is computed from, below which it is rounding."""
+
+
+class Decay(NamedTuple):
+    """The prediction of ‖e_N‖_W, or the reason why there is none."""
+
+    slow: Array | None  # upper bound, shape (N,); None without a prediction
+    fast: Array | None  # lower bound, shape (N,); the same array for a scalar gain
+    gains: tuple[float, float]  # the rates of the upper and the lower bound [1/s]
+    why_not: str  # why there is no prediction; "" if there is one
+
+
+def predicted_decay(rollout: Rollout) -> Decay:
+    """Return ‖e_N(0)‖_W exp(-K_N t), or bounds for a matrix K_N.
+
+    ``docs/law.md``, Equations (7) and (13) over a metric, Proposition 2.
+    V' = -e_NᵀW K_N e_N lies between -2V times the largest and -2V times the smallest
+    eigenvalue of the symmetric part of W K_N relative to W.
+    """
+    if not rollout.meta.get("controls_null_space", True):
+        why = "no prediction: self-motion is not controlled"
+        return Decay(None, None, (0.0, 0.0), why)
+    gain = rollout.meta.get("null_space_gain")
+    if gain is None:
+        why = "no prediction: $K_N$ not in the log"
+        return Decay(None, None, (0.0, 0.0), why)
+    K_N = np.asarray(gain, dtype=float)
+    multiple = K_N[0, 0] * np.eye(len(K_N))
+    scalar = np.array_equal(K_N, multiple)
+    W = np.eye(len(K_N)) if scalar else constant_metric(rollout)
+    if W is None:
+        why = "no prediction: $K_N$ is a matrix, $W$ not in the log"
+        return Decay(None, None, (0.0, 0.0), why)
+    power = 0.5 * (W @ K_N + (W @ K_N).T)
+    from scipy.linalg import eigh  # here: SciPy takes long to import
+
+    rates = eigh(power, W, eigvals_only=True)
+    slowest, fastest = float(rates[0]), float(rates[-1])
+    norm, elapsed = rollout["null_space_norm"], rollout.t - rollout.t[0]
+    speeds = np.linalg.norm(rollout["field.g"], axis=1)
+    speeds = speeds + np.linalg.norm(rollout.v, axis=1)
+    if not norm[0] > ROUNDING * float(speeds.max()):
+        why = "no prediction: starts with $e_N$ = 0"
+        return Decay(None, None, (slowest, fastest), why)
+    slow = norm[0] * np.exp(-slowest * elapsed)
+    fast = slow if scalar else norm[0] * np.exp(-fastest * elapsed)
+    return Decay(slow, fast, (slowest, fastest), "")

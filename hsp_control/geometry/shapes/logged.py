@@ -5,7 +5,7 @@ from typing import Any
 
 from hsp_control.declaration.families import value_fields
 from hsp_control.declaration.quantities import plain
-from hsp_control.geometry.shapes.shape import Shape
+from hsp_control.geometry.shapes.primitives import Shape
 
 
 def shape_to_log(shape: Shape) -> dict[str, Any]:

@@ -1,4 +1,8 @@
-"""A robot in a MuJoCo scene, which moves as MuJoCo says."""
+"""A robot in a MuJoCo scene, which moves as MuJoCo says.
+
+MuJoCo has no contacts between a body and its parent, except where the parent stands
+still: a base that its first link overlaps holds this link like a brake.
+"""
 
 import importlib
 import logging
@@ -17,9 +21,9 @@ from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Flag
 from hsp_control.declaration.quantities import Names as NameList
 from hsp_control.robot import MujocoCoordinates, Robot
-from hsp_control.robot.description.mujoco.compiling import compile_mjcf
 from hsp_control.robot.description.mujoco.motors import Motor, joint_actuators, motor
 from hsp_control.robot.description.mujoco.names import Names
+from hsp_control.robot.description.mujoco.source import compile_mjcf
 from hsp_control.robot.integrators import Integrator
 from hsp_control.robot.step_count import number_of_steps
 from hsp_control.simulation.plants.contact_channels import contact_channels
