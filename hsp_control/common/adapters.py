@@ -164,10 +164,7 @@ def _unpacked(typing: Any, words: Any, kind: Any) -> Any:
 
 @cache
 def foreign_adapter(count: int) -> int:
-    """Return the address of what calls a C function with ``count`` words.
-
-    The words are the function's address and its arguments: integers and pointers.
-    """
+    """Return the address of what calls a C function with ``count`` words."""
     place = {
         "__name__": __name__,
         "words_of_call": cast("Any", types).UniTuple(types.int64, count + 1),

@@ -83,10 +83,7 @@ _watchers: list[Callable[[], AbstractContextManager[None]]] = []
 
 @contextmanager
 def watched(watcher: Callable[[], AbstractContextManager[None]]) -> Iterator[None]:
-    """Enter the watcher's context around each compilation not found on disk.
-
-    Those of the kernels that a kernel calls lie within its own.
-    """
+    """Enter the watcher's context around each compilation not found on disk."""
     _watchers.append(watcher)
     try:
         yield

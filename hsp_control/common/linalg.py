@@ -41,10 +41,7 @@ def multiply_transposed(A: Array, x: Array, out: Array) -> None:
 
 @kernel
 def add_rows(weights: Array, rows: Array, out: Array) -> None:
-    """Add Σ weight row to out, shape (n,), for as many rows as weights.
-
-    Four rows at a time: out is read and written a quarter as often.
-    """
+    """Add Σ weight row to out, shape (n,), for as many rows as weights."""
     count, n = weights.shape[0], out.shape[0]
     for group in range(count // 4):
         r = 4 * group
@@ -71,10 +68,7 @@ def norm(W: Array, x: Array) -> float:
 
 @kernel
 def cholesky(A: Array, L: Array) -> bool:
-    """Write the Cholesky factor L of A = L Lᵀ; return whether A is positive definite.
-
-    Shapes (n, n). If A is not positive definite, L is incomplete.
-    """
+    """Write the factor L of A = L Lᵀ (n, n); return whether A is positive definite."""
     n = A.shape[0]
     for j in range(n):
         pivot = A[j, j]
@@ -130,10 +124,7 @@ def solve_rows_transposed(L: Array, X: Array) -> None:
 
 @kernel
 def solve_columns(L: Array, X: Array) -> None:
-    """Overwrite X with (L Lᵀ)⁻¹ X; shapes (m, m) and (m, n).
-
-    The loops follow the rows of X, in the order of memory.
-    """
+    """Overwrite X with (L Lᵀ)⁻¹ X; shapes (m, m) and (m, n)."""
     m, n = X.shape
     for i in range(m):
         for k in range(i):
@@ -261,11 +252,7 @@ def squared_norm(x: Array) -> float:
 
 @kernel
 def smallest_singular_value_bound(X: Array) -> float:
-    """Return 1/√‖X Xᵀ‖_F for the X of `orthonormalise_rows`, shape (m, m).
-
-    It is a lower bound of the smallest singular value, too small by a factor of the
-    fourth root of m at most: tighter than what `orthonormalise_rows` returns.
-    """
+    """Return 1/√‖X Xᵀ‖_F (m, m), a lower bound of the smallest singular value."""
     m = X.shape[0]
     square = 0.0
     for i in range(m):

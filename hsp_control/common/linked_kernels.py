@@ -89,11 +89,7 @@ class _Passes(cast("Any", compiler_machinery).PassManager):  # type: ignore[misc
 
 
 class KernelCompiler(cast("Any", compiler).CompilerBase):  # type: ignore[misc]
-    """Numba's compiler without the passes that find nothing in kernels.
-
-    These look for array expressions, which would allocate, for closures, for what
-    is inlined before it is typed, and for the last use of what has to be freed.
-    """
+    """Numba's compiler without the passes that find nothing in kernels."""
 
     def define_pipelines(self) -> list[Any]:
         """Return the passes."""
@@ -133,10 +129,7 @@ class _Flags(cast("Any", compiler).Flags):  # type: ignore[misc]
 
 
 class _Typing(type(_target.typing_context)):  # type: ignore[misc]
-    """Says what calls mean for the types of their arguments; of Numba's own once.
-
-    Numba tries out all that an operator can mean each time: most of type inference.
-    """
+    """Says what calls mean for the types of their arguments; asks Numba once."""
 
     def resolve_function_type(self, func: Any, args: Any, kws: Any) -> Any:
         """Return the signature of a call."""

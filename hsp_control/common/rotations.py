@@ -200,10 +200,7 @@ def quaternion_from_rotation(R: Array, out: Array) -> None:
 
 @kernel
 def _quaternion(R: Array) -> tuple[float, float, float, float]:
-    """Return (x, y, z, w), w >= 0, from the row of 4 q qᵀ with the largest diagonal.
-
-    The four diagonal entries add up to 4, so the largest is at least 1.
-    """
+    """Return (x, y, z, w), w >= 0, from the row of 4 q qᵀ with the largest diagonal."""
     a, b, c = R[0, 0], R[1, 1], R[2, 2]
     if a + b + c >= max(a, b, c):
         x, y, z = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]

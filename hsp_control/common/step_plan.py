@@ -14,10 +14,7 @@ def stay(t: float) -> None:
 
 
 class StepPlan(NamedTuple):
-    """The calls that evaluate one part of a controller, at whatever the state is.
-
-    To find out at every step what to call would cost as much as the small kernels do.
-    """
+    """The calls that evaluate one part of a controller, at whatever the state is."""
 
     # calls of the time [s] that update references
     follow: tuple[Callable[[float], object], ...] = ()
@@ -57,11 +54,7 @@ class TimeWindow:
 def steps(
     plans: Iterable[StepPlan], last: Callable[[], Any]
 ) -> list[Callable[[float], Any]]:
-    """Return the calls of a step, each to be given the time: all plans, then ``last``.
-
-    All references are updated before anything reads them. Native calls that follow one
-    another become one call.
-    """
+    """Return the calls of a step: all references first; native ones as one call."""
     plans = list(plans)
     parts = [part for p in plans for follow in p.follow for part in _parts(follow)]
     for write in [*(write for p in plans for write in p.write), last]:

@@ -19,11 +19,7 @@ from hsp_control.robot.description.access import ANYWHERE
 
 
 def assign(data: dict[str, Any], keys: list[str], value: Any) -> KeyPath:
-    """Set the value at a key path, and return the key path.
-
-    Missing keys of mappings are created (also in a mapping that was left empty); the
-    schema then checks them. List entries are given by number and must exist.
-    """
+    """Set the value at a key path, and create missing keys; the schema checks them."""
     if len(keys) > MAX_DEPTH:
         raise ValueError(f"nested deeper than {MAX_DEPTH} levels")
     holder: Any = data
@@ -116,9 +112,7 @@ class Document:
     def override(self, assignment: str) -> None:
         """Change one value by ``tasks.0.gains.kp=100``, the argument of ``--set``.
 
-        The value is YAML. Missing keys are created, and the schema then checks them;
-        missing list entries are an error. Keys that contain a dot need quotes:
-        ``frames.'a.b'.parent=x``.
+        The value is YAML. Keys with a dot need quotes: ``frames.'a.b'.parent=x``.
         """
         origin = shortened(f"--set {' '.join(assignment.split())}", _LONGEST_ORIGIN)
         try:
@@ -153,18 +147,12 @@ class Document:
         return True
 
     def says_nothing(self, key: str) -> bool:
-        """Return whether the text has the key with nothing behind it.
-
-        Logs and dictionaries can have None there, as Python has.
-        """
+        """Return whether the text has the key with nothing behind it."""
         given = self._data.get(key, self) is None
         return given and isinstance(self._origins.get((key,)), Mark)
 
     def mark(self, path: KeyPath) -> Mark | None:
-        """Return the place of a key path in the text, None if it was overridden.
-
-        For a path that does not exist it is the place of its nearest ancestor.
-        """
+        """Return the place of a key path in the text, None if it was overridden."""
         origin = self._origin(path)
         return origin if isinstance(origin, Mark) else None
 

@@ -30,10 +30,7 @@ def check_rates(
     q0: Array,
     moving: Robot,
 ) -> tuple[RateFinding, ...]:
-    """Check that the loop is stable at its rate; return gains that are high for it.
-
-    The delays are the plant's, compensated or not; the bodies are the moving robot's.
-    """
+    """Check that the loop is stable at its rate; return gains that are high for it."""
     settings, plant = scenario.simulation, scenario.plant
     if settings.control_period is None or not settings.check_rate:
         return ()

@@ -24,10 +24,7 @@ def read_document(
     strict: bool = False,
     allow: Sequence[str | PathLike[str]] = (),
 ) -> Document:
-    """Return the configuration's data with the location of each key.
-
-    See `load_experiment` for the arguments.
-    """
+    """Return the configuration's data with the location of each key."""
     document = _read(source)
     if strict:
         own = [] if isinstance(source, dict) else [Path(document.name).parent]

@@ -60,10 +60,7 @@ def with_recordings(
 
 
 def without_sources(config: Mapping[str, Any] | None) -> dict[str, Any] | None:
-    """Return a configuration whose streams hear nothing: one process listens, not two.
-
-    Their references stay where they start.
-    """
+    """Return a configuration whose streams hear nothing: their references stay."""
     if config is None:
         return None
     deaf = deepcopy(dict(config))

@@ -27,10 +27,7 @@ def parts_within(value: Any, kind: type[Kind]) -> Iterator[Kind]:
 def with_parts_replaced(
     value: Any, kind: type[Kind], change: Callable[[Kind], Part]
 ) -> Any:
-    """Return a value in which all parts of a kind are replaced by ``change`` of them.
-
-    What contains none of them stays the same object. Errors contain the key path.
-    """
+    """Return a value in which all parts of a kind are changed; the rest is kept."""
     if isinstance(value, kind):
         return change(value)
     if isinstance(value, Part):

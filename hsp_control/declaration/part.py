@@ -28,10 +28,7 @@ from hsp_control.declaration.plain_data import plain_data
 
 
 def attribute_docstrings(cls: type) -> dict[str, str]:
-    """Return the docstring of each annotated attribute, as one line, by name.
-
-    Without source text, such as in an interactive session, there are none.
-    """
+    """Return the docstring of each annotated attribute, as one line, by name."""
     return _of_module(cls.__module__).get(cls.__qualname__, {})
 
 
@@ -231,10 +228,7 @@ def _with_one_error(init: Callable[..., None]) -> Callable[..., None]:
 
 
 def _hide_properties(cls: type) -> list[str]:
-    """Return the fields without default that have the name of an inherited property.
-
-    Such a property is not the default of the field.
-    """
+    """Return the fields without default that hide an inherited property."""
     own = vars(cls)
     hidden = [
         name

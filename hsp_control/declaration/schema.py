@@ -145,10 +145,7 @@ def literals(options: Iterable[Any]) -> list[Any]:
 
 
 def entry(option: Any, key: str | int) -> Shape | None:
-    """Return the shape of the value at ``key`` in a value of this type.
-
-    None if the type has no such key, or the key is not known.
-    """
+    """Return the shape of the value at ``key`` in a value of this type."""
     if is_model(option):
         field = fields(option).get(str(key))
         return None if field is None else field_shape(field)

@@ -137,10 +137,7 @@ class ClosedFormDistances:
         return StepPlan(self._moving, (measure,))
 
     def witness(self, k: int) -> tuple[Array, Array, Array]:
-        """Return the witness points [m] and the unit normal from first to second.
-
-        For the k-th of these pairs, in world axes, shape (3,) each.
-        """
+        """Return the witness points [m] and the unit normal from first to second."""
         x, y, n = self._cores[k]
         first, second = self._sizes[self._pairs[k], 6]
         return x - first * n, y + second * n, -n
@@ -153,10 +150,7 @@ class ClosedFormDistances:
         gradient: Array,
         rate: Array,
     ) -> None:
-        """Write Σ b'(d_k) ∇d_k (nv,) and its exact rate, after `measure` at this state.
-
-        The slopes b' and the curvatures b'' are those of all pairs of the `Proximity`.
-        """
+        """Write Σ b'(d_k) ∇d_k (nv,) and its rate, after `measure` at this state."""
         self._derivatives.get(state, slopes, curvatures, gradient, rate)()
 
     def derivatives(
@@ -289,10 +283,7 @@ def _to_solid(
     H: Array,
     n: Array,
 ) -> float:
-    """Return the distance of a point in the world to a solid, and write the normal.
-
-    The normal n is in world axes, the Hessian H in the solid's own axes.
-    """
+    """Return the distance of a point in the world to a solid, and write the normal."""
     R = motion[:9].reshape(3, 3)
     for a in range(3):
         local[a] = x[a] - motion[9 + a]
@@ -315,10 +306,7 @@ def _differentiate(
     gradient: Array,
     rate: Array,
 ) -> None:
-    """Write Σ b' ∇d and Σ (b'' d' ∇d + b' (∇d)'); pairs with b' = b'' = 0 are skipped.
-
-    ``slopes`` are b' and ``curvatures`` b'', of all pairs of the `Proximity`.
-    """
+    """Write Σ b' ∇d and Σ (b'' d' ∇d + b' (∇d)'), without pairs of b' = b'' = 0."""
     kinds, sizes, motion = bodies.kinds, bodies.sizes, bodies.motion
     for p in range(gradient.shape[0]):
         gradient[p] = rate[p] = 0.0

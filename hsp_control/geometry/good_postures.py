@@ -58,11 +58,7 @@ class PostureSearch:
     def __init__(
         self, robot: Robot, rows: Sequence[Rows], obstacles: Sequence[Obstacle] = ()
     ) -> None:
-        """Set up the search.
-
-        If the shapes of the links cannot be read, a warning is logged, and collisions
-        do not count.
-        """
+        """Set up the search."""
         self.robot = robot  # the robot, with a fixed base
         self._state = robot.state(0.0, robot.home(), np.zeros(robot.nv))
         self._rows = tuple(rows)
@@ -241,10 +237,7 @@ class PostureSearch:
 
 
 def _halton(number: int, dimension: int) -> float:
-    """Return an entry of the Halton sequence, in (0, 1) (Halton 1960).
-
-    Dimensions beyond the primes at hand use the first ones again, shifted.
-    """
+    """Return an entry of the Halton sequence, in (0, 1) (Halton 1960)."""
     base = _PRIMES[dimension % len(_PRIMES)]
     number += 409 * (dimension // len(_PRIMES))
     share, value = 1.0, 0.0

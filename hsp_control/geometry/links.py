@@ -158,10 +158,7 @@ def _shapes_of_urdf(robot: Robot, part: Part) -> list[LinkShape]:
 
 
 def _locate_meshes(xml: Element, source: RobotSource) -> dict[str, str]:
-    """Put the path of each collision mesh into a URDF; delete those that do not exist.
-
-    Returns the name of the first missing mesh of each link that lacks one.
-    """
+    """Put meshes' paths into a URDF, without missing ones; return these by link."""
     missing: dict[str, str] = {}
     for link in xml.iter("link"):
         for element in link.findall("collision"):
@@ -294,10 +291,7 @@ def _capsule(shape: LinkShape) -> LinkShape:
 
 
 def _spheres_along(capsule: LinkShape) -> list[LinkShape]:
-    """Return spheres along a capsule that contain it, at most one radius apart.
-
-    Along a very slender capsule they are farther apart, and larger.
-    """
+    """Return spheres along a capsule that contain it, at most one radius apart."""
     if isinstance(capsule.geometry, coal.Sphere):
         return [capsule]
     radius, half = capsule.geometry.radius, capsule.geometry.halfLength

@@ -75,11 +75,7 @@ class CoalDistances:
         distances[self.places] = [result.min_distance for result in self._results]
 
     def witness(self, k: int) -> tuple[Array, Array, Array]:
-        """Return the witness points [m] and the unit normal from first to second.
-
-        For the k-th of these pairs, in world axes, shape (3,) each. They are read from
-        Coal on demand, since few pairs are close enough to need them.
-        """
+        """Return the k-th pair's witness points [m] and normal, asked of Coal."""
         result = self._results[k]
         first, second = result.getNearestPoint1(), result.getNearestPoint2()
         if k in self._reversed:
@@ -194,10 +190,7 @@ class Proximity:
         return state.stamp, count
 
     def witness(self, k: int) -> tuple[Array, Array, Array]:
-        """Return the k-th pair's nearest points [m] and normal from first to second.
-
-        All are in world axes; `measure` has been called.
-        """
+        """Return the k-th pair's nearest points [m] and normal from first to second."""
         computed_by, own = self._computed_by[k]
         assert computed_by is not None
         return computed_by.witness(own)

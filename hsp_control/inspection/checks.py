@@ -148,10 +148,7 @@ _DOUBTFUL = 1e5
 
 
 def worst_condition(robot: Robot) -> tuple[float, str]:
-    """Return M's largest condition number, and the dof that moves most without inertia.
-
-    At home and at random configurations; inf where M is not positive definite.
-    """
+    """Return M's worst condition number, and the dof that moves most there."""
     rng, rest = np.random.default_rng(0), np.zeros(robot.nv)
     worst, which = 0.0, 0
     for sample in range(_SAMPLES + 1):
@@ -208,10 +205,7 @@ REGULAR = 0.03
 
 
 def check_home(robot: Robot) -> Iterator[Finding]:
-    """Yield that home is singular for the end effector, or in collision.
-
-    Robots with a floating base are not checked: they stand on contacts.
-    """
+    """Yield that home is singular for the end effector, or in collision."""
     if robot.unactuated:
         return
     search = PostureSearch(robot, tracked_by_hand(robot))
@@ -231,10 +225,7 @@ def check_home(robot: Robot) -> Iterator[Finding]:
 
 
 def tracked_by_hand(robot: Robot) -> list[Rows]:
-    """Return the rows of the end effector's pose that it can move independently.
-
-    They are all six; or those of its position, as many as the robot can move.
-    """
+    """Return the rows of the end effector's pose that it can move independently."""
     spread = np.random.default_rng(0).uniform(-1.0, 1.0, robot.nv)
     q = robot.integrate(robot.home(), spread)
     J = robot.state(0.0, q, np.zeros(robot.nv)).frame(robot.end_effector).jacobian

@@ -22,10 +22,7 @@ def too_weak(robot: Robot, q: Array, limits: Array) -> Iterator[tuple[str, str]]
 
 
 def check_strength(robot: Robot) -> Iterator[Finding]:
-    """Yield the joints whose limits are too low to hold the robot at home.
-
-    Robots with a floating base are not checked: they stand on contacts.
-    """
+    """Yield the joints whose limits are too low to hold the robot at home."""
     if robot.unactuated:
         return
     own = np.array(robot.model.effortLimit)

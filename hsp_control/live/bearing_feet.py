@@ -41,10 +41,7 @@ class BearingFeet:
         return not self._base or bool(self.contacts)
 
     def feel(self, measured: Measurement) -> None:
-        """Find which contacts bear: those that are pressed.
-
-        A contact without a sensor bears while its schedule says so.
-        """
+        """Find which contacts bear: those that are pressed."""
         if self._base:
             self.contacts = tuple(
                 each for each in self._all if _bears(each, measured)

@@ -26,10 +26,7 @@ class DeadReckoning:
         self.predicted_for = 0.0
 
     def predict(self, tau: Array) -> None:
-        """Integrate the state over one period under an effort, shape (nv,).
-
-        One semi-implicit Euler step. If its result is not finite, the state is kept.
-        """
+        """Integrate the state over one period under an effort, shape (nv,)."""
         state, h = self.state, self._period
         self.predicted_for += h
         v = state.v.copy()

@@ -39,12 +39,7 @@ class Deadlines:
     """
 
     def __init__(self, period: float, capacity: int = CAPACITY) -> None:
-        """Allocate the memory and write to all of it, to avoid page faults later.
-
-        Args:
-            period: Length of a period [s].
-            capacity: Number of periods whose times are stored.
-        """
+        """Allocate the memory and write to all of it, to avoid page faults later."""
         self.period = period
         self.periods = self.missed = self.without_state = self.skipped_states = 0
         self._responses: Array = np.full(capacity, np.nan)

@@ -96,10 +96,7 @@ class EffortLimiter:
         return True
 
     def nothing_heard(self) -> None:
-        """Count a period without a measurement: what was sent may be lost.
-
-        After `_SURE` of them a line is dead, not bad: what was sent counts.
-        """
+        """Count a period without a measurement; a dead line got what was sent."""
         self._unheard += 1
         if self._says and self._unheard <= _SURE:
             least, most = self._before

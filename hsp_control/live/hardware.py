@@ -51,10 +51,7 @@ class Hardware(Protocol):
 
 
 def described(error: BaseException) -> str:
-    """Return an exception's message; of foreign exceptions, with their type.
-
-    It never raises: the message of a foreign exception may itself fail.
-    """
+    """Return an exception's message, a foreign one's with its type; never raise."""
     name = type(error).__name__
     try:
         message = str(error)

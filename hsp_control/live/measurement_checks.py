@@ -201,11 +201,7 @@ class MeasurementMonitor:
         self._read(limits)
 
     def follow(self, limits: RobotLimits | None) -> None:
-        """Check against the controller's limits of now, which may change in a run.
-
-        A controller without limits may receive some: then those of the robot's model
-        count as well.
-        """
+        """Check against the controller's limits of now, which may change in a run."""
         if limits is not self._limits:
             self._read(limits)
 
@@ -224,11 +220,7 @@ class MeasurementMonitor:
         return self.last is None or measurement.sequence > self.last.sequence
 
     def jump(self, measurement: Measurement) -> str | None:
-        """Return why the robot cannot have come here from the last state, or None.
-
-        A joint moves no further than its greatest speed allows. A state that jumps is
-        not the robot's: predict it instead.
-        """
+        """Return why the robot cannot have come here from the last state, or None."""
         last = self.last
         if last is None:
             return None
@@ -239,11 +231,7 @@ class MeasurementMonitor:
         return self._outside(moved, -furthest, furthest, "jumps by")
 
     def violation(self, measurement: Measurement) -> str | None:
-        """Return why the loop must stop at a valid state, or None.
-
-        Checks what the hardware found, the robot's own stop, state age, skipped states,
-        positions and speeds.
-        """
+        """Return why the loop must stop at a valid state, or None."""
         last, allowed = self.last, self._settings
         if measurement.fault:
             return measurement.fault

@@ -183,11 +183,7 @@ class OneRun:
         self.stop("fault", told, error)
 
     def hear_applied(self) -> None:
-        """Learn which effort the robot has, and tell the controller if it is another.
-
-        Efforts may be lost: then neither the rate nor the controller's memory may count
-        from what was sent.
-        """
+        """Tell the controller which effort the robot has: one may be lost."""
         if (measurement := self.reader.measurement) is None:
             self.limiter.nothing_heard()
             return

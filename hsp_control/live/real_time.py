@@ -12,9 +12,8 @@ from hsp_control.common.exceptions import SimulationError
 def no_garbage_collection() -> Iterator[None]:
     """Disable Python's garbage collector in this context.
 
-    A collection visits every container object: it takes milliseconds, at an unknown
-    time. A control step creates no reference cycles, so that reference counting frees
-    all its memory. Existing objects are frozen: an explicit collection skips them.
+    A collection takes milliseconds at an unknown time, and a control step creates no
+    reference cycles. Existing objects are frozen: an explicit collection skips them.
     """
     was_enabled = gc.isenabled()
     gc.collect()

@@ -270,11 +270,7 @@ class SimulatedRobot:
 
 
 def sampled(plant: Plant, integrator: Integrator, period: float) -> SampledPlant:
-    """Return a plant as one that advances period by period.
-
-    A continuous plant is integrated by the integrator. An adaptive one may take any
-    time, so one Runge-Kutta step per period replaces it.
-    """
+    """Return a plant as one that advances period by period; an adaptive one by Rk4."""
     if isinstance(plant, ContinuousPlant):
         adaptive = integrator.longest_step is None
         return IntegratedPlant(plant, Rk4(period) if adaptive else integrator)

@@ -245,10 +245,7 @@ class _SemiImplicitEuler(Steps):
 
 
 class _Rk4(Steps):
-    """The four stages of a step, in the chart q = base ⊕ δ.
-
-    The slopes are those of (δ, v): the rows of D and A.
-    """
+    """The four stages of a step, in the chart q = base ⊕ δ."""
 
     def _bind(self) -> list[Callable[[], object]]:
         robot = self.robot
@@ -358,11 +355,7 @@ class Dop853(Integrator, type="dop853"):
     """Absolute tolerance of a step [rad, m, rad/s or m/s]."""
 
     def begin(self, robot: Robot, bind_dynamics: Bind) -> Advance:
-        """Return what integrates; see `Integrator.begin`.
-
-        It raises a SimulationError if no step, however small, meets the tolerance, and
-        what the dynamics raise if they do so at every step size.
-        """
+        """Return what integrates; see `Integrator.begin`."""
         return partial(self._advance, robot, _of_new_arrays(robot, bind_dynamics))
 
     def _advance(

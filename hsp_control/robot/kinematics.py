@@ -61,10 +61,7 @@ class _Carrier(NamedTuple):
 
 
 class FrameKinematics:
-    """Placement and motion of a frame, in world axes, linear rows before angular rows.
-
-    This is Pinocchio's LOCAL_WORLD_ALIGNED.
-    """
+    """Placement and motion of a frame, in world axes, linear before angular rows."""
 
     __slots__ = (
         "compute",
@@ -179,11 +176,7 @@ def frame_kinematics(
 
 
 def mass_matrix_difference(model: pin.Model, q: Array, v: Array) -> Array:
-    """Return M' along v by fourth-order differences, shape (nv, nv).
-
-    The error is about 1e-11 of M. It is for robots with mimic joints, which Pinocchio's
-    Coriolis matrix does not support.
-    """
+    """Return M' along v (nv, nv) by differences, for robots with mimic joints."""
     data, h = model.createData(), 1e-3 / max(1.0, float(np.abs(v).max()))
 
     def M(s: float) -> Array:
@@ -193,11 +186,7 @@ def mass_matrix_difference(model: pin.Model, q: Array, v: Array) -> Array:
 
 
 def joint_support(model: pin.Model, joint: int) -> tuple[Indices, Indices]:
-    """Return the columns of Pinocchio's J that move a joint, and their indices in v.
-
-    The two differ for mimic joints: a mimic joint has a column of its own, already
-    scaled, and the index of its leader.
-    """
+    """Return the columns of Pinocchio's J that move a joint, and their indices in v."""
     columns: list[int] = []
     dofs: list[int] = []
     for index in list(model.supports[joint])[1:]:  # without the universe

@@ -267,10 +267,7 @@ class MujocoCoordinates:
         return q, v
 
     def _rotated(self, q: Array, tangent: Array, out: Array) -> None:
-        """Write a velocity or an effort in MuJoCo's order, without mimic joints.
-
-        Both transform in the same way, because the blocks of T are rotations.
-        """
+        """Write a velocity or an effort in MuJoCo's order, without mimic joints."""
         out[self._qvel] = tangent[self._v]
         for joint, _, at in self._special:
             part = tangent[joint.v :]

@@ -14,10 +14,7 @@ from hsp_control.robot.valid_state import REFUSED, copy_valid
 
 
 class NativeMove(partial[float]):
-    """Copies q and v, if they are valid, and makes native calls at the time.
-
-    From Python: (t, q, v) ↦ what the last call returned, or `REFUSED`.
-    """
+    """Copies valid q and v, and makes native calls; the last result, or `REFUSED`."""
 
     calls: Sequence[NativeCall]  # the calls, which own the memory of their arguments
 

@@ -9,11 +9,7 @@ from hsp_control.robot.robot import Robot
 
 
 def joint_dofs(robot: Robot) -> NDArray[np.bool_]:
-    """Return a mask of the degrees of freedom of single-dof joints, shape (nv,).
-
-    The others belong to a root or to a ball joint, which have no motor, no gear and no
-    encoder.
-    """
+    """Return a mask of the degrees of freedom of single-dof joints, shape (nv,)."""
     joints = np.zeros(robot.nv, dtype=bool)
     joints[[j.idx_v for j in robot.joints.values() if j.nv == 1]] = True
     return joints

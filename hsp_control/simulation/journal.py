@@ -110,10 +110,7 @@ def is_journal(path: Path) -> bool:
 
 
 def read_journal(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
-    """Return the columns and the meta data of a journal, up to an incomplete frame.
-
-    Where a column was added later or was narrower, earlier rows hold NaN.
-    """
+    """Return the columns and the meta data of a journal, up to an incomplete frame."""
     meta: dict[str, Any] = {}
     parts: list[_Part] = []
     end: dict[str, Any] = {"status": "interrupted", "message": KILLED}
@@ -236,10 +233,7 @@ class JournalTail:
         return self.count - before
 
     def rows(self, first: int) -> dict[str, Array]:
-        """Return the columns from a row on, as far as they are kept.
-
-        Rows before the heading of the last one are not: their columns were others.
-        """
+        """Return the columns from a row on, as far as they are kept."""
         wanted = max(self.count - first, 0)
         kept = self._rows[max(len(self._rows) - wanted, 0) :] if wanted else []
         width = sum(int(np.prod(shape)) for shape in self._shapes.values())

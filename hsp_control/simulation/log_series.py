@@ -63,11 +63,7 @@ def task_errors(rollout: Rollout) -> list[ErrorPart]:
 
 
 def drawn_parts(rollout: Rollout, name: str) -> dict[str, slice]:
-    """Return the columns of a task's reference that can be drawn, by what they are.
-
-    They are ``position`` [m], ``orientation``, a quaternion (x, y, z, w), and
-    ``direction``, a unit vector.
-    """
+    """Return the columns of a task's reference that can be drawn, by what they are."""
     about = rollout.meta["tasks"][name]
     drawn, axes = about.get("drawn", ()), about.get("axes")
     widths = {"position": len(axes or "xyz"), "orientation": 4, "direction": 3}
@@ -76,10 +72,7 @@ def drawn_parts(rollout: Rollout, name: str) -> dict[str, slice]:
 
 
 def task_path(rollout: Rollout, name: str) -> TaskPath | None:
-    """Return the path of the point that a task controls, if it controls one.
-
-    Along axes that the task does not track, the point is found in the skeleton.
-    """
+    """Return the path of the point that a task controls, if it controls one."""
     where = drawn_parts(rollout, name).get("position")
     if where is None:
         return None
@@ -97,10 +90,7 @@ def task_path(rollout: Rollout, name: str) -> TaskPath | None:
 
 
 def joint_names(rollout: Rollout) -> list[str]:
-    """Return the dofs' names, without the prefix that all of them share.
-
-    ``panda_joint1, panda_joint2`` become ``joint1, joint2``.
-    """
+    """Return the dofs' names, without the prefix that all of them share."""
     names = [str(name) for name in rollout.meta["robot"]["dofs"]]
     first, last = min(names), max(names)
     shared = 0

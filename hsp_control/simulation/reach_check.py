@@ -52,9 +52,8 @@ def out_of_reach(
 ) -> Iterator[OutOfReach]:
     """Yield the tasks whose targets leave the reach during a run.
 
-    Positions and poses of frames are looked at, by inverse kinematics within the
-    robot's position limits, each task by itself: of robots with a fixed base and joints
-    of one degree of freedom, and of targets that are known before the run.
+    By inverse kinematics of each frame by itself, within position limits: of robots
+    with a fixed base and single-dof joints, and targets known before the run.
     """
     if robot.unactuated or robot.nq != robot.nv:
         return
@@ -108,10 +107,7 @@ def _target(task: Task, t: float) -> pin.SE3:
 def _nearest(
     robot: Robot, target: Target, q: Array, starts: int
 ) -> tuple[Array, float]:
-    """Return the posture nearest to a target, and its distance from it.
-
-    The search begins at q, and where that fails at other postures, so many of them.
-    """
+    """Return the posture nearest to a target, and its distance from it."""
     lower, upper = robot.position_limits()
     best = reach(robot, target, q, q, lower, upper)
     rng = np.random.default_rng(0)

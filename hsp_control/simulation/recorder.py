@@ -222,9 +222,8 @@ def _skeleton(
 ) -> tuple[list[tuple[int, str]], list[int]]:
     """Return which of the points to draw are frames, and the parent of each point.
 
-    There is one point per joint, in their order, and then one per frame that a task
-    controls: of these index and name. A parent is the index of another point, -1 for
-    none.
+    A point for each joint in order, then for each frame of a task (index and name); a
+    parent is the index of another point, -1 for none.
     """
     named: list[tuple[int, str]] = []
     parents: list[int] = []

@@ -220,9 +220,8 @@ def _remove(part: Path) -> None:
 def complete_columns(columns: Mapping[str, Array], continuous: Sequence[int]) -> None:
     """Complete columns that were written row by row, in place.
 
-    Positions of continuous joints pass ±π without a jump. For a task that was added
-    during the run, the earlier rows get its first reference and position, because what
-    is drawn must be finite. Its errors stay NaN there.
+    Continuous joints pass ±π without a jump. A task that was added during the run gets
+    its first reference and position before, because what is drawn must be finite.
     """
     positions, dofs = columns["joint_positions"], list(continuous)
     positions[:, dofs] = np.unwrap(positions[:, dofs], axis=0)
@@ -236,10 +235,7 @@ def complete_columns(columns: Mapping[str, Array], continuous: Sequence[int]) ->
 def without_absurd_rows(
     columns: dict[str, Array], meta: dict[str, Any]
 ) -> tuple[dict[str, Array], dict[str, Any]]:
-    """Return the columns without rows that cannot be drawn; the message counts them.
-
-    A row that a loop wrote of an absurd state must not make its journal useless.
-    """
+    """Return the columns without rows that cannot be drawn; the message counts them."""
     kept = _drawable_rows(columns)
     if kept.all():
         return columns, meta

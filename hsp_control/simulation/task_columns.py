@@ -61,11 +61,7 @@ class TaskColumns:
         return True
 
     def _log_name(self, task: Task) -> str:
-        """Return the task's name in the log.
-
-        A number is added if another task was logged by this name, whose columns do not
-        fit.
-        """
+        """Return the task's name in the log."""
         name, k = task.name, 2
         while name in self.logged and task_meta(self.logged[name]) != task_meta(task):
             name, k = f"{task.name}_{k}", k + 1

@@ -56,10 +56,7 @@ def candidates(source: RobotSource, name: str) -> list[Path]:
 
 
 def find_file(source: RobotSource, name: str) -> Path | None:
-    """Return what a file name in a URDF means; None if there is nothing.
-
-    It is no file only if there is something else at its place, such as a pipe.
-    """
+    """Return what a file name in a URDF means; None if there is nothing."""
     places = candidates(source, name)
     file = next(filter(is_file, places), None)
     return file or next(filter(_is_there, places), None)

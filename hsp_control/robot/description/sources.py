@@ -334,11 +334,7 @@ def _example_loaders() -> dict[str, Any]:
 
 
 def _example_robot_data_folder() -> Path:
-    """Return ``<prefix>/share/example-robot-data`` of the installed package.
-
-    The package's own constant contains the path of its build machine, so the folder is
-    found from the path of its Python modules: ``share`` is next to their ``lib``.
-    """
+    """Return ``<prefix>/share/example-robot-data`` of the installed package."""
     spec = importlib.util.find_spec("example_robot_data")
     origin = spec.origin if spec is not None else None
     for parent in Path(origin or "").parents:

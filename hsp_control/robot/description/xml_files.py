@@ -56,10 +56,7 @@ def parse_xml(data: bytes) -> Element:
 
 
 def check_no_document_type(data: bytes) -> None:
-    """Check that an XML text of any size has no document type.
-
-    Only the text before the top element is read: a document type can be only there.
-    """
+    """Check that XML has no document type; it stands before the top element."""
     _Limits(1, MAX_DEPTH).check(data, only_prolog=True)
 
 

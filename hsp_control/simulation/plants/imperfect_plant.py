@@ -43,9 +43,6 @@ class ImperfectPlant(SampledPlant):
             sensors: The chain from the true state to the controller, in order.
             drives: The chain from the controller to the joints, in order.
             seed: Seed of the random numbers; each sensor and drive has its own.
-
-        Raises:
-            SimulationError: If a sensor or drive does not fit the robot.
         """
         super().__init__(plant.robot)
         self.plant = plant

@@ -39,10 +39,7 @@ class ModelChange(Part, ABC, error=SimulationError):
 
 
 def changed(robot: Robot, changes: Iterable[ModelChange], seed: int = 0) -> Robot:
-    """Return a new robot with all changes applied in order.
-
-    It has no description: loading that again would give the robot without changes.
-    """
+    """Return a new robot with all changes applied in order."""
     model = robot.model.copy()
     for change in changes:
         change.apply(model, robot, seed)
@@ -131,12 +128,7 @@ class Payload(ModelChange):
     """Radius of the ball [m]; 0 is a point mass."""
 
     def apply(self, model: pin.Model, robot: Robot, seed: int) -> None:
-        """Add the ball to the body of the frame.
-
-        Raises:
-            FrameNotFoundError: If there is no such frame.
-            SimulationError: If the frame is fixed to the world.
-        """
+        """Add the ball to the body of the frame."""
         with within("frame"):
             frame = robot.model.frames[robot.frame_id(self.frame)]
             if frame.parentJoint == 0:

@@ -53,11 +53,7 @@ class RigidBodyPlant(ContinuousPlant):
     """
 
     def __init__(self, robot: Robot, pushes: Sequence[Push] = ()) -> None:
-        """Set the robot and the pushes.
-
-        Raises:
-            FrameNotFoundError: If a push's frame does not exist.
-        """
+        """Set the robot and the pushes."""
         super().__init__(robot)
         self.pushes = Pushes(robot, pushes)
 
@@ -177,10 +173,7 @@ class StickingPlant(SampledPlant):
 
 @kernel
 def _minimize(A: Array, b: Array, c: Array, x: Array) -> None:
-    """Move x to the minimum of ½ xᵀA x - bᵀx + Σ c_i |x_i|, coordinate by coordinate.
-
-    A is positive definite, so that this converges from anywhere.
-    """
+    """Move x to the minimum of ½ xᵀA x - bᵀx + Σ c_i |x_i|, A positive definite."""
     n = x.shape[0]
     for _ in range(10_000):
         largest = 0.0
@@ -211,12 +204,7 @@ class RigidBody(FrictionalPart, type="rigid_body"):
     """Pinocchio's rigid-body dynamics; with friction, joints stick and slip."""
 
     def engine(self, robot: Robot, integrator: Integrator) -> Plant:
-        """Return a `RigidBodyPlant`, or with friction a `StickingPlant`.
-
-        Raises:
-            FrameNotFoundError: If the frame of a push does not exist.
-            SimulationError: If the friction does not fit the robot.
-        """
+        """Return a `RigidBodyPlant`, or with friction a `StickingPlant`."""
         friction = self.joint_friction(robot)
         if friction is None:
             return RigidBodyPlant(robot, self.pushes)

@@ -181,10 +181,7 @@ class ContactPlant(ContinuousPlant):
 
 
 def _minimum_norm_solution(A: Array, b: Array) -> Array:
-    """Return the x of minimum norm with A x = b, A positive semidefinite.
-
-    So redundant contacts share the force.
-    """
+    """Return the x of minimum norm with A x = b, A positive semidefinite."""
     values, vectors = np.linalg.eigh(A)
     kept = values > REDUNDANT * values[-1]
     share = vectors[:, kept].T @ b / values[kept]
@@ -201,11 +198,7 @@ class RigidContacts(PlantPart, type="rigid_contacts"):
     """Rate at which the velocity of a contact decays [1/s]."""
 
     def engine(self, robot: Robot, integrator: Integrator) -> ContactPlant:
-        """Return the plant.
-
-        Raises:
-            FrameNotFoundError: If a frame does not exist.
-        """
+        """Return the plant."""
         return ContactPlant(
             robot, self.contacts, damping=self.damping, pushes=self.pushes
         )

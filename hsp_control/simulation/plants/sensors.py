@@ -244,11 +244,7 @@ class Imu(Sensor, type="imu"):
     def begin(
         self, robot: Robot, q: Array, v: Array, random: np.random.Generator
     ) -> Sensing:
-        """Return what measures; see `Sensor.begin`.
-
-        Raises:
-            FrameNotFoundError: If the frame does not exist.
-        """
+        """Return what measures; see `Sensor.begin`."""
         with within("frame"):
             frame = robot.frame_id(self.frame)
         return RunningImu(self, robot, frame, random)

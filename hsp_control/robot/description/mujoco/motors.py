@@ -34,11 +34,7 @@ def joint_actuators(model: Any) -> dict[int, list[int]]:
 
 
 def motor(model: Any, actuator: int) -> Motor | None:
-    """Return a direct torque motor, or None if the actuator is of another kind.
-
-    Direct means: it acts on a hinge or a slide; its gain is a constant; it has no bias,
-    no dynamics of its own and no delay.
-    """
+    """Return a direct torque motor, or None if the actuator is of another kind."""
     joint = int(model.actuator_trnid[actuator, 0])
     kinds = constants("mjtJoint")
     scalar = kinds.mjJNT_HINGE, kinds.mjJNT_SLIDE
@@ -94,11 +90,7 @@ def _range(model: Any, actuator: int) -> tuple[float, float]:
 
 
 def _added(model: Any, joint: int, quantity: str) -> float:
-    """Return what a joint's actuators add to its armature or damping.
-
-    Since MuJoCo 4 an actuator has an armature and a damping of its own, which count
-    with its gear squared.
-    """
+    """Return what a joint's actuators add to its armature or damping."""
     owner = getattr(model, "jnt_actuatorid", None)
     if owner is None or owner[joint] < 0:
         return 0.0

@@ -185,11 +185,7 @@ def _name_of_scene(selection: Selection, file: Path | None) -> str:
 
 
 def _home(selection: Selection, model: pin.Model) -> Array:
-    """Return the displacement from neutral to the scene's configuration, shape (nv,).
-
-    If nobody chose that configuration, a joint which is not within its limits there is
-    in their middle: many arms are straight at zero, or beyond a limit.
-    """
+    """Return the scene's configuration from neutral (nv,); within limits."""
     scene, kinds = selection.model, constants("mjtJoint")
     q = pin.neutral(model)
     for index, joint in enumerate(selection.moving, start=1):

@@ -73,10 +73,7 @@ def _add_wrenches(
     world: Array,
     sums: Array,
 ) -> None:
-    """Add the wrench of each contact to those that it touches, about their origins.
-
-    A contact pushes from its first geom on its second, along the rows of its frame.
-    """
+    """Add the wrench of each contact to those that it touches, about their origins."""
     for k in range(touched.shape[0]):
         for i in range(3):
             world[i] = world[3 + i] = 0.0

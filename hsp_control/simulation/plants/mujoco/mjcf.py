@@ -140,11 +140,7 @@ def geom_of(geometry: Any, place: pin.SE3, frame: pin.SE3 | None = None) -> Geom
 
 
 def _box_of_sole(points: Array, frame: pin.SE3) -> Geom | None:
-    """Return the bounding box of points that have a flat sole, None for others.
-
-    The sole is flat if the lowest tenth of the height is at least half as long and half
-    as wide as the whole.
-    """
+    """Return the bounding box of points that have a flat sole, None for others."""
     low, high = points.min(axis=0), points.max(axis=0)
     sole = points[points[:, 2] <= low[2] + 0.1 * (high[2] - low[2])]
     if (np.ptp(sole[:, :2], axis=0) < 0.5 * (high - low)[:2]).any():

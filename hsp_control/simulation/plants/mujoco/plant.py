@@ -175,10 +175,7 @@ class MujocoPlant(SampledPlant):
     def log_channels(
         self, t: float, q: Array, v: Array, tau: Array
     ) -> Mapping[str, LogChannel]:
-        """Return each contact's force and moment at a true state under an effort.
-
-        Also where each loose solid is.
-        """
+        """Return each contact's force and moment at a true state under an effort."""
         if not self.contacts:
             return {}
         effort = self._roots.remove_effort(t, tau) + self.pushes.effort(t, q)
@@ -285,13 +282,7 @@ class Mujoco(FrictionalPart, type="mujoco"):
         return self.timestep
 
     def engine(self, robot: Robot, integrator: Integrator) -> MujocoPlant:
-        """Return the plant, which has its own integrator.
-
-        Raises:
-            SimulationError: If MuJoCo is not installed or rejects the model.
-            ModelError: If a joint has no counterpart in MuJoCo.
-            FrameNotFoundError: If a frame does not exist.
-        """
+        """Return the plant, which has its own integrator."""
         return MujocoPlant(
             robot,
             timestep=self.timestep,

@@ -43,10 +43,7 @@ _DEEP = 1e-3
 
 
 def own_overlaps(robot: Robot, model: Any, data: Any) -> dict[str, float]:
-    """Return how deep [m] parts of a robot overlap, by ``base and link1``.
-
-    Parts are what its joints move, and what they are mounted on.
-    """
+    """Return how deep [m] parts of a robot overlap, by ``base and link1``."""
     names = Names(model)
     joints = [names.joints.index(name) for name in robot.joints]
     jointed = {int(model.jnt_bodyid[joint]) for joint in joints}
@@ -120,11 +117,6 @@ class MujocoScenePlant(SampledPlant):
                 get a group of their own in ``model``, which is disabled. Without it
                 they are an error, since they would work against the controller.
             pushes: External wrenches on the robot.
-
-        Raises:
-            SimulationError: If MuJoCo is not installed, or a servo acts on a joint.
-            JointNotFoundError: If the scene lacks a joint of the robot.
-            FrameNotFoundError: If the scene lacks a body, or the robot a frame.
         """
         super().__init__(robot)
         mujoco = import_mujoco()
@@ -165,14 +157,7 @@ class MujocoScenePlant(SampledPlant):
         self._tell_overlaps()
 
     def advance(self, t: float, end: float, tau: Array) -> tuple[Array, Array]:
-        """Step MuJoCo from t to ``end``; see `SampledPlant.advance`.
-
-        The interval is divided into equal steps, at most as long as the scene's own.
-
-        Raises:
-            SimulationError: If the effort pushes a root, which has no motor, or the
-                motion diverges.
-        """
+        """Step MuJoCo from t to ``end``; see `SampledPlant.advance`."""
         data, own = self.data, self.model.opt.timestep
         effort = self._roots.remove_effort(t, tau)
         steps = number_of_steps(end - t, own)
@@ -336,14 +321,7 @@ class MujocoScene(PlantPart, type="mujoco_scene"):
             )
 
     def engine(self, robot: Robot, integrator: Integrator) -> MujocoScenePlant:
-        """Return the plant, which has its own integrator.
-
-        Raises:
-            SimulationError: If the robot has no MJCF, MuJoCo is not installed, or a
-                servo acts on a joint of the robot.
-            ModelError: If MuJoCo rejects the scene.
-            FrameNotFoundError: If the scene has no such body.
-        """
+        """Return the plant, which has its own integrator."""
         description = robot.description
         if description is None or description.mjcf is None:
             raise SimulationError(
