@@ -98,7 +98,6 @@ class Stamp:
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
-        """Keep the function."""
         self._function = function
 
     @cached_property

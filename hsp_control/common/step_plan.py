@@ -26,7 +26,6 @@ class CallSequence:
     """Several calls as one."""
 
     def __init__(self, *calls: Callable[..., Any], result: int = -1) -> None:
-        """Keep the calls."""
         self.calls = calls  # the calls, in order
         self.result = result  # the index of the call whose result is returned
 
@@ -41,7 +40,6 @@ class TimeWindow:
     def __init__(
         self, call: Callable[[float], object], start: float, end: float
     ) -> None:
-        """Keep the call and its window."""
         # the window [s]; at its end the call is not made
         self.call, self.start, self.end = call, start, end
 

@@ -62,7 +62,6 @@ class Document:
     def __init__(
         self, data: dict[str, Any], marks: dict[KeyPath, Mark], name: str
     ) -> None:
-        """Keep a copy of the data."""
         self.name = name  # the file's path as it was given, for messages
         self.access = ANYWHERE  # which files the configuration may name
         # the packages whose types it may name, besides our own; None: all
@@ -136,7 +135,6 @@ class Document:
         return path
 
     def __contains__(self, path: KeyPath) -> bool:
-        """Say whether there is a value at the key path."""
         value: Any = self._data
         for part in path:
             if isinstance(value, list):

@@ -240,7 +240,6 @@ class Experiment:
         )
 
     def __setattr__(self, attribute: str, value: object) -> NoReturn:
-        """Raise: an experiment does not change."""
         raise ImmutableError(
             f"Experiment.{attribute} cannot be assigned: build another experiment, or "
             "change the controller while it runs with experiment.controller.at(t)"

@@ -19,7 +19,6 @@ class YamlError(Exception):
     """The text is not YAML, or uses a part of YAML that is not allowed."""
 
     def __init__(self, line: int, message: str, path: KeyPath = ()) -> None:
-        """Store the parts; the caller adds the name of the file."""
         super().__init__(line, message, path)
         self.line = line  # the line of the error, counted from 1
         self.message = message  # what is wrong there

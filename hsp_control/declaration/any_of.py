@@ -26,7 +26,6 @@ class AnyOf:
     """
 
     def __init__(self, *bases: type[Declared]) -> None:
-        """Set the base classes of the families."""
         self.bases = bases
         self._checked: dict[str, type[Declared]] = {}
         self._validator: SchemaValidator | None = None
@@ -83,7 +82,6 @@ class AnyOf:
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        """Return pydantic's schema."""
         return self.core_schema()
 
     def _json_schema(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> Any:

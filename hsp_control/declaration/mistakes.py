@@ -371,7 +371,6 @@ class Carrier(ValueError):
     """Carries an error that is no `ValueError` through pydantic."""
 
     def __init__(self, error: HspControlError) -> None:
-        """Carry an error."""
         super().__init__(str(error))
         self.error = error
 

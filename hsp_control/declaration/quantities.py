@@ -100,7 +100,6 @@ class ArrayField:
     def __init__(
         self, items: Any, convert: Callable[[Any], object], none: str | None = None
     ) -> None:
-        """Set all."""
         # what pydantic checks first, such as nested lists of numbers
         self.items = items
         self.convert = convert  # makes the array of them, and may check more
@@ -109,7 +108,6 @@ class ArrayField:
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        """Return the schema: to plain lists, checked, to a read-only array."""
         return core_schema.no_info_before_validator_function(
             plain,
             core_schema.no_info_after_validator_function(
@@ -127,14 +125,12 @@ class OrInstance(ArrayField):
     """
 
     def __init__(self, items: Any, instance_of: type) -> None:
-        """Set the type of YAML and the class."""
         super().__init__(items, lambda value: value)
         self.instance_of = instance_of  # the class
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        """Return pydantic's schema."""
         return core_schema.no_info_wrap_validator_function(
             lambda value, check: (
                 value if isinstance(value, self.instance_of) else check(value)

@@ -58,7 +58,6 @@ class PostureSearch:
     def __init__(
         self, robot: Robot, rows: Sequence[Rows], obstacles: Sequence[Obstacle] = ()
     ) -> None:
-        """Set up the search."""
         self.robot = robot  # the robot, with a fixed base
         self._state = robot.state(0.0, robot.home(), np.zeros(robot.nv))
         self._rows = tuple(rows)

@@ -30,7 +30,6 @@ class CoalDistances:
         pairs: Indices,
         places: Indices,
     ) -> None:
-        """Create the geometry; see `ClosedFormDistances` for the arguments."""
         self._robot, self._obstacles = robot, tuple(obstacles)
         self._first_obstacle = len(links)
         # index of each pair in the `Proximity`, shape (k,)

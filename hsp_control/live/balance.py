@@ -17,7 +17,6 @@ class Balance:
     """Compares tilt and height with those of the start; see `FallDetector`."""
 
     def __init__(self, detector: FallDetector) -> None:
-        """Set what detects a fall."""
         self._detector = detector
         self.lost = False  # whether the robot has fallen
 

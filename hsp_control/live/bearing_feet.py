@@ -29,7 +29,6 @@ class BearingFeet:
     """
 
     def __init__(self, robot: Robot, contacts: Sequence[Contact]) -> None:
-        """Set the robot and its contacts, all of which bear."""
         self._robot = robot
         self._all = tuple(c for c in contacts if c.axes[2, 2] >= _STEEPEST)
         self._base = list(robot.unactuated)

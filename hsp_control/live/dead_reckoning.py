@@ -15,7 +15,6 @@ class DeadReckoning:
     """
 
     def __init__(self, robot: Robot, period: float) -> None:
-        """Allocate the state."""
         self._robot, self._period = robot, period
         self.state = RobotState(robot)  # the state, measured or predicted
         self.predicted_for = 0.0  # time since the last measurement [s]

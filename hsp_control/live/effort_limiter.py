@@ -25,7 +25,6 @@ class EffortLimiter:
         period: float,
         limits: RobotLimits | None = None,
     ) -> None:
-        """Read the limits."""
         self._robot, self._settings, self._limits = robot, settings, limits
         self._rest = np.zeros(robot.nv)
         self._compensates = settings.compensates_gravity

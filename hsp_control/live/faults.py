@@ -30,7 +30,6 @@ class Faults:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Check the probabilities and the delay."""
         for name in _KINDS:
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise LiveError(
@@ -78,7 +77,6 @@ class FaultInjector:
     """Applies `Faults` to packets."""
 
     def __init__(self, faults: Faults, stream: int = 0) -> None:
-        """Seed the random numbers."""
         self._faults = faults
         self._rng = np.random.default_rng((faults.seed, stream))
         self._cumulative = np.cumsum([getattr(faults, kind) for kind in _KINDS])

@@ -187,7 +187,6 @@ class AgeEstimator:
     """
 
     def __init__(self, window: float = 10.0) -> None:
-        """Set the length of the time window [s]."""
         self._window = window
         self._smallest = self._smallest_before = np.inf
         self._end = -np.inf

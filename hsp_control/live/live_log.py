@@ -52,7 +52,6 @@ class LiveLog:
         scene: Scene | None = None,
         meta: Mapping[str, Any] | None = None,
     ) -> None:
-        """Create the journal."""
         self.path = path  # the journal
         self._recorder = Recorder(controller, scene or Scene(), 1)
         self._meta = dict(meta or {})
@@ -111,7 +110,6 @@ class LoopLog:
         scene: Scene | None,
         meta: Mapping[str, Any],
     ) -> None:
-        """Create the journal, if there is a path."""
         self._chain, self._period = chain, period
         self._log: LiveLog | None = None
         self._next, self._phase = -inf, Phase.WAITING

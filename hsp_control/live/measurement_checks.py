@@ -151,7 +151,6 @@ class FrozenState:
     """
 
     def __init__(self, robot: Robot, period: float, tolerated: int) -> None:
-        """Allocate."""
         self._robot, self._tolerated = robot, tolerated
         self._reckoning = DeadReckoning(robot, period)
         self._last: Measurement | None = None
@@ -194,7 +193,6 @@ class MeasurementMonitor:
         settings: LiveSettings,
         period: float,
     ) -> None:
-        """Read the limits."""
         self._robot, self._settings, self._period = robot, settings, period
         self._own = own_limits(robot) if limits is None else None
         self.last: Measurement | None = None  # the last valid measurement

@@ -34,7 +34,6 @@ class OneRun:
         end: float,
         balance: Balance | None = None,
     ) -> None:
-        """Connect the parts."""
         self.chain, self.hardware, self.reader = chain, hardware, reader
         self.balance = balance
         self.limiter, self.safe_stop, self.log = limiter, safe_stop, log

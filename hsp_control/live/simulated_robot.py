@@ -34,7 +34,6 @@ class EffortCheck:
     def __init__(
         self, robot: Robot, settings: LiveSettings, period: float, effort: Array
     ) -> None:
-        """Read the limits."""
         self._names = robot.dof_names
         # The controller's limits may be lower, and may grow while it runs.
         upper = np.maximum(effort, settings.effort_limits(robot))

@@ -31,7 +31,6 @@ class RobotClock:
     def __init__(
         self, start_time: float, period: float, tolerated: int, start_periods: float
     ) -> None:
-        """Begin with the next measurement."""
         self._start_time, self._period = start_time, period
         self._tolerated, self._start_periods = tolerated, start_periods
         self.restart()
@@ -84,7 +83,6 @@ class StateReader:
         clock: Callable[[], float],
         start_time: float = 0.0,
     ) -> None:
-        """Allocate."""
         self._hardware, self._settings, self._clock = hardware, settings, clock
         self._robot, self._period = robot, hardware.period
         self._monitor = MeasurementMonitor(robot, limits, settings, self._period)

@@ -36,7 +36,6 @@ class Chart:
     """Coordinates y = (δ, v), shape (2 nv,), with q = base ⊕ δ."""
 
     def __init__(self, robot: Robot, base: Array) -> None:
-        """Create the chart about a configuration, shape (nq,)."""
         self.robot = robot
         self.base = base.copy()
 

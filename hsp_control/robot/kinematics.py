@@ -77,7 +77,6 @@ class FrameKinematics:
     def __init__(
         self, model: pin.Model, data: pin.Data, v: Array, stamp: Indices, index: int
     ) -> None:
-        """Allocate the arrays; `compute` fills them."""
         nv, frame = model.nv, model.frames[index]
         joint = data.oMi[frame.parentJoint]  # its arrays are views of data
         # the first five of them, as a record

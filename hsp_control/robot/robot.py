@@ -345,7 +345,6 @@ class SeenState(RobotState):
         t, q, v = _shown("t"), _shown("q"), _shown("v")
 
     def __init__(self, own: RobotState) -> None:
-        """Set the state to show."""
         self.__dict__ = own.__dict__
         self._own = own
         self._shown_q, self._shown_v = _read_only(own.q), _read_only(own.v)

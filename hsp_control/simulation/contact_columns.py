@@ -11,7 +11,6 @@ class ContactColumns:
     """The columns of all contacts of a controller."""
 
     def __init__(self, controller: Controller, columns: LogColumns) -> None:
-        """Add the columns."""
         self._controller, self._columns = controller, columns.arrays
         for contact in controller.contacts:
             prefix, column = f"contact.{contact.name}", columns.add

@@ -77,7 +77,6 @@ class ControlChain(Generic[Source_co]):
         plan: Plan | None = None,
         estimators: Sequence[Estimator] = (),
     ) -> None:
-        """Set the parts."""
         self.command = command  # what computes the efforts
         self._plan, self._estimators = plan, tuple(estimators)
         self._feels = bool(getattr(command, "feels_contacts", False))

@@ -43,7 +43,6 @@ class InitialState(Part, error=ConfigurationError):
     [rad/s or m/s]."""
 
     def __post_init__(self) -> None:
-        """Check that the configuration is given once."""
         given = self._given()
         if len(given) > 1:
             raise ConfigurationError(

@@ -189,7 +189,6 @@ class JournalTail:
     """The last rows of a journal that still grows."""
 
     def __init__(self, path: Path) -> None:
-        """Begin; the file may appear later."""
         self.path = path  # the journal
         # the meta data of the last heading; those of the end once it is there
         self.meta: dict[str, Any] = {}

@@ -25,7 +25,6 @@ class LimitExcess:
     """
 
     def __init__(self, robot: Robot) -> None:
-        """Begin with nothing seen."""
         joints = [j for j in robot.joints.values() if j.nq == 1 and j.nv == 1]
         # Only such a joint has a range; see `Robot.position_limits`.
         self._coordinates = np.array([j.idx_q for j in joints], dtype=np.int64)

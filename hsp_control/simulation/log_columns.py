@@ -15,7 +15,6 @@ class LogColumns:
     """Columns for a known number of rows; what is not written is NaN."""
 
     def __init__(self, capacity: int) -> None:
-        """Begin without columns."""
         # the columns by name; each has a row for every row of the log
         self.arrays: dict[str, Array] = {}
         # the unit and the meaning of each, as JSON data

@@ -45,7 +45,6 @@ class Recorder:
         rows: int,
         plan: RunningPlan | None = None,
     ) -> None:
-        """Allocate all columns."""
         self._controller = controller
         # what the robot follows; its streams are recorded. None: no plan
         self.plan = plan

@@ -41,7 +41,6 @@ class Rollout:
     """
 
     def __init__(self, columns: Mapping[str, Array], meta: dict[str, Any]) -> None:
-        """Set the columns and the meta data; arrays are not copied."""
         self.columns = dict(columns)
         self.meta = meta
 

@@ -12,7 +12,6 @@ class RowCopies:
     """Copies arrays to a row of their columns, ten times as fast as Python."""
 
     def __init__(self, pairs: Iterable[tuple[Array, Array]]) -> None:
-        """Bind the arrays."""
         copies = [bind(_copy, *pair, timed=True) for pair in pairs]
         self._write = merged(CallSequence(*copies))
 

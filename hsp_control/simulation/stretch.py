@@ -35,7 +35,6 @@ class Stretch:
         steps: Steps,
         excess: LimitExcess,
     ) -> None:
-        """Keep the parts."""
         self._controller, self._excess = controller, excess
         self._plant, self._steps = plant, steps
         self._step: FreeStep | None = None

@@ -31,7 +31,6 @@ class TaskColumns:
     """The columns of all tasks of a run; a task that is removed keeps its own."""
 
     def __init__(self, controller: Controller, columns: LogColumns) -> None:
-        """Add the columns of the tasks that there are now."""
         self._controller, self._columns = controller, columns
         # all tasks that there have been, by their names in the log
         self.logged: dict[str, Task] = {}

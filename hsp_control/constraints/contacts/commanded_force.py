@@ -41,7 +41,6 @@ class CommandedForce(Part, error=ContactError):
     """Instead: the command in time, of dimension 1, 3 or 6 [N, N·m]."""
 
     def __post_init__(self) -> None:
-        """Check that there is one command, of a known dimension, and no stream."""
         if (self.value is None) == (self.trajectory is None):
             raise ContactError("give either the value of the force or its trajectory")
         if self.trajectory is None:

@@ -222,7 +222,6 @@ class UnactuatedRows:
     """
 
     def __init__(self, robot: Robot, base: Indices, count: int) -> None:
-        """Create the rows."""
         self.name = "unactuated"  # name of these rows in messages
         self.robot = robot
         self.rows = count  # the number of free base motions

@@ -139,7 +139,6 @@ class SlidingContact(Contact, type="sliding"):
     """Speed u_s at which three quarters of the friction are expected [m/s]."""
 
     def __post_init__(self) -> None:
-        """Check that there is a command, without moments."""
         if self.force is None:
             with within("force"):
                 raise ContactError(
@@ -222,7 +221,6 @@ class SurfaceContact(Contact, type="surface"):
     """Instead: at least three corners of the sole in the frame, shape (k, 3) [m]."""
 
     def __post_init__(self) -> None:
-        """Check that the sole is given in one way."""
         sizes = [self.length is not None, self.width is not None]
         moved = self.center is not None and np.any(self.center)
         if self.corners is not None and (any(sizes) or moved):

@@ -196,7 +196,6 @@ class PositionRange(Part, error=LimitError):
     """Upper joint position limits, one number or nv, None for no limit [rad or m]."""
 
     def __post_init__(self) -> None:
-        """Check that lower limits are below upper ones."""
         pairs: Any = (self.lower, self.upper)
         lower, upper = (np.array(each, dtype=float) for each in pairs)
         if lower.ndim and upper.ndim and lower.shape != upper.shape:
@@ -237,7 +236,6 @@ class PositionsByJoint(Part, error=LimitError):
     """Lower and upper limit by joint name [rad or m]."""
 
     def __post_init__(self) -> None:
-        """Check that lower limits are below upper ones."""
         for joint, (lower, upper) in self.joints.items():
             if lower >= upper:
                 raise LimitError(

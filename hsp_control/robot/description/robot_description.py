@@ -81,7 +81,6 @@ class PlacedRobot(Part, error=ModelError):
     (x, y, z, w) [-], or a matrix [-]."""
 
     def __post_init__(self) -> None:
-        """Check that it is one robot."""
         _check_one(self, "name", "description")
 
     def find(self, access: Access = ANYWHERE) -> RobotSource:
@@ -141,7 +140,6 @@ class RobotDescription(Part, error=ModelError):
     ``<part>_<own name>``."""
 
     def __post_init__(self) -> None:
-        """Check that it is one robot, or several."""
         _check_one(self, "name", "description", "mjcf", "parts")
         if self.mjcf is None:
             self._check_without_mjcf()

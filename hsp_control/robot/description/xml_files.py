@@ -23,7 +23,6 @@ class XmlError(Exception):
     """XML that is malformed or not allowed."""
 
     def __init__(self, line: int, message: str, column: int = 0) -> None:
-        """Store all; the caller adds the name of the file."""
         super().__init__(line, message, column)
         # line and column from 1; 0 if the whole file or line is meant
         self.line, self.message, self.column = line, message, column

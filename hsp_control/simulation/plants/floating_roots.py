@@ -14,7 +14,6 @@ class FloatingRoots:
     """The degrees of freedom of a robot's free-flyer joints."""
 
     def __init__(self, robot: Robot) -> None:
-        """Find the degrees of freedom of all free-flyer joints."""
         self._unactuated = np.zeros(robot.nv, dtype=bool)
         for joint in robot.joints.values():
             if joint.shortname() == "JointModelFreeFlyer":

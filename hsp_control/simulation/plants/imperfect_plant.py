@@ -127,7 +127,6 @@ class ImperfectPlant(SampledPlant):
         }
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what a copy gets: all but the run under way."""
         return {**vars(self), "_sensing": [], "_driving": []}
 
     def _begin(self, q: Array, v: Array) -> None:

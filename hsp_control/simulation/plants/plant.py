@@ -29,7 +29,6 @@ class Plant:
     effort_delay: int = 0
 
     def __init__(self, robot: Robot) -> None:
-        """Set the robot that moves."""
         self.robot = robot
 
     def log_channels(

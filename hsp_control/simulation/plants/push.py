@@ -38,7 +38,6 @@ class Spring:
     def __init__(
         self, joint: int, point: Array, hand: Array, stiffness: float, largest: float
     ) -> None:
-        """Set all of them."""
         # index of the link's joint; the point in its frame, the hand in the world [m]
         self.joint, self.point, self.hand = joint, point, hand
         # k [N/m] and the largest force [N]
@@ -55,7 +54,6 @@ class Pushes:
     """All pushes on a robot, as a generalised effort."""
 
     def __init__(self, robot: Robot, pushes: Sequence[Push] = ()) -> None:
-        """Set the robot and the pushes."""
         self.robot = robot
         self.pushes = tuple(pushes)  # the pushes that were declared
         # that of somebody who pulls now; None: nobody does

@@ -53,7 +53,6 @@ class RigidBodyPlant(ContinuousPlant):
     """
 
     def __init__(self, robot: Robot, pushes: Sequence[Push] = ()) -> None:
-        """Set the robot and the pushes."""
         super().__init__(robot)
         self.pushes = Pushes(robot, pushes)
 

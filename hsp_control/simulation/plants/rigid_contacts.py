@@ -41,7 +41,6 @@ class RigidContact(Part, error=SimulationError):
     no end; always by default."""
 
     def __post_init__(self) -> None:
-        """Check that the intervals follow one another."""
         with within("on"):
             _ = self._schedule
 

@@ -256,7 +256,6 @@ class RunningImu:
     def __init__(
         self, imu: Imu, robot: Robot, frame: int, random: np.random.Generator
     ) -> None:
-        """Draw the biases."""
         self._imu, self._model, self._frame = imu, robot.model, frame
         self._data = robot.model.createData()
         self._random = random

@@ -202,7 +202,6 @@ class Solid(Part, error=SimulationError):
     """From each copy to the next, in the world [m]."""
 
     def __post_init__(self) -> None:
-        """Check that copies do not lie inside one another."""
         if self.copies > 1 and not np.any(np.asarray(self.spacing)):
             raise SimulationError(
                 f"{self.copies} copies have the spacing [0, 0, 0]; give another one"

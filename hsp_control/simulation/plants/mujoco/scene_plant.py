@@ -312,7 +312,6 @@ class MujocoScene(PlantPart, type="mujoco_scene"):
     error."""
 
     def __post_init__(self) -> None:
-        """Check that the scene is left as it is."""
         own = {"robot", "inertias", "payload", "motor_inertia"}
         if given := own & {*self.changed_fields()}:
             raise SimulationError(
