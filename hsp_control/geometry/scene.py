@@ -87,14 +87,7 @@ class Obstacle(Part, error=SceneError):
         return pin.SE3(rotation, self.center.sample(t).position)
 
     def follow(self, motion: Array) -> Follower:
-        """Return a function of time [s] that writes the obstacle's motion to an array.
-
-        See `Trajectory.follow`.
-
-        Args:
-            motion: Is overwritten with R row by row, the centre c [m], c' [m/s] and the
-                angular velocity ω [rad/s] in the world, shape (18,).
-        """
+        """Return what writes R by rows, c, c' and ω (18,) at a time."""
         center = TrajectorySample(motion[9:12], motion[12:15], np.zeros(3))
         turn = OrientationSample(motion[:9].reshape(3, 3), motion[15:18], np.zeros(3))
         return follow_all(self.center.follow(center), self.orientation.follow(turn))

@@ -47,12 +47,7 @@ class Deadlines:
         self._worst_response = self._worst_interval = 0.0
 
     def add(self, interval: float, response: float) -> None:
-        """Record a period.
-
-        Args:
-            interval: Time between the arrivals of the last state and of this one [s].
-            response: Time from this state's arrival until its effort was sent [s].
-        """
+        """Record a period: from state to state, and from state to effort [s]."""
         k = self.periods % len(self._responses)
         self._responses[k], self._intervals[k] = response, interval
         self.periods += 1

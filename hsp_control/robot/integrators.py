@@ -179,13 +179,7 @@ class Steps(ABC):
     """
 
     def __init__(self, robot: Robot, bind_dynamics: Bind, longest: float) -> None:
-        """Allocate, and bind the calls of a step.
-
-        Args:
-            robot: The robot.
-            bind_dynamics: Makes v' of the arrays q and v.
-            longest: The longest step [s].
-        """
+        """Allocate, and bind the calls of a step."""
         self.robot, self._longest = robot, longest
         self.q, self.v = robot.neutral(), np.zeros(robot.nv)
         self.acceleration = bind_dynamics(self.q, self.v)

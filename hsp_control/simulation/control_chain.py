@@ -18,11 +18,6 @@ class EffortSource(Protocol):
 
     One that has an attribute ``feels_contacts`` which is true gets the wrenches of
     `Measurement` as a fifth argument of `effort`.
-
-    Attributes:
-        controller: The controller.
-        output: The controller's last output.
-        state: The state for which the controller computed it.
     """
 
     @property

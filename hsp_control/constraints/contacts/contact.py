@@ -92,11 +92,7 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
         return with_memories_copied(self, memo)
 
     def placed(self, start: Start) -> Self:
-        """Return the contact, checked.
-
-        Raises:
-            FrameNotFoundError: If the robot has no such frame.
-        """
+        """Return the contact, checked."""
         with within("frame"):
             start.state.robot.frame_id(self.frame)
         if self.force is not None:

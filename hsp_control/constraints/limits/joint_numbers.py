@@ -111,12 +111,7 @@ class Scaled(Part, error=LimitError):
     keep their own limits."""
 
     def of(self, own: Array, robot: Robot) -> Array:
-        """Return the robot's own limit, scaled, shape (nv,).
-
-        Raises:
-            JointNotFoundError: If a joint does not exist.
-            LimitError: If a joint has no limit of its own.
-        """
+        """Return the robot's own limit, scaled, shape (nv,)."""
         if not isinstance(self.scale, Mapping):
             return self.scale * own
         scaled = own.copy()
@@ -136,12 +131,7 @@ class ByJoint(Part, error=LimitError):
     """Limits by joint name [N·m or N, rad/s or m/s]."""
 
     def of(self, own: Array, robot: Robot) -> Array:
-        """Return the robot's own limit with these numbers, shape (nv,).
-
-        Raises:
-            JointNotFoundError: If a joint does not exist.
-            LimitError: If no motor moves a joint.
-        """
+        """Return the robot's own limit with these numbers, shape (nv,)."""
         limit = own.copy()
         for joint, number in self.joints.items():
             with within("joints", joint):
@@ -208,11 +198,7 @@ class PositionRange(Part, error=LimitError):
             )
 
     def of(self, robot: Robot) -> tuple[Array, Array]:
-        """Return lower and upper limits, shape (nv,); ±inf where there is none.
-
-        Raises:
-            LimitError: If they do not fit the robot.
-        """
+        """Return lower and upper limits, shape (nv,); ±inf where there is none."""
         with within("lower"):
             lower = by_dof(self.lower, robot.nv, -np.inf)
         with within("upper"):
@@ -243,12 +229,7 @@ class PositionsByJoint(Part, error=LimitError):
                 )
 
     def of(self, robot: Robot) -> tuple[Array, Array]:
-        """Return lower and upper limits, shape (nv,); ±inf where there is none.
-
-        Raises:
-            JointNotFoundError: If a joint does not exist.
-            LimitError: If a joint has no single coordinate.
-        """
+        """Return lower and upper limits, shape (nv,); ±inf where there is none."""
         lower, upper = (each.copy() for each in robot.position_limits())
         for joint, limits in self.joints.items():
             with within("joints", joint):

@@ -65,16 +65,9 @@ class StaticEffort:
     def rows(
         self, state: RobotState, bandwidth: float, excluded: Indices
     ) -> tuple[Array, Array]:
-        """Return the rows A a ≥ b of the motors near their limit.
+        """Return the rows A a ≥ b, (k, nv) and (k,), of the motors near their limit.
 
-        Args:
-            state: The robot's state.
-            bandwidth: α [1/s].
-            excluded: Degrees of freedom that are left out: those between the root and a
-                contact, whose efforts depend on the contact forces.
-
-        Returns:
-            A, shape (k, nv), and b, shape (k,).
+        Efforts of ``excluded`` dofs, from root to contact, depend on contact forces.
         """
         robot, model = state.robot, state.robot.model
         data = state.made(self, "data", model.createData)
@@ -134,36 +127,12 @@ class RobotLimits:
         return self.motion.acceleration
 
     @property
-    def guarded_velocity(self) -> Array:
-        """The speed that the barriers keep: the limit less its margin, shape (nv,)."""
-        return self.motion.velocity
-
-    @property
-    def guarded_lower(self) -> Array:
-        """The lower position that the barriers keep: the limit plus its margin."""
-        return self.motion.lower
-
-    @property
-    def guarded_upper(self) -> Array:
-        """The upper position that the barriers keep: the limit less its margin."""
-        return self.motion.upper
-
-    @property
     def bandwidth(self) -> float:
         """α of the barriers [1/s]."""
         return float(self.motion.bandwidth[0])
 
     def check_start(self, q: Array, v: Array) -> None:
-        """Check that a start is within the limits; distances are those at t = 0.
-
-        Args:
-            q: Configuration, shape (nq,).
-            v: Velocity, shape (nv,).
-
-        Raises:
-            LimitError: Names the joint, its position or speed, and the limit; or the
-                pair of shapes and its distance.
-        """
+        """Check that a start is within the limits; distances are those at t = 0."""
         names = self.robot.dof_names
         positions = self.robot.joint_positions(q)
         outside = np.flatnonzero((positions < self.lower) | (positions > self.upper))
@@ -253,15 +222,7 @@ class Limits(Part, error=LimitError):
     its motors can hold it; for motors that carry no contact. Unlimited by default."""
 
     def placed(self, start: Start) -> RobotLimits:
-        """Return the limits in numbers, for one robot and one scene.
-
-        Raises:
-            LimitError: If numbers do not fit the robot, a joint has no limit to scale,
-                or the position limits leave no room; the message says which.
-            JointNotFoundError: If a joint does not exist.
-            SceneError: If an obstacle does not exist.
-            FieldError: If a minimum distance has no pairs.
-        """
+        """Return the limits in numbers, for one robot and one scene."""
         robot = start.state.robot
         with within("effort"):
             effort = maximum(self.effort, robot.model.effortLimit, robot)

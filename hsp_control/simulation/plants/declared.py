@@ -105,17 +105,7 @@ class PlantPart(Part, ABC, family="plants", error=SimulationError):
     def build(
         self, robot: Robot, integrator: Integrator, *, access: Access = ANYWHERE
     ) -> Plant:
-        """Return the plant, which has the controller's joints.
-
-        Args:
-            robot: The controller's robot.
-            integrator: The integrator of the simulation.
-            access: Which files may be read for a robot of its own.
-
-        Raises:
-            SimulationError: If a field does not fit the robot, or the joints differ.
-            HspControlError: If a frame does not exist, or the robot cannot be loaded.
-        """
+        """Return the plant, which has the controller's joints."""
         plant = self.engine(self._simulated(robot, access), integrator)
         check_plant(plant, robot)
         sensors = [sensor for sensor in self.sensors if sensor.active]

@@ -156,11 +156,7 @@ def differing_bodies(plant: Plant, robot: Robot) -> dict[str, Any]:
 
 
 def check_plant(plant: Plant, robot: Robot) -> None:
-    """Check that a plant has the joints of the controller's robot.
-
-    Raises:
-        SimulationError: If their names, order or kinds differ.
-    """
+    """Check that a plant has the joints of the controller's robot."""
     ours, theirs = (
         [(name, j.nq, j.nv) for name, j in r.joints.items()]
         for r in (robot, plant.robot)
