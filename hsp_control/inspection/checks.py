@@ -1,6 +1,8 @@
-"""The checks: what is odd about a robot's file, meshes, limits, masses and home."""
+"""Findings, and the checks of a robot's file, meshes, limits, masses and home."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -10,7 +12,6 @@ from hsp_control.common.exceptions import ConfigurationError
 from hsp_control.common.suggestions import listing
 from hsp_control.geometry import Proximity, link_shapes, self_pairs
 from hsp_control.geometry.good_postures import PostureSearch, Rows
-from hsp_control.inspection.finding import Finding, Severity
 from hsp_control.robot import Robot
 from hsp_control.robot.description.inertias import impossible_inertias, tensor_of
 from hsp_control.robot.description.loading import NEGATIVE_MOMENT
@@ -21,6 +22,25 @@ from hsp_control.robot.description.mesh_files import (
 )
 from hsp_control.robot.description.sources import RobotSource
 from hsp_control.robot.description.urdf_checks import problems
+
+Severity = Literal["error", "warning", "note"]
+"""Of an error, the robot does not load; of a warning, something does not work well; a
+note is good to know."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something odd in a robot's description."""
+
+    severity: Severity  # how bad it is
+    check: str  # which check found it, such as ``inertia``
+    element: str  # the link, joint, file or pair of links that it is about
+    message: str  # what is odd, with the value
+    cure: str = ""  # what would be right, or what to do; empty if nothing is to be done
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return asdict(self)
 
 
 def check_elements(xml: Element) -> Iterator[Finding]:

@@ -10,6 +10,7 @@ import pinocchio as pin
 
 from hsp_control.common.exceptions import ModelError
 from hsp_control.inspection.checks import (
+    Finding,
     check_elements,
     check_home,
     check_inertias,
@@ -19,7 +20,6 @@ from hsp_control.inspection.checks import (
     check_self_collisions,
     worst_condition,
 )
-from hsp_control.inspection.finding import Finding
 from hsp_control.inspection.strength import check_strength
 from hsp_control.robot import Robot, RobotDescription
 from hsp_control.robot.description.loading import load_model

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.inspection.finding import Finding
+from hsp_control.inspection.checks import Finding
 from hsp_control.robot import Robot
 
 

@@ -8,13 +8,45 @@ from typing import Any
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.exceptions import HardwareError, HspControlError
 from hsp_control.constraints.limits import RobotLimits, own_limits
 from hsp_control.control.measurement import Inertial
-from hsp_control.live.dead_reckoning import DeadReckoning
 from hsp_control.live.hardware import Measurement
 from hsp_control.live.settings import LiveSettings
-from hsp_control.robot import Robot
+from hsp_control.robot import Robot, RobotState
+
+
+class DeadReckoning:
+    """The last measured state, integrated with the model under the applied efforts.
+
+    Of a robot with a floating base the velocity is kept: nobody knows what its feet
+    push meanwhile, and without them the model would fall.
+    """
+
+    def __init__(self, robot: Robot, period: float) -> None:
+        self._robot, self._period = robot, period
+        self.state = RobotState(robot)  # the state, measured or predicted
+        self.predicted_for = 0.0  # time since the last measurement [s]
+
+    def correct(self, t: float, q: Array, v: Array) -> None:
+        """Set the state to a measurement."""
+        self.state.update(t, q, v)
+        self.predicted_for = 0.0
+
+    def predict(self, tau: Array) -> None:
+        """Integrate the state over one period under an effort, shape (nv,)."""
+        state, h = self.state, self._period
+        self.predicted_for += h
+        v = state.v.copy()
+        if not self._robot.unactuated:
+            v += h * self._robot.forward_dynamics(state.q, state.v, tau)
+        if not np.isfinite(v).all():
+            return
+        try:
+            state.update(state.t + h, self._robot.integrate(state.q, h * v), v)
+        except HspControlError:  # too fast: the configuration would overflow
+            return
+
 
 _LARGEST_SPEED = 1e4
 """No joint moves faster [rad/s or m/s]: it holds where the model has no limit."""

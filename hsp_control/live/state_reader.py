@@ -5,10 +5,10 @@ from collections.abc import Callable
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HardwareError
 from hsp_control.constraints.limits import RobotLimits
-from hsp_control.live.dead_reckoning import DeadReckoning
 from hsp_control.live.deadlines import Deadlines
 from hsp_control.live.hardware import Hardware, Measurement, described
 from hsp_control.live.measurement_checks import (
+    DeadReckoning,
     FrozenState,
     MeasurementMonitor,
     valid_measurement,

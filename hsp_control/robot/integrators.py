@@ -188,7 +188,7 @@ class Steps(ABC):
         self._calls = in_order(self._bind())
         self.native: NativeCall | None = None
         if are_native(self._calls):
-            from hsp_control.robot.native_steps import make_steps
+            from hsp_control.robot.native_move import make_steps
 
             self.native = NativeCall.over(
                 make_steps, self._calls, self.interval, longest, self.h

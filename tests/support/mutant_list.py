@@ -1381,7 +1381,7 @@ MUTANTS = (
     ),
     Mutant(
         "reckoning: explicit Euler",
-        LIVE + "dead_reckoning.py",
+        LIVE + "measurement_checks.py",
         "self._robot.integrate(state.q, h * v), v)",
         "self._robot.integrate(state.q, h * state.v), v)",
         UNIT + "live/test_safe_stop.py -k reckoning",

@@ -12,8 +12,8 @@ from urllib.parse import unquote
 from hsp_control.common.exceptions import AccessError
 from hsp_control.common.files import is_file
 from hsp_control.robot.description.access import Access
-from hsp_control.robot.description.packages import package_folders
 from hsp_control.robot.description.sources import RobotSource
+from hsp_control.robot.description.xacro_files import package_folders
 from hsp_control.robot.description.xml_files import XmlError, check_no_document_type
 
 MAX_SIZE = 100_000_000

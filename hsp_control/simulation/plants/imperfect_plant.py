@@ -1,7 +1,11 @@
-"""A plant with imperfect sensors and drives."""
+"""A plant with imperfect sensors and drives.
+
+Each part has its own random numbers: adding one does not change those of the others.
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 
@@ -10,10 +14,13 @@ from hsp_control.control.log_channel import LogChannel
 from hsp_control.control.measurement import Inertial
 from hsp_control.declaration import within
 from hsp_control.simulation.plants.drives import Drive, Driving
-from hsp_control.simulation.plants.json_data import to_json_data
-from hsp_control.simulation.plants.plant import SampledPlant
-from hsp_control.simulation.plants.random_numbers import seeded_generator
+from hsp_control.simulation.plants.plant import SampledPlant, to_json_data
 from hsp_control.simulation.plants.sensors import RunningImu, Sensing, Sensor
+
+
+def seeded_generator(seed: int, name: str) -> np.random.Generator:
+    """Return a new generator for a plant's seed and the name of the part's class."""
+    return np.random.default_rng([seed, crc32(name.encode())])
 
 
 class ImperfectPlant(SampledPlant):

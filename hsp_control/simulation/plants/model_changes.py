@@ -18,7 +18,7 @@ from hsp_control.declaration.quantities import (
 )
 from hsp_control.robot import Robot
 from hsp_control.robot.per_joint import per_dof
-from hsp_control.simulation.plants.random_numbers import seeded_generator
+from hsp_control.simulation.plants.imperfect_plant import seeded_generator
 
 
 class ModelChange(Part, ABC, error=SimulationError):

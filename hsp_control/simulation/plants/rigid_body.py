@@ -18,8 +18,12 @@ from hsp_control.robot.friction import Friction, JointFriction
 from hsp_control.robot.integrators import Integrator
 from hsp_control.robot.step_count import number_of_steps
 from hsp_control.simulation.plants.declared import PlantPart
-from hsp_control.simulation.plants.json_data import to_json_data
-from hsp_control.simulation.plants.plant import ContinuousPlant, Plant, SampledPlant
+from hsp_control.simulation.plants.plant import (
+    ContinuousPlant,
+    Plant,
+    SampledPlant,
+    to_json_data,
+)
 from hsp_control.simulation.plants.push import Push, Pushes
 
 

@@ -30,8 +30,7 @@ from hsp_control.live import (
     run_loop,
 )
 from hsp_control.live.bearing_feet import BearingFeet
-from hsp_control.live.dead_reckoning import DeadReckoning
-from hsp_control.live.measurement_checks import valid_measurement
+from hsp_control.live.measurement_checks import DeadReckoning, valid_measurement
 from hsp_control.live.sensor_layout import SensorLayout
 
 pytest.importorskip("example_robot_data")

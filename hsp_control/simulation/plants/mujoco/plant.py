@@ -18,9 +18,6 @@ from hsp_control.robot.friction import JointFriction
 from hsp_control.robot.integrators import Integrator
 from hsp_control.robot.mujoco_coordinates import MujocoCoordinates, joints_of
 from hsp_control.robot.step_count import number_of_steps
-from hsp_control.simulation.plants.contact_channels import contact_channels
-from hsp_control.simulation.plants.floating_roots import FloatingRoots
-from hsp_control.simulation.plants.json_data import to_json_data
 from hsp_control.simulation.plants.mujoco.engine import (
     check_motion,
     contact_wrenches,
@@ -35,7 +32,12 @@ from hsp_control.simulation.plants.mujoco.mjcf import (
     geoms_of,
     write_mjcf,
 )
-from hsp_control.simulation.plants.plant import SampledPlant
+from hsp_control.simulation.plants.plant import (
+    FloatingRoots,
+    SampledPlant,
+    contact_channels,
+    to_json_data,
+)
 from hsp_control.simulation.plants.push import Push, Pushes
 from hsp_control.simulation.plants.rigid_body import FrictionalPart
 

@@ -26,16 +26,18 @@ from hsp_control.robot.description.mujoco.names import Names
 from hsp_control.robot.description.mujoco.source import compile_mjcf
 from hsp_control.robot.integrators import Integrator
 from hsp_control.robot.step_count import number_of_steps
-from hsp_control.simulation.plants.contact_channels import contact_channels
 from hsp_control.simulation.plants.declared import PlantPart
-from hsp_control.simulation.plants.floating_roots import FloatingRoots
-from hsp_control.simulation.plants.json_data import to_json_data
 from hsp_control.simulation.plants.mujoco.engine import (
     check_motion,
     contact_wrenches,
     import_mujoco,
 )
-from hsp_control.simulation.plants.plant import SampledPlant
+from hsp_control.simulation.plants.plant import (
+    FloatingRoots,
+    SampledPlant,
+    contact_channels,
+    to_json_data,
+)
 from hsp_control.simulation.plants.push import Push, Pushes
 
 _DEEP = 1e-3
