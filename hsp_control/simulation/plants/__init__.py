@@ -3,6 +3,7 @@
 from hsp_control.robot.friction import Friction as Friction
 
 from .declared import AnyPlant as AnyPlant
+from .declared import FrictionalPart as FrictionalPart
 from .declared import PlantPart as PlantPart
 from .drives import Drive as Drive
 from .drives import DroppedPeriods as DroppedPeriods
@@ -26,7 +27,6 @@ from .plant import SampledPlant as SampledPlant
 from .plant import check_plant as check_plant
 from .plant import differing_bodies as differing_bodies
 from .push import Push as Push
-from .rigid_body import FrictionalPart as FrictionalPart
 from .rigid_body import RigidBody as RigidBody
 from .rigid_body import RigidBodyPlant as RigidBodyPlant
 from .rigid_body import StickingPlant as StickingPlant

@@ -1,9 +1,7 @@
 """Rigid bodies with friction, pushed and held: the plant of most simulations."""
 
-from abc import ABC
 from collections.abc import Sequence
-from dataclasses import KW_ONLY
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -11,13 +9,12 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.common.kernels import kernel
-from hsp_control.declaration import within
 from hsp_control.robot import Robot
 from hsp_control.robot.acceleration import Acceleration
-from hsp_control.robot.friction import Friction, JointFriction
+from hsp_control.robot.friction import JointFriction
 from hsp_control.robot.integrators import Integrator
 from hsp_control.robot.step_count import number_of_steps
-from hsp_control.simulation.plants.declared import PlantPart
+from hsp_control.simulation.plants.declared import FrictionalPart
 from hsp_control.simulation.plants.plant import (
     ContinuousPlant,
     Plant,
@@ -25,28 +22,6 @@ from hsp_control.simulation.plants.plant import (
     to_json_data,
 )
 from hsp_control.simulation.plants.push import Push, Pushes
-
-
-class FrictionalPart(PlantPart, ABC):
-    """A plant whose joints may have friction."""
-
-    _: KW_ONLY
-    friction: Literal["urdf"] | Friction | None = None
-    """Friction of the joints [-]; ``urdf`` takes it from the robot's file. None by
-    default."""
-
-    def joint_friction(self, robot: Robot) -> JointFriction | None:
-        """Return the friction of a robot's joints, None if there is none.
-
-        Raises:
-            SimulationError: If it does not fit the robot.
-        """
-        if self.friction is None:
-            return None
-        if self.friction == "urdf":
-            return JointFriction.of_model(robot)
-        with within("friction"):
-            return self.friction.of(robot)
 
 
 class RigidBodyPlant(ContinuousPlant):

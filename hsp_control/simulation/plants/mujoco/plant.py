@@ -18,6 +18,7 @@ from hsp_control.robot.friction import JointFriction
 from hsp_control.robot.integrators import Integrator
 from hsp_control.robot.mujoco_coordinates import MujocoCoordinates, joints_of
 from hsp_control.robot.step_count import number_of_steps
+from hsp_control.simulation.plants.declared import FrictionalPart
 from hsp_control.simulation.plants.mujoco.engine import (
     check_motion,
     contact_wrenches,
@@ -39,7 +40,6 @@ from hsp_control.simulation.plants.plant import (
     to_json_data,
 )
 from hsp_control.simulation.plants.push import Push, Pushes
-from hsp_control.simulation.plants.rigid_body import FrictionalPart
 
 MujocoIntegrator = Literal["Euler", "RK4", "implicit", "implicitfast"]
 
