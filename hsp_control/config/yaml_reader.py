@@ -60,10 +60,7 @@ def _text(text: str) -> str:
 
 SCALARS = {
     TAG + "null": Scalar(
-        "null",
-        _null,
-        pattern=r"~|null|Null|NULL|",
-        first=("~", "n", "N", ""),
+        "null", _null, pattern=r"~|null|Null|NULL|", first=("~", "n", "N", "")
     ),
     TAG + "bool": Scalar(
         "true or false",

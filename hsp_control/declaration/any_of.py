@@ -4,11 +4,7 @@ from dataclasses import fields, is_dataclass
 from typing import Any, cast
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
-from pydantic_core import (
-    CoreSchema,
-    SchemaValidator,
-    core_schema,
-)
+from pydantic_core import CoreSchema, SchemaValidator, core_schema
 
 from hsp_control.common.exceptions import ConfigError
 from hsp_control.declaration.families import Declared, check_admitted, full_name

@@ -53,15 +53,11 @@ Count = Annotated[int, Strict(), Field(ge=0), _PLAIN]
 PositiveCount = Annotated[int, Strict(), Field(ge=1), _PLAIN]
 Flag = Annotated[bool, Strict()]
 Name = Annotated[
-    str,
-    Strict(),
-    Field(min_length=1, max_length=100, pattern=r"^[^\x00-\x1f\x7f]*$"),
+    str, Strict(), Field(min_length=1, max_length=100, pattern=r"^[^\x00-\x1f\x7f]*$")
 ]
 """What a user calls a part, in messages and in columns of the log."""
 FileName = Annotated[
-    str | Path,
-    AfterValidator(str),
-    WithJsonSchema({"type": "string"}),
+    str | Path, AfterValidator(str), WithJsonSchema({"type": "string"})
 ]
 """The path of a file, stored as text."""
 Names = Annotated[Sequence[str], AfterValidator(tuple)]

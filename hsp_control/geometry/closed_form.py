@@ -275,13 +275,7 @@ def _place(
 
 @kernel
 def _to_solid(
-    kind: int,
-    size: Array,
-    motion: Array,
-    x: Array,
-    local: Array,
-    H: Array,
-    n: Array,
+    kind: int, size: Array, motion: Array, x: Array, local: Array, H: Array, n: Array
 ) -> float:
     """Return the distance of a point in the world to a solid, and write the normal."""
     R = motion[:9].reshape(3, 3)

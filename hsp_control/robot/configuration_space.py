@@ -240,10 +240,7 @@ def _is_ball(joint: Any) -> bool:
 
 
 def _dof_names(joints: Mapping[str, Any]) -> tuple[str, ...]:
-    suffixes = {
-        3: ("x", "y", "yaw"),
-        6: ("x", "y", "z", "roll", "pitch", "yaw"),
-    }
+    suffixes = {3: ("x", "y", "yaw"), 6: ("x", "y", "z", "roll", "pitch", "yaw")}
     names: list[str] = []
     for name, joint in joints.items():
         if joint.nv == 1:

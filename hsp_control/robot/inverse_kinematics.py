@@ -41,12 +41,7 @@ class Reached(NamedTuple):
 
 
 def reach(
-    robot: Robot,
-    target: Target,
-    q: Array,
-    preferred: Array,
-    lower: Array,
-    upper: Array,
+    robot: Robot, target: Target, q: Array, preferred: Array, lower: Array, upper: Array
 ) -> Reached:
     """Return a configuration at which a frame is at its target, or the nearest found.
 

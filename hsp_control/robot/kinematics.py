@@ -99,13 +99,7 @@ class FrameKinematics:
         )
         # updates the attributes below to the state, if they are not up to date
         self.compute: Callable[[], object] = bind(
-            frame_kinematics,
-            stamp,
-            np.array([-1]),
-            carrier,
-            v,
-            motion,
-            self.drift,
+            frame_kinematics, stamp, np.array([-1]), carrier, v, motion, self.drift
         )
 
 

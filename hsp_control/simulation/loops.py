@@ -17,11 +17,7 @@ from hsp_control.robot import RobotState
 from hsp_control.robot.integrators import Integrator, bound
 from hsp_control.simulation.control_chain import ControlChain
 from hsp_control.simulation.limit_excess import LimitExcess
-from hsp_control.simulation.plants import (
-    ContinuousPlant,
-    IntegratedPlant,
-    SampledPlant,
-)
+from hsp_control.simulation.plants import ContinuousPlant, IntegratedPlant, SampledPlant
 
 if TYPE_CHECKING:
     from hsp_control.simulation.stretch import Stretch

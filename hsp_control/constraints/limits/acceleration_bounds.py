@@ -169,7 +169,4 @@ def within(x: Array, lower: Array, upper: Array) -> bool:
 @kernel
 def _narrow(low: float, high: float, lower: float, upper: float) -> tuple[float, float]:
     """Return the part of [low, high] within [lower, upper], or its nearest point."""
-    return (
-        max(low, min(lower, high)),
-        min(high, max(upper, low)),
-    )
+    return (max(low, min(lower, high)), min(high, max(upper, low)))

@@ -104,8 +104,7 @@ class Scaled(Part, error=LimitError):
     """The robot's own limit, multiplied by a factor."""
 
     scale: Annotated[
-        float | Mapping[str, float],
-        ArrayField(Positive | _PositiveOfJoints, of_joints),
+        float | Mapping[str, float], ArrayField(Positive | _PositiveOfJoints, of_joints)
     ]
     """The factor [-]; 0.5 halves the limit. Or factors by joint name; the other joints
     keep their own limits."""

@@ -88,11 +88,7 @@ class ObstacleDistance(MinimumDistance, type="obstacles"):
     """The minimum distance [m]."""
     _: KW_ONLY
     obstacles: (
-        Annotated[
-            Sequence[ObstacleOrName],
-            Field(min_length=1),
-            AfterValidator(tuple),
-        ]
+        Annotated[Sequence[ObstacleOrName], Field(min_length=1), AfterValidator(tuple)]
         | None
     ) = None
     """Names of the obstacles; or, in Python, the obstacles themselves [-]; all of the

@@ -21,10 +21,7 @@ from hsp_control.common.exceptions import (
 )
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.robot.description.combining import placement
-from hsp_control.robot.description.inertias import (
-    impossible_inertias,
-    project_inertias,
-)
+from hsp_control.robot.description.inertias import impossible_inertias, project_inertias
 from hsp_control.robot.description.mesh_files import check_mesh_name
 from hsp_control.robot.description.robot_description import (
     PlacedRobot,
@@ -34,10 +31,7 @@ from hsp_control.robot.description.robot_description import (
 from hsp_control.robot.description.sources import RobotSource, Root
 from hsp_control.robot.description.urdf_checks import named_files, read_urdf
 
-_ROOT_JOINTS = {
-    "planar": pin.JointModelPlanar,
-    "free_flyer": pin.JointModelFreeFlyer,
-}
+_ROOT_JOINTS = {"planar": pin.JointModelPlanar, "free_flyer": pin.JointModelFreeFlyer}
 _NO_HAND = re.compile(
     "finger|thumb|camera|imu|sensor|range|accelerometer|laser|optical|force|(^|_)ft_frame"
 )

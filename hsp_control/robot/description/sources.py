@@ -17,11 +17,7 @@ from typing import Any, Literal, NamedTuple
 
 import yaml
 
-from hsp_control.common.exceptions import (
-    AccessError,
-    ModelError,
-    RobotNotFoundError,
-)
+from hsp_control.common.exceptions import AccessError, ModelError, RobotNotFoundError
 from hsp_control.common.files import is_folder
 from hsp_control.common.resources import bundled_robots
 from hsp_control.common.suggestions import did_you_mean, listing
@@ -177,9 +173,7 @@ def find_robot(
 
 
 def find_description(
-    name: str,
-    access: Access = ANYWHERE,
-    xacro_args: Mapping[str, str] | None = None,
+    name: str, access: Access = ANYWHERE, xacro_args: Mapping[str, str] | None = None
 ) -> RobotSource:
     """Find a robot of the package robot_descriptions, such as ``gen3_description``."""
     if access.strict:

@@ -36,10 +36,7 @@ def check_motion(data: Any, end: float) -> None:
 
 
 def contact_wrenches(
-    model: Any,
-    data: Any,
-    owners: Mapping[int, str],
-    origins: Mapping[str, Array],
+    model: Any, data: Any, owners: Mapping[int, str], origins: Mapping[str, Array]
 ) -> dict[str, Array]:
     """Return the wrench of all contacts on each owner, shape (6,), in world axes.
 
