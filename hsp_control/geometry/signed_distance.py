@@ -98,15 +98,10 @@ def nearest_rates(
 
 @kernel
 def distance_to_solid(kind: int, size: Array, x: Array, n: Array, H: Array) -> float:
-    """Return the signed distance of a point to a solid; write gradient and Hessian.
+    """Return the signed distance of a point x to a solid, in the solid's frame.
 
-    Args:
-        kind: BOX, CYLINDER or HALF_SPACE.
-        size: Box: half the edges. Cylinder: radius, radius and half the height.
-            Half-space: not used. Shape (≥ 3,) [m].
-        x: The point in the solid's frame, shape (3,) [m].
-        n: Is overwritten with the gradient, a unit vector, shape (3,).
-        H: Is overwritten with the Hessian, shape (3, 3) [1/m].
+    The size is a box's half edges; a cylinder's radius, radius and half height [m]. The
+    gradient n, a unit vector, and the Hessian H [1/m] are written.
     """
     for i in range(3):
         n[i] = 0.0

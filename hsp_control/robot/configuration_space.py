@@ -43,13 +43,10 @@ class ConfigurationSpace:
     def __init__(
         self, model: pin.Model, name: str, home: Sequence[float] | None = None
     ) -> None:
-        """Set up the space of a model.
+        """Set up the space of a model, with the robot's name for messages.
 
-        Args:
-            model: The Pinocchio model.
-            name: The robot's name, for messages.
-            home: Displacement from neutral of the home posture, shape (nv,), or None;
-                ignored if it has another size.
+        ``home`` is the displacement from neutral (nv,) of the home posture, ignored if
+        it has another size.
         """
         self.model = model
         self.name = name

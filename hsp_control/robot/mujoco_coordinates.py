@@ -140,13 +140,9 @@ class MujocoCoordinates:
         qpos_address: Mapping[str, int],
         qvel_address: Mapping[str, int],
     ) -> None:
-        """Set the joints and where MuJoCo stores their coordinates.
+        """Set the joints, from `joints_of`, and where MuJoCo stores their coordinates.
 
-        Args:
-            robot: The robot.
-            joints: Its joints, from `joints_of`.
-            qpos_address: Index in qpos by name of the MuJoCo joint.
-            qvel_address: Index in qvel by name of the MuJoCo joint.
+        The addresses are indices in qpos and qvel by name of the MuJoCo joint.
         """
         self.robot = robot
         self.constant_effort = all(j.kind != PLANAR for j in joints)

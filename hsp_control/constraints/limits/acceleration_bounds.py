@@ -56,26 +56,17 @@ def acceleration_bounds(
     a_lower: Array,
     a_upper: Array,
 ) -> None:
-    """Write the bounds on the acceleration that the barriers of `Limits` require.
+    """Write the bounds (nv,) on the acceleration that the barriers of `Limits` require.
 
     Where they contradict each other, position has priority over velocity, and velocity
     over acceleration: each narrows the range that the earlier ones leave, as far as it
-    can.
+    can. ``where`` is the index in q of each dof's coordinate, -1 for none.
 
-    Args:
-        q: Configuration, shape (nq,).
-        v: Velocity, shape (nv,).
-        where: Index in q of the coordinate of each degree of freedom, -1 for none,
-            shape (nv,).
-        limits: What the barriers keep.
-        error: Largest error that the acceleration had of late, shape (nv,); the margin
-            of the speed covers it and its growth, up to half the speed.
-        drift: Mean error of late, shape (nv,); the barrier of the position makes up for
-            it where it leads beyond the limit.
-        steady: What of it is still there, shape (nv,). What is commanded against a
-            steady force moves nothing: the barriers are wider by as much.
-        a_lower: Written: lower bound on the acceleration, shape (nv,).
-        a_upper: Written: upper bound on the acceleration, shape (nv,).
+    The margin of the speed covers the largest ``error`` that the acceleration had of
+    late and its growth, up to half the speed. The barrier of the position makes up for
+    the ``drift``, the mean error, where it leads beyond the limit. ``steady`` is what
+    of it is still there: what is commanded against a steady force moves nothing, and
+    the barriers are wider by as much.
     """
     lower, upper, velocity, acceleration, jerk, alpha = limits
     bandwidth = alpha[0]
