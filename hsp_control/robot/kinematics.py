@@ -61,7 +61,21 @@ class _Carrier(NamedTuple):
 
 
 class FrameKinematics:
-    """Placement and motion of a frame, in world axes, linear before angular rows."""
+    """Placement and motion of a frame, in world axes, linear rows before angular rows.
+
+    This is Pinocchio's LOCAL_WORLD_ALIGNED.
+
+    Attributes:
+        compute: Updates the attributes below to the state, if they are not up to date.
+        motion: The first five of them, as a record.
+        rotation: Rotation matrix from frame axes to world axes, shape (3, 3).
+        position: The frame's origin in the world [m], shape (3,).
+        jacobian: J, where J v = (velocity of the origin, angular velocity), shape
+            (6, nv).
+        jacobian_dot: J' = dJ/dt along v, exact, shape (6, nv).
+        velocity: J v, shape (6,) [m/s, rad/s].
+        drift: J' v, shape (6,) [m/s², rad/s²]: the classical acceleration for v' = 0.
+    """
 
     __slots__ = (
         "compute",
@@ -79,14 +93,10 @@ class FrameKinematics:
     ) -> None:
         nv, frame = model.nv, model.frames[index]
         joint = data.oMi[frame.parentJoint]  # its arrays are views of data
-        # the first five of them, as a record
         self.motion = motion = FrameMotion.allocate(nv)
-        # J, where J v = (velocity of the origin, angular velocity), and J', (6, nv)
         self.jacobian, self.jacobian_dot = motion.jacobian, motion.jacobian_dot
-        # from frame to world axes, shape (3, 3), and the frame's origin [m], (3,)
         self.rotation, self.position = motion.rotation, motion.position
-        self.velocity = motion.velocity  # J v, shape (6,) [m/s, rad/s]
-        # J' v, shape (6,) [m/s², rad/s²]: the classical acceleration for v' = 0
+        self.velocity = motion.velocity
         self.drift: Array = np.zeros(6)
         carrier = _Carrier(
             matrix_view(data.J),
@@ -97,7 +107,6 @@ class FrameKinematics:
             frame.placement.translation.copy(),
             *joint_support(model, frame.parentJoint),
         )
-        # updates the attributes below to the state, if they are not up to date
         self.compute: Callable[[], object] = bind(
             frame_kinematics, stamp, np.array([-1]), carrier, v, motion, self.drift
         )
@@ -212,7 +221,19 @@ def joint_placements(data: pin.Data) -> Array:
 
 
 class CentroidalMotion:
-    """Centre of mass and centroidal angular momentum of a robot, in world axes."""
+    """Centre of mass and centroidal angular momentum of a robot, in world axes.
+
+    Attributes:
+        compute: Updates the attributes below to the state, if they are not up to date.
+        mass: Total mass [kg].
+        position: The centre of mass c [m], shape (3,).
+        velocity: c' = J v [m/s], shape (3,).
+        jacobian: J, shape (3, nv).
+        jacobian_dot: J' = dJ/dt along v, exact, shape (3, nv).
+        momentum_matrix: A, where A v is the angular momentum about c [kg·m²/s], shape
+            (3, nv).
+        momentum_matrix_dot: A' = dA/dt along v, exact, shape (3, nv).
+    """
 
     def __init__(
         self, model: pin.Model, data: pin.Data, q: Array, v: Array, stamp: Indices
@@ -220,15 +241,12 @@ class CentroidalMotion:
         """Allocate the arrays; `compute` takes the values that q and v have then."""
         # Pinocchio allocates these results at the first call; take views after it.
         pin.computeCentroidalMapTimeVariation(model, data, q, v)
-        self.mass: float = pin.computeTotalMass(model)  # total mass [kg]
-        self.position: Array = data.com[0]  # the centre of mass c [m], shape (3,)
-        self.velocity: Array = np.zeros(3)  # c' = J v [m/s], shape (3,)
-        self.jacobian: Array = np.zeros((3, model.nv))  # J, shape (3, nv)
-        # J' = dJ/dt along v, exact, shape (3, nv)
+        self.mass: float = pin.computeTotalMass(model)
+        self.position: Array = data.com[0]
+        self.velocity: Array = np.zeros(3)
+        self.jacobian: Array = np.zeros((3, model.nv))
         self.jacobian_dot: Array = np.zeros((3, model.nv))
-        # A, where A v is the angular momentum about c [kg·m²/s], shape (3, nv)
         self.momentum_matrix: Array = np.zeros((3, model.nv))
-        # A' = dA/dt along v, exact, shape (3, nv)
         self.momentum_matrix_dot: Array = np.zeros((3, model.nv))
         momentum = bind_pinocchio("centroidal", model, data, q, v)
         extract = bind(
@@ -243,7 +261,6 @@ class CentroidalMotion:
             self.momentum_matrix,
             self.momentum_matrix_dot,
         )
-        # updates the attributes below to the state, if they are not up to date
         self.compute: Callable[[], object] = once([momentum, extract], stamp)
 
 
