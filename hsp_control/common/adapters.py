@@ -97,13 +97,7 @@ def _kind_of_tuple(kinds: tuple[types.Type, ...], record: type) -> types.Type:
 def adapter(
     function: Callable[..., Any], kinds: tuple[types.Type, ...], timed: bool
 ) -> int:
-    """Return the address of what calls a kernel: f(where its arguments are, time).
-
-    Args:
-        function: The kernel.
-        kinds: The types of its arguments, from `packed`.
-        timed: Whether the time comes after them.
-    """
+    """Return the address of what calls a kernel: f(where its arguments are, time)."""
     key = function, timed, *map(id, kinds)
     address = _addresses.get(key)
     if address is None:
@@ -170,13 +164,7 @@ def _unpacked(typing: Any, words: Any, kind: Any) -> Any:
 
 @cache
 def foreign_adapter(count: int) -> int:
-    """Return the address of what calls a C function whose arguments are words.
-
-    The words are the function's address and its arguments: integers and pointers.
-
-    Args:
-        count: The number of arguments.
-    """
+    """Return the address of what calls a C function with ``count`` words."""
     place = {
         "__name__": __name__,
         "words_of_call": cast("Any", types).UniTuple(types.int64, count + 1),
@@ -225,11 +213,7 @@ def _invoke(typing: Any, address: Any, words: Any, t: Any) -> Any:
 
 @kernel
 def run(calls: Indices, when: Array, t: float) -> float:
-    """Make calls, each a row (code, arguments), those at whose time it is.
-
-    Returns:
-        What the last one returned.
-    """
+    """Make calls, rows (code, arguments), whose time it is; return the last result."""
     value = 0.0
     for k in range(calls.shape[0]):
         if when[k, 0] <= t < when[k, 1]:
@@ -247,11 +231,7 @@ def run_once(calls: Indices, when: Array, stamp: Indices, made: Indices) -> None
 
 @kernel
 def run_if(calls: Indices, when: Array, found: Array) -> float:
-    """Make calls that do not depend on the time, if ``found[1]`` is not zero.
-
-    Returns:
-        ``found[0]``, plus what the last call returned if they were made.
-    """
+    """If ``found[1]``, make the calls; return ``found[0]`` plus the last result."""
     value = float(found[0])
     if found[1] != 0.0:
         value += run(calls, when, 0.0)

@@ -4,15 +4,9 @@ from urllib.parse import unquote
 
 
 def name_and_options(address: str) -> tuple[str, dict[str, str]]:
-    """Return what an address says: its name, and its options.
+    """Return the name and the options of an address without its ``scheme://``.
 
     ``%26`` stands for ``&`` in a value, and so on; ``+`` is a plus.
-
-    Args:
-        address: The address, without ``scheme://``.
-
-    Raises:
-        ValueError: If an option has no ``=``, or is given twice.
     """
     name, _, query = address.partition("?")
     options: dict[str, str] = {}

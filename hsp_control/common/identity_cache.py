@@ -18,7 +18,6 @@ class IdentityCache(Generic[Made]):
     __slots__ = ("_fifth", "_first", "_fourth", "_made", "_make", "_second", "_third")
 
     def __init__(self, make: Callable[..., Made]) -> None:
-        """Keep the function, which makes the result of up to five arguments."""
         self._make = make
         self._first: Any = _NONE_YET
         self._second: Any = None

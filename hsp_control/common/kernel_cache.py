@@ -98,7 +98,6 @@ class Stamp:
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
-        """Keep the function."""
         self._function = function
 
     @cached_property
@@ -147,10 +146,7 @@ def _code(code: CodeType, docstring: str | None, names: set[str]) -> Iterator[by
 
 
 def _value(value: Any, seen: set[int]) -> Iterator[bytes]:
-    """Yield the contents of a value that a kernel reads.
-
-    For values of unknown kinds never the same twice: their code is compiled anew.
-    """
+    """Yield the contents of a value that a kernel reads."""
     function = getattr(value, "py_func", getattr(value, "_defn", value))
     if isinstance(function, FunctionType):
         yield from _function(function, seen)
@@ -227,12 +223,7 @@ class _KernelCache(Cache):
     _impl_class: Any = _KernelCacheImpl
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return kept code, None if there is none that can be read.
-
-        What is kept names the records that a kernel takes: after an upgrade one may no
-        longer exist, and a file may be damaged. Then the code is compiled anew.
-        Numba's own method loads what compiling needs first, SciPy too: half of a start.
-        """
+        """Return kept code, None if none fits: records that it names may be gone."""
         try:
             return self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
         except Exception:  # whatever unpickling raises

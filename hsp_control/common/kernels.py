@@ -63,12 +63,7 @@ def is_compiled(function: Callable[..., Any]) -> bool:
 
 
 def callback(signature: Any, function: Callable[..., Any]) -> Any:
-    """Return a function compiled at once, for calls by its ``address``.
-
-    Args:
-        signature: Its types, as ``types.float64(types.int64)``.
-        function: The function.
-    """
+    """Return a function of these types, compiled now, for calls by its ``address``."""
     from numba.core.ccallback import CFunc
 
     from hsp_control.common.kernel_cache import Kept
@@ -88,10 +83,7 @@ _watchers: list[Callable[[], AbstractContextManager[None]]] = []
 
 @contextmanager
 def watched(watcher: Callable[[], AbstractContextManager[None]]) -> Iterator[None]:
-    """Enter the watcher's context around each compilation not found on disk.
-
-    Those of the kernels that a kernel calls lie within its own.
-    """
+    """Enter the watcher's context around each compilation not found on disk."""
     _watchers.append(watcher)
     try:
         yield

@@ -1,6 +1,9 @@
 """Dense linear algebra for small matrices, as kernels: no allocation, no LAPACK.
 
-Shapes: A and J are (m, n) unless a docstring says otherwise, L is lower triangular.
+Shapes: A and J are (m, n) unless a docstring says otherwise, L is lower triangular. The
+bounded inverse of a wide B is B# = Qᵀ X: away from rank loss Q = X B has orthonormal
+rows, X lower triangular; near it Q = U B has orthogonal rows, and X = q(s²) U inverts
+the spectrum.
 """
 
 import numpy as np
@@ -38,10 +41,7 @@ def multiply_transposed(A: Array, x: Array, out: Array) -> None:
 
 @kernel
 def add_rows(weights: Array, rows: Array, out: Array) -> None:
-    """Add Σ weight row to out, shape (n,), for as many rows as weights.
-
-    Four rows at a time: out is read and written a quarter as often.
-    """
+    """Add Σ weight row to out, shape (n,), for as many rows as weights."""
     count, n = weights.shape[0], out.shape[0]
     for group in range(count // 4):
         r = 4 * group
@@ -68,10 +68,7 @@ def norm(W: Array, x: Array) -> float:
 
 @kernel
 def cholesky(A: Array, L: Array) -> bool:
-    """Write the Cholesky factor L of A = L Lᵀ; return whether A is positive definite.
-
-    Shapes (n, n). If A is not positive definite, L is incomplete.
-    """
+    """Write the factor L of A = L Lᵀ (n, n); return whether A is positive definite."""
     n = A.shape[0]
     for j in range(n):
         pivot = A[j, j]
@@ -127,10 +124,7 @@ def solve_rows_transposed(L: Array, X: Array) -> None:
 
 @kernel
 def solve_columns(L: Array, X: Array) -> None:
-    """Overwrite X with (L Lᵀ)⁻¹ X; shapes (m, m) and (m, n).
-
-    The loops follow the rows of X, in the order of memory.
-    """
+    """Overwrite X with (L Lᵀ)⁻¹ X; shapes (m, m) and (m, n)."""
     m, n = X.shape
     for i in range(m):
         for k in range(i):
@@ -167,7 +161,7 @@ def gram(A: Array, B: Array, symmetric: bool, out: Array) -> None:
 
 @kernel
 def orthonormalise_rows(J: Array, Q: Array, X: Array) -> float:
-    """Write a lower triangular X, and Q = X J with orthonormal rows, for m ≤ n.
+    """Write a lower triangular X (m, m), and Q = X J (m, n) with orthonormal rows.
 
     Modified Gram-Schmidt: each row is normalised, then its component is subtracted from
     the rows after it. X goes through the same steps. If a row loses nine tenths of its
@@ -175,14 +169,8 @@ def orthonormalise_rows(J: Array, Q: Array, X: Array) -> float:
     et al. 2005), so that Q is orthonormal to rounding. A row that becomes zero leaves
     zeros in Q and X.
 
-    Args:
-        J: Shape (m, n).
-        Q: Shape (m, n).
-        X: Shape (m, m) or larger.
-
-    Returns:
-        1/‖X‖_F, a lower bound of J's smallest singular value, too small by a factor of
-        √m at most; 0 if a row became zero, inf without rows.
+    Returns 1/‖X‖_F, a lower bound of J's smallest singular value, too small by a factor
+    of √m at most; 0 if a row became zero, inf without rows.
     """
     m, n = J.shape
     for j in range(m):
@@ -227,16 +215,10 @@ def _project_out_row(Q: Array, X: Array, j: int) -> float:
 
 @kernel
 def triangularise_rows(Y: Array) -> float:
-    """Overwrite the lower triangle of Y with that of Y H, which is zero elsewhere.
+    """Overwrite the lower triangle of Y (m, n), m ≤ n, with Y H's; return det(Y Yᵀ).
 
-    H is orthogonal, a product of Householder's reflections: the triangle has Y's
-    singular values. The rest of Y is used.
-
-    Args:
-        Y: Shape (m, n), m ≤ n, of any rank.
-
-    Returns:
-        det(Y Yᵀ).
+    H is orthogonal, a product of Householder's reflections: Y H is zero elsewhere, and
+    has Y's singular values. The rest of Y is used.
     """
     m, n = Y.shape
     product = 1.0
@@ -270,11 +252,7 @@ def squared_norm(x: Array) -> float:
 
 @kernel
 def smallest_singular_value_bound(X: Array) -> float:
-    """Return 1/√‖X Xᵀ‖_F for the X of `orthonormalise_rows`, shape (m, m).
-
-    It is a lower bound of the smallest singular value, too small by a factor of the
-    fourth root of m at most: tighter than what `orthonormalise_rows` returns.
-    """
+    """Return 1/√‖X Xᵀ‖_F (m, m), a lower bound of the smallest singular value."""
     m = X.shape[0]
     square = 0.0
     for i in range(m):
@@ -288,16 +266,12 @@ def smallest_singular_value_bound(X: Array) -> float:
 
 @kernel
 def orthogonalise_rows(Y: Array, U: Array) -> None:
-    """Overwrite Y with U Y, whose rows are orthogonal; U is orthogonal.
+    """Overwrite Y (m, n) with U Y, whose rows are orthogonal; U (m, m) is orthogonal.
 
     One-sided Jacobi, in rounds of pairs that share no row, on several of which a
     processor works at a time. The norms of the new rows are the singular values of Y;
     small ones have high relative accuracy (Demmel and Veselić 1992). Y may be
-    rank-deficient.
-
-    Args:
-        Y: Shape (m, n).
-        U: Shape (m, m); shape (0, m) if only the singular values are needed.
+    rank-deficient. A U of shape (0, m) is not written.
     """
     m = Y.shape[0]
     for i in range(m):
@@ -344,3 +318,42 @@ def _rotate_rows(Y: Array, U: Array, p: int, q: int) -> bool:
         U[p, i] = c * y - s * U[q, i]
         U[q, i] = s * y + c * U[q, i]
     return True
+
+
+@kernel
+def bounded_inverse(B: Array, threshold: float, Q: Array, X: Array) -> bool:
+    """Write the factors of B# = Bᵀ q(B Bᵀ), and return whether it was damped.
+
+    q(x) = 1/x for x ≥ threshold² and (2 - x/threshold²)/threshold² below it: exactly
+    the pseudo-inverse while every singular value of B is above the threshold,
+    continuously differentiable, and bounded: ‖B#‖ ≤ 1.09/threshold. B has the shape
+    (m, n), m ≤ n; the rows of Q (m, n) span those of B; X has the shape (m, m).
+    """
+    # The spectrum is computed only where cheaper bounds cannot decide.
+    bound = orthonormalise_rows(B, Q, X)
+    if 0.0 < bound < threshold:
+        bound = smallest_singular_value_bound(X)
+    if bound < threshold:
+        return _bounded_factors(B, threshold, Q, X)
+    return False
+
+
+@kernel
+def _bounded_factors(B: Array, threshold: float, Q: Array, X: Array) -> bool:
+    """Write Q = U B with rows of norms s, and X = q(s²) U; return whether it damped."""
+    m, n = B.shape
+    for k in range(m):
+        for i in range(n):
+            Q[k, i] = B[k, i]
+    orthogonalise_rows(Q, X)
+    floor = threshold * threshold
+    damped = False
+    for k in range(m):
+        x = 0.0
+        for i in range(n):
+            x += Q[k, i] * Q[k, i]
+        inverse = 1.0 / x if x >= floor else (2.0 - x / floor) / floor
+        damped = damped or x < floor
+        for i in range(m):
+            X[k, i] *= inverse
+    return damped

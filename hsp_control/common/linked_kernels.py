@@ -89,11 +89,7 @@ class _Passes(cast("Any", compiler_machinery).PassManager):  # type: ignore[misc
 
 
 class KernelCompiler(cast("Any", compiler).CompilerBase):  # type: ignore[misc]
-    """Numba's compiler without the passes that find nothing in kernels.
-
-    These look for array expressions, which would allocate, for closures, for what
-    is inlined before it is typed, and for the last use of what has to be freed.
-    """
+    """Numba's compiler without the passes that find nothing in kernels."""
 
     def define_pipelines(self) -> list[Any]:
         """Return the passes."""
@@ -133,10 +129,7 @@ class _Flags(cast("Any", compiler).Flags):  # type: ignore[misc]
 
 
 class _Typing(type(_target.typing_context)):  # type: ignore[misc]
-    """Says what calls mean for the types of their arguments; of Numba's own once.
-
-    Numba tries out all that an operator can mean each time: most of type inference.
-    """
+    """Says what calls mean for the types of their arguments; asks Numba once."""
 
     def resolve_function_type(self, func: Any, args: Any, kws: Any) -> Any:
         """Return the signature of a call."""
@@ -182,14 +175,7 @@ def _flags(dispatcher: Any) -> _Flags:
 
 
 def compile_callable(own: Any, function: Callable[..., Any], args: Any, to: Any) -> Any:
-    """Return what Numba makes of a function that is called by its address.
-
-    Args:
-        own: Numba's compiler of the function.
-        function: The function.
-        args: The types of its arguments.
-        to: The type that it returns.
-    """
+    """Return what Numba makes of a function that is called by its address."""
     flags = cast("Any", compiler).Flags()
     own.targetdescr.options.parse_as_flags(flags, own.targetoptions)
     target = _target.target_context
@@ -209,12 +195,7 @@ def compile_callable(own: Any, function: Callable[..., Any], args: Any, to: Any)
 
 
 def linked(function: Callable[..., Any], options: dict[str, Any]) -> Any:
-    """Return Numba's dispatcher of a function, for calls by other compiled functions.
-
-    Args:
-        function: The function.
-        options: Numba's options.
-    """
+    """Return Numba's dispatcher of a function, for calls by compiled functions."""
     dispatcher: Any = cast("Any", numba).jit(
         **options, no_cpython_wrapper=True, no_cfunc_wrapper=True
     )(function)

@@ -85,27 +85,18 @@ def are_native(calls: Sequence[object]) -> TypeGuard[Sequence[NativeCall]]:
 
 
 def table(calls: Sequence[NativeCall]) -> tuple[Indices, Array]:
-    """Return what `adapters.run` reads of calls: where they are, and their windows.
-
-    Both are of shape (parts, 2). They are addresses: who uses them keeps the calls.
-    """
+    """Return calls' addresses, not the calls, and their windows, shape (parts, 2)."""
     rows = [np.zeros((0, 2), dtype=np.int64), *(call.args[0] for call in calls)]
     when = [np.zeros((0, 2)), *(call.args[1] for call in calls)]
     return np.concatenate(rows), np.concatenate(when)
 
 
 class Timed(NamedTuple):
-    """A call and when it is made.
+    """A call and when it is made."""
 
-    Attributes:
-        call: The call; a native one in a `sequence`.
-        start: Start of its window of time [s].
-        end: End of its window [s].
-    """
-
-    call: Any
-    start: float = FOREVER[0]
-    end: float = FOREVER[1]
+    call: Any  # the call; a native one in a `sequence`
+    start: float = FOREVER[0]  # start of its window of time [s]
+    end: float = FOREVER[1]  # end of its window [s]
 
 
 def bind(
@@ -148,10 +139,7 @@ def _make_once(
 
 
 def only_if(calls: Sequence[Callable[[], float]], found: Array) -> Callable[[], float]:
-    """Return one call that makes several if ``found[1]`` is not zero, found (2,).
-
-    It returns ``found[0]``, plus what the last one returned if they were made.
-    """
+    """Return one call that makes several if ``found[1]`` is not zero, found (2,)."""
     if not are_native(calls):
         return partial(_make_if, calls, found)
     from hsp_control.common.adapters import run_if
@@ -169,10 +157,7 @@ def _make_if(calls: Sequence[Callable[[], float]], found: Array) -> float:
 
 
 def sequence(calls: Sequence[Timed], *free: float) -> NativeCall:
-    """Return one call of the time that makes several; it returns the last result.
-
-    With a time as ``free`` it is a call without arguments.
-    """
+    """Return one call of the time that makes several; it returns the last result."""
     from hsp_control.common import adapters
 
     rows = np.concatenate([each.call.args[0] for each in calls])

@@ -7,11 +7,7 @@ _PACKAGE = Path(__file__).resolve().parents[1]
 
 
 def bundled(folder: str) -> Path:
-    """Return the bundled folder ``robots``, ``configs`` or ``machine_code``.
-
-    In an installed wheel it is inside the package (``hsp_control/data``); in a
-    checkout or an editable install it is next to the package.
-    """
+    """Return a bundled folder: inside the package, in a checkout beside it."""
     installed = _PACKAGE / "data" / folder
     return installed if installed.is_dir() else _PACKAGE.parent / folder
 

@@ -117,14 +117,7 @@ def _combine(identity: float, skew: float, outer: float, y: Array, out: Array) -
 
 @kernel
 def turn(R: Array, a: Array, scale: float, out: Array) -> None:
-    """Write exp(scale · a) R: R rotated about a, a vector in world axes.
-
-    Args:
-        R: Rotation matrix, shape (3, 3).
-        a: Rotation vector, shape (3,) [rad].
-        scale: Factor of ``a``: the angle is scale · |a|.
-        out: Rotation matrix, shape (3, 3); may be ``R``.
-    """
+    """Write exp(scale · a) R: R rotated about a, in world axes; ``out`` may be R."""
     s = scale * scale * (a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
     c0, c1, c2, _, _, _ = stumpff(s)
     skew = scale * c1
@@ -139,37 +132,21 @@ def turn(R: Array, a: Array, scale: float, out: Array) -> None:
 
 @kernel
 def exp3(y: Array, out: Array) -> None:
-    """Write the rotation exp([y]×).
-
-    Args:
-        y: Rotation vector, shape (3,) [rad].
-        out: Rotation matrix, shape (3, 3).
-    """
+    """Write the rotation exp([y]×)."""
     c0, c1, c2, _, _, _ = stumpff(y[0] * y[0] + y[1] * y[1] + y[2] * y[2])
     _combine(c0, c1, c2, y, out)
 
 
 @kernel
 def jexp3(y: Array, out: Array) -> None:
-    """Write the right Jacobian of exp: ω = Jexp(y) y', ω in the body frame of exp(y).
-
-    Args:
-        y: Rotation vector, shape (3,) [rad].
-        out: Jexp(y), shape (3, 3).
-    """
+    """Write the right Jacobian of exp: ω = Jexp(y) y' in the body frame of exp(y)."""
     _, c1, c2, c3, _, _ = stumpff(y[0] * y[0] + y[1] * y[1] + y[2] * y[2])
     _combine(c1, -c2, c3, y, out)
 
 
 @kernel
 def jexp3_dot(y: Array, y_dot: Array, out: Array) -> None:
-    """Write the time derivative of `jexp3`, so that ω' = Jexp y'' + Jexp' y'.
-
-    Args:
-        y: Rotation vector, shape (3,) [rad].
-        y_dot: Its rate, shape (3,) [rad/s].
-        out: Jexp'(y, y'), shape (3, 3) [1/s].
-    """
+    """Write the time derivative of `jexp3`, so that ω' = Jexp y'' + Jexp' y'."""
     _, _, c2, c3, c4, c5 = stumpff(y[0] * y[0] + y[1] * y[1] + y[2] * y[2])
     half_s_dot = y[0] * y_dot[0] + y[1] * y_dot[1] + y[2] * y_dot[2]
     c1_dot = (c3 - c2) * half_s_dot
@@ -188,12 +165,7 @@ def jexp3_dot(y: Array, y_dot: Array, out: Array) -> None:
 
 @kernel
 def jlog3(y: Array, out: Array) -> None:
-    """Write the inverse of `jexp3`: y' = Jlog(y) ω for y = log(R), ω in the body frame.
-
-    Args:
-        y: Rotation vector, shape (3,), |y| < 2π [rad].
-        out: Jlog(y), shape (3, 3).
-    """
+    """Write the inverse of `jexp3`: y' = Jlog(y) ω for y = log(R), |y| < 2π."""
     _, c1, c2, c3, c4, _ = stumpff(y[0] * y[0] + y[1] * y[1] + y[2] * y[2])
     _combine(0.5 * c1 / c2, 0.5, 0.5 * (c3 - 2.0 * c4) / c2, y, out)
 
@@ -204,10 +176,6 @@ def log3(R: Array, out: Array) -> None:
 
     It is computed from the quaternion, whose vector part stays accurate near π, where
     the trace and the skew part of R both lose digits. At π either sign of y is right.
-
-    Args:
-        R: Rotation matrix, shape (3, 3).
-        out: Rotation vector, shape (3,) [rad].
     """
     x, y, z, w = _quaternion(R)
     sine = sqrt(x * x + y * y + z * z)  # of the half angle; w >= 0 is its cosine
@@ -217,12 +185,7 @@ def log3(R: Array, out: Array) -> None:
 
 @kernel
 def rotation_from_quaternion(quaternion: Array, out: Array) -> None:
-    """Write the rotation matrix of a quaternion of any non-zero norm.
-
-    Args:
-        quaternion: (x, y, z, w) as in Pinocchio, shape (4,).
-        out: Rotation matrix, shape (3, 3).
-    """
+    """Write the rotation matrix of a quaternion (x, y, z, w) of any non-zero norm."""
     x, y, z, w = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     length_squared = x * x + y * y + z * z + w * w
     scale = 2.0 / length_squared
@@ -231,21 +194,13 @@ def rotation_from_quaternion(quaternion: Array, out: Array) -> None:
 
 @kernel
 def quaternion_from_rotation(R: Array, out: Array) -> None:
-    """Write the unit quaternion of R whose scalar part is not negative.
-
-    Args:
-        R: Rotation matrix, shape (3, 3).
-        out: (x, y, z, w) as in Pinocchio, shape (4,).
-    """
+    """Write R's unit quaternion (x, y, z, w) whose scalar part is not negative."""
     out[0], out[1], out[2], out[3] = _quaternion(R)
 
 
 @kernel
 def _quaternion(R: Array) -> tuple[float, float, float, float]:
-    """Return (x, y, z, w), w >= 0, from the row of 4 q qᵀ with the largest diagonal.
-
-    The four diagonal entries add up to 4, so the largest is at least 1.
-    """
+    """Return (x, y, z, w), w >= 0, from the row of 4 q qᵀ with the largest diagonal."""
     a, b, c = R[0, 0], R[1, 1], R[2, 2]
     if a + b + c >= max(a, b, c):
         x, y, z = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]

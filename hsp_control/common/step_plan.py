@@ -14,31 +14,20 @@ def stay(t: float) -> None:
 
 
 class StepPlan(NamedTuple):
-    """The calls that evaluate one part of a controller, at whatever the state is.
+    """The calls that evaluate one part of a controller, at whatever the state is."""
 
-    To find out at every step what to call would cost as much as the small kernels do.
-
-    Attributes:
-        follow: Calls of the time [s] that update references.
-        write: Calls without arguments that read the state and write the results.
-    """
-
+    # calls of the time [s] that update references
     follow: tuple[Callable[[float], object], ...] = ()
+    # calls without arguments that read the state and write the results
     write: tuple[Callable[[], object], ...] = ()
 
 
 class CallSequence:
-    """Several calls as one.
-
-    Attributes:
-        calls: The calls, in order.
-        result: The index of the call whose result is returned.
-    """
+    """Several calls as one."""
 
     def __init__(self, *calls: Callable[..., Any], result: int = -1) -> None:
-        """Keep the calls."""
-        self.calls = calls
-        self.result = result
+        self.calls = calls  # the calls, in order
+        self.result = result  # the index of the call whose result is returned
 
     def __call__(self, *arguments: float) -> Any:
         """Make the calls in order."""
@@ -46,18 +35,12 @@ class CallSequence:
 
 
 class TimeWindow:
-    """A call of the time that is made only within a window of time.
-
-    Attributes:
-        call: The call.
-        start: Start of the window [s].
-        end: End of the window [s]; at the end it is not made.
-    """
+    """A call of the time that is made only within a window of time."""
 
     def __init__(
         self, call: Callable[[float], object], start: float, end: float
     ) -> None:
-        """Keep the call and its window."""
+        # the window [s]; at its end the call is not made
         self.call, self.start, self.end = call, start, end
 
     def __call__(self, t: float) -> None:
@@ -69,11 +52,7 @@ class TimeWindow:
 def steps(
     plans: Iterable[StepPlan], last: Callable[[], Any]
 ) -> list[Callable[[float], Any]]:
-    """Return the calls of a step, each to be given the time: all plans, then ``last``.
-
-    All references are updated before anything reads them. Native calls that follow one
-    another become one call.
-    """
+    """Return the calls of a step: all references first; native ones as one call."""
     plans = list(plans)
     parts = [part for p in plans for follow in p.follow for part in _parts(follow)]
     for write in [*(write for p in plans for write in p.write), last]:

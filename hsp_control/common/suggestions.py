@@ -7,10 +7,8 @@ from difflib import get_close_matches
 def nearest(word: str, options: Iterable[str]) -> str | None:
     """Return the option that the user probably meant by ``word``, or None.
 
-    Upper and lower case are treated as equal. An option with similar spelling is
-    preferred. If there is none, the shortest option that contains the word, or is
-    contained in it, is returned: ``hand`` finds ``panda_hand``. Words of one or two
-    letters are not searched for in this way.
+    One of similar spelling, else the shortest that contains the word of three letters
+    or more, or is contained in it: ``hand`` finds ``panda_hand``.
     """
     folded = {option.casefold(): option for option in options}
     target = word.casefold()
@@ -25,21 +23,13 @@ def nearest(word: str, options: Iterable[str]) -> str | None:
 
 
 def did_you_mean(word: str, options: Iterable[str]) -> str:
-    """Return ``; did you mean 'x'?`` with the nearest option, or an empty string.
-
-    Append it to a message that says that ``word`` does not exist.
-    """
+    """Return ``; did you mean 'x'?`` with the nearest option, or an empty string."""
     near = nearest(word, options)
     return "" if near is None else f"; did you mean {near!r}?"
 
 
 def listing(options: Iterable[str], limit: int = 12) -> str:
-    """Return ``a, b, c``, or ``a, b, c, ... (37 in all)`` if the list is long.
-
-    Args:
-        options: The names, in the order in which they are listed.
-        limit: How many names are written out.
-    """
+    """Return ``a, b, c``, or ``a, b, c, ... (37 in all)`` if the list is long."""
     names = list(options)
     if len(names) <= limit:
         return ", ".join(names)

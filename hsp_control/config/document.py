@@ -1,5 +1,6 @@
 """A configuration as plain data, with the line that each key came from."""
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from copy import deepcopy
@@ -9,13 +10,43 @@ from typing import Any
 
 from hsp_control.common.exceptions import ConfigError, HspControlError
 from hsp_control.common.suggestions import nearest
-from hsp_control.config.overrides import assign
 from hsp_control.config.syntax import YamlError
-from hsp_control.config.yaml_reader import MAX_SIZE, Mark, read_yaml
-from hsp_control.declaration.keys import KeyPath, split_assignment
+from hsp_control.config.yaml_reader import MAX_DEPTH, MAX_SIZE, Mark, read_yaml
+from hsp_control.declaration.keys import KeyPath, split_assignment, written
 from hsp_control.declaration.located import locate, located
 from hsp_control.declaration.plain import shortened, shown
 from hsp_control.robot.description.access import ANYWHERE
+
+
+def assign(data: dict[str, Any], keys: list[str], value: Any) -> KeyPath:
+    """Set the value at a key path, and create missing keys; the schema checks them."""
+    if len(keys) > MAX_DEPTH:
+        raise ValueError(f"nested deeper than {MAX_DEPTH} levels")
+    holder: Any = data
+    path: KeyPath = ()
+    for key in keys[:-1]:
+        place = _place(holder, key, path)
+        inner = holder.get(place) if isinstance(holder, dict) else holder[place]
+        if inner is None:
+            inner = holder[place] = {}
+        holder = inner
+        path = (*path, place)
+    last = _place(holder, keys[-1], path)
+    holder[last] = value
+    return (*path, last)
+
+
+def _place(holder: Any, key: str, path: KeyPath) -> str | int:
+    """Return ``key`` for a mapping, or the number of the entry for a list."""
+    if isinstance(holder, dict):
+        return key
+    if not isinstance(holder, list):
+        raise ValueError(f"{written(path)} is {shown(holder)}, which has no keys")
+    if not re.fullmatch(r"[0-9]{1,6}", key) or int(key) >= len(holder):
+        entries = f"0 to {len(holder) - 1}" if holder else "none"
+        raise ValueError(f"{written(path)} has no entry {key!r} (entries: {entries})")
+    return int(key)
+
 
 _TOO_LARGE = f"larger than {MAX_SIZE // 1_000_000} MB, the limit for a configuration"
 _LONGEST_ORIGIN = 72
@@ -26,36 +57,21 @@ class Document:
 
     A key path is a tuple: ``("tasks", 0, "frame")`` for what the user writes as
     ``tasks.0.frame``. All errors have the form ``file:line: key.path: what is wrong``.
-
-    Attributes:
-        name: The file's path as it was given, for messages.
-        access: Which files the configuration may name.
-        packages: The packages whose types it may name, besides our own; None: all.
     """
 
     def __init__(
         self, data: dict[str, Any], marks: dict[KeyPath, Mark], name: str
     ) -> None:
-        """Keep a copy of the data.
-
-        Args:
-            data: The plain data.
-            marks: The place of each key path in the text; empty if there is no text.
-            name: The file's path, for messages.
-        """
-        self.name = name
-        self.access = ANYWHERE
+        self.name = name  # the file's path as it was given, for messages
+        self.access = ANYWHERE  # which files the configuration may name
+        # the packages whose types it may name, besides our own; None: all
         self.packages: frozenset[str] | None = None
         self._data = deepcopy(data)
         self._origins: dict[KeyPath, Mark | str] = dict(marks)
 
     @classmethod
     def read(cls, path: str | PathLike[str]) -> "Document":
-        """Read a YAML file.
-
-        Raises:
-            ConfigError: If it cannot be read, or is not a mapping in plain YAML.
-        """
+        """Read a YAML file."""
         name = fspath(path)
         try:
             with Path(name).open("rb") as file:
@@ -74,15 +90,7 @@ class Document:
 
     @classmethod
     def parse(cls, text: str, name: str = "<string>") -> "Document":
-        """Parse a YAML text.
-
-        Args:
-            text: The text.
-            name: The file's path, for messages.
-
-        Raises:
-            ConfigError: If it is not a mapping in plain YAML.
-        """
+        """Parse a YAML text."""
         if len(text) > MAX_SIZE:
             raise located(name, _TOO_LARGE)
         try:
@@ -103,13 +111,7 @@ class Document:
     def override(self, assignment: str) -> None:
         """Change one value by ``tasks.0.gains.kp=100``, the argument of ``--set``.
 
-        The value is YAML. Missing keys are created, and the schema then checks them;
-        missing list entries are an error. Keys that contain a dot need quotes:
-        ``frames.'a.b'.parent=x``.
-
-        Raises:
-            ConfigError: If the assignment has another form, or its key path leads
-                nowhere.
+        The value is YAML. Keys with a dot need quotes: ``frames.'a.b'.parent=x``.
         """
         origin = shortened(f"--set {' '.join(assignment.split())}", _LONGEST_ORIGIN)
         try:
@@ -122,16 +124,7 @@ class Document:
         self.assign(keys, value, origin)
 
     def assign(self, keys: list[str], value: Any, origin: str) -> KeyPath:
-        """Set the value at a key path, and return the key path.
-
-        Args:
-            keys: The parts of the key path, as text; see `override`.
-            value: The new value, plain data.
-            origin: What messages about the value say instead of file and line.
-
-        Raises:
-            ConfigError: If the key path leads nowhere.
-        """
+        """Set the value at a key path; ``origin`` is its place in messages."""
         try:
             path = assign(self._data, keys, value)
         except ValueError as error:
@@ -142,7 +135,6 @@ class Document:
         return path
 
     def __contains__(self, path: KeyPath) -> bool:
-        """Say whether there is a value at the key path."""
         value: Any = self._data
         for part in path:
             if isinstance(value, list):
@@ -153,18 +145,12 @@ class Document:
         return True
 
     def says_nothing(self, key: str) -> bool:
-        """Return whether the text has the key with nothing behind it.
-
-        Logs and dictionaries can have None there, as Python has.
-        """
+        """Return whether the text has the key with nothing behind it."""
         given = self._data.get(key, self) is None
         return given and isinstance(self._origins.get((key,)), Mark)
 
     def mark(self, path: KeyPath) -> Mark | None:
-        """Return the place of a key path in the text, None if it was overridden.
-
-        For a path that does not exist it is the place of its nearest ancestor.
-        """
+        """Return the place of a key path in the text, None if it was overridden."""
         origin = self._origin(path)
         return origin if isinstance(origin, Mark) else None
 
@@ -181,15 +167,11 @@ class Document:
     def at(self, *path: str | int) -> Iterator[None]:
         """Add the location of a key path to errors that are raised inside the block.
 
-        An error keeps its class. An error that has a location already keeps it, so of
-        nested blocks the innermost one counts. A key path that the error has itself
-        (see `hsp_control.declaration.located.within`) continues the given one::
+        An error that has a location already keeps it: the innermost block counts. A key
+        path that the error has itself continues the given one::
 
             with document.at("tasks", "hand"), within("frame"):
                 robot.frame_id("panda_hnad")  # FrameNotFoundError: panda.yaml:7: ...
-
-        Raises:
-            HspControlError: The error that was raised inside, with the location.
         """
         try:
             yield

@@ -240,11 +240,6 @@ class Experiment:
         )
 
     def __setattr__(self, attribute: str, value: object) -> NoReturn:
-        """Raise: an experiment does not change.
-
-        Raises:
-            ImmutableError: Always.
-        """
         raise ImmutableError(
             f"Experiment.{attribute} cannot be assigned: build another experiment, or "
             "change the controller while it runs with experiment.controller.at(t)"
@@ -357,11 +352,7 @@ def load_experiment(
 
 
 def build(document: Document) -> Experiment:
-    """Build the experiment of a configuration.
-
-    Raises:
-        HspControlError: If the configuration is wrong; see `load_experiment`.
-    """
+    """Build the experiment of a configuration."""
     return Experiment.of(load_scenario(document))
 
 
@@ -383,11 +374,7 @@ def _plant(document: Document, scenario: Scenario, robot: Robot) -> Plant:
 
 
 def _description(robot: str | Robot | RobotDescription) -> RobotDescription:
-    """Return what a configuration says about a robot.
-
-    Raises:
-        ModelError: If it was not loaded.
-    """
+    """Return what a configuration says about a robot."""
     if isinstance(robot, str):
         return RobotDescription(robot)
     if isinstance(robot, RobotDescription):

@@ -15,26 +15,15 @@ from hsp_control.robot import Robot
 
 
 class LoadedScenario(NamedTuple):
-    """A checked configuration, with its robot and its scene.
+    """A checked configuration, with its robot and its scene."""
 
-    Attributes:
-        document: The configuration as it was read; it locates errors.
-        scenario: The configuration, checked.
-        robot: The robot.
-        scene: Its obstacles.
-    """
-
-    document: Document
-    scenario: Scenario
-    robot: Robot
-    scene: Scene
+    document: Document  # the configuration as it was read; it locates errors
+    scenario: Scenario  # the configuration, checked
+    robot: Robot  # the robot
+    scene: Scene  # its obstacles
 
     def start(self) -> Array:
-        """Return the start configuration, shape (nq,); home where it has to be found.
-
-        Raises:
-            HspControlError: If it is wrong; `Experiment.of` says where.
-        """
+        """Return the start configuration (nq,); home where it has to be found."""
         start, contacts = self.scenario.start, self.scenario.contacts.values()
         if start.is_found:
             return self.robot.home()
@@ -42,11 +31,7 @@ class LoadedScenario(NamedTuple):
 
 
 def load_scenario(document: Document) -> LoadedScenario:
-    """Check a configuration, and load its robot and its scene: it compiles no kernel.
-
-    Raises:
-        HspControlError: If the configuration is wrong; see `load_experiment`.
-    """
+    """Check a configuration, and load its robot and scene: no kernel is compiled."""
     if document.says_nothing("limits"):
         raise document.error(
             ("limits",),
@@ -70,11 +55,7 @@ def load_scenario(document: Document) -> LoadedScenario:
 
 
 def load_robot(document: Document, scenario: Scenario) -> Robot:
-    """Return the robot of a configuration.
-
-    Raises:
-        HspControlError: If it cannot be loaded; with a location.
-    """
+    """Return the robot of a configuration."""
     keys = [key for key in ("name", "description") if getattr(scenario.robot, key)]
     with document.at("robot", *keys):
         return Robot.load(scenario.robot, access=document.access)

@@ -11,17 +11,7 @@ from hsp_control.robot.description.mesh_files import check_references
 
 
 def located_scene(scene: Scene, folder: Path, access: Access) -> Scene:
-    """Return the scene with absolute paths of its meshes, checked.
-
-    Args:
-        scene: The scene.
-        folder: Where relative paths begin.
-        access: Which files may be read.
-
-    Raises:
-        AccessError: If a mesh may not be read.
-        SceneError: If a mesh cannot be read, or a shape is degenerate.
-    """
+    """Return the scene with absolute paths of its meshes, checked."""
     return Scene([_located(each, folder, access) for each in scene.values()])
 
 

@@ -11,13 +11,7 @@ from hsp_control.robot import Robot
 def check_compensation(
     document: Document, scenario: Scenario, controller: Controller
 ) -> None:
-    """Check the compensation against the robot, its tasks and contacts.
-
-    Raises:
-        ConfigError: If the configuration has no control period.
-        CompensationError: If a compensator does not fit.
-        GainError: If errors would not decay with the integral action.
-    """
+    """Check the compensation against the robot, its tasks and contacts."""
     compensation = scenario.compensation
     if compensation.names and scenario.simulation.control_period is None:
         raise document.error(
@@ -36,14 +30,7 @@ def check_rates(
     q0: Array,
     moving: Robot,
 ) -> tuple[RateFinding, ...]:
-    """Check that the loop is stable at its rate; return gains that are high for it.
-
-    The delays are those of the plant, whether or not a predictor compensates them, and
-    the bodies are those of the robot that moves.
-
-    Raises:
-        UnstableRateError: If the loop is unstable.
-    """
+    """Check that the loop is stable at its rate; return gains that are high for it."""
     settings, plant = scenario.simulation, scenario.plant
     if settings.control_period is None or not settings.check_rate:
         return ()

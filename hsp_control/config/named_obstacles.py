@@ -10,15 +10,7 @@ from hsp_control.geometry import Obstacle, Scene
 
 
 def named_obstacles(scene: Scene, parts: Any) -> tuple[Scene, Any]:
-    """Return parts with names instead of obstacles, and the scene that has them.
-
-    Args:
-        scene: The scene.
-        parts: A part, or a tuple of parts.
-
-    Raises:
-        SceneError: If two different obstacles have the same name.
-    """
+    """Return parts with names instead of obstacles, and the scene that has them."""
     known = dict(scene)
 
     def named(value: Any) -> Any:

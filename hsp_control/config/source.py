@@ -24,14 +24,7 @@ def read_document(
     strict: bool = False,
     allow: Sequence[str | PathLike[str]] = (),
 ) -> Document:
-    """Return the configuration's data with the location of each key.
-
-    See `load_experiment` for the arguments.
-
-    Raises:
-        ConfigError: If there is no such configuration or it is not plain YAML.
-        LogError: If it is a log that cannot be read.
-    """
+    """Return the configuration's data with the location of each key."""
     document = _read(source)
     if strict:
         own = [] if isinstance(source, dict) else [Path(document.name).parent]
@@ -80,11 +73,7 @@ def _read(source: str | PathLike[str] | dict[str, Any]) -> Document:
 
 
 def _check_heard(path: Path, run: Rollout) -> None:
-    """Check that a log holds all that its streams have taken.
-
-    Raises:
-        ConfigError: If it does not: it is the journal of a process that was killed.
-    """
+    """Check that a log holds all that its streams have taken."""
     for name, recordings in (run.meta.get("streams") or {}).items():
         for k, messages in enumerate(recordings):
             column = f"stream.{name}{f'_{k + 1}' if k else ''}.taken"

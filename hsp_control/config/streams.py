@@ -16,18 +16,7 @@ from hsp_control.trajectories.streams.stream import Streamed
 
 
 def with_messages(scenario: Scenario, folder: Path, access: Access) -> Scenario:
-    """Return a scenario whose streams hold the messages of their recordings.
-
-    Args:
-        scenario: The scenario.
-        folder: Where relative paths begin.
-        access: Which files may be read; strict reading also refuses to listen to other
-            computers.
-
-    Raises:
-        AccessError: If a recording may not be read, or a stream would listen to others.
-        StreamError: If a recording cannot be read, or a message is invalid.
-    """
+    """Return a scenario whose streams hold the messages of their recordings."""
 
     def located(stream: Streamed) -> Streamed:
         with within("source"):
@@ -59,14 +48,7 @@ def with_recordings(
     heard: Mapping[str, Sequence[Any]],
     planned: Sequence[Any] = (),
 ) -> dict[str, Any]:
-    """Return a log's configuration in which its streams repeat what they heard.
-
-    Args:
-        config: The configuration's data.
-        heard: For each task what its streams have taken, in their order; see
-            `recorder.repeatable`.
-        planned: What the streams of the plan have taken.
-    """
+    """Return a log's configuration in which its streams repeat what they heard."""
     repeated = deepcopy(dict(config))
     tasks = repeated.get("tasks", {})
     told = [(tasks.get(name, {}), recordings) for name, recordings in heard.items()]
@@ -78,10 +60,7 @@ def with_recordings(
 
 
 def without_sources(config: Mapping[str, Any] | None) -> dict[str, Any] | None:
-    """Return a configuration whose streams hear nothing: one process listens, not two.
-
-    Their references stay where they start.
-    """
+    """Return a configuration whose streams hear nothing: their references stay."""
     if config is None:
         return None
     deaf = deepcopy(dict(config))

@@ -16,20 +16,13 @@ _HINTS = {
 
 
 class YamlError(Exception):
-    """The text is not YAML, or uses a part of YAML that is not allowed.
-
-    Attributes:
-        line: The line of the error, counted from 1.
-        message: What is wrong there.
-        path: The key path of the error; empty if it is not known.
-    """
+    """The text is not YAML, or uses a part of YAML that is not allowed."""
 
     def __init__(self, line: int, message: str, path: KeyPath = ()) -> None:
-        """Store the parts; the caller adds the name of the file."""
         super().__init__(line, message, path)
-        self.line = line
-        self.message = message
-        self.path = path
+        self.line = line  # the line of the error, counted from 1
+        self.message = message  # what is wrong there
+        self.path = path  # the key path of the error; empty if it is not known
 
 
 def syntax_error(error: yaml.MarkedYAMLError) -> YamlError:

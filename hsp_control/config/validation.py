@@ -9,11 +9,15 @@ from hsp_control.common.exceptions import HspControlError
 from hsp_control.config.document import Document
 from hsp_control.declaration import Part
 from hsp_control.declaration.families import only_packages
-from hsp_control.declaration.findings import Finding, Pending, findings
 from hsp_control.declaration.located import locate
-from hsp_control.declaration.mistakes import domain_error
+from hsp_control.declaration.mistakes import (
+    Finding,
+    Pending,
+    domain_error,
+    explained,
+    findings,
+)
 from hsp_control.declaration.schema import shape
-from hsp_control.declaration.wording import explained
 
 Value = TypeVar("Value", bound=Part)
 
@@ -23,13 +27,7 @@ _ENTRIES = 20
 
 
 def validate(document: Document, part: type[Value]) -> Value:
-    """Return the document as a part.
-
-    Raises:
-        HspControlError: If it does not follow the declaration of the part. The message
-            describes the first mistake in the order of the file, then up to five
-            others, a line each.
-    """
+    """Return the document as a part; an error names up to six mistakes in order."""
     admitted: AbstractContextManager[None] = nullcontext()
     if document.packages is not None:
         admitted = only_packages(*document.packages)

@@ -10,7 +10,7 @@ from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.native import bind
 from hsp_control.common.step_plan import StepPlan, steps
 from hsp_control.constraints.contacts import Contact
-from hsp_control.constraints.contacts.unactuated import UnactuatedRows, unactuated_count
+from hsp_control.constraints.contacts.contact import UnactuatedRows, unactuated_count
 from hsp_control.control.actuation.support import Support
 from hsp_control.control.setup import PlannedTask
 from hsp_control.law import FieldSample, Outcome, Resolution, TaskSample

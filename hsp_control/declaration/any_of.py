@@ -4,11 +4,7 @@ from dataclasses import fields, is_dataclass
 from typing import Any, cast
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
-from pydantic_core import (
-    CoreSchema,
-    SchemaValidator,
-    core_schema,
-)
+from pydantic_core import CoreSchema, SchemaValidator, core_schema
 
 from hsp_control.common.exceptions import ConfigError
 from hsp_control.declaration.families import Declared, check_admitted, full_name
@@ -26,7 +22,6 @@ class AnyOf:
     """
 
     def __init__(self, *bases: type[Declared]) -> None:
-        """Set the base classes of the families."""
         self.bases = bases
         self._checked: dict[str, type[Declared]] = {}
         self._validator: SchemaValidator | None = None
@@ -83,7 +78,6 @@ class AnyOf:
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        """Return pydantic's schema."""
         return self.core_schema()
 
     def _json_schema(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> Any:
@@ -133,11 +127,7 @@ def _is_known(reference: Any, handler: GetJsonSchemaHandler) -> bool:
 
 
 def _check_complete(type_name: str, member: type[Declared]) -> None:
-    """Check that a class implements what its family asks for.
-
-    Raises:
-        ConfigError: If it does not.
-    """
+    """Check that a class implements what its family asks for."""
     missing = sorted(getattr(member, "__abstractmethods__", ()))
     if missing:
         raise ConfigError(

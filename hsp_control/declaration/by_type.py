@@ -32,7 +32,6 @@ class ByType:
     """
 
     def __init__(self, base: type[Declared]) -> None:
-        """Set the base class of the family."""
         self.base = base
         self._model: type[BaseModel] | None = None
 
@@ -65,11 +64,7 @@ class ByType:
         return self._distinct(tuple(value))
 
     def _distinct(self, parts: tuple[Declared, ...]) -> tuple[Declared, ...]:
-        """Return parts of the family.
-
-        Raises:
-            ValueError: If one is of another family, or two are of one type.
-        """
+        """Return parts of the family."""
         assert self.base.family is not None
         for part in parts:
             if not isinstance(part, self.base):
@@ -83,7 +78,6 @@ class ByType:
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        """Return pydantic's schema."""
         return core_schema.no_info_plain_validator_function(
             self.validate, metadata={"pydantic_js_functions": [self._json_schema]}
         )
@@ -106,16 +100,11 @@ def as_entry(part: Declared) -> Any:
 
 
 class _Entry:
-    """What YAML may say after a type.
-
-    Attributes:
-        member: The class of the type.
-        first: The name of its first field; None if it has none.
-    """
+    """What YAML may say after a type."""
 
     def __init__(self, member: type[Declared]) -> None:
-        """Set the member."""
-        self.member = member
+        self.member = member  # the class of the type
+        # the name of its first field; None if it has none
         self.first = next(iter(member.__pydantic_fields__), None)  # type: ignore[attr-defined]
 
     def field(self) -> Any:

@@ -22,11 +22,7 @@ def written(path: KeyPath) -> str:
 
 
 def split_assignment(assignment: str) -> tuple[list[str], str]:
-    """Split ``tasks.0.gain=5`` into its keys and the text of its value.
-
-    Raises:
-        ValueError: If it does not have this form.
-    """
+    """Split ``tasks.0.gain=5`` into its keys and the text of its value."""
     match = _ASSIGNMENT.fullmatch(assignment)
     if match is None:
         raise ValueError("needs the form key=value, for example tasks.0.gains.kp=100")

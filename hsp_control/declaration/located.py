@@ -33,13 +33,7 @@ def place(error: HspControlError, path: KeyPath) -> None:
 
 
 def locate(error: HspControlError, where: str, path: KeyPath | None = None) -> None:
-    """Add file and line to the error's message, unless it has them already.
-
-    Args:
-        error: The error, which keeps its class, attributes and traceback.
-        where: File and line.
-        path: The key path; None: the error's own.
-    """
+    """Add file and line to the error's message, unless it has them already."""
     if error.location is None:
         _rewrite(error, error.path if path is None else path, where)
 

@@ -1,17 +1,339 @@
-"""One error for the wrong arguments of a part, in the words of the package."""
+"""The user's mistakes, found in pydantic's list of errors, in the package's words.
+
+Pydantic reports a wrong value once for every alternative of a union, under a path that
+contains the alternatives' names. It reports a misspelt key twice, as unknown and as
+missing. This module follows errors and schema together, from the top, and finds one
+mistake of each, under the key path that the user wrote.
+"""
 
 import dataclasses
-from collections.abc import Mapping
-from typing import Any
+import re
+from collections import defaultdict
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol, TypeAlias, get_args, get_origin
 
 from pydantic import ValidationError
+from pydantic_core import ErrorDetails
 
 from hsp_control.common.exceptions import HspControlError
+from hsp_control.common.suggestions import did_you_mean, listing, nearest
 from hsp_control.declaration.families import Declared
-from hsp_control.declaration.findings import Finding, findings
 from hsp_control.declaration.keys import KeyPath, written
-from hsp_control.declaration.schema import shape
-from hsp_control.declaration.wording import explained
+from hsp_control.declaration.plain import joined, kind, shown
+from hsp_control.declaration.schema import (
+    Shape,
+    entry,
+    is_model,
+    keys,
+    literals,
+    shape,
+    tagged,
+)
+
+Pending: TypeAlias = tuple[KeyPath, ErrorDetails]
+"""The remaining part of an error's path, and the error."""
+
+
+_KINDS = {
+    "unexpected_keyword_argument": "extra_forbidden",  # of a part
+    "missing_argument": "missing",
+}
+
+
+class Source(Protocol):
+    """Where the checked data come from."""
+
+    def __contains__(self, path: KeyPath) -> bool:
+        """Say whether there is a value at the key path."""
+
+    def mark(self, path: KeyPath) -> tuple[int, ...] | None:
+        """Return the place of a key path in the text, None if there is no text."""
+
+
+class Finding(NamedTuple):
+    """One mistake."""
+
+    # the key path that the user wrote; for a missing key, that of the mapping without
+    # it
+    path: KeyPath
+    # ``mismatch`` for a wrong type, ``misspelt_tag`` for a misspelt discriminator key,
+    # otherwise pydantic's name for the error
+    kind: str
+    value: Any  # the wrong value or key; for missing keys, their list
+    expected: Shape  # the allowed types there; for keys, those of their mapping
+    error: ErrorDetails  # pydantic's own error
+
+
+def findings(
+    document: Source, expected: Shape, errors: Sequence[Pending], path: KeyPath = ()
+) -> list[Finding]:
+    """Return one finding for each mistake at ``path`` or below it."""
+    found = [_here(path, expected, error) for ahead, error in errors if not ahead]
+    below: dict[str | int, list[Pending]] = defaultdict(list)
+    for ahead, error in errors:
+        if ahead:
+            below[ahead[0]].append((ahead[1:], error))
+    if expected.discriminator is not None:
+        choices = tagged(expected.options, expected.discriminator)
+        for tag, inner in below.items():
+            chosen = shape(choices.get(tag, Any))._replace(tag=expected.discriminator)
+            found += findings(document, chosen, inner, path)
+        return found
+    if len(expected.options) == 1:
+        for key, inner in below.items():
+            found += _at_key(document, expected, inner, path, key)
+        return _gathered(found, path)
+    # Below a union, pydantic labels the alternatives with its own names. All of them
+    # failed, so all of them are in the list, in their order.
+    known = len(below) == len(expected.options)
+    options = expected.options if known else [Any] * len(below)
+    tries = [
+        findings(document, shape(option), inner, path)
+        for option, inner in zip(options, below.values(), strict=True)
+    ]
+    return found + (_most_likely(document, tries, path) if tries else [])
+
+
+def _here(path: KeyPath, expected: Shape, error: ErrorDetails) -> Finding:
+    """Return the finding for an error of the value at ``path`` itself."""
+    kind, value = error["type"], error["input"]
+    if kind.endswith(("_type", "_parsing", "_from_float")) or _not_a_list(error):
+        kind = "mismatch"
+    if kind in ("extra_forbidden", "missing"):  # its key is not known
+        kind = "other"
+    tag = expected.discriminator
+    if tag is not None and isinstance(value, dict):
+        unknown = [name for name in value if name not in keys(expected)]
+        if kind == "union_tag_invalid":
+            path, value = (*path, tag), value[tag]
+        elif kind == "union_tag_not_found" and (misspelt := nearest(tag, unknown)):
+            path, kind, value = (*path, misspelt), "misspelt_tag", misspelt
+    return Finding(path, kind, value, expected, error)
+
+
+def _not_a_list(error: ErrorDetails) -> bool:
+    if error["type"] == "is_instance_of":
+        return bool(error["ctx"]["class"] == "Sequence")
+    return error["type"] == "sequence_str"
+
+
+def _at_key(
+    document: Source,
+    holder: Shape,
+    errors: Sequence[Pending],
+    path: KeyPath,
+    key: str | int,
+) -> list[Finding]:
+    """Return the findings at one key of the value at ``path``, which is not a union."""
+    found: list[Finding] = []
+    deeper: list[Pending] = []
+    for ahead, error in errors:
+        kind = _KINDS.get(error["type"], error["type"])
+        if ahead == ("[key]",):
+            found.append(Finding((*path, key), "key", key, shape(Any), error))
+        elif ahead or kind not in ("extra_forbidden", "missing"):
+            deeper.append((ahead, error))
+        elif kind == "extra_forbidden":
+            found.append(Finding((*path, key), kind, key, holder, error))
+        elif isinstance(key, int):  # a tuple without its last entries
+            found.append(Finding(path, "too_short", error["input"], holder, error))
+        else:
+            found.append(Finding(path, kind, [key], holder, error))
+    if path and getattr(holder.options[0], "yaml_key", None) == key:  # the key itself
+        return found + [Finding(path, "key", path[-1], holder, e) for _, e in deeper]
+    within = entry(holder.options[0], key)
+    if within is None and (*path, key) not in document:  # a label of pydantic
+        return found + findings(document, shape(Any), deeper, path)
+    return found + findings(document, within or shape(Any), deeper, (*path, key))
+
+
+def _gathered(found: list[Finding], path: KeyPath) -> list[Finding]:
+    """Join the keys missing at ``path`` in one finding, without misspelt ones."""
+    missing = [f for f in found if f.kind == "missing" and f.path == path]
+    others = [f for f in found if f.kind != "missing" or f.path != path]
+    unknown = [f for f in found if f.kind == "extra_forbidden" and f.path[:-1] == path]
+    misspelt = {nearest(f.value, keys(f.expected)) for f in unknown}
+    names = [name for f in missing for name in f.value if name not in misspelt]
+    return [*others, missing[0]._replace(value=names)] if names else others
+
+
+def _most_likely(
+    document: Source, tries: list[list[Finding]], path: KeyPath
+) -> list[Finding]:
+    """Return the findings of the alternative that the user most likely meant.
+
+    It is the alternative whose outer type is right, with the fewest mistakes inside. If
+    several are equally likely, it is the one whose first mistake is furthest down in
+    the text. If all of them fail at the same value, that value has none of the expected
+    types; if at the same key, none of them has it.
+    """
+
+    def unlikeliness(found: list[Finding]) -> tuple[bool, int]:
+        return any(f.path == path and _misfit(f) for f in found), len(found)
+
+    lowest = min(map(unlikeliness, tries))
+    likely = [found for found in tries if unlikeliness(found) == lowest]
+    first = likely[0][0]
+    options = tuple(o for found in likely for o in found[0].expected.options)
+    if len(likely) > 1 and all(found[0].path == first.path for found in likely):
+        if all(found[0].kind == "extra_forbidden" for found in likely):
+            return [first._replace(expected=Shape(options))]
+        if all(len(found) == 1 and _misfit(found[0]) for found in likely):
+            return [first._replace(kind="mismatch", expected=Shape(options))]
+    return max(likely, key=lambda found: document.mark(found[0].path) or (0, 0))
+
+
+def _misfit(finding: Finding) -> bool:
+    return finding.kind in ("mismatch", "literal_error", "enum")
+
+
+_SIMPLE = {
+    float: ("a number", "numbers"),
+    int: ("an integer", "integers"),
+    bool: ("true or false", "booleans"),
+    str: ("text", "texts"),
+    Path: ("a path", "paths"),
+}
+_COMPARISONS = {
+    "greater_than": ("gt", "greater than"),
+    "greater_than_equal": ("ge", "at least"),
+    "less_than": ("lt", "less than"),
+    "less_than_equal": ("le", "at most"),
+}
+_ENTRIES = ("entry", "entries")
+_LONG_LIST = 40
+
+
+def explained(finding: Finding) -> str:
+    """Return the message for a finding, without its location."""
+    value, expected = finding.value, finding.expected
+    match finding.kind:
+        case "mismatch" if words := joined(_words(expected)):
+            return _mismatch(value, words, literals(expected.options))
+        case "extra_forbidden":
+            return f"unknown key {_unknown(value, keys(expected))}"
+        case "missing":
+            return _missing(value, keys(expected, required=True))
+        case "union_tag_invalid" if key := expected.discriminator:
+            return f"unknown {key} {_unknown(value, tagged(expected.options, key))}"
+        case "union_tag_not_found" if key := expected.discriminator:
+            return f"missing key {key!r}; {_tags(expected, key)}"
+        case "misspelt_tag" if key := expected.discriminator:
+            hint = f"did you mean {key!r}? ({_tags(expected, key)})"
+            return f"unknown key {value!r}; {hint}"
+        case "literal_error" | "enum" if choices := literals(expected.options):
+            return f"unknown value {_unknown(value, choices)}"
+        case "too_short" | "too_long" | "string_too_short" | "string_too_long":
+            return _wrong_length(finding)
+        case "finite_number":
+            return f"{shown(value)} is not a finite number"
+        case comparison if comparison in _COMPARISONS:
+            return _out_of_bounds(finding)
+        case "value_error" | "assertion_error":
+            return str(finding.error["ctx"]["error"])
+        case "key":
+            return f"the key {_message_of_pydantic(finding)}"
+    return _message_of_pydantic(finding)
+
+
+def _unknown(value: Any, options: Iterable[Any]) -> str:
+    allowed = [str(option) for option in options]
+    near = _near(value, allowed)
+    among = f" (allowed: {listing(allowed, _LONG_LIST)})" if allowed else ""
+    return f"{shown(value)}{near}{among}"
+
+
+def _missing(names: list[str], required: list[str]) -> str:
+    plural = "s" if len(names) > 1 else ""
+    among = f"; required here: {listing(required, _LONG_LIST)}" if required else ""
+    return f"missing key{plural} {listing(map(repr, names), _LONG_LIST)}{among}"
+
+
+def _tags(expected: Shape, key: str) -> str:
+    tags = map(str, tagged(expected.options, key))
+    return f"{key} is one of: {listing(tags, _LONG_LIST)}"
+
+
+def _near(value: Any, options: Iterable[Any]) -> str:
+    return did_you_mean(value, map(str, options)) if isinstance(value, str) else ""
+
+
+def _mismatch(value: Any, words: str, choices: list[Any]) -> str:
+    given = "nothing given" if value is None else f"{shown(value)} is {kind(value)}"
+    return f"{given}; expected {words}{_near(value, choices)}"
+
+
+def _wrong_length(finding: Finding) -> str:
+    value, (fewest, most) = finding.value, finding.expected.bounds()
+    count = len(value)
+    units = ("character", "characters") if isinstance(value, str) else _ENTRIES
+    if fewest == most:
+        needs = f"{fewest}"
+    elif count < fewest:
+        needs = f"at least {fewest}"
+    elif most is not None:
+        needs = f"at most {most}"
+    else:
+        return _message_of_pydantic(finding)
+    return f"{shown(value)} has {count} {units[count != 1]}, needs {needs}"
+
+
+def _out_of_bounds(finding: Finding) -> str:
+    symbol, words = _COMPARISONS[finding.kind]
+    bound = finding.error["ctx"][symbol]
+    low = symbol in ("gt", "ge")
+    wrong = "too small" if low else "too large"
+    if low and bound == 0 and shown(finding.value).startswith("-"):
+        wrong = "negative"
+    limit = f"{bound:g}" if isinstance(bound, float) else f"{bound}"
+    return f"{shown(finding.value)} is {wrong}; must be {words} {limit}"
+
+
+def _message_of_pydantic(finding: Finding) -> str:
+    """Return pydantic's message, with the value instead of its word "Input"."""
+    value, message = shown(finding.value), finding.error["msg"]
+    sentence = re.sub(r"^\w+ (?=should )", f"{value} ".replace("\\", r"\\"), message)
+    return sentence if sentence != message else f"{value}: {message}"
+
+
+def _words(expected: Shape, *, many: bool = False) -> list[str]:
+    """Return the types in plain words; an empty list if a type has no plain word."""
+    found: list[str] = []
+    for option in expected.options:
+        inner = shape(option)
+        choices = [shown(choice) for choice in literals([option])]
+        if inner.options != (option,):  # an alias, or ``Annotated``
+            words = _words(inner, many=many)
+        else:
+            words = choices or [_word(option, expected.bounds(), many=many)]
+        if not (words and all(words)):
+            return []
+        found += [word for word in words if word not in found]
+    return found
+
+
+def _word(option: Any, bounds: tuple[int, int | None], *, many: bool) -> str:
+    if option in _SIMPLE:
+        return _SIMPLE[option][many]
+    container = get_origin(option) or option
+    if not isinstance(container, type):
+        return ""
+    if is_model(container) or issubclass(container, Mapping):
+        return "mappings" if many else "a mapping"
+    if issubclass(container, Collection):
+        return _list(option, bounds, many=many)
+    return ""
+
+
+def _list(option: Any, bounds: tuple[int, int | None], *, many: bool) -> str:
+    items = [shape(item) for item in get_args(option) if item is not Ellipsis]
+    words = joined(_words(items[0], many=True)) if items else ""
+    if words in ("lists of numbers", "lists of integers"):
+        return "matrices" if many else "a matrix"
+    fewest, most = bounds
+    number = f"{fewest} " if fewest == most else ""
+    return f"{'lists' if many else 'a list'} of {number}{words or 'values'}"
 
 
 def argument_error(cls: type[Declared], error: ValidationError) -> HspControlError:
@@ -46,14 +368,9 @@ def as_error(finding: Finding, cls: type[Declared]) -> HspControlError:
 
 
 class Carrier(ValueError):
-    """Carries an error that is no `ValueError` through pydantic, which collects those.
-
-    Attributes:
-        error: The error.
-    """
+    """Carries an error that is no `ValueError` through pydantic."""
 
     def __init__(self, error: HspControlError) -> None:
-        """Carry an error."""
         super().__init__(str(error))
         self.error = error
 

@@ -14,12 +14,7 @@ Member = TypeVar("Member")
 
 
 def keyed(parts: Any, field: str = "name") -> Any:
-    """Return parts as a mapping by a field; data of YAML with their keys as the field.
-
-    Raises:
-        ConfigError: If data give the field beside the key.
-        ValueError: If it is the same for two.
-    """
+    """Return parts as a mapping by a field; data of YAML with their keys as it."""
     if isinstance(parts, Mapping):
         return {key: _with_key(key, each, field) for key, each in parts.items()}
     if isinstance(parts, str) or not isinstance(parts, Iterable):
@@ -49,11 +44,7 @@ def _with_key(key: Any, entry: Any, field: str) -> Any:
 
 
 def stored(parts: Mapping[str, Member], field: str = "name") -> tuple[Member, ...]:
-    """Return the parts of a mapping by a field.
-
-    Raises:
-        ValueError: If a part's field is not its key.
-    """
+    """Return the parts of a mapping by a field."""
     for key, each in parts.items():
         if (own := getattr(each, field)) != key:
             raise ValueError(f"the one at {key!r} has another {field}, {own!r}")

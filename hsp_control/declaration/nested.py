@@ -27,15 +27,7 @@ def parts_within(value: Any, kind: type[Kind]) -> Iterator[Kind]:
 def with_parts_replaced(
     value: Any, kind: type[Kind], change: Callable[[Kind], Part]
 ) -> Any:
-    """Return a value in which all parts of a kind are replaced.
-
-    What contains none of them stays the same object. Errors contain the key path.
-
-    Args:
-        value: A part, a mapping or a sequence.
-        kind: The class of the parts to replace.
-        change: Returns what replaces a part.
-    """
+    """Return a value in which all parts of a kind are changed; the rest is kept."""
     if isinstance(value, kind):
         return change(value)
     if isinstance(value, Part):

@@ -1,8 +1,11 @@
 """The base class of all parts: immutable values with checked fields."""
 
+import ast
 import dataclasses
-from collections.abc import Callable
-from functools import wraps
+import inspect
+import sys
+from collections.abc import Callable, Iterator
+from functools import cache, wraps
 from typing import Any, NoReturn, dataclass_transform
 
 import numpy as np
@@ -18,11 +21,47 @@ from pydantic_core import CoreSchema
 
 from hsp_control.common.exceptions import HspControlError, ImmutableError
 from hsp_control.declaration.any_of import AnyOf
-from hsp_control.declaration.docstrings import attribute_docstrings
 from hsp_control.declaration.equality import same
 from hsp_control.declaration.families import Declared, Family, value_fields
 from hsp_control.declaration.mistakes import Carrier, argument_error
 from hsp_control.declaration.plain_data import plain_data
+
+
+def attribute_docstrings(cls: type) -> dict[str, str]:
+    """Return the docstring of each annotated attribute, as one line, by name."""
+    return _of_module(cls.__module__).get(cls.__qualname__, {})
+
+
+@cache
+def _of_module(module: str) -> dict[str, dict[str, str]]:
+    try:
+        source = inspect.getsource(sys.modules[module])
+    except (KeyError, OSError, TypeError):
+        return {}
+    return dict(_of_classes(ast.parse(source), ""))
+
+
+def _of_classes(node: ast.AST, prefix: str) -> Iterator[tuple[str, dict[str, str]]]:
+    for each in ast.iter_child_nodes(node):
+        if isinstance(each, ast.ClassDef):
+            name = f"{prefix}{each.name}"
+            yield name, dict(_of_attributes(each))
+            yield from _of_classes(each, f"{name}.")
+        elif isinstance(each, ast.FunctionDef):
+            yield from _of_classes(each, f"{prefix}{each.name}.<locals>.")
+
+
+def _of_attributes(node: ast.ClassDef) -> Iterator[tuple[str, str]]:
+    for field, below in zip(node.body, node.body[1:], strict=False):
+        if (
+            isinstance(field, ast.AnnAssign)
+            and isinstance(field.target, ast.Name)
+            and isinstance(below, ast.Expr)
+            and isinstance(below.value, ast.Constant)
+            and isinstance(below.value.value, str)
+        ):
+            yield field.target.id, " ".join(below.value.value.split())
+
 
 _CONFIG = ConfigDict(
     extra="forbid",
@@ -62,17 +101,7 @@ class Part(Declared):
         error: type[HspControlError] | None = None,
         **arguments: Any,
     ) -> None:
-        """Make the class a value class, and register it with its family.
-
-        Args:
-            family: For the base class of a family: its name.
-            type: For a member of a family: what YAML calls it.
-            error: The class of the errors about its fields; inherited by default.
-            **arguments: For other base classes.
-
-        Raises:
-            TypeError: If the class has an ``__init__``, which would not be called.
-        """
+        """Make the class a value class, and register it with its family."""
         super().__init_subclass__(**arguments)
         if "__init__" in vars(cls):
             raise TypeError(
@@ -199,10 +228,7 @@ def _with_one_error(init: Callable[..., None]) -> Callable[..., None]:
 
 
 def _hide_properties(cls: type) -> list[str]:
-    """Return the fields without default that have the name of an inherited property.
-
-    Such a property is not the default of the field.
-    """
+    """Return the fields without default that hide an inherited property."""
     own = vars(cls)
     hidden = [
         name
@@ -237,11 +263,7 @@ def _completed(check: Callable[[Any], None]) -> Callable[[Any], None]:
 
 
 def _refuse_assignment(self: Part, name: str, value: object) -> NoReturn:
-    """Raise: a value does not change.
-
-    Raises:
-        ImmutableError: Always.
-    """
+    """Raise: a value does not change."""
     raise ImmutableError(
         f"{type(self).__name__}.{name} cannot be assigned: parts never change; make "
         f"another with dataclasses.replace(part, {name}=...)"
@@ -249,11 +271,7 @@ def _refuse_assignment(self: Part, name: str, value: object) -> NoReturn:
 
 
 def _refuse_deletion(self: Part, name: str) -> NoReturn:
-    """Raise: a value does not change.
-
-    Raises:
-        ImmutableError: Always.
-    """
+    """Raise: a value does not change."""
     raise ImmutableError(f"{type(self).__name__}.{name} cannot be deleted")
 
 

@@ -19,15 +19,7 @@ _SIMPLE = bool, int, float, str, type(None)
 
 
 def plain_data(value: Any, *, defaults: bool = False) -> Any:
-    """Return a value as mappings, lists, numbers and text.
-
-    Args:
-        value: A part, a model of the configuration, or what they contain.
-        defaults: Whether fields that have their default value are included.
-
-    Raises:
-        ConfigError: If YAML cannot say it: a Python function, for example.
-    """
+    """Return a value as mappings, lists, numbers and text, with defaults or without."""
     if isinstance(value, _SIMPLE):
         return value
     if isinstance(value, np.ndarray | np.generic):
@@ -63,11 +55,7 @@ def _of_part(part: Declared, defaults: bool) -> dict[str, Any]:
 
 
 def _type_of(part: Declared) -> str:
-    """Return what YAML calls the part's class.
-
-    Raises:
-        ConfigError: If it has no name.
-    """
+    """Return what YAML calls the part's class."""
     if part.yaml_type is None:
         raise ConfigError(
             f"YAML has no name for {type(part).__name__}: declare it with "

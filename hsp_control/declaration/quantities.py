@@ -53,15 +53,11 @@ Count = Annotated[int, Strict(), Field(ge=0), _PLAIN]
 PositiveCount = Annotated[int, Strict(), Field(ge=1), _PLAIN]
 Flag = Annotated[bool, Strict()]
 Name = Annotated[
-    str,
-    Strict(),
-    Field(min_length=1, max_length=100, pattern=r"^[^\x00-\x1f\x7f]*$"),
+    str, Strict(), Field(min_length=1, max_length=100, pattern=r"^[^\x00-\x1f\x7f]*$")
 ]
 """What a user calls a part, in messages and in columns of the log."""
 FileName = Annotated[
-    str | Path,
-    AfterValidator(str),
-    WithJsonSchema({"type": "string"}),
+    str | Path, AfterValidator(str), WithJsonSchema({"type": "string"})
 ]
 """The path of a file, stored as text."""
 Names = Annotated[Sequence[str], AfterValidator(tuple)]
@@ -78,11 +74,7 @@ class ReadOnlyDict(dict[Any, Any]):
     """A mapping that cannot be changed."""
 
     def _refuse(self, *_: Any, **__: Any) -> NoReturn:
-        """Raise: a value does not change.
-
-        Raises:
-            ImmutableError: Always.
-        """
+        """Raise: a value does not change."""
         raise ImmutableError("the mappings of a part cannot be changed")
 
     __setitem__ = __delitem__ = _refuse
@@ -99,26 +91,19 @@ Axes = Annotated[str, AfterValidator(_distinct_axes)]
 
 
 class ArrayField:
-    """The validation of a field that holds an array, or another thing made of a list.
-
-    Attributes:
-        items: What pydantic checks first, such as nested lists of numbers.
-        convert: Makes the array of them, and may check more.
-        none: What plain data say for None.
-    """
+    """The validation of a field that holds an array, or what a list makes."""
 
     def __init__(
         self, items: Any, convert: Callable[[Any], object], none: str | None = None
     ) -> None:
-        """Set all."""
+        # what pydantic checks first, such as nested lists of numbers
         self.items = items
-        self.convert = convert
-        self.none = none
+        self.convert = convert  # makes the array of them, and may check more
+        self.none = none  # what plain data say for None
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        """Return the schema: to plain lists, checked, to a read-only array."""
         return core_schema.no_info_before_validator_function(
             plain,
             core_schema.no_info_after_validator_function(
@@ -133,20 +118,15 @@ class OrInstance(ArrayField):
 
     As an annotation: ``Annotated[str | Obstacle, OrInstance(Name, Obstacle)]``. Schemas
     and messages mention only what YAML says.
-
-    Attributes:
-        instance_of: The class.
     """
 
     def __init__(self, items: Any, instance_of: type) -> None:
-        """Set the type of YAML and the class."""
         super().__init__(items, lambda value: value)
-        self.instance_of = instance_of
+        self.instance_of = instance_of  # the class
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        """Return pydantic's schema."""
         return core_schema.no_info_wrap_validator_function(
             lambda value, check: (
                 value if isinstance(value, self.instance_of) else check(value)
@@ -156,11 +136,7 @@ class OrInstance(ArrayField):
 
 
 def read_only(value: Any) -> Array:
-    """Return a read-only copy, as doubles.
-
-    Raises:
-        ValueError: If rows have different lengths.
-    """
+    """Return a read-only copy, as doubles."""
     if isinstance(value, list):
         sizes = {len(row) for row in value if isinstance(row, list)}
         if len(sizes) > 1:

@@ -15,16 +15,7 @@ _ROUNDING = 1e-8
 
 
 def matrix_of(rotation: ArrayLike, name: str = "rotation") -> Array:
-    """Return the rotation matrix of a `Rotation`, body to world, shape (3, 3).
-
-    Args:
-        rotation: See `Rotation`.
-        name: What messages call it.
-
-    Raises:
-        ValueError: If it is none: a matrix that is not orthonormal or a
-            reflection, a quaternion that has not norm 1, or another shape.
-    """
+    """Return the rotation matrix of a `Rotation`, body to world, shape (3, 3)."""
     given = np.asarray(rotation, dtype=float)
     if given.shape == (3,):
         return np.array(pin.rpy.rpyToMatrix(*given))

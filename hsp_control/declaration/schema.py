@@ -21,16 +21,12 @@ _BY_TYPE = _Discriminator("type")
 
 
 class Shape(NamedTuple):
-    """The types that a value may have.
+    """The types that a value may have."""
 
-    Attributes:
-        options: The types; ``Any`` for a type whose inside is not known.
-        metadata: Pydantic's constraints beside the type: bounds, discriminators.
-        tag: The key whose value chose this type among others, if one did.
-    """
-
-    options: tuple[Any, ...]
+    options: tuple[Any, ...]  # the types; ``Any`` for a type whose inside is not known
+    # pydantic's constraints beside the type: bounds, discriminators
     metadata: tuple[Any, ...] = ()
+    # the key whose value chose this type among others, if one did
     tag: str | None = None
 
     @property
@@ -149,10 +145,7 @@ def literals(options: Iterable[Any]) -> list[Any]:
 
 
 def entry(option: Any, key: str | int) -> Shape | None:
-    """Return the shape of the value at ``key`` in a value of this type.
-
-    None if the type has no such key, or the key is not known.
-    """
+    """Return the shape of the value at ``key`` in a value of this type."""
     if is_model(option):
         field = fields(option).get(str(key))
         return None if field is None else field_shape(field)

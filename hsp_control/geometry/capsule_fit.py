@@ -1,24 +1,24 @@
-"""Fit a small capsule around a set of points."""
+"""Capsules that enclose points and ellipsoids, and Coal's geometry of a body."""
 
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
+import coal
 import numpy as np
+import pinocchio as pin
 
 from hsp_control.common.arrays import Array
+from hsp_control.geometry.hulls import convex_hull
+from hsp_control.robot.description.body_shape import BodyShape
 
 
 def enclosing_capsule(points: Array) -> tuple[Array, Array, float]:
-    """Return the ends and the radius of a small capsule that contains all points.
+    """Return the ends (3,) and the radius [m] of a small capsule around points (k, 3).
 
     The direction and the offset of its axis minimise the volume, by a local search from
-    each of the three principal axes. For a given axis the segment is the shortest.
-
-    Args:
-        points: Shape (k, 3) [m].
-
-    Returns:
-        (first end (3,), second end (3,), radius) [m]; for a sphere the ends are equal.
+    each of the three principal axes. For a given axis the segment is the shortest; the
+    ends of a sphere are equal.
     """
     from scipy.optimize import minimize  # here: SciPy takes long to import
 
@@ -61,11 +61,7 @@ def _volume(
 def _segment(
     points: Array, anchor: Array, direction: Array
 ) -> tuple[float, float, float]:
-    """Return the shortest segment on an axis whose capsule contains the points.
-
-    Returns:
-        (low, high, radius): the ends of the segment along the axis, and the radius.
-    """
+    """Return (low, high, radius) of the shortest capsule that contains the points."""
     along = (points - anchor) @ direction
     across = np.linalg.norm(points - anchor - np.outer(along, direction), axis=1)
     radius = float(across.max())
@@ -75,3 +71,40 @@ def _segment(
         low = high = 0.5 * (low + high)
         radius = float(np.hypot(across, along - low).max())
     return low, high, radius
+
+
+def body_geometry(shape: BodyShape) -> Any:
+    """Return Coal's geometry; of a mesh its convex hull, or a flat mesh as it is."""
+    match shape.kind:
+        case "box":
+            return coal.Box(*shape.size)
+        case "sphere":
+            return coal.Sphere(*shape.size)
+        case "capsule":
+            return coal.Capsule(*shape.size)
+        case "cylinder":
+            return coal.Cylinder(*shape.size)
+        case "ellipsoid":
+            return coal.Ellipsoid(*shape.size)
+    assert shape.mesh is not None
+    vertices, triangles = shape.mesh
+    mesh = coal.BVHModelOBBRSS()
+    mesh.beginModel(len(triangles), len(vertices))
+    for triangle in vertices[triangles]:
+        mesh.addTriangle(*triangle)
+    mesh.endModel()
+    return convex_hull(mesh) or mesh
+
+
+def enclosing_ellipsoid_capsule(ellipsoid: Any) -> tuple[pin.SE3, float, float]:
+    """Return pose (axis along z), radius and length of an ellipsoid's least capsule.
+
+    With semi-axes a ≥ b ≥ c, it lies along the first, with the radius b and the length
+    2 (a - b): at its ends the ellipsoid is more curved than a sphere of radius b.
+    """
+    radii = np.asarray(ellipsoid.radii, dtype=float)
+    shortest, middle, longest = np.argsort(radii, kind="stable")
+    axes = np.eye(3)[:, [shortest, middle, longest]]
+    axes[:, 0] *= np.linalg.det(axes)  # a rotation
+    radius = float(radii[middle])
+    return pin.SE3(axes, np.zeros(3)), radius, 2.0 * (float(radii[longest]) - radius)

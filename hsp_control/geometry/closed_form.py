@@ -58,11 +58,7 @@ def has_closed_form(first: LinkShape, second: LinkShape | Obstacle) -> bool:
 
 
 class ClosedFormDistances:
-    """Distances in closed form at one state, and weighted sums of their gradients.
-
-    Attributes:
-        measurements: Number of calls of `measure`, at any state, shape (1,).
-    """
+    """Distances in closed form at one state, and weighted sums of their gradients."""
 
     def __init__(
         self,
@@ -72,15 +68,7 @@ class ClosedFormDistances:
         pairs: Indices,
         places: Indices,
     ) -> None:
-        """Allocate the arrays.
-
-        Args:
-            robot: The robot.
-            links: Shapes of its links.
-            obstacles: The obstacles.
-            pairs: Indices into links followed by obstacles, shape (k, 2).
-            places: Index of each pair among all pairs of the `Proximity`, shape (k,).
-        """
+        """Allocate; ``places`` are the pairs' indices among all of the `Proximity`."""
         self._pairs, self._places = pairs, places
         used = np.unique(pairs)
         self._motion = np.zeros((len(obstacles), MOTION_SIZE))
@@ -115,6 +103,7 @@ class ClosedFormDistances:
         self._segments = np.zeros((len(rows), 2, 3))
         self._cores = np.zeros((len(pairs), 3, 3))
         self._scratch = np.zeros((40, 3))
+        # number of calls of `measure`, at any state, shape (1,)
         self.measurements: Indices = np.zeros(1, dtype=np.int64)
         self._plans = IdentityCache(self._plan)
         self._derivatives = IdentityCache(self.derivatives)
@@ -148,10 +137,7 @@ class ClosedFormDistances:
         return StepPlan(self._moving, (measure,))
 
     def witness(self, k: int) -> tuple[Array, Array, Array]:
-        """Return the witness points [m] and the unit normal from first to second.
-
-        For the k-th of these pairs, in world axes, shape (3,) each.
-        """
+        """Return the witness points [m] and the unit normal from first to second."""
         x, y, n = self._cores[k]
         first, second = self._sizes[self._pairs[k], 6]
         return x - first * n, y + second * n, -n
@@ -164,15 +150,7 @@ class ClosedFormDistances:
         gradient: Array,
         rate: Array,
     ) -> None:
-        """Write Σ b'(d_k) ∇d_k and its exact rate, after `measure` at the same state.
-
-        Args:
-            state: The robot's state.
-            slopes: b'(d_k) of all pairs of the `Proximity`.
-            curvatures: b''(d_k) of all pairs of the `Proximity`.
-            gradient: Is overwritten with the sum, shape (nv,).
-            rate: Is overwritten with the rate of the sum, shape (nv,).
-        """
+        """Write Σ b'(d_k) ∇d_k (nv,) and its rate, after `measure` at this state."""
         self._derivatives.get(state, slopes, curvatures, gradient, rate)()
 
     def derivatives(
@@ -224,22 +202,16 @@ def _obstacle(shape: Shape) -> tuple[int, list[float]]:
 
 
 class _Bodies(NamedTuple):
-    """Links, then obstacles.
+    """Links, then obstacles."""
 
-    Attributes:
-        kinds: Kind, joint (-1 - k for the k-th obstacle), and where the columns of the
-            joint begin and end, shape (n, 4).
-        sizes: Segment and radius, or half sizes, in the body's own frame, shape (n, 7).
-        motion: Placement and velocity of the obstacles, see `Obstacle.follow`.
-        columns: The columns of the joints' Jacobian that move each link.
-        dofs: The indices in v of these columns.
-    """
-
+    # kind, joint (-1 - k for the k-th obstacle), and where the columns of the joint
+    # begin and end, shape (n, 4)
     kinds: Indices
+    # segment and radius, or half sizes, in the body's own frame, shape (n, 7)
     sizes: Array
-    motion: Array
-    columns: Indices
-    dofs: Indices
+    motion: Array  # placement and velocity of the obstacles, see `Obstacle.follow`
+    columns: Indices  # the columns of the joints' Jacobian that move each link
+    dofs: Indices  # the indices in v of these columns
 
 
 @kernel
@@ -303,18 +275,9 @@ def _place(
 
 @kernel
 def _to_solid(
-    kind: int,
-    size: Array,
-    motion: Array,
-    x: Array,
-    local: Array,
-    H: Array,
-    n: Array,
+    kind: int, size: Array, motion: Array, x: Array, local: Array, H: Array, n: Array
 ) -> float:
-    """Return the distance of a point in the world to a solid, and write the normal.
-
-    The normal n is in world axes, the Hessian H in the solid's own axes.
-    """
+    """Return the distance of a point in the world to a solid, and write the normal."""
     R = motion[:9].reshape(3, 3)
     for a in range(3):
         local[a] = x[a] - motion[9 + a]
@@ -337,10 +300,7 @@ def _differentiate(
     gradient: Array,
     rate: Array,
 ) -> None:
-    """Write Σ b' ∇d and Σ (b'' d' ∇d + b' (∇d)'); pairs with b' = b'' = 0 are skipped.
-
-    ``slopes`` are b' and ``curvatures`` b'', of all pairs of the `Proximity`.
-    """
+    """Write Σ b' ∇d and Σ (b'' d' ∇d + b' (∇d)'), without pairs of b' = b'' = 0."""
     kinds, sizes, motion = bodies.kinds, bodies.sizes, bodies.motion
     for p in range(gradient.shape[0]):
         gradient[p] = rate[p] = 0.0

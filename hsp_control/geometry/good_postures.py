@@ -40,49 +40,25 @@ Rows = tuple[str, tuple[int, ...]]
 
 
 class Judgement(NamedTuple):
-    """What counts for a posture.
+    """What counts for a posture."""
 
-    Attributes:
-        q: The configuration, shape (nq,).
-        regularity: The smallest singular value of the tasks' stacked Jacobian.
-        distance: The smallest distance of links and obstacles [m]; inf: there are none.
-        pair: The two that are at this distance.
-        clear: Whether no links overlap, and no obstacle is near.
-        eccentricity: Distance from the middle: root mean square over the joints, 1 at
-            the limits.
-    """
-
-    q: Array
-    regularity: float
+    q: Array  # the configuration, shape (nq,)
+    regularity: float  # the smallest singular value of the tasks' stacked Jacobian
+    # the smallest distance of links and obstacles [m]; inf: there are none
     distance: float
-    pair: str
-    clear: bool
+    pair: str  # the two that are at this distance
+    clear: bool  # whether no links overlap, and no obstacle is near
+    # distance from the middle: root mean square over the joints, 1 at the limits
     eccentricity: float
 
 
 class PostureSearch:
-    """Judges postures of one robot, and finds a good one.
-
-    Attributes:
-        robot: The robot, with a fixed base.
-        middle: Displacement from neutral of the middle of the limits, shape (nv,); of a
-            joint without limits: of home.
-    """
+    """Judges postures of one robot, and finds a good one."""
 
     def __init__(
         self, robot: Robot, rows: Sequence[Rows], obstacles: Sequence[Obstacle] = ()
     ) -> None:
-        """Set up the search.
-
-        If the shapes of the links cannot be read, a warning is logged, and collisions
-        do not count.
-
-        Args:
-            robot: The robot.
-            rows: What the tasks track; it decides which postures are regular.
-            obstacles: What the robot must not touch, where it is at the time 0.
-        """
-        self.robot = robot
+        self.robot = robot  # the robot, with a fixed base
         self._state = robot.state(0.0, robot.home(), np.zeros(robot.nv))
         self._rows = tuple(rows)
         lower, upper = robot.position_limits()
@@ -90,6 +66,8 @@ class PostureSearch:
         home = robot.joint_positions(robot.home())
         half = np.full(robot.nv, np.pi)
         half[bounded] = 0.5 * (upper[bounded] - lower[bounded])
+        # displacement from neutral of the middle of the limits, shape (nv,); of a joint
+        # without limits: of home
         self.middle: Array = home.copy()
         self.middle[bounded] = 0.5 * (lower[bounded] + upper[bounded])
         self._half = half
@@ -120,13 +98,10 @@ class PostureSearch:
         return Judgement(q, regularity, distance, pair, spare > 0.0, eccentricity)
 
     def overlap(self, q: Array) -> tuple[float, str]:
-        """Return how deep links and obstacles overlap at a configuration, and which.
+        """Return how deep [m] links and obstacles overlap, and the pair ``a to b``.
 
         Capsules are larger than the links; so what overlaps as capsules is measured
         again with the convex hulls of the links.
-
-        Returns:
-            The depth [m], 0 if nothing overlaps, and the pair, ``a to b``.
         """
         rough = self._proximity
         if rough is None:
@@ -152,14 +127,7 @@ class PostureSearch:
         return max(-distance, 0.0), pair
 
     def find(self, least: float) -> Judgement:
-        """Return a good posture near the middle, with as few joints away as possible.
-
-        Args:
-            least: Smallest singular value that counts as regular.
-
-        Raises:
-            ConfigurationError: If none is found; the message says how near it came.
-        """
+        """Return a good posture near the middle, with few joints away from it."""
         seen = [self.judge(self._at(x)) for x in self._displacements()]
         good, needed = self._qualified(seen, least)
         if not good:
@@ -182,16 +150,7 @@ class PostureSearch:
         return f"{{joints: [{', '.join(f'{x:.3f}' for x in positions)}]}}"
 
     def find_with(self, target: Target, least: float) -> Judgement:
-        """Return a good posture at which a frame is at a target.
-
-        Args:
-            target: Where the frame shall be.
-            least: Smallest singular value that counts as regular.
-
-        Raises:
-            ConfigurationError: If none is found; the message says how near it came.
-            FrameNotFoundError: If there is no such frame.
-        """
+        """Return a good posture at which a frame is at a target."""
         self.robot.frame_id(target.frame)
         bounds = self._lower, self._upper
         found = [
@@ -277,10 +236,7 @@ class PostureSearch:
 
 
 def _halton(number: int, dimension: int) -> float:
-    """Return an entry of the Halton sequence, in (0, 1) (Halton 1960).
-
-    Dimensions beyond the primes at hand use the first ones again, shifted.
-    """
+    """Return an entry of the Halton sequence, in (0, 1) (Halton 1960)."""
     base = _PRIMES[dimension % len(_PRIMES)]
     number += 409 * (dimension // len(_PRIMES))
     share, value = 1.0, 0.0

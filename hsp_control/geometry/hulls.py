@@ -8,10 +8,7 @@ from hsp_control.common.arrays import Array
 
 
 def convex_hull(mesh: Any) -> Any:
-    """Return the convex hull of one of Coal's meshes, or None if the mesh is flat.
-
-    For a flat mesh Coal would abort the process.
-    """
+    """Return the hull of one of Coal's meshes; None if it is flat: Coal would abort."""
     from scipy.spatial import ConvexHull, QhullError  # here: SciPy takes long to import
 
     try:
@@ -23,10 +20,7 @@ def convex_hull(mesh: Any) -> Any:
 
 
 def hull_corners(points: Array) -> Array:
-    """Return those of the points, shape (k, 3), that are vertices of their hull.
-
-    All points are returned if they have no hull: too few points, or all at one place.
-    """
+    """Return those of the points (k, 3) that are their hull's vertices; all without."""
     from scipy.spatial import ConvexHull, QhullError  # here: SciPy takes long to import
 
     try:

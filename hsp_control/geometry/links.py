@@ -14,11 +14,11 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ModelError
 from hsp_control.common.suggestions import listing
-from hsp_control.geometry.body_geometry import (
+from hsp_control.geometry.capsule_fit import (
     body_geometry,
+    enclosing_capsule,
     enclosing_ellipsoid_capsule,
 )
-from hsp_control.geometry.capsule_fit import enclosing_capsule
 from hsp_control.geometry.hulls import convex_hull, hull_corners
 from hsp_control.robot import Robot
 from hsp_control.robot.description import mesh_files
@@ -45,25 +45,19 @@ _found: "WeakKeyDictionary[Robot, dict[Proxy, tuple[LinkShape, ...]]]" = (
 
 @dataclass(frozen=True)
 class LinkShape:
-    """A shape fixed to a joint.
+    """A shape fixed to a joint."""
 
-    Attributes:
-        link: Name of the link, for SRDF files and messages.
-        joint: Index of the joint that it is fixed to; 0 is the world.
-        placement: Its placement in the joint's frame.
-        geometry: Coal's geometry.
-    """
-
-    link: str
-    joint: int
-    placement: pin.SE3
-    geometry: Any
+    link: str  # name of the link, for SRDF files and messages
+    joint: int  # index of the joint that it is fixed to; 0 is the world
+    placement: pin.SE3  # its placement in the joint's frame
+    geometry: Any  # coal's geometry
 
 
 def link_shapes(robot: Robot, proxy: Proxy = "capsules") -> list[LinkShape]:
     """Return the shapes of the robot's links; they are found once for each robot.
 
-    A robot without collision geometry gets capsules between its joints, and a warning.
+    A robot without collision geometry gets capsules between its joints, and a warning;
+    meshes that do not exist are left out, with a warning.
 
     Args:
         robot: The robot.
@@ -72,12 +66,6 @@ def link_shapes(robot: Robot, proxy: Proxy = "capsules") -> list[LinkShape]:
             for spheres. ``spheres``: spheres along these capsules; gradients are
             smooth for all convex obstacles. ``hulls``, ``meshes``: the robot's own
             collision geometry, as convex hulls or as it is.
-
-    Meshes that do not exist are left out, with a warning.
-
-    Raises:
-        ModelError: If a collision mesh cannot be read, none exists and no other shape
-            is left, or the proxy is unknown.
     """
     if proxy not in get_args(Proxy):
         raise ModelError(f"proxy {proxy!r} is not one of {', '.join(get_args(Proxy))}")
@@ -170,14 +158,7 @@ def _shapes_of_urdf(robot: Robot, part: Part) -> list[LinkShape]:
 
 
 def _locate_meshes(xml: Element, source: RobotSource) -> dict[str, str]:
-    """Put the path of each collision mesh into a URDF; delete those that do not exist.
-
-    Returns:
-        For each link without one of its meshes: the name of the first one.
-
-    Raises:
-        ModelError: If a mesh exists, but cannot be used.
-    """
+    """Put meshes' paths into a URDF, without missing ones; return these by link."""
     missing: dict[str, str] = {}
     for link in xml.iter("link"):
         for element in link.findall("collision"):
@@ -199,11 +180,7 @@ def _locate_meshes(xml: Element, source: RobotSource) -> dict[str, str]:
 def _report_missing(
     robot: Robot, part: Part, missing: Mapping[str, str], left: int
 ) -> None:
-    """Warn of meshes that do not exist, once for each robot.
-
-    Raises:
-        ModelError: If no other shape is left.
-    """
+    """Warn of meshes that do not exist, once for each robot."""
     name = next(iter(missing.values()))
     hint = mesh_files.where_to_put(name)
     if not left:
@@ -314,10 +291,7 @@ def _capsule(shape: LinkShape) -> LinkShape:
 
 
 def _spheres_along(capsule: LinkShape) -> list[LinkShape]:
-    """Return spheres along a capsule that contain it, at most one radius apart.
-
-    Along a very slender capsule they are farther apart, and larger.
-    """
+    """Return spheres along a capsule that contain it, at most one radius apart."""
     if isinstance(capsule.geometry, coal.Sphere):
         return [capsule]
     radius, half = capsule.geometry.radius, capsule.geometry.halfLength
@@ -358,11 +332,7 @@ def _hull(geometry: Any) -> Any:
 
 
 def _placement_along(first: Array, second: Array) -> tuple[pin.SE3, float]:
-    """Return the placement half-way between two points, its z axis along their line.
-
-    Returns:
-        The placement, and the distance of the points [m].
-    """
+    """Return the pose half-way between points, z along them, and their distance."""
     line = second - first
     length = float(np.linalg.norm(line))
     if length == 0.0:

@@ -1,16 +1,127 @@
-"""Distances between pairs of shapes and their gradients, computed once per state."""
+"""Distances of pairs of shapes, by Coal or in closed form, and their gradients."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
-from hsp_control.common.arrays import Array
+from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import FieldError
+from hsp_control.common.kernels import kernel
 from hsp_control.geometry.closed_form import ClosedFormDistances, has_closed_form
-from hsp_control.geometry.coal_distances import CoalDistances
 from hsp_control.geometry.links import LinkShape
 from hsp_control.geometry.scene import Obstacle
 from hsp_control.robot import Robot, RobotState
+from hsp_control.robot.kinematics import joint_support
+
+GJK_TOLERANCE = 1e-10
+"""Coal's default is 1e-6, which is too coarse for differences of gradients."""
+
+
+class CoalDistances:
+    """Distances by Coal at one state, and weighted sums of their gradients."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        links: Sequence[LinkShape],
+        obstacles: Sequence[Obstacle],
+        pairs: Indices,
+        places: Indices,
+    ) -> None:
+        self._robot, self._obstacles = robot, tuple(obstacles)
+        self._first_obstacle = len(links)
+        # index of each pair in the `Proximity`, shape (k,)
+        self._pairs, self.places = pairs, places
+        self._geometry = pin.GeometryModel()
+        for i, link in enumerate(links):
+            self._add(f"link {i}", link.joint, link.placement, link.geometry)
+        for obstacle in obstacles:
+            shape = obstacle.shape.geometry()
+            self._add(obstacle.name, 0, obstacle.placement(0.0), shape)
+        for first, second in pairs.tolist():
+            self._geometry.addCollisionPair(pin.CollisionPair(first, second))
+        self._data = pin.GeometryData(self._geometry)
+        for request in self._data.distanceRequests:
+            request.gjk_tolerance = GJK_TOLERANCE
+            request.epa_tolerance = GJK_TOLERANCE
+        self._results = list(
+            self._data.distanceResults
+        )  # references: computeDistances updates them
+        self._reversed = frozenset(
+            k
+            for k, second in enumerate(pairs[:, 1].tolist())
+            if second >= len(links)
+            and obstacles[second - len(links)].shape.witness_reversed
+        )
+        joints = [link.joint for link in links] + [0] * len(obstacles)
+        support = {joint: joint_support(robot.model, joint) for joint in set(joints)}
+        self._supports = [
+            (*support[joints[first]], *support[joints[second]])
+            for first, second in pairs.tolist()
+        ]
+
+    def measure(self, state: RobotState, distances: Array) -> None:
+        """Write the distances [m] at the indices ``places`` of ``distances``."""
+        items = self._geometry.geometryObjects
+        for index, obstacle in enumerate(self._obstacles, start=self._first_obstacle):
+            items[index].placement = obstacle.placement(state.t)
+        pin.updateGeometryPlacements(
+            self._robot.model, state.data, self._geometry, self._data
+        )
+        pin.computeDistances(self._geometry, self._data)
+        distances[self.places] = [result.min_distance for result in self._results]
+
+    def witness(self, k: int) -> tuple[Array, Array, Array]:
+        """Return the k-th pair's witness points [m] and normal, asked of Coal."""
+        result = self._results[k]
+        first, second = result.getNearestPoint1(), result.getNearestPoint2()
+        if k in self._reversed:
+            return second, first, -result.normal
+        return first, second, result.normal
+
+    def add_gradient(self, state: RobotState, slopes: Array, gradient: Array) -> None:
+        """Add Σ b'(d_k) ∇d_k, shape (nv,), after `measure` at the same state."""
+        own = slopes[self.places]
+        J = state.world.jacobian
+        for k in np.flatnonzero(own).tolist():
+            columns, dofs, columns2, dofs2 = self._supports[k]
+            first, second, normal = self.witness(k)
+            force = -own[k] * normal
+            _add_force(J, columns, dofs, first, force, gradient)
+            if len(columns2):
+                _add_force(J, columns2, dofs2, second, -force, gradient)
+
+    def _add(self, name: str, joint: int, placement: pin.SE3, geometry: Any) -> None:
+        self._geometry.addGeometryObject(
+            pin.GeometryObject(name, joint, placement, geometry)
+        )
+
+
+@kernel
+def _add_force(
+    J_world: Array,
+    columns: Indices,
+    dofs: Indices,
+    point: Array,
+    force: Array,
+    out: Array,
+) -> None:
+    """Add J(point)ᵀ force to ``out``; J is the linear Jacobian of a point on a link."""
+    mx = point[1] * force[2] - point[2] * force[1]
+    my = point[2] * force[0] - point[0] * force[2]
+    mz = point[0] * force[1] - point[1] * force[0]
+    for k in range(columns.shape[0]):
+        c = columns[k]
+        out[dofs[k]] += (
+            J_world[0, c] * force[0]
+            + J_world[1, c] * force[1]
+            + J_world[2, c] * force[2]
+            + J_world[3, c] * mx
+            + J_world[4, c] * my
+            + J_world[5, c] * mz
+        )
 
 
 class Proximity:
@@ -20,15 +131,6 @@ class Proximity:
     the unit vector from the second point to the first; an obstacle has J_2 = 0. Pairs
     of spheres and capsules have a closed form, and so have a sphere and a box, cylinder
     or half-space; the rate of their gradient is exact. Coal computes all others.
-
-    Attributes:
-        robot: The robot.
-        links: Shapes of its links.
-        obstacles: The obstacles.
-        pairs: Indices into links followed by obstacles.
-        distances: At the last `measure`, shape (k,) [m]; negative if shapes overlap.
-        closed_form: The pairs that have a closed form, or None.
-        coal: The other pairs, or None.
     """
 
     def __init__(
@@ -38,32 +140,23 @@ class Proximity:
         obstacles: Sequence[Obstacle],
         pairs: Sequence[tuple[int, int]],
     ) -> None:
-        """Set up the pairs.
-
-        Args:
-            robot: The robot.
-            links: Shapes of its links.
-            obstacles: The obstacles.
-            pairs: Indices into links followed by obstacles; the first of a pair is a
-                link. Repeated pairs count once.
-
-        Raises:
-            FieldError: If there is no pair.
-        """
+        """Set up the pairs (link, other), indices into links and then obstacles."""
         if not pairs:
             raise FieldError("there are no pairs of shapes to keep apart")
         # (i, j) and (j, i) are one pair, as in Pinocchio.
         pairs = list({frozenset(pair): pair for pair in pairs}.values())
         self.robot = robot
-        self.links = tuple(links)
+        self.links = tuple(links)  # shapes of its links
         self.obstacles = tuple(obstacles)
-        self.pairs = tuple(pairs)
+        self.pairs = tuple(pairs)  # indices into links followed by obstacles
+        # at the last `measure`, shape (k,) [m]; negative if shapes overlap
         self.distances: Array = np.zeros(len(pairs))
         items: list[LinkShape | Obstacle] = [*links, *obstacles]
         closed = np.array([has_closed_form(links[i], items[j]) for i, j in pairs])
         index = np.array(pairs, dtype=np.int64)
+        # the pairs that have a closed form, or None
         self.closed_form: ClosedFormDistances | None = None
-        self.coal: CoalDistances | None = None
+        self.coal: CoalDistances | None = None  # the other pairs, or None
         if closed.any():
             places = np.flatnonzero(closed)
             self.closed_form = ClosedFormDistances(
@@ -96,23 +189,13 @@ class Proximity:
         return state.stamp, count
 
     def witness(self, k: int) -> tuple[Array, Array, Array]:
-        """Return the nearest points of the k-th pair, after `measure`.
-
-        Returns:
-            The points on the first and on the second shape [m], and the unit normal
-            from the first to the second; in world axes, shape (3,) each.
-        """
+        """Return the k-th pair's nearest points [m] and normal from first to second."""
         computed_by, own = self._computed_by[k]
         assert computed_by is not None
         return computed_by.witness(own)
 
     def gradient(self, state: RobotState, slopes: Array) -> Array:
-        """Return Σ slopes_k ∇d_k, shape (nv,); pairs with slope 0 are skipped.
-
-        Args:
-            state: The robot's state.
-            slopes: ∂f/∂d_k, shape (k,).
-        """
+        """Return Σ slopes_k ∇d_k, shape (nv,); pairs with slope 0 are skipped."""
         self.measure(state)
         result, rate = np.zeros(self.robot.nv), np.zeros(self.robot.nv)
         if self.closed_form is not None:

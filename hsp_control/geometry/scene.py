@@ -28,12 +28,7 @@ from hsp_control.trajectories.streams.stream import Streamed
 
 
 def _in_space(center: Trajectory) -> Trajectory:
-    """Return the trajectory of a point in the world.
-
-    Raises:
-        SceneError: If it is relative to a start, a stream that does not run, or its
-            dimension is not 3.
-    """
+    """Return the trajectory of a point in the world."""
     if _streamed(center):
         return center
     try:
@@ -46,12 +41,7 @@ def _in_space(center: Trajectory) -> Trajectory:
 
 
 def _streamed(trajectory: Part) -> bool:
-    """Return whether a trajectory has a stream, which then runs already.
-
-    Raises:
-        SceneError: If it does not run: a scene is no part of a run, and has no memory
-            of one. A change while the controller runs is one, see `MoveObstacle`.
-    """
+    """Return whether a trajectory has a stream, which then runs already."""
     streams = list(parts_within(trajectory, Streamed))
     if not all(stream.is_placed for stream in streams):
         raise SceneError(
@@ -97,14 +87,7 @@ class Obstacle(Part, error=SceneError):
         return pin.SE3(rotation, self.center.sample(t).position)
 
     def follow(self, motion: Array) -> Follower:
-        """Return a function of time [s] that writes the obstacle's motion to an array.
-
-        See `Trajectory.follow`.
-
-        Args:
-            motion: Is overwritten with R row by row, the centre c [m], c' [m/s] and the
-                angular velocity ω [rad/s] in the world, shape (18,).
-        """
+        """Return what writes R by rows, c, c' and ω (18,) at a time."""
         center = TrajectorySample(motion[9:12], motion[12:15], np.zeros(3))
         turn = OrientationSample(motion[:9].reshape(3, 3), motion[15:18], np.zeros(3))
         return follow_all(self.center.follow(center), self.orientation.follow(turn))

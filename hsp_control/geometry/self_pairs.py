@@ -11,11 +11,7 @@ from hsp_control.robot.description.xml_files import XmlError, read_xml
 def self_pairs(robot: Robot, links: Sequence[LinkShape]) -> list[tuple[int, int]]:
     """Return the pairs of link shapes that can collide, as indices into ``links``.
 
-    Pairs on one joint or on neighbouring joints are left out, since they always touch,
-    and so are pairs that the robot's SRDF or MuJoCo model disables.
-
-    Raises:
-        ModelError: If the SRDF cannot be read.
+    Neighbours, which always touch, and pairs that the SRDF or MJCF disables are none.
     """
     disabled = _disabled(robot)
     parents = list(robot.model.parents)
@@ -35,11 +31,7 @@ def self_pairs(robot: Robot, links: Sequence[LinkShape]) -> list[tuple[int, int]
 def _neighbours(
     robot: Robot, first: LinkShape, second: LinkShape, parents: Sequence[int]
 ) -> bool:
-    """Return whether the joint of one link is the parent of the other's.
-
-    In a combined robot, the world is a neighbour of a first joint only for links of the
-    same part.
-    """
+    """Return whether a link's joint is the parent of the other's, in one part."""
     a, b = first.joint, second.joint
     if parents[a] != b and parents[b] != a:
         return False

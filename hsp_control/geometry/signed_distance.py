@@ -26,18 +26,11 @@ def dot(a: Array, b: Array) -> float:
 def nearest_on_segments(
     segments: Array, i: int, j: int
 ) -> tuple[float, float, bool, bool]:
-    """Return (s, t) of the nearest points a + s e and b + t f, and which are free.
+    """Return (s, t, free, free) of the nearest points a + s e and b + t f.
 
     A free point is inside its segment, where it can slide; a fixed one is at an end
-    (Ericson, Real-Time Collision Detection, 2005, 5.1.9).
-
-    Args:
-        segments: Start and axis of each segment, shape (k, 2, 3) [m].
-        i: Index of the segment (a, e).
-        j: Index of the segment (b, f).
-
-    Returns:
-        (s, t, whether s is free, whether t is free), s and t in [0, 1].
+    (Ericson, Real-Time Collision Detection, 2005, 5.1.9). A row of segments (k, 2, 3)
+    is a start and an axis.
     """
     ee = ff = ef = er = fr = 0.0
     for c in range(3):
@@ -105,15 +98,10 @@ def nearest_rates(
 
 @kernel
 def distance_to_solid(kind: int, size: Array, x: Array, n: Array, H: Array) -> float:
-    """Return the signed distance of a point to a solid; write gradient and Hessian.
+    """Return the signed distance of a point x to a solid, in the solid's frame.
 
-    Args:
-        kind: BOX, CYLINDER or HALF_SPACE.
-        size: Box: half the edges. Cylinder: radius, radius and half the height.
-            Half-space: not used. Shape (≥ 3,) [m].
-        x: The point in the solid's frame, shape (3,) [m].
-        n: Is overwritten with the gradient, a unit vector, shape (3,).
-        H: Is overwritten with the Hessian, shape (3, 3) [1/m].
+    The size is a box's half edges; a cylinder's radius, radius and half height [m]. The
+    gradient n, a unit vector, and the Hessian H [1/m] are written.
     """
     for i in range(3):
         n[i] = 0.0
@@ -200,11 +188,8 @@ def _cylinder(size: Array, x: Array, n: Array, H: Array) -> float:
 def direction(points: Array) -> float:
     """Return the distance of two points, write the unit vector from second to first.
 
-    If the points coincide, the distance is 0 and the z axis is written, so that all
-    results are finite.
-
-    Args:
-        points: Rows x, y and n, shape (3, 3); n is overwritten with (x - y)/|x - y|.
+    ``points`` has the rows x, y and n = (x - y)/|x - y|, which is written: the z axis
+    if the points coincide, so that all results are finite.
     """
     square = 0.0
     for c in range(3):

@@ -9,14 +9,17 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.exceptions import ModelError
-from hsp_control.inspection.elements import check_elements
-from hsp_control.inspection.finding import Finding
-from hsp_control.inspection.home import check_home
-from hsp_control.inspection.inertias import check_inertias
-from hsp_control.inspection.limits import check_limits
-from hsp_control.inspection.mass_matrix import check_mass_matrix, worst_condition
-from hsp_control.inspection.meshes import check_meshes
-from hsp_control.inspection.self_collisions import check_self_collisions
+from hsp_control.inspection.checks import (
+    Finding,
+    check_elements,
+    check_home,
+    check_inertias,
+    check_limits,
+    check_mass_matrix,
+    check_meshes,
+    check_self_collisions,
+    worst_condition,
+)
 from hsp_control.inspection.strength import check_strength
 from hsp_control.robot import Robot, RobotDescription
 from hsp_control.robot.description.loading import load_model
@@ -26,17 +29,11 @@ from hsp_control.robot.description.urdf_checks import parse_urdf
 
 @dataclass(frozen=True)
 class Inspection:
-    """What was found about a robot.
+    """What was found about a robot."""
 
-    Attributes:
-        source: Where the robot comes from.
-        findings: What is odd, errors first.
-        facts: What can be said about it in general: names and texts.
-    """
-
-    source: RobotSource
-    findings: tuple[Finding, ...]
-    facts: Mapping[str, str]
+    source: RobotSource  # where the robot comes from
+    findings: tuple[Finding, ...]  # what is odd, errors first
+    facts: Mapping[str, str]  # what can be said about it in general: names and texts
 
     @property
     def loads(self) -> bool:

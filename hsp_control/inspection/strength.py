@@ -5,18 +5,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.inspection.finding import Finding
+from hsp_control.inspection.checks import Finding
 from hsp_control.robot import Robot
 
 
 def too_weak(robot: Robot, q: Array, limits: Array) -> Iterator[tuple[str, str]]:
-    """Yield the joints that cannot hold the robot at a configuration, and why.
-
-    Args:
-        robot: The robot, with a fixed base.
-        q: The configuration, shape (nq,).
-        limits: Effort limits, shape (nv,) [N·m or N]; inf: none.
-    """
+    """Yield the joints that cannot hold the robot at a configuration, and why."""
     rest = np.zeros(robot.nv)
     static = np.abs(robot.inverse_dynamics(q, rest, rest))
     for k in np.flatnonzero(static > limits):
@@ -28,10 +22,7 @@ def too_weak(robot: Robot, q: Array, limits: Array) -> Iterator[tuple[str, str]]
 
 
 def check_strength(robot: Robot) -> Iterator[Finding]:
-    """Yield the joints whose limits are too low to hold the robot at home.
-
-    Robots with a floating base are not checked: they stand on contacts.
-    """
+    """Yield the joints whose limits are too low to hold the robot at home."""
     if robot.unactuated:
         return
     own = np.array(robot.model.effortLimit)

@@ -6,9 +6,9 @@ multiplies by one after the other: J# = L⁻ᵀ Qᵀ X.
 """
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.bounded_inverse import bounded_inverse
 from hsp_control.common.kernels import kernel
 from hsp_control.common.linalg import (
+    bounded_inverse,
     multiply,
     multiply_transposed,
     solve_lower,

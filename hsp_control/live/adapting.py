@@ -10,26 +10,16 @@ from hsp_control.live.settings import LiveSettings
 
 @runtime_checkable
 class LocatedHardware(Hardware, Protocol):
-    """`Hardware` that knows where the robot is: a run can begin there.
+    """`Hardware` that knows where the robot is: a run can begin there."""
 
-    Attributes:
-        q: Its configuration when it was connected, shape (nq,).
-    """
-
-    q: Array
+    q: Array  # its configuration when it was connected, shape (nq,)
 
 
 @runtime_checkable
 class AdaptingHardware(LocatedHardware, Protocol):
-    """`Hardware` that corrects the settings of its loop, and tells what it found.
+    """`Hardware` that corrects the settings of its loop, and tells what it found."""
 
-    Attributes:
-        lines: What the user should know of the robot, one sentence each.
-        fault: Why the robot stopped by itself or was lost, once it is known; also if
-            that was after the loop's safe stop began, or only in `close`.
-    """
-
-    lines: Sequence[str]
+    lines: Sequence[str]  # what the user should know of the robot, one sentence each
 
     @property
     def fault(self) -> str | None:

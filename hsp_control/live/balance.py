@@ -14,16 +14,11 @@ _ROOT = 1
 
 
 class Balance:
-    """Compares tilt and height with those of the start; see `FallDetector`.
-
-    Attributes:
-        lost: Whether the robot has fallen.
-    """
+    """Compares tilt and height with those of the start; see `FallDetector`."""
 
     def __init__(self, detector: FallDetector) -> None:
-        """Set what detects a fall."""
         self._detector = detector
-        self.lost = False
+        self.lost = False  # whether the robot has fallen
 
     def fault(self, state: RobotState) -> str | None:
         """Return why the robot is falling, or None."""
@@ -37,13 +32,7 @@ class Balance:
 def balance_of(
     robot: Robot, contacts: Sequence[Contact], state: RobotState
 ) -> Balance | None:
-    """Return what watches a robot's balance; None if its base is fixed.
-
-    Args:
-        robot: The robot.
-        contacts: Its feet.
-        state: The state in which it stands.
-    """
+    """Return what watches a robot's balance; None if its base is fixed."""
     if not robot.unactuated:
         return None
     base = next(

@@ -26,22 +26,13 @@ class BearingFeet:
     J v = 0, these efforts do the work of x: vᵀ Sᵀ tau = vᵀ x.
 
     Without motors in six rows, and without a foot that bears, nothing holds the robot.
-
-    Attributes:
-        contacts: The contacts that bear now.
     """
 
     def __init__(self, robot: Robot, contacts: Sequence[Contact]) -> None:
-        """Set the robot and its contacts, all of which bear.
-
-        Args:
-            robot: The robot; one with a fixed base needs no feet.
-            contacts: The controller's contacts; those on steep planes do not carry.
-        """
         self._robot = robot
         self._all = tuple(c for c in contacts if c.axes[2, 2] >= _STEEPEST)
         self._base = list(robot.unactuated)
-        self.contacts = self._all
+        self.contacts = self._all  # the contacts that bear now
 
     @property
     def hold(self) -> bool:
@@ -49,10 +40,7 @@ class BearingFeet:
         return not self._base or bool(self.contacts)
 
     def feel(self, measured: Measurement) -> None:
-        """Find which contacts bear: those that are pressed.
-
-        A contact without a sensor bears while its schedule says so.
-        """
+        """Find which contacts bear: those that are pressed."""
         if self._base:
             self.contacts = tuple(
                 each for each in self._all if _bears(each, measured)
@@ -63,15 +51,7 @@ class BearingFeet:
         self.contacts = ()
 
     def joint_effort(self, state: RobotState, force: Array) -> Array:
-        """Return the efforts that exert a generalized force with the feet's help.
-
-        Args:
-            state: The state.
-            force: x, shape (nv,).
-
-        Returns:
-            tau, shape (nv,), with zeros where there is no motor.
-        """
+        """Return the efforts (nv,) that exert x (nv,) with the feet's help."""
         if not self._base:
             return force
         effort = force.copy()

@@ -11,19 +11,12 @@ CAPACITY = 600_000
 
 
 class Quantiles(NamedTuple):
-    """Quantiles of a distribution of times [s].
+    """Quantiles of a distribution of times [s]."""
 
-    Attributes:
-        median: 50 % quantile.
-        p99: 99 % quantile.
-        p999: 99.9 % quantile.
-        worst: Maximum.
-    """
-
-    median: float
-    p99: float
-    p999: float
-    worst: float
+    median: float  # 50 % quantile
+    p99: float  # 99 % quantile
+    p999: float  # 99.9 % quantile
+    worst: float  # maximum
 
     @classmethod
     def of(cls, times: Array) -> Self:
@@ -46,12 +39,7 @@ class Deadlines:
     """
 
     def __init__(self, period: float, capacity: int = CAPACITY) -> None:
-        """Allocate the memory and write to all of it, to avoid page faults later.
-
-        Args:
-            period: Length of a period [s].
-            capacity: Number of periods whose times are stored.
-        """
+        """Allocate the memory and write to all of it, to avoid page faults later."""
         self.period = period
         self.periods = self.missed = self.without_state = self.skipped_states = 0
         self._responses: Array = np.full(capacity, np.nan)
@@ -59,12 +47,7 @@ class Deadlines:
         self._worst_response = self._worst_interval = 0.0
 
     def add(self, interval: float, response: float) -> None:
-        """Record a period.
-
-        Args:
-            interval: Time between the arrivals of the last state and of this one [s].
-            response: Time from this state's arrival until its effort was sent [s].
-        """
+        """Record a period: from state to state, and from state to effort [s]."""
         k = self.periods % len(self._responses)
         self._responses[k], self._intervals[k] = response, interval
         self.periods += 1

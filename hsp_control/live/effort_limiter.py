@@ -16,13 +16,7 @@ _SURE = 5
 
 
 class EffortLimiter:
-    """Converts an effort into the value that is sent, within effort and rate limits.
-
-    Attributes:
-        sent: The value sent last, shape (nv,): tau, or tau - g(q).
-        applied: The effort that the motors then apply, shape (nv,): tau.
-        gravity: g(q) at the last configuration, shape (nv,).
-    """
+    """Converts an effort into the value that is sent, within effort and rate limits."""
 
     def __init__(
         self,
@@ -31,17 +25,6 @@ class EffortLimiter:
         period: float,
         limits: RobotLimits | None = None,
     ) -> None:
-        """Read the limits.
-
-        Args:
-            robot: The model.
-            settings: Limits, and whether the robot adds g(q) itself.
-            period: Time between two efforts [s].
-            limits: The controller's limits, for efforts that the settings do not limit.
-
-        Raises:
-            LiveError: If there are neither one nor nv numbers for a limit.
-        """
         self._robot, self._settings, self._limits = robot, settings, limits
         self._rest = np.zeros(robot.nv)
         self._compensates = settings.compensates_gravity
@@ -49,8 +32,11 @@ class EffortLimiter:
         # The controller's limits may fall while it runs: efforts follow by their rate.
         self._largest = np.maximum(self._upper, settings.effort_limits(robot))
         self._step = settings.rate_limits(robot) * period
+        # the value sent last, shape (nv,): tau, or tau - g(q)
         self.sent: Array = np.zeros(robot.nv)
+        # the effort that the motors then apply, shape (nv,): tau
         self.applied: Array = np.zeros(robot.nv)
+        # g(q) at the last configuration, shape (nv,)
         self.gravity: Array = np.zeros(robot.nv)
         # What the robot may have, at least and at most; and before the last effort.
         self._least: Array = np.zeros(robot.nv)
@@ -91,16 +77,10 @@ class EffortLimiter:
         return bool((tau <= self._largest * (1.0 + _TOLERANCE)).all())
 
     def robot_has(self, effort: Array | None) -> bool:
-        """Use the effort that the robot has, as it says; None: it does not say.
+        """Use the effort that the robot has, as it says; return whether it is another.
 
         What was sent last may be lost, or still under way: the robot may have both,
-        unless they are too far apart for one step from both.
-
-        Args:
-            effort: In the terms of ``sent``, shape (nv,), finite.
-
-        Returns:
-            Whether it differs from what was sent last; ``applied`` then follows it.
+        unless they are too far apart for one step from both. None: it does not say.
         """
         self._unheard, self._says = 0, effort is not None
         if effort is None or np.array_equal(effort, self.sent):
@@ -115,10 +95,7 @@ class EffortLimiter:
         return True
 
     def nothing_heard(self) -> None:
-        """Count a period without a measurement: what was sent may be lost.
-
-        After `_SURE` of them a line is dead, not bad: what was sent counts.
-        """
+        """Count a period without a measurement; a dead line got what was sent."""
         self._unheard += 1
         if self._says and self._unheard <= _SURE:
             least, most = self._before
@@ -126,19 +103,11 @@ class EffortLimiter:
             self._most = np.maximum(most, self.sent)
 
     def apply(self, tau: Array, q: Array) -> bool:
-        """Compute ``sent`` from an effort.
+        """Compute ``sent`` from an effort; return whether tau is finite, else it stays.
 
         The effort is clipped to its limits first, then the sent value to its rate. If
-        some value satisfies both limits, the result does.
-
-        The rate counts from all efforts that the robot may have.
-
-        Args:
-            tau: Effort, shape (nv,).
-            q: Configuration, shape (nq,).
-
-        Returns:
-            Whether tau is finite; if not, ``sent`` keeps its last value.
+        some value satisfies both limits, the result does. The rate counts from all
+        efforts that the robot may have.
         """
         if not np.isfinite(tau).all():
             return False

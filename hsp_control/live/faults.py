@@ -30,11 +30,6 @@ class Faults:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Check the probabilities and the delay.
-
-        Raises:
-            LiveError: If a value is out of range.
-        """
         for name in _KINDS:
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise LiveError(
@@ -79,23 +74,14 @@ _KINDS = ("late", "lost", "duplicated", "corrupted")
 
 
 class FaultInjector:
-    """Applies `Faults` to packets.
-
-    Attributes:
-        injected: Number of injected faults of each kind.
-    """
+    """Applies `Faults` to packets."""
 
     def __init__(self, faults: Faults, stream: int = 0) -> None:
-        """Seed the random numbers.
-
-        Args:
-            faults: The probabilities.
-            stream: Stream of random numbers; each sender has its own.
-        """
         self._faults = faults
         self._rng = np.random.default_rng((faults.seed, stream))
         self._cumulative = np.cumsum([getattr(faults, kind) for kind in _KINDS])
         self._waiting: list[tuple[int, bytes]] = []
+        # number of injected faults of each kind
         self.injected: Counter[str] = Counter(dict.fromkeys(_KINDS, 0))
 
     def apply(self, data: bytes) -> list[bytes]:

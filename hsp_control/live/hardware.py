@@ -1,8 +1,9 @@
-"""The interface between a live loop and a robot: states, efforts, period."""
+"""What a robot must offer to be controlled."""
 
 from typing import Protocol, runtime_checkable
 
 from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import HspControlError
 from hsp_control.control.measurement import Measurement as Measurement
 
 
@@ -47,3 +48,15 @@ class Hardware(Protocol):
 
     def close(self) -> None:
         """Tell the robot that no more efforts follow; a second call does nothing."""
+
+
+def described(error: BaseException) -> str:
+    """Return an exception's message, a foreign one's with its type; never raise."""
+    name = type(error).__name__
+    try:
+        message = str(error)
+    except Exception:
+        return name
+    if isinstance(error, HspControlError | OSError) and message:
+        return message
+    return f"{name}: {message}" if message else name

@@ -187,18 +187,12 @@ class AgeEstimator:
     """
 
     def __init__(self, window: float = 10.0) -> None:
-        """Set the length of the time window [s]."""
         self._window = window
         self._smallest = self._smallest_before = np.inf
         self._end = -np.inf
 
     def age(self, arrival: float, stamp: float) -> float:
-        """Return a packet's age [s].
-
-        Args:
-            arrival: When it arrived, by this end's clock [s].
-            stamp: When it was sent, by the sender's clock [s].
-        """
+        """Return a packet's age [s]."""
         if arrival > self._end:
             self._smallest_before, self._smallest = self._smallest, np.inf
             self._end = arrival + self._window

@@ -34,27 +34,16 @@ CHANNEL_INFO = {
 
 
 class Row(NamedTuple):
-    """One row of the log; see `Recorder.record`.
+    """One row of the log; see `Recorder.record`."""
 
-    Attributes:
-        state: The state.
-        output: The controller's output for it, or None.
-        tau: The effort of the motors, shape (nv,).
-        log_channels: Further values to log, by name.
-    """
-
-    state: RobotState
-    output: ControlOutput | None
-    tau: Array
-    log_channels: Mapping[str, LogChannel]
+    state: RobotState  # the state
+    output: ControlOutput | None  # the controller's output for it, or None
+    tau: Array  # the effort of the motors, shape (nv,)
+    log_channels: Mapping[str, LogChannel]  # further values to log, by name
 
 
 class LiveLog:
-    """Writes rows to a journal; each is passed to the operating system at once.
-
-    Attributes:
-        path: The journal.
-    """
+    """Writes rows to a journal; each is passed to the operating system at once."""
 
     def __init__(
         self,
@@ -63,18 +52,7 @@ class LiveLog:
         scene: Scene | None = None,
         meta: Mapping[str, Any] | None = None,
     ) -> None:
-        """Create the journal.
-
-        Args:
-            path: The journal.
-            controller: The controller whose tasks and fields are logged.
-            scene: Obstacles to log.
-            meta: JSON data of the log.
-
-        Raises:
-            LogError: If it cannot be written.
-        """
-        self.path = path
+        self.path = path  # the journal
         self._recorder = Recorder(controller, scene or Scene(), 1)
         self._meta = dict(meta or {})
         self._last_t = -inf
@@ -93,11 +71,7 @@ class LiveLog:
         self._recorder.plan = plan
 
     def add(self, row: Row) -> None:
-        """Write a row if it is later than the last one.
-
-        Raises:
-            LogError: If it cannot be written.
-        """
+        """Write a row if it is later than the last one."""
         if not row.state.t > self._last_t:
             return
         try:
@@ -111,16 +85,7 @@ class LiveLog:
             self._recorder.clear()
 
     def end(self, status: str, message: str, **meta: Any) -> None:
-        """Write how the run ended, and close the file.
-
-        Args:
-            status: ``completed``, ``interrupted`` or ``stopped``.
-            message: Why it ended.
-            **meta: Further JSON data.
-
-        Raises:
-            LogError: If it cannot be written.
-        """
+        """Write how the run ended, and close the file."""
         try:
             came = self._recorder.repeatable()
             self._journal.write_end(status, message, **came, **meta)
@@ -135,12 +100,7 @@ class LiveLog:
 
 
 class LoopLog:
-    """Selects what a loop logs: rows on a time grid, and each change of the phase.
-
-    Attributes:
-        path: The journal; None without a log.
-        controller_failed: Whether the controller has raised; it is not called again.
-    """
+    """Selects what a loop logs: rows on a time grid, and each change of the phase."""
 
     def __init__(
         self,
@@ -150,24 +110,14 @@ class LoopLog:
         scene: Scene | None,
         meta: Mapping[str, Any],
     ) -> None:
-        """Create the journal, if there is a path.
-
-        Args:
-            path: The journal; None: no log.
-            period: Time between two rows [s].
-            chain: Computes the efforts that are logged.
-            scene: Obstacles to log.
-            meta: JSON data of the log.
-
-        Raises:
-            LogError: If it cannot be written.
-        """
         self._chain, self._period = chain, period
         self._log: LiveLog | None = None
         self._next, self._phase = -inf, Phase.WAITING
         self._failed = False
         self._excess = LimitExcess(chain.command.controller.robot)
+        # the journal; None without a log
         self.path = None if path is None else Path(path)
+        # whether the controller has raised; it is not called again
         self.controller_failed = False
         if self.path is not None:
             self._log = LiveLog(self.path, chain.command.controller, scene, meta)
@@ -181,18 +131,7 @@ class LoopLog:
         *,
         last: bool,
     ) -> None:
-        """Write a row if one is due.
-
-        Args:
-            phase: The loop's phase.
-            reader: The state.
-            limiter: The efforts.
-            response: Response time of this period [s].
-            last: Whether this is the last period, which is always logged.
-
-        Raises:
-            LogError: If it cannot be written; later calls then do nothing.
-        """
+        """Write a row if one is due."""
         measurement, state = reader.measurement, reader.state
         if self._log is None or self._failed:
             return
@@ -245,11 +184,7 @@ class LoopLog:
         return Row(state, self._output(phase, state), limiter.applied, log_channels)
 
     def end(self, report: LoopReport) -> None:
-        """Write how the loop ended, and close the journal, if there is one.
-
-        Raises:
-            LogError: If it cannot be written.
-        """
+        """Write how the loop ended, and close the journal, if there is one."""
         if self._log is None:
             return
         deadlines = report.deadlines

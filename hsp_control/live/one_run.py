@@ -8,8 +8,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FallError
 from hsp_control.live.balance import Balance
 from hsp_control.live.effort_limiter import EffortLimiter
-from hsp_control.live.failures import described
-from hsp_control.live.hardware import Hardware
+from hsp_control.live.hardware import Hardware, described
 from hsp_control.live.live_log import LoopLog
 from hsp_control.live.operator_requests import OperatorRequests
 from hsp_control.live.report import Ended, LoopReport
@@ -20,16 +19,7 @@ from hsp_control.simulation.control_chain import ControlChain, EffortSource
 
 
 class OneRun:
-    """One run of a loop, whose parts are ready; `run`, then `finish`. Neither raises.
-
-    Attributes:
-        phase: Running, damping or holding.
-        ending: How it will end, and why, once the plan has brought the robot to rest.
-        asked_at: When that was asked for [s].
-        silent: Whether it stopped sending efforts.
-        abandoned: Whether the operator did not wait for the safe stop.
-        later: The first fault in the safe stop, "" without one.
-    """
+    """One run of a loop whose parts are ready: `run`, then `finish`; none raises."""
 
     def __init__(
         self,
@@ -44,40 +34,24 @@ class OneRun:
         end: float,
         balance: Balance | None = None,
     ) -> None:
-        """Connect the parts.
-
-        Args:
-            chain: Computes the efforts.
-            hardware: The robot.
-            reader: Reads its states; it has the first one.
-            limiter: Limits the efforts.
-            safe_stop: Ends the run.
-            log: The log.
-            requests: The operator's requests.
-            settings: What is tolerated.
-            end: The controller's time at which the run is complete [s].
-            balance: Tells whether a robot with a floating base falls.
-        """
         self.chain, self.hardware, self.reader = chain, hardware, reader
         self.balance = balance
         self.limiter, self.safe_stop, self.log = limiter, safe_stop, log
         self.requests, self.settings, self.end = requests, settings, end
         self.period = hardware.period
-        self.phase = Phase.RUNNING
+        self.phase = Phase.RUNNING  # running, damping or holding
         self.ended: Ended = "completed"
         self.reason = ""
         self.error: Exception | None = None
+        # how it will end, and why, once the plan has brought the robot to rest
         self.ending: tuple[Ended, str] | None = None
-        self.asked_at = 0.0
+        self.asked_at = 0.0  # when that was asked for [s]
+        # whether it stopped sending efforts
         self.silent = self.done = self.abandoned = False
-        self.later = ""
+        self.later = ""  # the first fault in the safe stop, "" without one
 
     def run(self, on_period: Callable[[float], object] | None) -> None:
-        """Run period after period until the safe stop is complete.
-
-        Args:
-            on_period: Called with the controller's time [s] in the rest of a period.
-        """
+        """Run period after period until the safe stop is complete."""
         self.reader.start()
         self.limiter.reset(self.reader.state.q)
         while not self.done:
@@ -208,11 +182,7 @@ class OneRun:
         self.stop("fault", told, error)
 
     def hear_applied(self) -> None:
-        """Learn which effort the robot has, and tell the controller if it is another.
-
-        Efforts may be lost: then neither the rate nor the controller's memory may count
-        from what was sent.
-        """
+        """Tell the controller which effort the robot has: one may be lost."""
         if (measurement := self.reader.measurement) is None:
             self.limiter.nothing_heard()
             return
@@ -233,11 +203,7 @@ class OneRun:
             self.fail(error)
 
     def send(self, before: Array) -> None:
-        """Send the limited effort, unless the state is unknown (fail-silent).
-
-        Args:
-            before: What was sent before, shape (nv,).
-        """
+        """Send the limited effort, unless the state is unknown (fail-silent)."""
         if self.silent:
             return
         try:

@@ -12,7 +12,6 @@ class OperatorRequests:
     """
 
     def __init__(self) -> None:
-        """Start without requests."""
         self.reason: str | None = None
         self._changes: deque[Callable[[], object]] = deque()
 

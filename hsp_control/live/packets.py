@@ -42,27 +42,16 @@ class Kind(IntEnum):
 
 
 class Packet(NamedTuple):
-    """The content of a datagram.
+    """The content of a datagram."""
 
-    Attributes:
-        kind: State, effort or end of the session.
-        phase: The robot's phase.
-        session: Number of the session.
-        sequence: Number of the packet at its sender.
-        acks: Sequence of the newest packet that the sender has received.
-        stamp: When it was sent, on the sender's clock [ns].
-        t: Time of the payload [s].
-        payload: The doubles, shape (count,).
-    """
-
-    kind: Kind
-    phase: int
-    session: int
-    sequence: int
-    acks: int
-    stamp: int
-    t: float
-    payload: Array
+    kind: Kind  # state, effort or end of the session
+    phase: int  # the robot's phase
+    session: int  # number of the session
+    sequence: int  # number of the packet at its sender
+    acks: int  # sequence of the newest packet that the sender has received
+    stamp: int  # when it was sent, on the sender's clock [ns]
+    t: float  # time of the payload [s]
+    payload: Array  # the doubles, shape (count,)
 
 
 def encode(packet: Packet) -> bytes:

@@ -12,9 +12,8 @@ from hsp_control.common.exceptions import SimulationError
 def no_garbage_collection() -> Iterator[None]:
     """Disable Python's garbage collector in this context.
 
-    A collection visits every container object: it takes milliseconds, at an unknown
-    time. A control step creates no reference cycles, so that reference counting frees
-    all its memory. Existing objects are frozen: an explicit collection skips them.
+    A collection takes milliseconds at an unknown time, and a control step creates no
+    reference cycles. Existing objects are frozen: an explicit collection skips them.
     """
     was_enabled = gc.isenabled()
     gc.collect()
@@ -32,13 +31,8 @@ def no_garbage_collection() -> Iterator[None]:
 def real_time_priority(level: int | None) -> Iterator[None]:
     """Run the process with real-time priority (SCHED_FIFO) in this context.
 
-    Args:
-        level: Priority, 1 to 99; on a real-time kernel drivers' threads have 50. None:
-            the scheduling stays as it is.
-
-    Raises:
-        SimulationError: If the level is out of range, or the user lacks the permission:
-            root, the capability CAP_SYS_NICE, or a line ``rtprio`` in limits.conf.
+    ``level`` is 1 to 99; drivers' threads of a real-time kernel have 50. None: the
+    scheduling stays as it is.
     """
     if level is None:
         yield

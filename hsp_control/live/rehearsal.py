@@ -20,15 +20,7 @@ def rehearse(
 ) -> None:
     """Evaluate a copy of a controller wherever its tasks or contacts change.
 
-    Each set of tasks and contacts has native calls of its own. Their kernels may not be
-    compiled in the loop: a robot waits some milliseconds for an effort, no seconds.
-
-    Args:
-        controller: The controller.
-        start: Start of the loop [s].
-        end: Its end [s], or infinity.
-        q: The robot's configuration, shape (nq,).
-        v: Its velocity, shape (nv,).
+    Their native calls are compiled then, not in the loop: a robot waits no seconds.
     """
     times = sorted({t for t in _instants(controller) if start < t <= end and t < inf})
     if not times:

@@ -123,13 +123,7 @@ class SafeStop:
 
 
 def largest_scale(base: Array, direction: Array, limits: Array) -> float:
-    """Return the largest s in [0, 1] with |base + s direction| ≤ limits; 0 if none.
-
-    Args:
-        base: Shape (n,).
-        direction: Shape (n,).
-        limits: Upper limits of the magnitudes, shape (n,).
-    """
+    """Return the largest s in [0, 1] with |base + s direction| ≤ limits; 0 if none."""
     room = np.maximum(limits - np.sign(direction) * base, 0.0)
     size = np.abs(direction)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -9,7 +9,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LiveError
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import RobotLimits
-from hsp_control.constraints.limits.numbers_by_joint import Positives, by_dof
+from hsp_control.constraints.limits.joint_numbers import Positives, by_dof
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import (
     Count,
@@ -50,9 +50,6 @@ class StopSettings(Part, error=LiveError):
         With one period of delay a rate k is stable for k h < 1 and a natural frequency
         ω for ω h < 0.43 (docs/robustness.md); half of it is the margin for model
         errors.
-
-        Raises:
-            LiveError: If a gain is too large.
         """
         for name, upper in (("damping", 0.5), ("natural_frequency", 0.2)):
             value = getattr(self, name)
@@ -102,11 +99,7 @@ class LiveSettings(Part, error=LiveError):
     """The safe stop of the loop and of the simulated robot."""
 
     def rate_limits(self, robot: Robot) -> Array:
-        """Return the limits of the effort rates, shape (nv,), inf where unlimited.
-
-        Raises:
-            LiveError: If they are neither one nor nv numbers.
-        """
+        """Return the limits of the effort rates, shape (nv,), inf where unlimited."""
         with within("effort_rate"):
             return by_dof(self.effort_rate, robot.nv, error=LiveError)
 
@@ -114,13 +107,6 @@ class LiveSettings(Part, error=LiveError):
         """Return the limits of the efforts, shape (nv,), inf where unlimited.
 
         They are 0 where there is no motor: at a floating base.
-
-        Args:
-            robot: The model.
-            limits: The controller's limits; None: without them.
-
-        Raises:
-            LiveError: If they are neither one nor nv numbers.
         """
         if self.effort is None and limits is not None:
             own = np.array(limits.effort)
@@ -138,17 +124,7 @@ class LiveSettings(Part, error=LiveError):
 def check_held(
     robot: Robot, contacts: Sequence[Contact], settings: LiveSettings
 ) -> None:
-    """Check that the robot can be held where it is: by its base, or on its contacts.
-
-    Args:
-        robot: The robot.
-        contacts: The controller's contacts.
-        settings: Whether the robot compensates gravity, which no floating base does.
-
-    Raises:
-        LiveError: If it has a floating base and no contacts, or is said to compensate
-            gravity.
-    """
+    """Check that the robot can be held where it is: by its base, or on its contacts."""
     if not robot.unactuated:
         return
     if not contacts:

@@ -1,4 +1,4 @@
-"""A simulated robot: a plant with a watchdog and its own safe stop."""
+"""A simulated robot behind the interface of a real one; it checks what it is sent."""
 
 from collections.abc import Sequence
 
@@ -7,14 +7,13 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HspControlError, LiveError
 from hsp_control.constraints.contacts import Contact
-from hsp_control.constraints.limits import RobotLimits
+from hsp_control.constraints.limits import RobotLimits, own_limits
 from hsp_control.live.bearing_feet import BearingFeet
-from hsp_control.live.effort_check import EffortCheck
 from hsp_control.live.effort_limiter import EffortLimiter
 from hsp_control.live.hardware import Measurement
 from hsp_control.live.safe_stop import Phase, SafeStop
 from hsp_control.live.settings import LiveSettings
-from hsp_control.robot import RobotState
+from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.integrators import Integrator, Rk4
 from hsp_control.simulation.plants import (
     ContinuousPlant,
@@ -22,6 +21,65 @@ from hsp_control.simulation.plants import (
     Plant,
     SampledPlant,
 )
+
+_ROUNDING = 1e-6
+"""Tolerance of efforts and their rates, relative to the limit."""
+_LARGEST_EFFORT = 1e6
+"""No motor is stronger [N·m or N]: it holds where there is no limit."""
+
+
+class EffortCheck:
+    """The checks of a robot's own safety controller, with its own model."""
+
+    def __init__(
+        self, robot: Robot, settings: LiveSettings, period: float, effort: Array
+    ) -> None:
+        self._names = robot.dof_names
+        # The controller's limits may be lower, and may grow while it runs.
+        upper = np.maximum(effort, settings.effort_limits(robot))
+        self._upper = np.minimum(upper * (1.0 + _ROUNDING), _LARGEST_EFFORT)
+        self._step = settings.rate_limits(robot) * period
+        self._rate = settings.rate_limits(robot)
+        self._compensates = settings.compensates_gravity
+        speed = own_limits(robot).velocity
+        self._speed = speed * (1.0 + settings.velocity_margin)
+
+    def fault(self, effort: Array, before: Array | None, gravity: Array) -> str | None:
+        """Return why an effort is not accepted; ``before`` is None under the brakes."""
+        if np.shape(effort) != gravity.shape:
+            return f"an effort has shape {np.shape(effort)}; needs {gravity.shape}"
+        if not np.isfinite(effort).all():
+            return f"an effort is not finite: {effort.tolist()}"
+        # The sender may have compensated another gravity: one of another load.
+        upper = self._upper + (np.abs(gravity) if self._compensates else 0.0)
+        i = int((np.abs(effort) - upper).argmax())
+        if abs(effort[i]) > upper[i]:
+            return (
+                f"{self._names[i]} was sent {effort[i]:.6g}; its effort is limited to "
+                f"{upper[i]:.6g}"
+            )
+        if before is None:
+            return None
+        step = np.abs(effort - before)
+        allowed = self._step * (1.0 + _ROUNDING) + _ROUNDING
+        i = int((step - allowed).argmax())
+        if step[i] > allowed[i]:
+            return (
+                f"the effort of {self._names[i]} jumped by {step[i]:.6g} in a period; "
+                f"{self._step[i]:.6g} are allowed, a rate of {self._rate[i]:.6g}"
+            )
+        return None
+
+    def too_fast(self, v: Array) -> str | None:
+        """Return which joint exceeds its speed limit, or None."""
+        i = int((np.abs(v) - self._speed).argmax())
+        if abs(v[i]) <= self._speed[i]:
+            return None
+        return (
+            f"{self._names[i]} moves at {v[i]:.6g}; its speed is limited to "
+            f"{self._speed[i]:.6g}"
+        )
+
 
 _LARGEST_SPEED = 1e4
 """Of a joint [rad/s or m/s]; what is faster is no motion of a robot."""
@@ -211,19 +269,7 @@ class SimulatedRobot:
 
 
 def sampled(plant: Plant, integrator: Integrator, period: float) -> SampledPlant:
-    """Return a plant as one that advances period by period.
-
-    A continuous plant is integrated by the integrator. An adaptive one may take any
-    time, so one Runge-Kutta step per period replaces it.
-
-    Args:
-        plant: The plant.
-        integrator: The integrator of a continuous plant.
-        period: Length of a period [s].
-
-    Raises:
-        LiveError: If the plant is neither continuous nor sampled.
-    """
+    """Return a plant as one that advances period by period; an adaptive one by Rk4."""
     if isinstance(plant, ContinuousPlant):
         adaptive = integrator.longest_step is None
         return IntegratedPlant(plant, Rk4(period) if adaptive else integrator)
@@ -232,3 +278,44 @@ def sampled(plant: Plant, integrator: Integrator, period: float) -> SampledPlant
             f"{type(plant).__name__} is neither a continuous nor a sampled plant"
         )
     return plant
+
+
+class InProcessRobot:
+    """A `SimulatedRobot` as `Hardware`: each `read` simulates the next period.
+
+    Before the first effort, reads return the robot waiting at its start. A run is not
+    in real time and has no deadline misses; it equals `simulate` with the same plant
+    and period.
+
+    Attributes:
+        robot: The robot.
+        period: Length of a period [s].
+        closed: Whether `close` was called.
+    """
+
+    def __init__(self, robot: SimulatedRobot) -> None:
+        """Connect to the robot."""
+        self.robot = robot
+        self.period = robot.period
+        self._sequence = 0
+        self._efforts: list[Array] = []
+        self.closed = False
+
+    def read(self, timeout: float) -> Measurement:
+        """Simulate a period, and return the state at its end, at once."""
+        self.robot.advance(self._efforts)
+        self._efforts = []
+        self._sequence += 1
+        return self.robot.measured()._replace(sequence=self._sequence)
+
+    def write(self, effort: Array) -> None:
+        """Set the effort of the next period, shape (nv,)."""
+        self._efforts.append(np.array(effort))
+
+    def close(self) -> None:
+        """Stop the robot, and simulate it until it has stopped."""
+        if not self.closed:
+            self.closed = True
+            self.robot.halt("the loop has ended")
+            while not self.robot.done:
+                self.robot.advance([])

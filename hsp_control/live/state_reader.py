@@ -1,36 +1,78 @@
-"""Read the robot's state each period; predict it when no new measurement arrives."""
+"""Reads the robot's state each period, and goes on without one for some periods."""
 
 from collections.abc import Callable
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HardwareError
 from hsp_control.constraints.limits import RobotLimits
-from hsp_control.live.dead_reckoning import DeadReckoning
 from hsp_control.live.deadlines import Deadlines
-from hsp_control.live.failures import described
-from hsp_control.live.frozen_state import FrozenState
-from hsp_control.live.hardware import Hardware, Measurement
-from hsp_control.live.measurement_monitor import MeasurementMonitor
-from hsp_control.live.robot_clock import RobotClock
+from hsp_control.live.hardware import Hardware, Measurement, described
+from hsp_control.live.measurement_checks import (
+    DeadReckoning,
+    FrozenState,
+    MeasurementMonitor,
+    valid_measurement,
+)
 from hsp_control.live.settings import LiveSettings
-from hsp_control.live.valid_measurement import valid_measurement
 from hsp_control.robot import Robot, RobotState
+
+
+class RobotClock:
+    """Converts the robot's time to the controller's, and judges its steps.
+
+    Between two measurements the robot's clock may advance by the periods that their
+    sequence numbers tell, or by the tolerated number of missing states. It may stand
+    before the robot starts, and for the tolerated number of states later.
+
+    After a jump the controller's time goes on by one period: the safe stop that follows
+    needs no other.
+    """
+
+    def __init__(
+        self, start_time: float, period: float, tolerated: int, start_periods: float
+    ) -> None:
+        self._start_time, self._period = start_time, period
+        self._tolerated, self._start_periods = tolerated, start_periods
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin again with the next measurement."""
+        self._last: Measurement | None = None
+        self._offset, self._standing, self._moved = 0.0, 0, False
+
+    def time(self, measurement: Measurement) -> float:
+        """Return the controller's time of the last measurement [s]."""
+        return measurement.t + self._offset
+
+    def fault(self, measurement: Measurement) -> str | None:
+        """Return why the clock cannot be right at a new measurement, or None."""
+        last, self._last = self._last, measurement
+        if last is None:
+            self._offset = self._start_time - measurement.t
+            return None
+        passed, period = measurement.t - last.t, self._period
+        states = measurement.sequence - last.sequence
+        longest = (max(states, self._tolerated + 1) + 1) * period
+        if not 0.0 <= passed <= longest:
+            self._offset -= passed - period
+            return (
+                f"the robot's clock jumps by {passed:.6g} s from one state to the "
+                f"next; {longest:.3g} s are allowed"
+            )
+        self._moved |= passed > 0.0
+        self._standing = 0 if passed > 0.0 else self._standing + 1
+        allowed = self._tolerated if self._moved else self._start_periods
+        if self._standing > allowed:
+            return f"the robot's clock stands still for {self._standing} states"
+        return None
+
 
 _READ_MARGIN = 0.5
 """How late a state may be before its period counts as one without a state [periods]."""
 
 
 class StateReader:
-    """Reads measurements in real time, and checks them.
-
-    Attributes:
-        measurement: The new, valid measurement of this period, or None.
-        fault: Why the robot must be stopped, or None.
-        error: What the hardware raised, or None.
-        connection_lost: Whether no state can arrive any more.
-        arrival: When this period's state arrived, by the loop's clock [s].
-        deadlines: Response times and deadline misses.
-    """
+    """Reads measurements in real time, and checks them."""
 
     def __init__(
         self,
@@ -41,16 +83,6 @@ class StateReader:
         clock: Callable[[], float],
         start_time: float = 0.0,
     ) -> None:
-        """Allocate.
-
-        Args:
-            robot: The model.
-            limits: The controller's limits; None: those of the robot's model.
-            hardware: The robot.
-            settings: Faults that are tolerated.
-            clock: A monotonic clock [s].
-            start_time: The controller's time at the first state [s].
-        """
         self._hardware, self._settings, self._clock = hardware, settings, clock
         self._robot, self._period = robot, hardware.period
         self._monitor = MeasurementMonitor(robot, limits, settings, self._period)
@@ -63,11 +95,14 @@ class StateReader:
             settings.start_timeout / self._period,
         )
         self._missing = 0
+        # the new, valid measurement of this period, or None
         self.measurement: Measurement | None = None
-        self.fault: str | None = None
-        self.error: Exception | None = None
-        self.connection_lost = False
+        self.fault: str | None = None  # why the robot must be stopped, or None
+        self.error: Exception | None = None  # what the hardware raised, or None
+        self.connection_lost = False  # whether no state can arrive any more
+        # when this period's state arrived, by the loop's clock [s]
         self.arrival = self._last_arrival = self._due = clock()
+        # response times and deadline misses
         self.deadlines = Deadlines(hardware.period)
 
     @property
@@ -81,11 +116,7 @@ class StateReader:
         return self._reckoning.predicted_for
 
     def wait_for_first(self) -> Measurement:
-        """Wait for the first state, and return it.
-
-        Raises:
-            HardwareError: If none arrives in time, or the robot cannot be started.
-        """
+        """Wait for the first state, and return it."""
         end = self._clock() + self._settings.start_timeout
         while (left := end - self._clock()) > 0.0:
             raw = self._hardware.read(left)
@@ -113,12 +144,7 @@ class StateReader:
         self._due = self._last_arrival + (1.0 + _READ_MARGIN) * self._period
 
     def read(self, applied: Array, limits: RobotLimits | None) -> None:
-        """Read the period's measurement; predict the state if there is none.
-
-        Args:
-            applied: The effort that the motors apply, shape (nv,).
-            limits: The controller's limits of now; None: those of the robot's model.
-        """
+        """Read the period's measurement; predict the state if there is none."""
         self._monitor.follow(limits)
         self.fault = self.error = self.measurement = None
         new = self._newest(applied)

@@ -19,14 +19,9 @@ def stop_signals(
 
     The first signal only sets the request, so that it interrupts nothing: no row of the
     log, no message to the robot. A second one raises `KeyboardInterrupt`: the loop ends
-    at once, and the robot's watchdog stops the robot.
-
-    Outside the main thread, which alone receives signals, the context does nothing.
-
-    Args:
-        requests: Receives the request.
-        takes_over: Also handle signals that the program handles itself, or ignores;
-            they are left to it by default.
+    at once, and the robot's watchdog stops the robot. Signals that the program handles
+    itself, or ignores, are left to it unless ``takes_over``. Outside the main thread,
+    which alone receives signals, the context does nothing.
     """
 
     def stop(number: int, frame: object) -> None:

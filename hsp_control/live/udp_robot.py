@@ -19,19 +19,15 @@ CLOSED_BY_LOOP = "the loop closed the connection"
 
 @dataclass
 class ServerReport:
-    """What `serve` counted.
+    """What `serve` counted."""
 
-    Attributes:
-        outdated: Number of efforts that were ignored, because they were computed from
-            a state older than the watchdog's limit.
-        overrun: By how much the robot's time fell behind real time, because its
-            process did not get the processor [s].
-        never_started: Whether no effort arrived.
-    """
-
+    # number of efforts that were ignored, because they were computed from a state older
+    # than the watchdog's limit
     outdated: int = 0
+    # by how much the robot's time fell behind real time, because its process did not
+    # get the processor [s]
     overrun: float = 0.0
-    never_started: bool = False
+    never_started: bool = False  # whether no effort arrived
 
 
 Row = Callable[[float, Array, Array, bool], object]

@@ -16,7 +16,7 @@ from hsp_control.play.channel import Channel
 from hsp_control.play.handles import Handles
 from hsp_control.play.knobs import RAMP
 from hsp_control.play.picture import Kind
-from hsp_control.simulation.journal_tail import JournalTail
+from hsp_control.simulation.journal import JournalTail
 from hsp_control.simulation.recorder import Recorder
 
 

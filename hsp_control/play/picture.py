@@ -14,7 +14,7 @@ from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.fields.weight import sample_weight
 from hsp_control.play.handles import Handles
 from hsp_control.simulation import Rollout
-from hsp_control.simulation.log_distances import distance_label
+from hsp_control.simulation.log_series import distance_label
 from hsp_control.simulation.unreached import unreached
 from hsp_control.visualization.palette import SERIES
 from hsp_control.visualization.viewer import Viewer

@@ -43,13 +43,10 @@ class ConfigurationSpace:
     def __init__(
         self, model: pin.Model, name: str, home: Sequence[float] | None = None
     ) -> None:
-        """Set up the space of a model.
+        """Set up the space of a model, with the robot's name for messages.
 
-        Args:
-            model: The Pinocchio model.
-            name: The robot's name, for messages.
-            home: Displacement from neutral of the home posture, shape (nv,), or None;
-                ignored if it has another size.
+        ``home`` is the displacement from neutral (nv,) of the home posture, ignored if
+        it has another size.
         """
         self.model = model
         self.name = name
@@ -240,10 +237,7 @@ def _is_ball(joint: Any) -> bool:
 
 
 def _dof_names(joints: Mapping[str, Any]) -> tuple[str, ...]:
-    suffixes = {
-        3: ("x", "y", "yaw"),
-        6: ("x", "y", "z", "roll", "pitch", "yaw"),
-    }
+    suffixes = {3: ("x", "y", "yaw"), 6: ("x", "y", "z", "roll", "pitch", "yaw")}
     names: list[str] = []
     for name, joint in joints.items():
         if joint.nv == 1:
@@ -259,17 +253,7 @@ def _dof_names(joints: Mapping[str, Any]) -> tuple[str, ...]:
 def as_numbers(
     vector: ArrayLike, size: int, what: str, space: ConfigurationSpace
 ) -> Array:
-    """Return numbers as doubles of shape (size,).
-
-    Args:
-        vector: The numbers.
-        size: How many they must be.
-        what: Their name, for messages.
-        space: The robot, for messages.
-
-    Raises:
-        ShapeError: If they are no real numbers, or have another shape.
-    """
+    """Return numbers as doubles (size,); ``what`` is their name in messages."""
     try:
         array = np.asarray(vector)
         if array.dtype.kind not in "fiu" and array.size:
@@ -306,14 +290,7 @@ def _check_vector(
 def joint_displacements(
     q: Array, reference: Array, single_dof_joints: Indices, out: Array
 ) -> None:
-    """Write q ⊖ reference for single-dof joints; continuous joints are within ±π.
-
-    Args:
-        q: Configuration, shape (nq,).
-        reference: The other configuration, shape (nq,).
-        single_dof_joints: See `ConfigurationSpace`, shape (k, 3).
-        out: Displacements, shape (nv,); entries of other joints are not changed.
-    """
+    """Write q ⊖ reference for single-dof joints; continuous joints are within ±π."""
     for k in range(single_dof_joints.shape[0]):
         i, at, size = (
             single_dof_joints[k, 0],

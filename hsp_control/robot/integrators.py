@@ -36,7 +36,6 @@ class Chart:
     """Coordinates y = (δ, v), shape (2 nv,), with q = base ⊕ δ."""
 
     def __init__(self, robot: Robot, base: Array) -> None:
-        """Create the chart about a configuration, shape (nq,)."""
         self.robot = robot
         self.base = base.copy()
 
@@ -180,13 +179,7 @@ class Steps(ABC):
     """
 
     def __init__(self, robot: Robot, bind_dynamics: Bind, longest: float) -> None:
-        """Allocate, and bind the calls of a step.
-
-        Args:
-            robot: The robot.
-            bind_dynamics: Makes v' of the arrays q and v.
-            longest: The longest step [s].
-        """
+        """Allocate, and bind the calls of a step."""
         self.robot, self._longest = robot, longest
         self.q, self.v = robot.neutral(), np.zeros(robot.nv)
         self.acceleration = bind_dynamics(self.q, self.v)
@@ -195,7 +188,7 @@ class Steps(ABC):
         self._calls = in_order(self._bind())
         self.native: NativeCall | None = None
         if are_native(self._calls):
-            from hsp_control.robot.native_steps import make_steps
+            from hsp_control.robot.native_move import make_steps
 
             self.native = NativeCall.over(
                 make_steps, self._calls, self.interval, longest, self.h
@@ -245,10 +238,7 @@ class _SemiImplicitEuler(Steps):
 
 
 class _Rk4(Steps):
-    """The four stages of a step, in the chart q = base ⊕ δ.
-
-    The slopes are those of (δ, v): the rows of D and A.
-    """
+    """The four stages of a step, in the chart q = base ⊕ δ."""
 
     def _bind(self) -> list[Callable[[], object]]:
         robot = self.robot
@@ -313,21 +303,7 @@ def _next_stage(
     q: Array,
     v: Array,
 ) -> None:
-    """Write the point that the slopes of a stage lead to, and its slope of δ.
-
-    Args:
-        stage: Which slopes, from 0.
-        fraction: For how much of the step.
-        h: The step [s], shape (1,).
-        D: Slopes of δ, shape (4, nv).
-        A: Slopes of v, shape (4, nv).
-        a: The slope of v at this stage, shape (nv,).
-        base: q where δ = 0, shape (nq,); empty if q is no vector.
-        v0: v at the beginning, shape (nv,).
-        delta: Written, shape (nv,).
-        q: Written, shape (nq,), unless it is empty.
-        v: Written, shape (nv,).
-    """
+    """Write the point (δ, q, v) where a stage's slopes lead, and its slope of δ."""
     for i in range(v.shape[0]):
         A[stage, i] = a[i]
         delta[i] = fraction * h[0] * D[stage, i]
@@ -372,11 +348,7 @@ class Dop853(Integrator, type="dop853"):
     """Absolute tolerance of a step [rad, m, rad/s or m/s]."""
 
     def begin(self, robot: Robot, bind_dynamics: Bind) -> Advance:
-        """Return what integrates; see `Integrator.begin`.
-
-        It raises a SimulationError if no step, however small, meets the tolerance, and
-        what the dynamics raise if they do so at every step size.
-        """
+        """Return what integrates; see `Integrator.begin`."""
         return partial(self._advance, robot, _of_new_arrays(robot, bind_dynamics))
 
     def _advance(
@@ -428,15 +400,11 @@ def _of_new_arrays(robot: Robot, bind_dynamics: Bind) -> Dynamics:
 
 
 class _Trial:
-    """An equation that returns NaN where it fails, so that SciPy rejects the step.
-
-    Attributes:
-        failure: The last error, or None.
-    """
+    """An equation that returns NaN where it fails, so that SciPy rejects the step."""
 
     def __init__(self, equation: Equation) -> None:
         self.equation = equation
-        self.failure: Exception | None = None
+        self.failure: Exception | None = None  # the last error, or None
 
     def __call__(self, t: float, y: Array) -> Array:
         if np.isfinite(y).all():

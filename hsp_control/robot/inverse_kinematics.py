@@ -20,29 +20,19 @@ _STILL = 1e-3
 
 
 class Target(NamedTuple):
-    """Where a frame shall be.
+    """Where a frame shall be."""
 
-    Attributes:
-        frame: Name of the frame.
-        place: Its placement in the world; only the position counts for three rows.
-        rows: 3 for its position, 6 for its pose.
-    """
-
-    frame: str
+    frame: str  # name of the frame
+    # its placement in the world; only the position counts for three rows
     place: pin.SE3
-    rows: int
+    rows: int  # 3 for its position, 6 for its pose
 
 
 class Reached(NamedTuple):
-    """A configuration that inverse kinematics found.
+    """A configuration that inverse kinematics found."""
 
-    Attributes:
-        q: The configuration, shape (nq,).
-        error: Distance from the target: the norm of e [m and rad].
-    """
-
-    q: Array
-    error: float
+    q: Array  # the configuration, shape (nq,)
+    error: float  # distance from the target: the norm of e [m and rad]
 
     @property
     def converged(self) -> bool:
@@ -51,12 +41,7 @@ class Reached(NamedTuple):
 
 
 def reach(
-    robot: Robot,
-    target: Target,
-    q: Array,
-    preferred: Array,
-    lower: Array,
-    upper: Array,
+    robot: Robot, target: Target, q: Array, preferred: Array, lower: Array, upper: Array
 ) -> Reached:
     """Return a configuration at which a frame is at its target, or the nearest found.
 
@@ -64,15 +49,7 @@ def reach(
     error e of position and rotation vector in world axes, and a λ that falls with e. In
     the null space of J it goes towards the preferred configuration. A joint at a limit
     that would go beyond it takes no part in a step. The result depends on the arguments
-    only.
-
-    Args:
-        robot: The robot; every joint has one degree of freedom.
-        target: The target.
-        q: Where the search begins, shape (nq,).
-        preferred: The preferred displacement from neutral, shape (nv,) [rad or m].
-        lower: Smallest displacement from neutral, shape (nv,) [rad or m].
-        upper: Largest displacement from neutral, shape (nv,) [rad or m].
+    only. ``preferred``, ``lower`` and ``upper`` are displacements from neutral, (nv,).
     """
     neutral, state = robot.neutral(), RobotState(robot)
     rest, unit = np.zeros(robot.nv), np.eye(target.rows)

@@ -1,4 +1,4 @@
-"""Placements of joints and frames, Jacobians, their exact rates and drift."""
+"""Placements of joints and frames, and of the mass: Jacobians, exact rates, drift."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -9,8 +9,9 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import ModelError
 from hsp_control.common.kernels import kernel
-from hsp_control.common.native import bind
+from hsp_control.common.native import bind, once
 from hsp_control.robot.matrix_view import matrix_view
+from hsp_control.robot.pinocchio_calls import bind_pinocchio
 
 
 class FrameMotion(NamedTuple):
@@ -18,21 +19,14 @@ class FrameMotion(NamedTuple):
 
     In the axes of the frame that it is relative to: the world's, unless said otherwise.
     Linear rows come before angular rows.
-
-    Attributes:
-        jacobian: J, where J v = (velocity of the origin, angular velocity), shape
-            (6, nv).
-        jacobian_dot: J' = dJ/dt along v, exact, shape (6, nv).
-        rotation: Rotation matrix from the frame's axes, shape (3, 3).
-        position: The frame's origin [m], shape (3,).
-        velocity: J v, shape (6,) [m/s, rad/s].
     """
 
+    # J, where J v = (velocity of the origin, angular velocity), shape (6, nv)
     jacobian: Array
-    jacobian_dot: Array
-    rotation: Array
-    position: Array
-    velocity: Array
+    jacobian_dot: Array  # J' = dJ/dt along v, exact, shape (6, nv)
+    rotation: Array  # rotation matrix from the frame's axes, shape (3, 3)
+    position: Array  # the frame's origin [m], shape (3,)
+    velocity: Array  # J v, shape (6,) [m/s, rad/s]
 
     @classmethod
     def allocate(cls, nv: int) -> "FrameMotion":
@@ -42,45 +36,28 @@ class FrameMotion(NamedTuple):
 
 
 class WorldKinematics(NamedTuple):
-    """Placements and Jacobians of all joints, from which distances are computed.
+    """Placements and Jacobians of all joints, from which distances are computed."""
 
-    Attributes:
-        placements: Placements of the joints, shape (njoints, 12): see
-            `joint_placements`.
-        jacobian: Pinocchio's J, in world axes at the world's origin, shape
-            (6, nvExtended): see `joint_support`.
-        jacobian_dot: Its time derivative, shape (6, nvExtended).
-        v: The velocity, shape (nv,).
-    """
-
+    # placements of the joints, shape (njoints, 12): see `joint_placements`
     placements: Array
+    # pinocchio's J, in world axes at the world's origin, shape (6, nvExtended): see
+    # `joint_support`
     jacobian: Array
-    jacobian_dot: Array
-    v: Array
+    jacobian_dot: Array  # its time derivative, shape (6, nvExtended)
+    v: Array  # the velocity, shape (nv,)
 
 
 class _Carrier(NamedTuple):
-    """The joint that carries a frame.
+    """The joint that carries a frame."""
 
-    Attributes:
-        J_world: The Jacobian of all joints at the world's origin, (6, nv_extended).
-        J_world_dot: Its rate.
-        R_joint: Rotation of the joint, shape (3, 3).
-        p_joint: Origin of the joint [m], shape (3,).
-        R_local: Rotation of the frame in the joint, shape (3, 3).
-        p_local: Origin of the frame in the joint [m], shape (3,).
-        columns: The columns of J_world that move the joint.
-        dofs: The indices in v of these columns.
-    """
-
-    J_world: Array
-    J_world_dot: Array
-    R_joint: Array
-    p_joint: Array
-    R_local: Array
-    p_local: Array
-    columns: Indices
-    dofs: Indices
+    J_world: Array  # the Jacobian of all joints at the world's origin, (6, nv_extended)
+    J_world_dot: Array  # its rate
+    R_joint: Array  # rotation of the joint, shape (3, 3)
+    p_joint: Array  # origin of the joint [m], shape (3,)
+    R_local: Array  # rotation of the frame in the joint, shape (3, 3)
+    p_local: Array  # origin of the frame in the joint [m], shape (3,)
+    columns: Indices  # the columns of J_world that move the joint
+    dofs: Indices  # the indices in v of these columns
 
 
 class FrameKinematics:
@@ -114,15 +91,6 @@ class FrameKinematics:
     def __init__(
         self, model: pin.Model, data: pin.Data, v: Array, stamp: Indices, index: int
     ) -> None:
-        """Allocate the arrays; `compute` fills them.
-
-        Args:
-            model: The model.
-            data: Its data, with the joints' placements and Jacobians.
-            v: The velocity, shape (nv,); the array is kept.
-            stamp: A number that changes when data and v do, shape (1,).
-            index: Index of the frame in the model.
-        """
         nv, frame = model.nv, model.frames[index]
         joint = data.oMi[frame.parentJoint]  # its arrays are views of data
         self.motion = motion = FrameMotion.allocate(nv)
@@ -140,13 +108,7 @@ class FrameKinematics:
             *joint_support(model, frame.parentJoint),
         )
         self.compute: Callable[[], object] = bind(
-            frame_kinematics,
-            stamp,
-            np.array([-1]),
-            carrier,
-            v,
-            motion,
-            self.drift,
+            frame_kinematics, stamp, np.array([-1]), carrier, v, motion, self.drift
         )
 
 
@@ -216,11 +178,7 @@ def frame_kinematics(
 
 
 def mass_matrix_difference(model: pin.Model, q: Array, v: Array) -> Array:
-    """Return M' along v by fourth-order differences, shape (nv, nv).
-
-    The error is about 1e-11 of M. It is for robots with mimic joints, which Pinocchio's
-    Coriolis matrix does not support.
-    """
+    """Return M' along v (nv, nv) by differences, for robots with mimic joints."""
     data, h = model.createData(), 1e-3 / max(1.0, float(np.abs(v).max()))
 
     def M(s: float) -> Array:
@@ -230,11 +188,7 @@ def mass_matrix_difference(model: pin.Model, q: Array, v: Array) -> Array:
 
 
 def joint_support(model: pin.Model, joint: int) -> tuple[Indices, Indices]:
-    """Return the columns of Pinocchio's J that move a joint, and their indices in v.
-
-    The two differ for mimic joints: a mimic joint has a column of its own, already
-    scaled, and the index of its leader.
-    """
+    """Return the columns of Pinocchio's J that move a joint, and their indices in v."""
     columns: list[int] = []
     dofs: list[int] = []
     for index in list(model.supports[joint])[1:]:  # without the universe
@@ -250,9 +204,6 @@ def joint_placements(data: pin.Data) -> Array:
 
     A row is R, column by column, followed by the origin [m]. The view relies on how
     Pinocchio stores its placements: one after the other in memory.
-
-    Raises:
-        ModelError: If this version of Pinocchio stores them in another way.
     """
     first, address = data.oMi[0].rotation, "__array_interface__"
     turns = [getattr(M.rotation, address)["data"][0] for M in data.oMi]
@@ -267,3 +218,81 @@ def joint_placements(data: pin.Data) -> Array:
     return np.lib.stride_tricks.as_strided(
         first.T.reshape(9), (len(turns), 12), (strides.pop() if strides else 96, 8)
     )
+
+
+class CentroidalMotion:
+    """Centre of mass and centroidal angular momentum of a robot, in world axes.
+
+    Attributes:
+        compute: Updates the attributes below to the state, if they are not up to date.
+        mass: Total mass [kg].
+        position: The centre of mass c [m], shape (3,).
+        velocity: c' = J v [m/s], shape (3,).
+        jacobian: J, shape (3, nv).
+        jacobian_dot: J' = dJ/dt along v, exact, shape (3, nv).
+        momentum_matrix: A, where A v is the angular momentum about c [kg·m²/s], shape
+            (3, nv).
+        momentum_matrix_dot: A' = dA/dt along v, exact, shape (3, nv).
+    """
+
+    def __init__(
+        self, model: pin.Model, data: pin.Data, q: Array, v: Array, stamp: Indices
+    ) -> None:
+        """Allocate the arrays; `compute` takes the values that q and v have then."""
+        # Pinocchio allocates these results at the first call; take views after it.
+        pin.computeCentroidalMapTimeVariation(model, data, q, v)
+        self.mass: float = pin.computeTotalMass(model)
+        self.position: Array = data.com[0]
+        self.velocity: Array = np.zeros(3)
+        self.jacobian: Array = np.zeros((3, model.nv))
+        self.jacobian_dot: Array = np.zeros((3, model.nv))
+        self.momentum_matrix: Array = np.zeros((3, model.nv))
+        self.momentum_matrix_dot: Array = np.zeros((3, model.nv))
+        momentum = bind_pinocchio("centroidal", model, data, q, v)
+        extract = bind(
+            _extract,
+            matrix_view(data.Ag),
+            matrix_view(data.dAg),
+            self.mass,
+            v,
+            self.velocity,
+            self.jacobian,
+            self.jacobian_dot,
+            self.momentum_matrix,
+            self.momentum_matrix_dot,
+        )
+        self.compute: Callable[[], object] = once([momentum, extract], stamp)
+
+
+@kernel
+def _extract(
+    A: Array,
+    A_dot: Array,
+    mass: float,
+    v: Array,
+    velocity: Array,
+    J: Array,
+    J_dot: Array,
+    angular: Array,
+    angular_dot: Array,
+) -> None:
+    """Write the linear rows divided by the mass, and the angular rows with their rate.
+
+    Pinocchio's A' is the rate about a point at rest, but the centre of mass moves. The
+    rate of the angular rows about c is A' - m c' × J (checked against finite
+    differences; Pinocchio's product A'v is right as it is, since c' × c' = 0).
+    """
+    for i in range(3):
+        velocity[i] = 0.0
+    for j in range(v.shape[0]):
+        for i in range(3):
+            J[i, j] = A[i, j] / mass
+            J_dot[i, j] = A_dot[i, j] / mass
+            angular[i, j] = A[3 + i, j]
+            velocity[i] += J[i, j] * v[j]
+    x, y, z = velocity[0], velocity[1], velocity[2]
+    for j in range(v.shape[0]):
+        px, py, pz = A[0, j], A[1, j], A[2, j]
+        angular_dot[0, j] = A_dot[3, j] - (y * pz - z * py)
+        angular_dot[1, j] = A_dot[4, j] - (z * px - x * pz)
+        angular_dot[2, j] = A_dot[5, j] - (x * py - y * px)

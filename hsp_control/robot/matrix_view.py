@@ -4,9 +4,5 @@ from hsp_control.common.arrays import Array
 
 
 def matrix_view(matrix: Array) -> Array:
-    """Return a matrix of Pinocchio's data as a two-dimensional view of its memory.
-
-    Pinocchio gives Python a matrix of one column as a vector: for a robot with one
-    degree of freedom.
-    """
+    """Return a matrix of Pinocchio's data as a two-dimensional view of its memory."""
     return matrix.reshape(-1, 1) if matrix.ndim == 1 else matrix

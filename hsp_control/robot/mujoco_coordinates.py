@@ -52,29 +52,17 @@ _KINDS = {
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint of the Pinocchio model, with what MuJoCo needs of it.
+    """A joint of the Pinocchio model, with what MuJoCo needs of it."""
 
-    Attributes:
-        name: Its name.
-        index: Its index in the Pinocchio model.
-        kind: One of the constants above.
-        q: Index in q where its configuration (a mimic joint: its leader's) begins.
-        v: Index in v where its velocity (a mimic joint: its leader's) begins.
-        axis: The axis of a hinge or a slide, shape (3,).
-        leader: The joint that it mimics, if any.
-        scaling: Factor in position = scaling · leader's position + offset.
-        offset: Offset in that formula [rad or m].
-    """
-
-    name: str
-    index: int
-    kind: str
-    q: int
-    v: int
-    axis: Array
-    leader: "Joint | None" = None
-    scaling: float = 1.0
-    offset: float = 0.0
+    name: str  # its name
+    index: int  # its index in the Pinocchio model
+    kind: str  # one of the constants above
+    q: int  # index in q where its configuration (a mimic joint: its leader's) begins
+    v: int  # index in v where its velocity (a mimic joint: its leader's) begins
+    axis: Array  # the axis of a hinge or a slide, shape (3,)
+    leader: "Joint | None" = None  # the joint that it mimics, if any
+    scaling: float = 1.0  # factor in position = scaling · leader's position + offset
+    offset: float = 0.0  # offset in that formula [rad or m]
 
     @property
     def mujoco_names(self) -> tuple[str, ...]:
@@ -85,11 +73,7 @@ class Joint:
 
 
 def joints_of(robot: Robot) -> list[Joint]:
-    """Return the robot's joints in Pinocchio's order, including mimic joints.
-
-    Raises:
-        ModelError: If MuJoCo has no joint of that kind.
-    """
+    """Return the robot's joints in Pinocchio's order, including mimic joints."""
     model = robot.model
     found: list[Joint] = []
     for index in range(1, model.njoints):
@@ -156,13 +140,9 @@ class MujocoCoordinates:
         qpos_address: Mapping[str, int],
         qvel_address: Mapping[str, int],
     ) -> None:
-        """Set the joints and where MuJoCo stores their coordinates.
+        """Set the joints, from `joints_of`, and where MuJoCo stores their coordinates.
 
-        Args:
-            robot: The robot.
-            joints: Its joints, from `joints_of`.
-            qpos_address: Index in qpos by name of the MuJoCo joint.
-            qvel_address: Index in qvel by name of the MuJoCo joint.
+        The addresses are indices in qpos and qvel by name of the MuJoCo joint.
         """
         self.robot = robot
         self.constant_effort = all(j.kind != PLANAR for j in joints)
@@ -283,10 +263,7 @@ class MujocoCoordinates:
         return q, v
 
     def _rotated(self, q: Array, tangent: Array, out: Array) -> None:
-        """Write a velocity or an effort in MuJoCo's order, without mimic joints.
-
-        Both transform in the same way, because the blocks of T are rotations.
-        """
+        """Write a velocity or an effort in MuJoCo's order, without mimic joints."""
         out[self._qvel] = tangent[self._v]
         for joint, _, at in self._special:
             part = tangent[joint.v :]

@@ -1,4 +1,4 @@
-"""A state's move and the calls that follow it, as one call from Python."""
+"""A state's move, or all steps of an interval of time, as one native call."""
 
 from collections.abc import Callable, Sequence
 from functools import cache, partial
@@ -10,19 +10,14 @@ from hsp_control.common.adapters import entry_point, run
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import NativeCall, table
+from hsp_control.robot.step_count import number_of_steps
 from hsp_control.robot.valid_state import REFUSED, copy_valid
 
 
 class NativeMove(partial[float]):
-    """Copies q and v, if they are valid, and makes native calls at the time.
+    """Copies valid q and v, and makes native calls; the last result, or `REFUSED`."""
 
-    From Python: (t, q, v) ↦ what the last call returned, or `REFUSED`.
-
-    Attributes:
-        calls: The calls, which own the memory of their arguments.
-    """
-
-    calls: Sequence[NativeCall]
+    calls: Sequence[NativeCall]  # the calls, which own the memory of their arguments
 
     @classmethod
     def of(
@@ -33,15 +28,7 @@ class NativeMove(partial[float]):
         unit_blocks: Indices,
         stamp: Indices,
     ) -> Self:
-        """Put the calls' rows together.
-
-        Args:
-            calls: The calls.
-            q: Where the configuration is kept, shape (nq,).
-            v: Where the velocity is kept, shape (nv,).
-            unit_blocks: (start, size) of what is of norm 1 in q, shape (blocks, 2).
-            stamp: Counted up, shape (1,).
-        """
+        """Put the calls' rows together."""
         move = cls(_entry(), *table(calls), q, v, unit_blocks, stamp)
         move.calls = calls
         return move
@@ -74,3 +61,18 @@ def _entry() -> Callable[..., float]:
         move_to, (table, types.float64[:, ::1], *rest)
     )
     return entry
+
+
+_count = kernel(number_of_steps)
+
+
+@kernel
+def make_steps(
+    calls: Indices, when: Array, interval: Array, longest: float, h: Array
+) -> None:
+    """Divide an interval into equal steps [s], and make the calls of each."""
+    t, duration = interval[0], interval[1] - interval[0]
+    steps = _count(duration, longest)
+    h[0] = duration / steps
+    for k in range(steps):
+        run(calls, when, t + k * h[0])

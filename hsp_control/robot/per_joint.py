@@ -9,26 +9,14 @@ from hsp_control.robot.robot import Robot
 
 
 def joint_dofs(robot: Robot) -> NDArray[np.bool_]:
-    """Return a mask of the degrees of freedom of single-dof joints, shape (nv,).
-
-    The others belong to a root or to a ball joint, which have no motor, no gear and no
-    encoder.
-    """
+    """Return a mask of the degrees of freedom of single-dof joints, shape (nv,)."""
     joints = np.zeros(robot.nv, dtype=bool)
     joints[[j.idx_v for j in robot.joints.values() if j.nv == 1]] = True
     return joints
 
 
 def per_dof(robot: Robot, value: ArrayLike) -> Array:
-    """Return a setting for each degree of freedom, shape (nv,).
-
-    Args:
-        robot: The robot.
-        value: One number for all single-dof joints (the others get 0), or shape (nv,).
-
-    Raises:
-        SimulationError: If the shape is wrong.
-    """
+    """Return a setting for each dof (nv,); one number is for all single-dof joints."""
     array = np.asarray(value, dtype=float)
     if array.shape not in ((), (robot.nv,)):
         raise SimulationError(

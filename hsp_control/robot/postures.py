@@ -16,16 +16,7 @@ configuration, shape (nq,)."""
 
 
 def configuration(posture: ArrayLike | str, start: RobotState) -> Array:
-    """Return the configuration of a `Posture`, shape (nq,).
-
-    Args:
-        posture: The posture.
-        start: The robot's state at the start.
-
-    Raises:
-        ShapeError: If it has neither nv nor nq numbers.
-        ConfigurationError: If it is no configuration.
-    """
+    """Return the configuration of a `Posture`, shape (nq,)."""
     robot: Robot = start.robot
     if isinstance(posture, str):
         return start.q.copy() if posture == "start" else robot.home()

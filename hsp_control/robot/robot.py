@@ -18,9 +18,9 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import ImmutableError, NonFiniteError
 from hsp_control.common.native import NativeCall, once
-from hsp_control.robot.centroidal import CentroidalMotion
 from hsp_control.robot.configuration_space import as_numbers
 from hsp_control.robot.kinematics import (
+    CentroidalMotion,
     FrameKinematics,
     WorldKinematics,
     joint_placements,
@@ -345,7 +345,6 @@ class SeenState(RobotState):
         t, q, v = _shown("t"), _shown("q"), _shown("v")
 
     def __init__(self, own: RobotState) -> None:
-        """Set the state to show."""
         self.__dict__ = own.__dict__
         self._own = own
         self._shown_q, self._shown_v = _read_only(own.q), _read_only(own.v)

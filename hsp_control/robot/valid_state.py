@@ -19,10 +19,7 @@ def copy_valid(
     unit_blocks: Indices,
     stamp: Indices,
 ) -> bool:
-    """Copy q and v if they are valid; return whether they are.
-
-    Valid means of the right size, finite, and of norm 1 in the unit blocks.
-    """
+    """Copy q and v if they are valid; return whether they are."""
     if q_in.shape[0] != q.shape[0] or v_in.shape[0] != v.shape[0]:
         return False
     total = t

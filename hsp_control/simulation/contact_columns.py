@@ -11,12 +11,6 @@ class ContactColumns:
     """The columns of all contacts of a controller."""
 
     def __init__(self, controller: Controller, columns: LogColumns) -> None:
-        """Add the columns.
-
-        Args:
-            controller: The controller; its contacts are the same during the run.
-            columns: Where they are added.
-        """
         self._controller, self._columns = controller, columns.arrays
         for contact in controller.contacts:
             prefix, column = f"contact.{contact.name}", columns.add
@@ -31,13 +25,7 @@ class ContactColumns:
             )
 
     def write(self, row: int, t: float, output: ControlOutput) -> None:
-        """Write a row.
-
-        Args:
-            row: Which one.
-            t: Its time [s].
-            output: What the controller has just computed.
-        """
+        """Write a row."""
         controller, columns = self._controller, self._columns
         if not controller.contacts:
             return

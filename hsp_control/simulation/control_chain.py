@@ -18,11 +18,6 @@ class EffortSource(Protocol):
 
     One that has an attribute ``feels_contacts`` which is true gets the wrenches of
     `Measurement` as a fifth argument of `effort`.
-
-    Attributes:
-        controller: The controller.
-        output: The controller's last output.
-        state: The state for which the controller computed it.
     """
 
     @property
@@ -68,12 +63,7 @@ Source_co = TypeVar("Source_co", bound=EffortSource, covariant=True)
 class ControlChain(Generic[Source_co]):
     """From a measurement to an effort, in simulations and on robots alike.
 
-        measurement → estimators → plan → command → effort
-
-    Attributes:
-        command: What computes the efforts.
-        needs_sensors: Whether more is needed of a measurement than q and v.
-        plan: What runs of the plan; None without one, or before `begin`.
+    measurement → estimators → plan → command → effort
     """
 
     def __init__(
@@ -82,19 +72,13 @@ class ControlChain(Generic[Source_co]):
         plan: Plan | None = None,
         estimators: Sequence[Estimator] = (),
     ) -> None:
-        """Set the parts.
-
-        Args:
-            command: What computes the efforts; its controller is made of the plan's
-                parts.
-            plan: What writes references and switches contacts.
-            estimators: What completes each measurement.
-        """
-        self.command = command
+        self.command = command  # what computes the efforts
         self._plan, self._estimators = plan, tuple(estimators)
         self._feels = bool(getattr(command, "feels_contacts", False))
+        # whether more is needed of a measurement than q and v
         self.needs_sensors = plan is not None or bool(estimators) or self._feels
         self._estimating: list[RunningEstimator] = []
+        # what runs of the plan; None without one, or before `begin`
         self.plan: RunningPlan | None = None
         self._status = 0.0
 
@@ -106,16 +90,8 @@ class ControlChain(Generic[Source_co]):
     def begin(self, inertial: Inertial | None, state: RobotState | None = None) -> None:
         """Begin a run: nothing is remembered of an earlier one.
 
-        Args:
-            inertial: A reading of the robot's inertial measurement unit, which says
-                where that is; None: there is no unit.
-            state: Where the robot is, so that the plan starts now; None: it starts
-                with the first effort.
-
-        Raises:
-            PlanError: If the controller has other parts than the plan, or the robot
-                cannot follow the plan from there.
-            EstimationError: If what an estimator needs is missing.
+        ``inertial``, a reading of the inertial measurement unit, says where that is. A
+        plan starts at ``state``; without one it starts with the first effort.
         """
         controller = self.command.controller
         if self._plan is not None:
@@ -126,18 +102,7 @@ class ControlChain(Generic[Source_co]):
             self.plan.start(state)
 
     def effort(self, measured: Measurement, period: float) -> Array:
-        """Return the effort to send now, shape (nv,); once a period, in order of time.
-
-        Args:
-            measured: What is measured.
-            period: Time until the next effort [s].
-
-        Raises:
-            EstimationError: If what an estimator needs is not measured.
-            PlanError: If what the plan needs is not measured.
-            FallError: If the plan finds that the robot falls.
-            HspControlError: If the measurement is not a valid state of the robot.
-        """
+        """Return the effort (nv,) to send now; once a period, in order of time."""
         for each in self._estimating:
             measured = each.update(measured)
         if self.plan is not None:
@@ -150,12 +115,7 @@ class ControlChain(Generic[Source_co]):
         return tau
 
     def log_channels(self, q: Array, v: Array) -> Mapping[str, LogChannel]:
-        """Return what the command, the plan and the estimators log, by name.
-
-        Args:
-            q: The true configuration, shape (nq,), for the errors of estimates.
-            v: The true velocity, shape (nv,).
-        """
+        """Return what is logged, estimates with their errors from the true q and v."""
         channels = self.command.log_channels()
         if self.plan is not None:
             channels = {**channels, **self.plan.log_channels()}

@@ -43,11 +43,6 @@ class InitialState(Part, error=ConfigurationError):
     [rad/s or m/s]."""
 
     def __post_init__(self) -> None:
-        """Check that the configuration is given once.
-
-        Raises:
-            ConfigurationError: If it is given twice.
-        """
         given = self._given()
         if len(given) > 1:
             raise ConfigurationError(
@@ -166,12 +161,7 @@ def _moved_joints(robot: Robot, joints: Mapping[str, float]) -> Array:
 def _put_on_ground(
     height: float, contacts: list[Contact], robot: Robot, q: Array
 ) -> Array:
-    """Return q with the root moved vertically: the lowest contact is then at a height.
-
-    Raises:
-        ContactError: If the robot has no free-flyer root, or no contact.
-        FrameNotFoundError: If the frame of a contact does not exist.
-    """
+    """Return q with the root moved vertically: the lowest contact is at a height."""
     if not (robot.unactuated and contacts):
         lacks = "contact" if robot.unactuated else "free-flyer root"
         with within("ground"):

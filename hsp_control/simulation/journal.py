@@ -38,19 +38,11 @@ HEADING, ROW, END = b"H", b"R", b"E"
 
 
 class JournalWriter:
-    """Writes a journal.
-
-    Attributes:
-        path: The file.
-    """
+    """Writes a journal."""
 
     def __init__(self, path: Path) -> None:
-        """Begin a journal; an existing file is overwritten.
-
-        Raises:
-            LogError: If the file cannot be written.
-        """
-        self.path = path
+        """Begin a journal; an existing file is overwritten."""
+        self.path = path  # the file
         self._shapes: dict[str, tuple[int, ...]] = {}
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -68,30 +60,18 @@ class JournalWriter:
     def write_heading(
         self, columns: Mapping[str, Array], meta: Mapping[str, Any]
     ) -> None:
-        """Write a heading for the next rows.
-
-        Raises:
-            LogError: If it cannot be written.
-        """
+        """Write a heading for the next rows."""
         shapes = {name: a.shape[1:] for name, a in columns.items()}
         self._frame(HEADING, _json({"columns": shapes, "meta": meta}))
         self._shapes = shapes  # only now: Ctrl-C may cut the heading short
 
     def write_row(self, columns: Mapping[str, Array]) -> None:
-        """Write the first row of columns that fit the last heading.
-
-        Raises:
-            LogError: If it cannot be written.
-        """
+        """Write the first row of columns that fit the last heading."""
         row = np.concatenate([columns[name][0].ravel() for name in self._shapes])
         self._frame(ROW, row.astype("<f8").tobytes())
 
     def write_end(self, status: str, message: str, **meta: Any) -> None:
-        """Write how the run ended, and meta data that replaces the heading's.
-
-        Raises:
-            LogError: If it cannot be written.
-        """
+        """Write how the run ended, and meta data that replaces the heading's."""
         self._frame(END, _json({"status": status, "message": message, **meta}))
 
     def close(self) -> None:
@@ -124,23 +104,13 @@ class JournalWriter:
 
 
 def is_journal(path: Path) -> bool:
-    """Return whether a file is a journal, by its content, not by its name.
-
-    Raises:
-        OSError: If it cannot be read.
-    """
+    """Return whether a file is a journal, by its content, not by its name."""
     with path.open("rb") as file:
         return file.read(len(MAGIC)) == MAGIC
 
 
 def read_journal(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
-    """Return the columns and the meta data of a journal, up to an incomplete frame.
-
-    Where a column was added later or was narrower, earlier rows hold NaN.
-
-    Raises:
-        LogError: If the first heading is incomplete.
-    """
+    """Return the columns and the meta data of a journal, up to an incomplete frame."""
     meta: dict[str, Any] = {}
     parts: list[_Part] = []
     end: dict[str, Any] = {"status": "interrupted", "message": KILLED}
@@ -209,3 +179,78 @@ def _joined(parts: list[_Part]) -> dict[str, Array]:
 
 def _json(data: Any) -> bytes:
     return json.dumps(data, ensure_ascii=False).encode()
+
+
+_KEPT = 1000
+"""Rows that are kept."""
+
+
+class JournalTail:
+    """The last rows of a journal that still grows."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path  # the journal
+        # the meta data of the last heading; those of the end once it is there
+        self.meta: dict[str, Any] = {}
+        self.count = 0  # the rows that were read
+        self._read = len(MAGIC)
+        self._shapes: dict[str, tuple[int, ...]] = {}
+        self._next_shapes: dict[str, tuple[int, ...]] | None = None
+        self._rows: list[Array] = []
+
+    @property
+    def ended(self) -> bool:
+        """Whether the writer has written its end."""
+        return "status" in self.meta and self.meta["status"] != "running"
+
+    def read(self) -> int:
+        """Read the frames that have come; return how many rows there are of them."""
+        before = self.count
+        try:
+            data = self._new_bytes()
+        except OSError as error:
+            raise LogError(f"{self.path}: cannot be read: {error.strerror}") from error
+        at = 0
+        while (frame := frame_at(data, at)) is not None:
+            kind, payload = frame
+            at += FRAME.size + len(payload)
+            if kind == HEADING:
+                heading = json.loads(payload)
+                self.meta = heading["meta"]
+                columns = heading["columns"]
+                self._next_shapes = {n: tuple(s) for n, s in columns.items()}
+            elif kind == ROW:
+                if self._next_shapes is not None:  # only now: the last row stays there
+                    self._shapes, self._next_shapes = self._next_shapes, None
+                    self._rows.clear()
+                self._rows.append(np.frombuffer(payload, "<f8"))
+                self.count += 1
+            elif kind == END:
+                self.meta = {**self.meta, **json.loads(payload)}
+        self._read += at
+        del self._rows[:-_KEPT]
+        return self.count - before
+
+    def rows(self, first: int) -> dict[str, Array]:
+        """Return the columns from a row on, as far as they are kept."""
+        wanted = max(self.count - first, 0)
+        kept = self._rows[max(len(self._rows) - wanted, 0) :] if wanted else []
+        width = sum(int(np.prod(shape)) for shape in self._shapes.values())
+        block = np.array(kept).reshape(len(kept), width)
+        ends = np.cumsum([int(np.prod(shape)) for shape in self._shapes.values()])
+        parts = np.split(block, ends[:-1], axis=1) if len(ends) else []
+        return {
+            name: part.reshape(len(kept), *shape)
+            for (name, shape), part in zip(self._shapes.items(), parts, strict=True)
+        }
+
+    def _new_bytes(self) -> bytes:
+        if not self.path.exists():
+            return b""
+        with self.path.open("rb") as file:
+            if self._read == len(MAGIC):
+                beginning = file.read(len(MAGIC))
+                if not MAGIC.startswith(beginning):
+                    raise LogError(f"{self.path} is no journal")
+            file.seek(self._read)
+            return file.read()

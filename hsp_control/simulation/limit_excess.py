@@ -22,30 +22,20 @@ class LimitExcess:
     The law keeps limits for its model, and `Status` says so much. A push that the model
     does not know, or a plant that differs, can take a joint beyond them: only the state
     tells. It is seen once a control period, so that no row of a log misses it.
-
-    Attributes:
-        position: Beyond the position limits, shape (nv,) [rad or m].
-        velocity: Beyond the speed limits, shape (nv,) [rad/s or m/s].
     """
 
     def __init__(self, robot: Robot) -> None:
-        """Begin with nothing seen."""
         joints = [j for j in robot.joints.values() if j.nq == 1 and j.nv == 1]
         # Only such a joint has a range; see `Robot.position_limits`.
         self._coordinates = np.array([j.idx_q for j in joints], dtype=np.int64)
         self._dofs = np.array([j.idx_v for j in joints], dtype=np.int64)
         unit = " or ".join(dict.fromkeys(robot.units))
         self._units = unit, f"{unit}/s"
+        # beyond the limits, shape (nv,) [rad or m, rad/s or m/s]
         self.position, self.velocity = np.zeros(robot.nv), np.zeros(robot.nv)
 
     def see(self, limits: RobotLimits | None, q: Array, v: Array) -> None:
-        """See a true state.
-
-        Args:
-            limits: The limits that are in force; None: there are none.
-            q: Configuration, shape (nq,).
-            v: Velocity, shape (nv,).
-        """
+        """See a true state."""
         if limits is not None:
             _see(*self._arguments(limits, q, v))
 

@@ -12,40 +12,20 @@ MAX_SIZE = 2_000_000_000
 
 
 class LogColumns:
-    """Columns for a known number of rows; what is not written is NaN.
-
-    Attributes:
-        arrays: The columns by name; each has a row for every row of the log.
-        descriptions: The unit and the meaning of each, as JSON data.
-        count: How many rows are complete.
-    """
+    """Columns for a known number of rows; what is not written is NaN."""
 
     def __init__(self, capacity: int) -> None:
-        """Begin without columns.
-
-        Args:
-            capacity: The largest number of rows.
-        """
+        # the columns by name; each has a row for every row of the log
         self.arrays: dict[str, Array] = {}
+        # the unit and the meaning of each, as JSON data
         self.descriptions: dict[str, dict[str, str]] = {}
-        self.count = 0
+        self.count = 0  # how many rows are complete
         self._capacity, self._size = capacity, 0
 
     def add(
         self, name: str, shape: tuple[int, ...], unit: str, meaning: str, **more: str
     ) -> None:
-        """Add a column if it does not exist.
-
-        Args:
-            name: Its name.
-            shape: The shape of a row.
-            unit: Its unit.
-            meaning: What it is.
-            **more: Further entries of its description.
-
-        Raises:
-            SimulationError: If the log would be too large to be loaded.
-        """
+        """Add a column if it does not exist."""
         if name in self.arrays:
             return
         self._size += 8 * self._capacity * math.prod(shape)

@@ -1,9 +1,13 @@
-"""Series for plots, computed from a log: task errors, joint positions, units, names."""
+"""Series for plots, computed from a log: errors, positions, distances, units, names.
+
+A clearance measures between surfaces, which touch at zero. The paper's cost measures
+from joints to an obstacle's centre: a joint is inside a ball below the ball's radius.
+"""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import accumulate
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,37 +18,25 @@ _EFFORT_UNITS = {"rad": "N·m", "m": "N"}
 
 
 class ErrorPart(NamedTuple):
-    """The components of a task's error that have the same unit.
+    """The components of a task's error that have the same unit."""
 
-    Attributes:
-        label: The task's name, and the name of the part if there are several, or if it
-            has no unit.
-        unit: The components' unit.
-        task: The task's index among the tasks.
-        norm: The components' Euclidean norm at every row, shape (N,).
-    """
-
+    # the task's name, and the name of the part if there are several, or if it has no
+    # unit
     label: str
-    unit: str
-    task: int
-    norm: Array
+    unit: str  # the components' unit
+    task: int  # the task's index among the tasks
+    norm: Array  # the components' Euclidean norm at every row, shape (N,)
 
 
 class TaskPath(NamedTuple):
-    """The path of a point that a task controls.
+    """The path of a point that a task controls."""
 
-    Attributes:
-        name: The task's name.
-        desired: The desired position [m], shape (N, 3); the actual one along world axes
-            that the task does not track.
-        actual: The actual position [m], shape (N, 3).
-        axes: The world axes that the task tracks, such as ``"xy"``.
-    """
-
-    name: str
+    name: str  # the task's name
+    # the desired position [m], shape (N, 3); the actual one along world axes that the
+    # task does not track
     desired: Array
-    actual: Array
-    axes: str
+    actual: Array  # the actual position [m], shape (N, 3)
+    axes: str  # the world axes that the task tracks, such as ``"xy"``
 
 
 def task_names(rollout: Rollout) -> list[str]:
@@ -71,11 +63,7 @@ def task_errors(rollout: Rollout) -> list[ErrorPart]:
 
 
 def drawn_parts(rollout: Rollout, name: str) -> dict[str, slice]:
-    """Return the columns of a task's reference that can be drawn, by what they are.
-
-    They are ``position`` [m], ``orientation``, a quaternion (x, y, z, w), and
-    ``direction``, a unit vector.
-    """
+    """Return the columns of a task's reference that can be drawn, by what they are."""
     about = rollout.meta["tasks"][name]
     drawn, axes = about.get("drawn", ()), about.get("axes")
     widths = {"position": len(axes or "xyz"), "orientation": 4, "direction": 3}
@@ -84,10 +72,7 @@ def drawn_parts(rollout: Rollout, name: str) -> dict[str, slice]:
 
 
 def task_path(rollout: Rollout, name: str) -> TaskPath | None:
-    """Return the path of the point that a task controls, if it controls one.
-
-    Along axes that the task does not track, the point is found in the skeleton.
-    """
+    """Return the path of the point that a task controls, if it controls one."""
     where = drawn_parts(rollout, name).get("position")
     if where is None:
         return None
@@ -105,10 +90,7 @@ def task_path(rollout: Rollout, name: str) -> TaskPath | None:
 
 
 def joint_names(rollout: Rollout) -> list[str]:
-    """Return the dofs' names, without the prefix that all of them share.
-
-    ``panda_joint1, panda_joint2`` become ``joint1, joint2``.
-    """
+    """Return the dofs' names, without the prefix that all of them share."""
     names = [str(name) for name in rollout.meta["robot"]["dofs"]]
     first, last = min(names), max(names)
     shared = 0
@@ -120,13 +102,7 @@ def joint_names(rollout: Rollout) -> list[str]:
 
 
 def joint_positions(rollout: Rollout, *, absolute: bool = True) -> tuple[Array, str]:
-    """Return the joints' unwrapped positions, shape (N, nv), and their description.
-
-    Args:
-        rollout: The log.
-        absolute: Whether to return absolute angles theta_i = q_1 + ... + q_i for a
-            robot that the literature describes by those.
-    """
+    """Return the joints' unwrapped positions (N, nv), and which angles they are."""
     positions = rollout["joint_positions"]
     if absolute and rollout.meta["robot"].get("joint_coordinates") == "absolute":
         return np.cumsum(positions, axis=1), "absolute joint angle"
@@ -199,16 +175,106 @@ def column_unit(rollout: Rollout, name: str) -> str:
 def chosen_rows(
     rollout: Rollout, count: int = 8, times: Sequence[float] | None = None
 ) -> list[int]:
-    """Return the rows of movie frames, in order and without repetition.
-
-    Args:
-        rollout: The log.
-        count: How many, evenly spaced from the first row to the last.
-        times: Times [s] to take instead; the nearest rows are taken.
-    """
+    """Return the rows of movie frames, in order and without repetition."""
     t = rollout.t
     if times is None:
         rows = np.linspace(0, len(t) - 1, min(count, len(t))).round().astype(int)
     else:
         rows = np.array([np.argmin(np.abs(t - time)) for time in times], dtype=int)
     return [int(row) for row in np.unique(rows)]
+
+
+class LoggedDistance(NamedTuple):
+    """A minimum distance over time."""
+
+    label: str  # what it measures
+    values: Array  # the distance [m], shape (N,)
+    edge: float | None  # the distance at contact [m]; None if it is not one number
+    edge_name: str = ""  # what the edge is; "" for zero, which needs no name
+
+
+def logged_distances(rollout: Rollout) -> list[LoggedDistance]:
+    """Return the minimum distances in a log."""
+    names = distances(rollout)
+    labels = [distance_label(rollout.meta, name) for name in names]
+    found = []
+    for name, label in zip(names, labels, strict=True):
+        unique = label if labels.count(label) == 1 else f"{label} ({name})"
+        edge, edge_name = _edge(rollout.meta, name)
+        values = rollout[f"distance.{name}"]
+        found.append(LoggedDistance(unique, values, edge, edge_name))
+    return found
+
+
+def distance_label(meta: Mapping[str, Any], name: str) -> str:
+    """Return what a distance measures."""
+    center = _center_of(meta, name)
+    return f"joint to centre of {center}" if center else name.replace("_", " ")
+
+
+def _center_of(meta: Mapping[str, Any], name: str) -> str:
+    """Return the obstacle to whose centre a distance leads; "" if to surfaces."""
+    about = meta.get("columns", {}).get(f"distance.{name}", {})
+    return str(about.get("center_of", ""))
+
+
+def _edge(meta: Mapping[str, Any], name: str) -> tuple[float | None, str]:
+    center = _center_of(meta, name)
+    if not center:
+        return 0.0, ""
+    about = meta.get("obstacles", {}).get(center, {})
+    # Only a ball has its surface at one distance from its centre.
+    if about.get("shape") != "Sphere" or about.get("radius") is None:
+        return None, ""
+    radius = float(about["radius"])
+    return radius, f"radius {radius:g} m"
+
+
+ROUNDING = 1e-12
+"""Ratio of ‖e_N(0)‖ to the speeds it is computed from, below which it is rounding."""
+
+
+class Decay(NamedTuple):
+    """The prediction of ‖e_N‖_W, or the reason why there is none."""
+
+    slow: Array | None  # upper bound, shape (N,); None without a prediction
+    fast: Array | None  # lower bound, shape (N,); the same array for a scalar gain
+    gains: tuple[float, float]  # the rates of the upper and the lower bound [1/s]
+    why_not: str  # why there is no prediction; "" if there is one
+
+
+def predicted_decay(rollout: Rollout) -> Decay:
+    """Return ‖e_N(0)‖_W exp(-K_N t), or bounds for a matrix K_N.
+
+    ``docs/law.md``, Equations (7) and (13) over a metric, Proposition 2.
+    V' = -e_NᵀW K_N e_N lies between -2V times the largest and -2V times the smallest
+    eigenvalue of the symmetric part of W K_N relative to W.
+    """
+    if not rollout.meta.get("controls_null_space", True):
+        why = "no prediction: self-motion is not controlled"
+        return Decay(None, None, (0.0, 0.0), why)
+    gain = rollout.meta.get("null_space_gain")
+    if gain is None:
+        why = "no prediction: $K_N$ not in the log"
+        return Decay(None, None, (0.0, 0.0), why)
+    K_N = np.asarray(gain, dtype=float)
+    multiple = K_N[0, 0] * np.eye(len(K_N))
+    scalar = np.array_equal(K_N, multiple)
+    W = np.eye(len(K_N)) if scalar else constant_metric(rollout)
+    if W is None:
+        why = "no prediction: $K_N$ is a matrix, $W$ not in the log"
+        return Decay(None, None, (0.0, 0.0), why)
+    power = 0.5 * (W @ K_N + (W @ K_N).T)
+    from scipy.linalg import eigh  # here: SciPy takes long to import
+
+    rates = eigh(power, W, eigvals_only=True)
+    slowest, fastest = float(rates[0]), float(rates[-1])
+    norm, elapsed = rollout["null_space_norm"], rollout.t - rollout.t[0]
+    speeds = np.linalg.norm(rollout["field.g"], axis=1)
+    speeds = speeds + np.linalg.norm(rollout.v, axis=1)
+    if not norm[0] > ROUNDING * float(speeds.max()):
+        why = "no prediction: starts with $e_N$ = 0"
+        return Decay(None, None, (slowest, fastest), why)
+    slow = norm[0] * np.exp(-slowest * elapsed)
+    fast = slow if scalar else norm[0] * np.exp(-fastest * elapsed)
+    return Decay(slow, fast, (slowest, fastest), "")

@@ -17,11 +17,7 @@ from hsp_control.robot import RobotState
 from hsp_control.robot.integrators import Integrator, bound
 from hsp_control.simulation.control_chain import ControlChain
 from hsp_control.simulation.limit_excess import LimitExcess
-from hsp_control.simulation.plants import (
-    ContinuousPlant,
-    IntegratedPlant,
-    SampledPlant,
-)
+from hsp_control.simulation.plants import ContinuousPlant, IntegratedPlant, SampledPlant
 
 if TYPE_CHECKING:
     from hsp_control.simulation.stretch import Stretch
@@ -31,19 +27,12 @@ RUNAWAY_SPEED = 1e4
 
 
 class Instant(NamedTuple):
-    """One instant of the closed loop; the next one overwrites its arrays.
+    """One instant of the closed loop; the next one overwrites its arrays."""
 
-    Attributes:
-        state: The true state.
-        output: The controller's output for the true state.
-        tau: The commanded effort, computed from the measured state, shape (nv,).
-        log_channels: What the command and the plan log, by name.
-    """
-
-    state: RobotState
-    output: ControlOutput
-    tau: Array
-    log_channels: Mapping[str, LogChannel]
+    state: RobotState  # the true state
+    output: ControlOutput  # the controller's output for the true state
+    tau: Array  # the commanded effort, computed from the measured state, shape (nv,)
+    log_channels: Mapping[str, LogChannel]  # what the command and the plan log, by name
 
 
 def continuous_loop(
@@ -54,19 +43,7 @@ def continuous_loop(
     q: Array,
     v: Array,
 ) -> Iterator[Instant]:
-    """Yield the instants of a loop without sampling, as in the proofs.
-
-    Args:
-        controller: The controller.
-        plant: The plant.
-        integrator: Integrates the plant, with the law in its stages.
-        times: When to yield an instant [s], increasing.
-        q: Start configuration, shape (nq,).
-        v: Start velocity, shape (nv,).
-
-    Raises:
-        SimulationError: If the motion diverges.
-    """
+    """Yield the instants of a loop without sampling, as in the proofs."""
     state = controller.state
     controller.restart()
 
@@ -91,21 +68,7 @@ def sampled_loop(
     q: Array,
     v: Array,
 ) -> Iterator[Instant]:
-    """Yield the instants of a loop that holds each effort for a control period.
-
-    Args:
-        chain: What computes the efforts; it has begun.
-        plant: The plant.
-        periods: How many control periods are between two of the times.
-        times: When to yield an instant [s], increasing.
-        q: Start configuration, shape (nq,).
-        v: Start velocity, shape (nv,).
-
-    Raises:
-        EstimationError: If what an estimator needs is not measured.
-        FallError: If the plan finds that the robot falls.
-        SimulationError: If the motion diverges.
-    """
+    """Yield the instants of a loop that holds each effort for a control period."""
     plant.reset(times[0], q, v)
     command, excess = chain.command, LimitExcess(plant.robot)
     controller = command.controller

@@ -20,21 +20,13 @@ _REACHED = 1e-3
 
 
 class OutOfReach(NamedTuple):
-    """A task whose target leaves the reach of its frame.
+    """A task whose target leaves the reach of its frame."""
 
-    Attributes:
-        task: The task's name.
-        first: The first time at which it is out of reach [s].
-        worst: The time at which it is farthest [s].
-        distance: How far from the nearest place it is then [m].
-        turned: Whether the position alone could be reached.
-    """
-
-    task: str
-    first: float
-    worst: float
-    distance: float
-    turned: bool
+    task: str  # the task's name
+    first: float  # the first time at which it is out of reach [s]
+    worst: float  # the time at which it is farthest [s]
+    distance: float  # how far from the nearest place it is then [m]
+    turned: bool  # whether the position alone could be reached
 
     @property
     def message(self) -> str:
@@ -60,15 +52,8 @@ def out_of_reach(
 ) -> Iterator[OutOfReach]:
     """Yield the tasks whose targets leave the reach during a run.
 
-    Positions and poses of frames are looked at, by inverse kinematics within the
-    robot's position limits, each task by itself: of robots with a fixed base and joints
-    of one degree of freedom, and of targets that are known before the run.
-
-    Args:
-        robot: The robot.
-        tasks: The placed tasks.
-        q0: The start, shape (nq,).
-        duration: Length of the run [s].
+    By inverse kinematics of each frame by itself, within position limits: of robots
+    with a fixed base and single-dof joints, and targets known before the run.
     """
     if robot.unactuated or robot.nq != robot.nv:
         return
@@ -122,10 +107,7 @@ def _target(task: Task, t: float) -> pin.SE3:
 def _nearest(
     robot: Robot, target: Target, q: Array, starts: int
 ) -> tuple[Array, float]:
-    """Return the posture nearest to a target, and its distance from it.
-
-    The search begins at q, and where that fails at other postures, so many of them.
-    """
+    """Return the posture nearest to a target, and its distance from it."""
     lower, upper = robot.position_limits()
     best = reach(robot, target, q, q, lower, upper)
     rng = np.random.default_rng(0)

@@ -10,14 +10,7 @@ from hsp_control.simulation.recorder import Recorder
 def in_real_time(
     period: float, on_row: Callable[[Recorder], None] | None
 ) -> Callable[[Recorder], None]:
-    """Return what `simulate` calls after every row, so that it waits for the clock.
-
-    A simulation that is slower than real time does not wait.
-
-    Args:
-        period: Time between two rows [s].
-        on_row: What is called besides; None: nothing.
-    """
+    """Return what `simulate` calls after every row, so that it waits for the clock."""
     rows, begin = count(), monotonic()
 
     def wait(recorder: Recorder) -> None:

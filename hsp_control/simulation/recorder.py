@@ -36,11 +36,7 @@ _EFFORT_UNITS = {"rad": "N·m", "m": "N"}
 
 
 class Recorder:
-    """Columns for a known number of rows; an incomplete row is never returned.
-
-    Attributes:
-        plan: What the robot follows; its streams are recorded. None: no plan.
-    """
+    """Columns for a known number of rows; an incomplete row is never returned."""
 
     def __init__(
         self,
@@ -49,18 +45,8 @@ class Recorder:
         rows: int,
         plan: RunningPlan | None = None,
     ) -> None:
-        """Allocate all columns.
-
-        Args:
-            controller: The controller; its tasks and fields may change during the run.
-            scene: Obstacles to log.
-            rows: The largest number of rows.
-            plan: What the robot follows; its streams are recorded.
-
-        Raises:
-            SimulationError: If the log would be too large to be loaded.
-        """
         self._controller = controller
+        # what the robot follows; its streams are recorded. None: no plan
         self.plan = plan
         self._scene = scene
         self._columns = LogColumns(rows)
@@ -112,15 +98,7 @@ class Recorder:
         tau: Array,
         log_channels: Mapping[str, LogChannel],
     ) -> None:
-        """Append a row.
-
-        Args:
-            state: The true state.
-            output: The controller's output for that state; None: none, and the columns
-                of the law hold NaN in this row.
-            tau: The commanded effort, computed from the measured state, shape (nv,).
-            log_channels: Further columns by name, of the plant and the compensation.
-        """
+        """Append a row."""
         i, columns = self._columns.count, self._columns.arrays
         robot = self._controller.robot
         settled = self._controller.settled
@@ -211,13 +189,7 @@ class Recorder:
         self._columns.clear()
 
     def rollout(self, status: str, message: str, **meta: Any) -> Rollout:
-        """Return the rows recorded so far as a rollout.
-
-        Args:
-            status: How the run ended; see `Rollout.status`.
-            message: Why it ended.
-            **meta: JSON data to add to the rollout's meta data.
-        """
+        """Return the rows recorded so far as a rollout."""
         columns = self._columns.rows()
         complete_columns(columns, continuous_dofs(self._controller.robot))
         return Rollout(columns, self.meta(status, message, **meta))
@@ -249,9 +221,8 @@ def _skeleton(
 ) -> tuple[list[tuple[int, str]], list[int]]:
     """Return which of the points to draw are frames, and the parent of each point.
 
-    There is one point per joint, in their order, and then one per frame that a task
-    controls: of these index and name. A parent is the index of another point, -1 for
-    none.
+    A point for each joint in order, then for each frame of a task (index and name); a
+    parent is the index of another point, -1 for none.
     """
     named: list[tuple[int, str]] = []
     parents: list[int] = []

@@ -16,13 +16,7 @@ from hsp_control.trajectories.streams.stream import Streamed
 def repeatable(
     controller: Controller, tasks: Mapping[str, Task], plan: RunningPlan | None
 ) -> dict[str, Any]:
-    """Return the changes that were made, and what streams have taken, as JSON data.
-
-    Args:
-        controller: The controller.
-        tasks: All tasks of the run, by their names in the log.
-        plan: What the robot follows; None: no plan.
-    """
+    """Return the changes that were made, and what streams have taken, as JSON data."""
     streams = {
         name: list(parts_within(task, Streamed))
         for name, task in tasks.items()

@@ -41,7 +41,6 @@ class Rollout:
     """
 
     def __init__(self, columns: Mapping[str, Array], meta: dict[str, Any]) -> None:
-        """Set the columns and the meta data; arrays are not copied."""
         self.columns = dict(columns)
         self.meta = meta
 
@@ -193,11 +192,7 @@ class Rollout:
 
 
 def _read_npz(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
-    """Return the columns and the meta data of an ``.npz``.
-
-    Raises:
-        LogError: If it has no meta data.
-    """
+    """Return the columns and the meta data of an ``.npz``."""
     with path.open("rb") as file:
         if not zipfile.is_zipfile(file):
             raise zipfile.BadZipFile("no archive")
@@ -224,13 +219,8 @@ def _remove(part: Path) -> None:
 def complete_columns(columns: Mapping[str, Array], continuous: Sequence[int]) -> None:
     """Complete columns that were written row by row, in place.
 
-    Positions of continuous joints pass ±π without a jump. For a task that was added
-    during the run, the earlier rows get its first reference and position, because what
-    is drawn must be finite. Its errors stay NaN there.
-
-    Args:
-        columns: The columns by name, N rows each.
-        continuous: The dofs of continuous joints.
+    Continuous joints pass ±π without a jump. A task that was added during the run gets
+    its first reference and position before, because what is drawn must be finite.
     """
     positions, dofs = columns["joint_positions"], list(continuous)
     positions[:, dofs] = np.unwrap(positions[:, dofs], axis=0)
@@ -244,14 +234,7 @@ def complete_columns(columns: Mapping[str, Array], continuous: Sequence[int]) ->
 def without_absurd_rows(
     columns: dict[str, Array], meta: dict[str, Any]
 ) -> tuple[dict[str, Array], dict[str, Any]]:
-    """Return the columns without rows that cannot be drawn; the message counts them.
-
-    A row that a loop wrote of an absurd state must not make its journal useless.
-
-    Args:
-        columns: The columns by name, N rows each.
-        meta: The meta data.
-    """
+    """Return the columns without rows that cannot be drawn; the message counts them."""
     kept = _drawable_rows(columns)
     if kept.all():
         return columns, meta

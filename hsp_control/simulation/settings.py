@@ -24,12 +24,6 @@ class SimulationSettings(Part, error=SimulationError):
     """The integrator of the robot's motion."""
 
     def __post_init__(self) -> None:
-        """Check that the periods fit together.
-
-        Raises:
-            SimulationError: If a period is no multiple of another, or the run is too
-                long.
-        """
         count_rows(self.duration, self.log_period, self.control_period)
         if (step := self.integrator.longest_step) is None:
             return

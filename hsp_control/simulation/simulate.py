@@ -189,16 +189,7 @@ def simulate(
 def count_rows(
     duration: float, log_period: float, control_period: float | None
 ) -> tuple[int, int]:
-    """Return the number of rows of a run, and of control periods per row.
-
-    Args:
-        duration: Length of the run [s].
-        log_period: Time between two rows [s].
-        control_period: The control period [s]; None: none, and 0 periods per row.
-
-    Raises:
-        SimulationError: If the periods do not fit, or the run is too long.
-    """
+    """Return the numbers of rows and of control periods per row (0: no periods)."""
     rows = _whole(duration, log_period, "duration", "log_period") + 1
     if rows > MAX_ROWS:
         raise SimulationError(
@@ -213,16 +204,7 @@ def count_rows(
 
 
 def check_steps(duration: float, step: float, name: str) -> None:
-    """Check that a run has at most `MAX_STEPS` steps.
-
-    Args:
-        duration: Length of the run [s].
-        step: The step [s].
-        name: The name of the step in the message.
-
-    Raises:
-        SimulationError: If it has more.
-    """
+    """Check that a run has at most `MAX_STEPS` steps."""
     if duration / step > MAX_STEPS:
         raise SimulationError(
             f"duration = {duration:g} s with {name} = {step:g} s is "
@@ -231,11 +213,7 @@ def check_steps(duration: float, step: float, name: str) -> None:
 
 
 def _whole(total: float, part: float, total_name: str, part_name: str) -> int:
-    """Return total/part if it is a whole number.
-
-    Raises:
-        SimulationError: If it is not, or a period is not positive.
-    """
+    """Return total/part if it is a whole number."""
     for value, name in ((total, total_name), (part, part_name)):
         if not 0.0 < value < np.inf:
             raise SimulationError(f"{name} is {value} s; must be positive")

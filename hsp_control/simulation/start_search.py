@@ -47,13 +47,7 @@ class StartPose(Part, error=ConfigurationError):
 def posture_search(
     robot: Robot, tasks: Iterable[Task] = (), scene: Scene | None = None
 ) -> PostureSearch:
-    """Return the search for postures that are good for tasks and clear of a scene.
-
-    Raises:
-        ConfigurationError: If the robot has a floating base: where it can stand is not
-            a matter of its joints.
-        FrameNotFoundError: If the frame of a task does not exist.
-    """
+    """Return the search for postures that are good for tasks and clear of a scene."""
     if robot.unactuated:
         raise ConfigurationError(
             f"{robot.name} has a free-flyer root; a start is found for robots with a "
@@ -64,11 +58,7 @@ def posture_search(
 
 
 def tracked_rows(tasks: Iterable[Task], robot: Robot) -> list[Rows]:
-    """Return what the tasks of the highest priority track, of those that track frames.
-
-    Raises:
-        FrameNotFoundError: If the frame of a task does not exist.
-    """
+    """Return what those tasks of the highest priority track that track frames."""
     tasks = list(tasks)
     first = min((task.priority or 1 for task in tasks), default=1)
     found = []

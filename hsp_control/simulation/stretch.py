@@ -35,14 +35,6 @@ class Stretch:
         steps: Steps,
         excess: LimitExcess,
     ) -> None:
-        """Keep the parts.
-
-        Args:
-            controller: The controller, without compensation.
-            plant: The plant.
-            steps: Its native steps.
-            excess: What sees every state.
-        """
         self._controller, self._excess = controller, excess
         self._plant, self._steps = plant, steps
         self._step: FreeStep | None = None
@@ -53,18 +45,10 @@ class Stretch:
     def advance(
         self, start: float, end: float, periods: int, k: int, tau: Array
     ) -> tuple[Array, Array, int] | None:
-        """Move on from the beginning of a period to that of a later one.
+        """Move on from the beginning of period k, under tau, to that of a later one.
 
-        Args:
-            start: Time of the row before [s].
-            end: Time of the row after [s].
-            periods: How many periods are between them.
-            k: The present period.
-            tau: Its effort, shape (nv,), computed and recorded.
-
-        Returns:
-            (q, v) there, in new arrays, and which period begins; None where the
-            controller has no free steps.
+        Returns (q, v) there, in new arrays, and which period begins; None where the
+        controller has no free steps.
         """
         if periods - k < 2:
             return None
@@ -125,30 +109,12 @@ def _stretch(
     interval: Array,
     which: Array,
 ) -> int:
-    """Move on from one period to another, or to one that is not free.
+    """Move on from one period to another, or to one that is not free; return which.
 
-    Args:
-        moving: Calls that move q and v over the interval, and see them there.
-        moving_when: Their windows.
-        law: `NativeMove`'s arguments, up to its stamp.
-        law_when: One of them.
-        q_law: One of them.
-        v_law: One of them.
-        unit_blocks: One of them.
-        stamp: One of them.
-        sending: Calls that record that the effort is held.
-        sending_when: Their windows.
-        q: The plant's configuration, shape (nq,).
-        v: Its velocity, shape (nv,).
-        held: The effort that it is under, shape (nv,).
-        effort: What the law writes, shape (nv,).
-        interval: Written: when a period begins and ends [s], shape (2,).
-        which: When period 0 begins, and the length of all periods together [s]; how
-            many they are, the present one, whose effort is held, and the one to move on
-            to.
-
-    Returns:
-        The period that begins where it ended.
+    ``law_when`` to ``stamp`` are `NativeMove`'s arguments. ``effort`` is written by the
+    law, ``held`` is what the plant is under. ``interval`` gets a period's two ends.
+    ``which`` holds when period 0 begins, the length of all periods together [s], how
+    many they are, the present one, and the one to move on to.
     """
     start, span, periods = which[0], which[1], which[2]
     first, last = int(which[3]), int(which[4])

@@ -28,20 +28,11 @@ STREAM_CHANNELS = {
 
 
 class TaskColumns:
-    """The columns of all tasks of a run; a task that is removed keeps its own.
-
-    Attributes:
-        logged: All tasks that there have been, by their names in the log.
-    """
+    """The columns of all tasks of a run; a task that is removed keeps its own."""
 
     def __init__(self, controller: Controller, columns: LogColumns) -> None:
-        """Add the columns of the tasks that there are now.
-
-        Args:
-            controller: The controller.
-            columns: Where they are added.
-        """
         self._controller, self._columns = controller, columns
+        # all tasks that there have been, by their names in the log
         self.logged: dict[str, Task] = {}
         self._levels: dict[str, int] = {}
         self._measured: dict[str, tuple[Array, Array]] = {}  # reference, actual
@@ -69,11 +60,7 @@ class TaskColumns:
         return True
 
     def _log_name(self, task: Task) -> str:
-        """Return the task's name in the log.
-
-        A number is added if another task was logged by this name, whose columns do not
-        fit.
-        """
+        """Return the task's name in the log."""
         name, k = task.name, 2
         while name in self.logged and task_meta(self.logged[name]) != task_meta(task):
             name, k = f"{task.name}_{k}", k + 1

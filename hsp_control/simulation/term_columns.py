@@ -18,12 +18,6 @@ class TermColumns:
     """The columns of all terms of a controller's field; old ones keep theirs."""
 
     def __init__(self, controller: Controller, columns: LogColumns) -> None:
-        """Add the columns of the terms that there are now.
-
-        Args:
-            controller: The controller.
-            columns: Where they are added.
-        """
         self._controller, self._columns = controller, columns
         self._unit = " or ".join(dict.fromkeys(controller.robot.units)) + "/s"
         self._field: NullSpaceField | None = None

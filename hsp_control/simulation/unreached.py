@@ -20,21 +20,16 @@ _LIMITED = 2  # the log's status from which on a limit changes the motion
 
 
 class Unreached(NamedTuple):
-    """A task and the rows in which its target is not reached.
+    """A task and the rows in which its target is not reached."""
 
-    Attributes:
-        task: Its name in the log.
-        far: Where the error is beyond the task's `largest_error` and not out of reach,
-            shape (N,).
-        out: The error that stays where the target is out of reach, else 0, shape (N,)
-            [m or rad]: the first part of the error that is not reached.
-        unit: Of each number of ``out``, shape (N,).
-    """
-
-    task: str
+    task: str  # its name in the log
+    # where the error is beyond the task's `largest_error` and not out of reach, shape
+    # (N,)
     far: NDArray[np.bool_]
+    # the error that stays where the target is out of reach, else 0, shape (N,) [m or
+    # rad]: the first part of the error that is not reached
     out: Array
-    unit: NDArray[np.object_]
+    unit: NDArray[np.object_]  # of each number of ``out``, shape (N,)
 
     def length(self, row: int) -> str:
         """Return the error that stays in a row."""
@@ -57,13 +52,8 @@ def unreached(
     A target is out of reach, of this robot within its limits, if an error stays that
     the law would remove: it rests, and the law is damped at a singularity or a limit
     binds. What friction or a load leaves, where the law is exact, is not meant; nor is
-    a target that moves on while the robot follows as near as it can.
-
-    Args:
-        columns: Rows of a log.
-        tasks: What the log's meta data say of its tasks.
-        moved: When each part of an error moved last [s], kept from these rows to the
-            next ones; None: these are all.
+    a target that moves on while the robot follows as near as it can. ``moved``, when
+    each part of an error moved last [s], is kept from these rows to the next ones.
     """
     moved = {} if moved is None else moved
     times, none = columns["t"], np.zeros(len(columns["t"]))

@@ -24,9 +24,9 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.bounded_inverse import bounded_inverse
 from hsp_control.common.kernels import kernel
 from hsp_control.common.linalg import (
+    bounded_inverse,
     cholesky,
     gram,
     orthogonalise_rows,

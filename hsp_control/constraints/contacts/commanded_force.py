@@ -41,7 +41,6 @@ class CommandedForce(Part, error=ContactError):
     """Instead: the command in time, of dimension 1, 3 or 6 [N, N·m]."""
 
     def __post_init__(self) -> None:
-        """Check that there is one command, of a known dimension, and no stream."""
         if (self.value is None) == (self.trajectory is None):
             raise ContactError("give either the value of the force or its trajectory")
         if self.trajectory is None:
@@ -82,13 +81,10 @@ class CommandedForce(Part, error=ContactError):
 
 
 def shares(dimension: int, arms: Array) -> Array:
-    """Return the map from a command to the forces at the points, shape (3 k, n).
+    """Return the map (3 k, n) from a command's coordinates to the forces at the points.
 
-    Of all forces with the commanded sum it gives those of least norm.
-
-    Args:
-        dimension: n, the number of coordinates of the command.
-        arms: The points from their middle, in the axes of the contact, (k, 3) [m].
+    Of all forces with the commanded sum it gives those of least norm. The arms (k, 3)
+    [m] are the points from their middle, in the axes of the contact.
     """
     k = len(arms)
     alike = np.tile(np.eye(3) / k, (k, 1))
@@ -105,16 +101,7 @@ def shares(dimension: int, arms: Array) -> Array:
 
 
 def check_points(forces: Array, side: float, wrench: bool) -> None:
-    """Check that the forces at the points of a contact are possible.
-
-    Args:
-        forces: Forces in the axes of the contact, shape (k, 3) [N].
-        side: The largest tangential force along an axis, per normal force.
-        wrench: Whether they are shares of a wrench.
-
-    Raises:
-        ContactError: If one pulls, or lies outside its friction pyramid.
-    """
+    """Check that the forces at a contact's points (k, 3) [N] push and do not slip."""
     rounding = 1e-9 * (1.0 + float(np.abs(forces).max()))
     for k, (first, second, normal) in enumerate(forces):
         where = f" at point {k + 1} of {len(forces)}, its share of the wrench," * wrench

@@ -1,4 +1,4 @@
-"""The base class of contacts: constraint rows, and points where forces may act."""
+"""Contacts, and the rows of a base that its contacts leave free."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import AfterValidator
 
-from hsp_control.common.arrays import Array
+from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import ContactError
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
@@ -25,18 +25,14 @@ from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import Positive, Vector3, read_only
 from hsp_control.geometry.start import Start
 from hsp_control.law import TaskSample
-from hsp_control.robot import RobotState
+from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.trajectories.remembering import with_memories_copied
 from hsp_control.trajectories.schedule import Schedule
 
 
 def _direction(vector: Array) -> Array:
-    """Return a vector that has a direction.
-
-    Raises:
-        ContactError: If it is zero, or so long that its length overflows.
-    """
+    """Return a vector that has a direction."""
     with np.errstate(over="ignore"):
         length = float(np.linalg.norm(vector))
     if not 0.0 < length < np.inf:
@@ -96,11 +92,7 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
         return with_memories_copied(self, memo)
 
     def placed(self, start: Start) -> Self:
-        """Return the contact, checked.
-
-        Raises:
-            FrameNotFoundError: If the robot has no such frame.
-        """
+        """Return the contact, checked."""
         with within("frame"):
             start.state.robot.frame_id(self.frame)
         if self.force is not None:
@@ -109,12 +101,7 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
         return self
 
     def _check_command(self, force: CommandedForce, state: RobotState) -> None:
-        """Check that the commanded force is possible, as it is at the start.
-
-        Raises:
-            ContactError: If the contact has too few points for it, or it pulls or lies
-                outside the friction pyramid.
-        """
+        """Check that the commanded force is possible, as it is at the start."""
         if force.dimension == WRENCH and len(self.points) < 3:
             raise ContactError(
                 f"it has 6 coordinates; a contact of type {self.yaml_type} exerts no "
@@ -219,3 +206,46 @@ def plane_axes(normal: ArrayLike) -> Array:
     tangent = along - (along @ n) * n
     tangent /= np.linalg.norm(tangent)
     return np.column_stack([tangent, np.cross(n, tangent), n])
+
+
+class UnactuatedRows:
+    """The rows Uᵀ(M a + N) = 0, with U the base motions that all contacts permit.
+
+    Contacts may leave some base motions free (two point feet: the rotation about the
+    line between them; in the air: all six). Nothing can produce an effort along such a
+    motion, so the law must not require one. The rows UᵀM are divided by the robot's
+    mass, which makes them comparable with those of tasks.
+    """
+
+    def __init__(self, robot: Robot, base: Indices, count: int) -> None:
+        self.name = "unactuated"  # name of these rows in messages
+        self.robot = robot
+        self.rows = count  # the number of free base motions
+        self._base = base
+        self._mass = sum(inertia.mass for inertia in robot.model.inertias)
+
+    def evaluate(
+        self, state: RobotState, contacts: TaskSample, out: TaskSample
+    ) -> TaskSample:
+        """Write the rows, given the stacked rows of the contacts."""
+        A = contacts.jacobian[:, self._base]
+        A_dot = contacts.jacobian_dot[:, self._base]
+        U = np.eye(len(self._base))
+        if len(A):
+            U = np.linalg.svd(A)[2][len(self._base) - self.rows :].T
+        # A U = 0 at all times, so U' = -A⁺A'U, up to a change of basis of the rows.
+        U_dot = -np.linalg.pinv(A) @ A_dot @ U if len(A) else np.zeros_like(U)
+        M, M_dot = state.mass_matrix[self._base], state.mass_matrix_rate[self._base]
+        out.jacobian[:] = U.T @ M / self._mass
+        out.jacobian_dot[:] = (U.T @ M_dot + U_dot.T @ M) / self._mass
+        effects = U.T @ state.nonlinear_effects[self._base] / self._mass
+        out.acceleration[:] = out.jacobian_dot @ state.v - effects
+        return out
+
+
+def unactuated_count(jacobian: Array, base: Indices) -> int:
+    """Return how many base motions the contacts' stacked rows (m, nv) permit."""
+    if not len(jacobian):
+        return len(base)
+    values = np.linalg.svd(jacobian[:, base], compute_uv=False)
+    return len(base) - int((values > 1e-6 * max(1.0, float(values[0]))).sum())

@@ -23,40 +23,25 @@ MOTION, EFFORT = 1, 2
 
 
 class MotionLimits(NamedTuple):
-    """The limits that the barriers keep, margins included.
+    """The limits that the barriers keep, margins included."""
 
-    Attributes:
-        lower: Lower position limit, shape (nv,) [rad or m].
-        upper: Upper position limit, shape (nv,) [rad or m].
-        velocity: Maximum speed, shape (nv,) [rad/s or m/s].
-        acceleration: Maximum acceleration, shape (nv,) [rad/s² or m/s²].
-        jerk: How fast the acceleration may change: the effort's rate over the joint's
-            largest inertia, shape (nv,) [rad/s³ or m/s³].
-        bandwidth: α of the barriers, shape (1,) [1/s].
-    """
-
-    lower: Array
-    upper: Array
-    velocity: Array
-    acceleration: Array
+    lower: Array  # lower position limit, shape (nv,) [rad or m]
+    upper: Array  # upper position limit, shape (nv,) [rad or m]
+    velocity: Array  # maximum speed, shape (nv,) [rad/s or m/s]
+    acceleration: Array  # maximum acceleration, shape (nv,) [rad/s² or m/s²]
+    # how fast the acceleration may change: the effort's rate over the joint's largest
+    # inertia, shape (nv,) [rad/s³ or m/s³]
     jerk: Array
-    bandwidth: Array
+    bandwidth: Array  # α of the barriers, shape (1,) [1/s]
 
 
 class Bounds(NamedTuple):
-    """Bounds of one step, shape (nv,) each.
+    """Bounds of one step, shape (nv,) each."""
 
-    Attributes:
-        a_lower: Lower bound on the acceleration.
-        a_upper: Upper bound on the acceleration.
-        tau_lower: Lower bound on the effort.
-        tau_upper: Upper bound on the effort.
-    """
-
-    a_lower: Array
-    a_upper: Array
-    tau_lower: Array
-    tau_upper: Array
+    a_lower: Array  # lower bound on the acceleration
+    a_upper: Array  # upper bound on the acceleration
+    tau_lower: Array  # lower bound on the effort
+    tau_upper: Array  # upper bound on the effort
 
 
 @kernel
@@ -71,26 +56,17 @@ def acceleration_bounds(
     a_lower: Array,
     a_upper: Array,
 ) -> None:
-    """Write the bounds on the acceleration that the barriers of `Limits` require.
+    """Write the bounds (nv,) on the acceleration that the barriers of `Limits` require.
 
     Where they contradict each other, position has priority over velocity, and velocity
     over acceleration: each narrows the range that the earlier ones leave, as far as it
-    can.
+    can. ``where`` is the index in q of each dof's coordinate, -1 for none.
 
-    Args:
-        q: Configuration, shape (nq,).
-        v: Velocity, shape (nv,).
-        where: Index in q of the coordinate of each degree of freedom, -1 for none,
-            shape (nv,).
-        limits: What the barriers keep.
-        error: Largest error that the acceleration had of late, shape (nv,); the margin
-            of the speed covers it and its growth, up to half the speed.
-        drift: Mean error of late, shape (nv,); the barrier of the position makes up for
-            it where it leads beyond the limit.
-        steady: What of it is still there, shape (nv,). What is commanded against a
-            steady force moves nothing: the barriers are wider by as much.
-        a_lower: Written: lower bound on the acceleration, shape (nv,).
-        a_upper: Written: upper bound on the acceleration, shape (nv,).
+    The margin of the speed covers the largest ``error`` that the acceleration had of
+    late and its growth, up to half the speed. The barrier of the position makes up for
+    the ``drift``, the mean error, where it leads beyond the limit. ``steady`` is what
+    of it is still there: what is commanded against a steady force moves nothing, and
+    the barriers are wider by as much.
     """
     lower, upper, velocity, acceleration, jerk, alpha = limits
     bandwidth = alpha[0]
@@ -152,15 +128,12 @@ def violated_limits(
     disturbance: Array,
     bounds: Bounds,
 ) -> int:
-    """Write the acceleration bounds, and return which bounds a and tau violate.
+    """Write the bounds; return whether a and tau violate `MOTION`, `EFFORT` or the sum.
 
     The robot accelerates by a plus the disturbance, the acceleration that something
     else is known to cause, shape (nv,); so the bounds on a are moved by it. It makes a
     bound narrower by no more than the speed's barrier permits at rest, so that a push
     that ends does no harm. See `acceleration_bounds` for the other arguments.
-
-    Returns:
-        0 for none, `MOTION`, `EFFORT`, or the sum of both.
     """
     acceleration_bounds(
         q, v, where, limits, error, drift, steady, bounds.a_lower, bounds.a_upper
@@ -187,7 +160,4 @@ def within(x: Array, lower: Array, upper: Array) -> bool:
 @kernel
 def _narrow(low: float, high: float, lower: float, upper: float) -> tuple[float, float]:
     """Return the part of [low, high] within [lower, upper], or its nearest point."""
-    return (
-        max(low, min(lower, high)),
-        min(high, max(upper, low)),
-    )
+    return (max(low, min(lower, high)), min(high, max(upper, low)))

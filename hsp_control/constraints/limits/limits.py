@@ -1,28 +1,26 @@
-"""Limits on efforts, their rate, joint motion and distances."""
+"""Limits of a robot: what is declared, and what it is for one robot."""
 
 from collections.abc import Sequence
-from dataclasses import KW_ONLY
+from dataclasses import KW_ONLY, dataclass
 from typing import Annotated, Literal
 
 import numpy as np
+import pinocchio as pin
 from pydantic import AfterValidator, BeforeValidator
 
-from hsp_control.common.arrays import Array
+from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import LimitError
 from hsp_control.constraints.limits.acceleration_bounds import MotionLimits
-from hsp_control.constraints.limits.maximum import (
+from hsp_control.constraints.limits.joint_numbers import (
     Maximum,
+    PositionRange,
+    PositionsByJoint,
+    Positives,
+    by_dof,
     maximum,
     none_for_nothing,
 )
 from hsp_control.constraints.limits.minimum_distance import MinimumDistance
-from hsp_control.constraints.limits.numbers_by_joint import Positives, by_dof
-from hsp_control.constraints.limits.position_range import (
-    PositionRange,
-    PositionsByJoint,
-)
-from hsp_control.constraints.limits.robot_limits import RobotLimits
-from hsp_control.constraints.limits.static_effort import StaticEffort
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import (
     ArrayField,
@@ -34,7 +32,127 @@ from hsp_control.declaration.quantities import (
 )
 from hsp_control.geometry.scene import Scene
 from hsp_control.geometry.start import Start
-from hsp_control.robot import Robot
+from hsp_control.robot import Robot, RobotState
+
+_STEP = 3e-4
+"""Step of the differences along the motion [s]: rounding and truncation errors are
+equal near 1e-7."""
+_AHEAD, _NEAR = 0.5, 0.5
+"""A motor gets a row if gravity takes more than the part _NEAR of what it may take, now
+or within the time _AHEAD [s] at the present rate."""
+
+
+@dataclass(frozen=True, eq=False)
+class StaticEffort:
+    """Gravity takes at most a part of every motor's effort.
+
+    An effort limit alone bounds the acceleration, but lets the arm reach postures in
+    which the motors cannot hold it: there it falls. The gravity effort of a motor,
+    G_i(q), depends on the posture only, so this is a limit on postures. With
+    h = share - |G_i|/effort_i, the rows require h'' + 2α h' + α² h ≥ 0 (an exponential
+    control barrier function), with G_i'' = ∇G_i·a + the drift of G_i' at constant
+    velocity.
+    Robots with mimic joints are not supported.
+
+    Attributes:
+        effort: Maximum effort, shape (nv,) [N·m or N]; inf where unlimited.
+        share: The part of it that gravity may take, in (0, 1].
+    """
+
+    effort: Array
+    share: float
+
+    def rows(
+        self, state: RobotState, bandwidth: float, excluded: Indices
+    ) -> tuple[Array, Array]:
+        """Return the rows A a ≥ b, (k, nv) and (k,), of the motors near their limit.
+
+        Efforts of ``excluded`` dofs, from root to contact, depend on contact forces.
+        """
+        robot, model = state.robot, state.robot.model
+        data = state.made(self, "data", model.createData)
+        slope = pin.computeGeneralizedGravityDerivatives(model, data, state.q)
+
+        def gravity(dt: float) -> Array:
+            """Return G(q ⊕ v dt), shape (nv,)."""
+            q = pin.integrate(model, state.q, dt * state.v) if dt else state.q
+            return np.array(pin.computeGeneralizedGravity(model, data, q))
+
+        G, ahead, behind = gravity(0.0), gravity(_STEP), gravity(-_STEP)
+        rate = slope @ state.v
+        sign = np.where(G < 0.0, -1.0, 1.0)
+        used, growth = sign * G / self.effort, sign * rate / self.effort
+        soon = used + _AHEAD * np.maximum(growth, 0.0)
+        near = np.isfinite(self.effort) & (soon > _NEAR * self.share)
+        near[[*robot.unactuated, *excluded]] = False
+        i = np.flatnonzero(near)
+        side = (sign / self.effort)[i]
+        drift = side * (ahead - 2.0 * G + behind)[i] / _STEP**2
+        b = drift + 2.0 * bandwidth * growth[i] - bandwidth**2 * (self.share - used[i])
+        return -side[:, None] * slope[i], b
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RobotLimits:
+    """The numbers of `Limits` for one robot; they never change.
+
+    The arrays are read-only. Where there is no limit they contain inf, or -inf.
+
+    Attributes:
+        robot: The robot.
+        effort: Maximum effort, shape (nv,) [N·m or N].
+        effort_rate: Maximum rate of effort, shape (nv,) [N·m/s or N/s].
+        velocity: Maximum speed, shape (nv,) [rad/s or m/s].
+        lower: Lower joint position limit, shape (nv,) [rad or m].
+        upper: Upper joint position limit, shape (nv,) [rad or m].
+        motion: What the barriers keep: position and velocity limits less their margins,
+            the maximum acceleration and α, as a record for kernels.
+        distances: The minimum distances.
+        static_effort: The limit on the effort against gravity, if any.
+    """
+
+    robot: Robot
+    effort: Array
+    effort_rate: Array
+    velocity: Array
+    lower: Array
+    upper: Array
+    motion: MotionLimits
+    distances: tuple[MinimumDistance, ...] = ()
+    static_effort: StaticEffort | None = None
+
+    @property
+    def acceleration(self) -> Array:
+        """Maximum acceleration, shape (nv,) [rad/s² or m/s²]."""
+        return self.motion.acceleration
+
+    @property
+    def bandwidth(self) -> float:
+        """α of the barriers [1/s]."""
+        return float(self.motion.bandwidth[0])
+
+    def check_start(self, q: Array, v: Array) -> None:
+        """Check that a start is within the limits; distances are those at t = 0."""
+        names = self.robot.dof_names
+        positions = self.robot.joint_positions(q)
+        outside = np.flatnonzero((positions < self.lower) | (positions > self.upper))
+        if outside.size:
+            i = outside[0]
+            raise LimitError(
+                f"the start is outside the limits: {names[i]} is at {positions[i]:.6g},"
+                f" its limits are {self.lower[i]:.6g} to {self.upper[i]:.6g}"
+            )
+        state = self.robot.state(0.0, q, v)
+        for each in self.distances:
+            each.check_start(state)
+        fast = np.flatnonzero(np.abs(v) > self.velocity)
+        if fast.size:
+            i = fast[0]
+            raise LimitError(
+                f"the start is outside the limits: {names[i]} moves at {v[i]:.6g}, "
+                f"its limit is {self.velocity[i]:.6g}"
+            )
+
 
 BANDWIDTH = 10.0
 """α of the barriers where nothing else is given [1/s]."""
@@ -104,15 +222,7 @@ class Limits(Part, error=LimitError):
     its motors can hold it; for motors that carry no contact. Unlimited by default."""
 
     def placed(self, start: Start) -> RobotLimits:
-        """Return the limits in numbers, for one robot and one scene.
-
-        Raises:
-            LimitError: If numbers do not fit the robot, a joint has no limit to scale,
-                or the position limits leave no room; the message says which.
-            JointNotFoundError: If a joint does not exist.
-            SceneError: If an obstacle does not exist.
-            FieldError: If a minimum distance has no pairs.
-        """
+        """Return the limits in numbers, for one robot and one scene."""
         robot = start.state.robot
         with within("effort"):
             effort = maximum(self.effort, robot.model.effortLimit, robot)
@@ -157,11 +267,7 @@ class Limits(Part, error=LimitError):
             return read_only(by_dof(getattr(self, field), robot.nv))
 
     def _positions(self, robot: Robot) -> tuple[Array, Array, Array]:
-        """Return lower and upper joint positions and their margin, shape (nv,).
-
-        Raises:
-            LimitError: If the limits do not fit the robot, or leave no room.
-        """
+        """Return lower and upper joint positions and their margin, shape (nv,)."""
         if isinstance(self.position, PositionRange | PositionsByJoint):
             lower, upper = self.position.of(robot)
         elif self.position == "robot":

@@ -46,25 +46,12 @@ class MinimumDistance(Part, ABC, family="distances", error=LimitError):
         """The field that knows the pairs of shapes."""
 
     def placed(self, start: Start) -> Self:
-        """Return the distances with obstacles instead of their names, checked.
-
-        Raises:
-            SceneError: If the scene has no such obstacle.
-            FieldError: If there is no pair, or a link has no geometry.
-        """
+        """Return the distances with obstacles instead of their names, checked."""
         self.clearance.proximity(start.state)
         return self
 
     def rows(self, state: RobotState, bandwidth: float) -> tuple[Array, Array]:
-        """Return the rows A a ≥ b of the pairs that are close or approaching.
-
-        Args:
-            state: The robot's state.
-            bandwidth: α [1/s].
-
-        Returns:
-            A, shape (k, nv), and b, shape (k,).
-        """
+        """Return the rows A a ≥ b, (k, nv) and (k,), of pairs close or approaching."""
         proximity = self.clearance.proximity(state)
         d = proximity.measure(state).copy()
         ahead = self._distances(state.ahead(_STEP))
@@ -85,11 +72,7 @@ class MinimumDistance(Part, ABC, family="distances", error=LimitError):
         return self.clearance.proximity(state).measure(state).copy()
 
     def check_start(self, state: RobotState) -> None:
-        """Check that no pair starts closer than the minimum distance.
-
-        Raises:
-            LimitError: Names the nearest pair and its distance.
-        """
+        """Check that no pair starts closer than the minimum distance."""
         distance, pair = self.clearance.proximity(state).nearest(state)
         if distance < self.minimum:
             raise LimitError(
@@ -105,11 +88,7 @@ class ObstacleDistance(MinimumDistance, type="obstacles"):
     """The minimum distance [m]."""
     _: KW_ONLY
     obstacles: (
-        Annotated[
-            Sequence[ObstacleOrName],
-            Field(min_length=1),
-            AfterValidator(tuple),
-        ]
+        Annotated[Sequence[ObstacleOrName], Field(min_length=1), AfterValidator(tuple)]
         | None
     ) = None
     """Names of the obstacles; or, in Python, the obstacles themselves [-]; all of the

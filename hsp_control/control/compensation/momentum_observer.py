@@ -15,7 +15,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError
-from hsp_control.constraints.limits.numbers_by_joint import Positives, by_dof
+from hsp_control.constraints.limits.joint_numbers import Positives, by_dof
 from hsp_control.control.compensation.checks import check_fixed_base
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import Flag, Positive

@@ -5,7 +5,7 @@ from typing import Any
 
 from hsp_control.declaration.families import value_fields
 from hsp_control.declaration.quantities import plain
-from hsp_control.geometry.shapes.shape import Shape
+from hsp_control.geometry.shapes.primitives import Shape
 
 
 def shape_to_log(shape: Shape) -> dict[str, Any]:
@@ -14,15 +14,7 @@ def shape_to_log(shape: Shape) -> dict[str, Any]:
 
 
 def shape_from_log(kind: str, parameters: Mapping[str, Any]) -> Shape | None:
-    """Return the shape that a log describes, or None if the kind is unknown.
-
-    Args:
-        kind: Name of the shape's class.
-        parameters: Its fields.
-
-    Raises:
-        SceneError: If the parameters are not those of this kind.
-    """
+    """Return the shape that a log describes, or None if the kind is unknown."""
     assert Shape.family is not None
     members = {each.__name__: each for each in Shape.family.members.values()}
     shape_class = members.get(kind)

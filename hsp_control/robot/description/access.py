@@ -16,12 +16,9 @@ from hsp_control.common.resources import bundled
 
 @dataclass(frozen=True)
 class Access:
-    """Which files may be read.
+    """Which files may be read."""
 
-    Attributes:
-        folders: Resolved paths of the allowed folders; None: every file is allowed.
-    """
-
+    # resolved paths of the allowed folders; None: every file is allowed
     folders: tuple[Path, ...] | None = None
 
     @property
@@ -39,16 +36,7 @@ class Access:
         )
 
     def check(self, path: Path, what: str) -> None:
-        """Check that a path is allowed.
-
-        Args:
-            path: The file; a relative path is relative to the working folder.
-            what: What names the file, for the message: ``robot`` or
-                ``link 'hand': mesh``.
-
-        Raises:
-            AccessError: If the file is outside the allowed folders.
-        """
+        """Check that a path is allowed."""
         if self.allows(path):
             return
         real = _resolved(path)

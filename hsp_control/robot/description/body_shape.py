@@ -10,27 +10,19 @@ ShapeKind = Literal["box", "sphere", "capsule", "cylinder", "ellipsoid", "mesh"]
 
 @dataclass(frozen=True, eq=False)
 class BodyShape:
-    """A shape that is fixed to a body, as it is seen or as it collides.
+    """A shape that is fixed to a body, as it is seen or as it collides."""
 
-    Attributes:
-        body: Name of the body's frame.
-        kind: What it is.
-        size: The lengths of a box, the radius and the length (of a cylinder, of a
-            capsule without its ends), the radius of a sphere, the semi-axes of an
-            ellipsoid [m]; of a mesh: nothing.
-        pose: Its pose in the body's frame, shape (4, 4).
-        color: Red, green, blue and opacity, from 0 to 1.
-        seen: Whether it is drawn.
-        collides: Whether distances and collisions count it.
-        mesh: Of a mesh: its vertices [m], shape (k, 3), and triangles of their indices,
-            shape (n, 3). What collides is its convex hull.
-    """
-
-    body: str
-    kind: ShapeKind
+    body: str  # name of the body's frame
+    kind: ShapeKind  # what it is
+    # the lengths of a box, the radius and the length (of a cylinder, of a capsule
+    # without its ends), the radius of a sphere, the semi-axes of an ellipsoid [m]; of a
+    # mesh: nothing
     size: tuple[float, ...]
-    pose: Array
+    pose: Array  # its pose in the body's frame, shape (4, 4)
+    # red, green, blue and opacity, from 0 to 1
     color: tuple[float, float, float, float]
-    seen: bool
-    collides: bool
+    seen: bool  # whether it is drawn
+    collides: bool  # whether distances and collisions count it
+    # of a mesh: its vertices [m], shape (k, 3), and triangles of their indices, shape
+    # (n, 3). What collides is its convex hull
     mesh: tuple[Array, Indices] | None = None

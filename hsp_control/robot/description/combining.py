@@ -19,30 +19,15 @@ from hsp_control.robot.description.sources import RobotSource
 
 @dataclass(frozen=True)
 class Part:
-    """One robot of a combined robot.
+    """One robot of a combined robot."""
 
-    Attributes:
-        prefix: The names of its joints and frames begin with this, e.g. ``left_``.
-        source: Where the robot comes from.
-        placement: Placement of its root in the world.
-    """
-
-    prefix: str
-    source: RobotSource
-    placement: pin.SE3
+    prefix: str  # the names of its joints and frames begin with this, e.g. ``left_``
+    source: RobotSource  # where the robot comes from
+    placement: pin.SE3  # placement of its root in the world
 
 
 def combine(parts: Sequence[tuple[Part, pin.Model]]) -> pin.Model:
-    """Return one model that contains all robots.
-
-    Args:
-        parts: For each robot its part and its own model.
-
-    Raises:
-        ModelError: If there are fewer than two robots, two have the same prefix, one is
-            already a combination, their gravity differs, or one has mimic joints
-            (Pinocchio cannot append those).
-    """
+    """Return one model that contains all robots, which have no mimic joints."""
     prefixes = [part.prefix for part, _ in parts]
     if len(parts) < 2 or len(set(prefixes)) < len(prefixes):
         raise ModelError(

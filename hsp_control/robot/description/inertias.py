@@ -34,19 +34,12 @@ _PLACES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 
 class ImpossibleInertia(NamedTuple):
-    """The inertia of a link that no body can have.
+    """The inertia of a link that no body can have."""
 
-    Attributes:
-        link: Name of the link.
-        element: Its element ``<inertia>``.
-        moments: The principal moments in the file, in ascending order [kg·m²].
-        nearest: The nearest inertia of a body, shape (3, 3) [kg·m²].
-    """
-
-    link: str
-    element: Element
-    moments: Array
-    nearest: Array
+    link: str  # name of the link
+    element: Element  # its element ``<inertia>``
+    moments: Array  # the principal moments in the file, in ascending order [kg·m²]
+    nearest: Array  # the nearest inertia of a body, shape (3, 3) [kg·m²]
 
     @property
     def reason(self) -> str:
@@ -87,17 +80,11 @@ def is_possible(tensor: Array) -> bool:
 
 
 def nearest_possible(tensor: Array) -> Array:
-    """Return the inertia of a body that is nearest in its second moments.
+    """Return the inertia (3, 3) of a body that is nearest in its second moments.
 
     The nearest matrix has the same axes, so that only the second moments σ about them
     are projected: onto the cone σᵢ ≥ FLOOR Σⱼ σⱼ. With σ = A⁻¹ μ and A = 1 - FLOOR 11ᵀ
-    this is a problem of non-negative least squares in μ.
-
-    Args:
-        tensor: About the centre of mass, shape (3, 3) [kg·m²].
-
-    Returns:
-        The tensor itself if a body can have it.
+    this is a problem of non-negative least squares in μ. What a body can have stays.
     """
     if is_possible(tensor):
         return tensor

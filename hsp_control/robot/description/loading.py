@@ -21,10 +21,7 @@ from hsp_control.common.exceptions import (
 )
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.robot.description.combining import placement
-from hsp_control.robot.description.inertias import (
-    impossible_inertias,
-    project_inertias,
-)
+from hsp_control.robot.description.inertias import impossible_inertias, project_inertias
 from hsp_control.robot.description.mesh_files import check_mesh_name
 from hsp_control.robot.description.robot_description import (
     PlacedRobot,
@@ -34,10 +31,7 @@ from hsp_control.robot.description.robot_description import (
 from hsp_control.robot.description.sources import RobotSource, Root
 from hsp_control.robot.description.urdf_checks import named_files, read_urdf
 
-_ROOT_JOINTS = {
-    "planar": pin.JointModelPlanar,
-    "free_flyer": pin.JointModelFreeFlyer,
-}
+_ROOT_JOINTS = {"planar": pin.JointModelPlanar, "free_flyer": pin.JointModelFreeFlyer}
 _NO_HAND = re.compile(
     "finger|thumb|camera|imu|sensor|range|accelerometer|laser|optical|force|(^|_)ft_frame"
 )
@@ -54,25 +48,7 @@ def load_model(
     settings: RobotDescription | PlacedRobot | None = None,
     gravity: ArrayLike | None = None,
 ) -> pin.Model:
-    """Return the Pinocchio model of a robot, built from its URDF.
-
-    Joints that mimic a locked joint are locked with it.
-
-    Args:
-        source: Where the robot comes from.
-        settings: How it is loaded; its name is not used. None: as the source says.
-        gravity: Acceleration of gravity in the world [m/s²], shape (3,); None: -9.81
-            along z.
-
-    Raises:
-        ModelError: If the URDF is invalid, a joint cannot be locked, a tool frame's
-            name exists already, a joint's limits are reversed, or the mass matrix is
-            singular.
-        RobotNotFoundError: If the URDF cannot be read.
-        AccessError: If the URDF names a file that the source's access does not allow.
-        JointNotFoundError: If a joint to lock does not exist.
-        FrameNotFoundError: If a tool frame's parent does not exist.
-    """
+    """Return the Pinocchio model of a URDF; what mimics a locked joint is locked."""
     if settings is None:
         settings = RobotDescription(source.name)
     model = _parse(source, settings)
@@ -88,13 +64,7 @@ def completed(
     tool_frames: Mapping[str, ToolFrame],
     gravity: ArrayLike | None,
 ) -> pin.Model:
-    """Return a checked model, with frames and gravity of one's own.
-
-    Raises:
-        ModelError: If a tool frame's name exists already, a joint's limits are
-            reversed, or the mass matrix is singular.
-        FrameNotFoundError: If a tool frame's parent does not exist.
-    """
+    """Return a checked model, with frames and gravity of one's own."""
     for name, tool in tool_frames.items():
         _add_frame(model, name, tool)
     if gravity is not None:
@@ -115,10 +85,7 @@ def moving_joints(model: pin.Model) -> dict[str, Any]:
 def reference_posture(
     model: pin.Model, source: RobotSource
 ) -> tuple[float, ...] | None:
-    """Return the reference posture of the source's SRDF, from neutral, shape (nv,).
-
-    None if the SRDF has none, or if the model has other joints than the SRDF describes.
-    """
+    """Return the reference posture of the source's SRDF, from neutral, shape (nv,)."""
     if source.srdf is None or source.posture is None:
         return None
     model = model.copy()  # Pinocchio stores the postures in the model
@@ -133,14 +100,10 @@ def reference_posture(
 def end_effector_frame(model: pin.Model) -> str:
     """Return the frame that is most likely the hand, found from the kinematic tree.
 
-    It is the last link on the last joint of the longest chain of joints (of the last
-    such chain if several are equally long). Links named after fingers or sensors come
-    after all others.
-
-    Where this chain branches in its second half into three or more chains, or into two
-    of similar lengths, these are taken for fingers, and it ends at the joint where it
-    branches so first. One much shorter branch is none: it is a part of the arm's own
-    mechanism, and the hand is not at the elbow where it begins.
+    It is the last link, no finger or sensor if possible, on the last joint of the
+    longest chain of joints. Where this chain branches in its second half into three or
+    more, or into two of similar lengths, these are fingers, and it ends there. One much
+    shorter branch is none: it is a part of the arm's own mechanism.
     """
     chains: list[list[int]] = [[]]
     for joint in range(1, model.njoints):
@@ -208,15 +171,7 @@ def _parse(source: RobotSource, settings: RobotDescription | PlacedRobot) -> pin
 
 
 def parser_text(xml: Element, *unused: str) -> str:
-    """Return the text of a URDF for the parser, without what it does not need.
-
-    The tree is changed, too.
-
-    Args:
-        xml: The URDF.
-        unused: Elements of links that are deleted, such as ``visual``: their faults are
-            no business of who reads the rest.
-    """
+    """Return a URDF's text for the parser, without ``unused`` elements of links."""
     for link in xml.iter("link"):
         for element in [each for each in link if each.tag in unused]:
             link.remove(element)
@@ -224,10 +179,7 @@ def parser_text(xml: Element, *unused: str) -> str:
 
 
 def _check_inertias(xml: Element, source: RobotSource) -> None:
-    """Check that no principal moment is negative, but for rounding.
-
-    Greater ones than a body can have are accepted, as by other programs.
-    """
+    """Check that no principal moment is negative, but for rounding."""
     for found in impossible_inertias(xml):
         if found.moments[0] < -NEGATIVE_MOMENT:
             raise ModelError(
@@ -370,11 +322,7 @@ def _check_limits(model: pin.Model, source: RobotSource) -> None:
 
 
 def _check_mass_matrix(model: pin.Model, source: RobotSource) -> None:
-    """Check that every joint moves some mass, so that M is not singular.
-
-    M is computed at a generic configuration: there it is singular only if a joint, or a
-    combination of joints, moves no mass at any configuration.
-    """
+    """Check at a generic configuration that every joint moves some mass."""
     if model.nv == 0:
         raise ModelError(f"{source.urdf}: the robot has no moving joint")
     spread = np.random.default_rng(0).uniform(-1.0, 1.0, model.nv)

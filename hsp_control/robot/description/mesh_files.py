@@ -12,8 +12,8 @@ from urllib.parse import unquote
 from hsp_control.common.exceptions import AccessError
 from hsp_control.common.files import is_file
 from hsp_control.robot.description.access import Access
-from hsp_control.robot.description.packages import package_folders
 from hsp_control.robot.description.sources import RobotSource
+from hsp_control.robot.description.xacro_files import package_folders
 from hsp_control.robot.description.xml_files import XmlError, check_no_document_type
 
 MAX_SIZE = 100_000_000
@@ -56,10 +56,7 @@ def candidates(source: RobotSource, name: str) -> list[Path]:
 
 
 def find_file(source: RobotSource, name: str) -> Path | None:
-    """Return what a file name in a URDF means; None if there is nothing.
-
-    It is no file only if there is something else at its place, such as a pipe.
-    """
+    """Return what a file name in a URDF means; None if there is nothing."""
     places = candidates(source, name)
     file = next(filter(is_file, places), None)
     return file or next(filter(_is_there, places), None)
@@ -79,18 +76,7 @@ def where_to_put(name: str) -> str:
 
 
 def check_mesh_name(source: RobotSource, name: str, what: str, access: Access) -> None:
-    """Check that a file that a URDF names may be read, and the files it refers to.
-
-    Args:
-        source: The robot.
-        name: The file name in the URDF, a path or a URL (``package://``, ...).
-        what: What names the file, for messages.
-        access: Which files may be read.
-
-    Raises:
-        AccessError: If a file is outside the allowed folders, or its format can refer
-            to other files in a way that is not checked.
-    """
+    """Check that a file that a URDF names may be read, and the files it refers to."""
     if not access.strict:
         return
     places = candidates(source, name)
@@ -105,11 +91,7 @@ def check_mesh_name(source: RobotSource, name: str, what: str, access: Access) -
 
 
 def check_references(file: Path, what: str, access: Access) -> None:
-    """Check that all files that a mesh file refers to may be read.
-
-    Raises:
-        AccessError: If one may not, or if the references of this format are not known.
-    """
+    """Check that all files that a mesh file refers to may be read."""
     if not access.strict:
         return
     if file.suffix.lower() not in CHECKED:

@@ -11,14 +11,7 @@ from hsp_control.robot.description.urdf_checks import named_files, read_urdf
 
 
 def write_repaired(source: RobotSource, path: Path) -> Path:
-    """Write a robot's URDF with projected inertias; all else stays, but comments.
-
-    Relative names of files then lead from the new file to where they led.
-
-    Raises:
-        ModelError: If the URDF is invalid, or is the file to write.
-        OSError: If the file cannot be written.
-    """
+    """Write a robot's URDF with projected inertias; all else stays, but comments."""
     xml = read_urdf(source)
     if path.exists() and path.samefile(source.urdf):
         raise ModelError(f"{path}: is the robot's own file; give another one")

@@ -81,11 +81,6 @@ class PlacedRobot(Part, error=ModelError):
     (x, y, z, w) [-], or a matrix [-]."""
 
     def __post_init__(self) -> None:
-        """Check that it is one robot.
-
-        Raises:
-            ModelError: If it is none, or given twice.
-        """
         _check_one(self, "name", "description")
 
     def find(self, access: Access = ANYWHERE) -> RobotSource:
@@ -145,11 +140,6 @@ class RobotDescription(Part, error=ModelError):
     ``<part>_<own name>``."""
 
     def __post_init__(self) -> None:
-        """Check that it is one robot, or several.
-
-        Raises:
-            ModelError: If it is neither, or both.
-        """
         _check_one(self, "name", "description", "mjcf", "parts")
         if self.mjcf is None:
             self._check_without_mjcf()

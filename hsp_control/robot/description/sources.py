@@ -1,27 +1,83 @@
-"""Find a robot by its name or by the path to its URDF."""
+"""Find a robot by its name or by the path to its URDF.
+
+The modules of the package robot_descriptions know the repository of each robot, and
+clone it at the first import.
+"""
 
 import importlib.util
 import os
+import sys
 from collections.abc import Mapping
-from contextlib import suppress
+from contextlib import redirect_stdout, suppress
 from dataclasses import dataclass, field
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import yaml
 
-from hsp_control.common.exceptions import (
-    AccessError,
-    ModelError,
-    RobotNotFoundError,
-)
+from hsp_control.common.exceptions import AccessError, ModelError, RobotNotFoundError
 from hsp_control.common.files import is_folder
 from hsp_control.common.resources import bundled_robots
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.robot.description.access import ANYWHERE, Access
 from hsp_control.robot.description.body_shape import BodyShape
-from hsp_control.robot.description.described import described_names, find_described
 from hsp_control.robot.description.xacro_files import expand, is_xacro
+
+PACKAGE = "robot_descriptions"
+
+
+class Described(NamedTuple):
+    """Where the files of a robot are."""
+
+    file: Path  # its URDF, or the xacro file that makes it
+    xacro_args: dict[str, str]  # arguments of the xacro file, by name
+    package_dirs: tuple[Path, ...]  # folders in which ``package://`` is looked up
+    srdf: Path | None  # its SRDF, if it has one
+
+
+def described_names() -> tuple[str, ...]:
+    """Return the names of all robots with a URDF; empty without the package."""
+    if find_spec(PACKAGE) is None:
+        return ()
+    known = import_module(PACKAGE).DESCRIPTIONS
+    return tuple(name for name, about in known.items() if about.has_urdf)
+
+
+def find_described(name: str) -> Described:
+    """Return the files of a robot; its repository is cloned if it is not yet there."""
+    if find_spec(PACKAGE) is None:
+        raise RobotNotFoundError(
+            f"robot {name!r} is described by the package {PACKAGE}: "
+            f"pip install {PACKAGE}"
+        )
+    known = described_names()
+    if name not in known:
+        raise RobotNotFoundError(
+            f"{PACKAGE} has no URDF of {name!r}{did_you_mean(name, known)} "
+            f"(it has {listing(known)})"
+        )
+    try:
+        with redirect_stdout(sys.stderr):  # it says there what it clones
+            module = import_module(f"{PACKAGE}.{name}")
+    except Exception as error:  # of git, or of a repository that has moved
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise RobotNotFoundError(
+            f"{PACKAGE} cannot fetch {name!r}: {reason}"
+        ) from error
+    own = vars(module)
+    package, repository = Path(own["PACKAGE_PATH"]), Path(own["REPOSITORY_PATH"])
+    file = Path(own.get("URDF_PATH") or own["XACRO_PATH"])
+    others = own.get("XACRO_PACKAGE_PATHS", {}).values()
+    folders = (package, repository, package.parent, repository.parent, file.parent)
+    return Described(
+        file,
+        {key: str(value) for key, value in own.get("XACRO_ARGS", {}).items()},
+        tuple(dict.fromkeys([*folders, *(Path(other).parent for other in others)])),
+        Path(own["SRDF_PATH"]) if "SRDF_PATH" in own else None,
+    )
+
 
 Root = Literal["fixed", "planar", "free_flyer"]
 FILE_ENDINGS = (".urdf", ".xml", ".xacro")
@@ -42,45 +98,36 @@ _END_EFFECTORS = {
 
 @dataclass(frozen=True)
 class RobotSource:
-    """Where a robot comes from, and the settings that its folder gives.
+    """Where a robot comes from, and the settings that its folder gives."""
 
-    Attributes:
-        name: Name of a known robot, or the URDF file's name without ``.urdf``.
-        urdf: The URDF file. Of a robot in a MuJoCo model, whose `shapes` are given:
-            the MJCF file, or the model's name if it was compiled in Python.
-        srdf: The SRDF file (reference postures, disabled collision pairs), if any.
-        root: The default root: ``fixed``, ``planar`` or ``free_flyer``.
-        package_dirs: Folders in which ``package://`` is looked up.
-        origin: ``bundled``, ``example-robot-data``, ``robot_descriptions``, ``file``,
-            ``mujoco`` or ``combined``.
-        locked: Joints that are locked by default, name to value [rad or m].
-        end_effector: The frame that tasks use by default, if known.
-        home: Joint values of a good start posture, shape (nv,) [rad or m], if known.
-        posture: Name of the reference posture in the SRDF, if known.
-        joint_coordinates: Which coordinates theta = A q the literature uses for this
-            robot (``absolute`` for the planar arm), if not q.
-        access: Which files its URDF may name.
-        shapes: The shapes of its bodies, if they are not in a URDF.
-        excluded: Pairs of bodies that never collide, besides those of the SRDF.
-        omitted: What the model that it comes from has and the robot lacks, in words.
-        expanded: The URDF that xacro makes of the file; None if the file is the URDF.
-    """
-
-    name: str
+    name: str  # name of a known robot, or the URDF file's name without ``.urdf``
+    # the URDF file. Of a robot in a MuJoCo model, whose `shapes` are given: the MJCF
+    # file, or the model's name if it was compiled in Python
     urdf: Path
+    # the SRDF file (reference postures, disabled collision pairs), if any
     srdf: Path | None = None
-    root: Root = "fixed"
-    package_dirs: tuple[Path, ...] = ()
+    root: Root = "fixed"  # the default root: ``fixed``, ``planar`` or ``free_flyer``
+    package_dirs: tuple[Path, ...] = ()  # folders in which ``package://`` is looked up
+    # ``bundled``, ``example-robot-data``, ``robot_descriptions``, ``file``, ``mujoco``
+    # or ``combined``
     origin: str = "file"
+    # joints that are locked by default, name to value [rad or m]
     locked: Mapping[str, float] = field(default_factory=dict)
-    end_effector: str | None = None
+    end_effector: str | None = None  # the frame that tasks use by default, if known
+    # joint values of a good start posture, shape (nv,) [rad or m], if known
     home: tuple[float, ...] | None = None
-    posture: str | None = None
+    posture: str | None = None  # name of the reference posture in the SRDF, if known
+    # which coordinates theta = A q the literature uses for this robot (``absolute`` for
+    # the planar arm), if not q
     joint_coordinates: str | None = None
-    access: Access = ANYWHERE
+    access: Access = ANYWHERE  # which files its URDF may name
+    # the shapes of its bodies, if they are not in a URDF
     shapes: tuple[BodyShape, ...] | None = field(default=None, repr=False)
+    # pairs of bodies that never collide, besides those of the SRDF
     excluded: frozenset[frozenset[str]] = frozenset()
+    # what the model that it comes from has and the robot lacks, in words
     omitted: tuple[str, ...] = ()
+    # the URDF that xacro makes of the file; None if the file is the URDF
     expanded: str | None = None
 
 
@@ -91,19 +138,7 @@ def find_robot(
 ) -> RobotSource:
     """Find a bundled robot, one of an installed package, or a URDF or xacro file.
 
-    Args:
-        name: For example ``"panda"``, ``"talos_arm"``, ``"gen3_description"`` or
-            ``"my_arm/arm.urdf"``. A name with a path separator, or with the ending of a
-            URDF or xacro file, is a path.
-        access: Which files may be read: a URDF given by path, and its meshes.
-        xacro_args: Arguments of a xacro file, by name.
-
-    Raises:
-        RobotNotFoundError: If there is no such robot; the message suggests the nearest.
-        AccessError: If the path is not allowed, or reading is strict and the robot is a
-            xacro file or one of robot_descriptions.
-        ModelError: If a xacro file cannot be expanded, or arguments are given for a
-            robot that is none.
+    A name with a path separator, or with the ending of a URDF or xacro file, is a path.
     """
     text = os.fspath(name)
     if is_path(text):
@@ -138,17 +173,9 @@ def find_robot(
 
 
 def find_description(
-    name: str,
-    access: Access = ANYWHERE,
-    xacro_args: Mapping[str, str] | None = None,
+    name: str, access: Access = ANYWHERE, xacro_args: Mapping[str, str] | None = None
 ) -> RobotSource:
-    """Find a robot of the package robot_descriptions, such as ``gen3_description``.
-
-    Raises:
-        RobotNotFoundError: If there is none.
-        AccessError: If reading is strict: the package clones repositories.
-        ModelError: If it cannot be expanded; see `find_robot`.
-    """
+    """Find a robot of the package robot_descriptions, such as ``gen3_description``."""
     if access.strict:
         raise AccessError(
             f"robot {name!r}: strict reading allows no robot of robot_descriptions, "
@@ -301,11 +328,7 @@ def _example_loaders() -> dict[str, Any]:
 
 
 def _example_robot_data_folder() -> Path:
-    """Return ``<prefix>/share/example-robot-data`` of the installed package.
-
-    The package's own constant contains the path of its build machine, so the folder is
-    found from the path of its Python modules: ``share`` is next to their ``lib``.
-    """
+    """Return ``<prefix>/share/example-robot-data`` of the installed package."""
     spec = importlib.util.find_spec("example_robot_data")
     origin = spec.origin if spec is not None else None
     for parent in Path(origin or "").parents:

@@ -58,14 +58,7 @@ _WITH_AXIS = {"revolute", "continuous", "prismatic"}
 
 
 def read_urdf(source: RobotSource) -> Element:
-    """Return the top element of a URDF that is safe to pass to any parser.
-
-    Its numbers are written so that all parsers read them.
-
-    Raises:
-        RobotNotFoundError, ModelError: See `parse_urdf`.
-        ModelError: If an element is wrong; the message says where.
-    """
+    """Return the top element of a URDF that any parser can read."""
     robot = parse_urdf(source)
     for where, problem in problems(robot):
         raise ModelError(f"{source.urdf}: {where}: {problem}")
@@ -77,12 +70,7 @@ def read_urdf(source: RobotSource) -> Element:
 
 
 def parse_urdf(source: RobotSource) -> Element:
-    """Return the top element of a URDF whose elements are not yet checked.
-
-    Raises:
-        RobotNotFoundError: If the file cannot be read.
-        ModelError: If the file is not XML, not a URDF, or too large.
-    """
+    """Return the top element of a URDF whose elements are not yet checked."""
     urdf = source.urdf
     try:
         if source.expanded is None:
@@ -108,10 +96,7 @@ def parse_urdf(source: RobotSource) -> Element:
 
 
 def problems(robot: Element) -> Iterator[tuple[str, str]]:
-    """Yield everything that is wrong with a URDF's elements, with the place.
-
-    For example ``("link 'hand': <mass>", 'value="heavy" must be a number')``.
-    """
+    """Yield everything that is wrong with a URDF's elements, with the place."""
     for owner, element in _elements(robot):
         if problem := _find_problem(element):
             yield f"{owner}<{element.tag}>", problem
@@ -128,10 +113,7 @@ def problems(robot: Element) -> Iterator[tuple[str, str]]:
 
 
 def named_files(robot: Element) -> Iterator[tuple[str, str]]:
-    """Yield every file name in a URDF, with the element that contains it.
-
-    For example ``("hand.stl", "link 'hand': <mesh>")``.
-    """
+    """Yield every file name in a URDF, with the element that contains it."""
     for owner, element in _elements(robot):
         name = element.get("filename")
         if name is not None:
@@ -211,10 +193,7 @@ def _parsed(text: str) -> list[float]:
 
 
 def _plain(text: str) -> str:
-    """Return numbers with one space between them, and none that are subnormal.
-
-    At a space behind a number, or at 1e-320, one parser drops the whole inertia.
-    """
+    """Return numbers with one space, none subnormal: a parser drops such an inertia."""
     words = text.split()
     return " ".join("0" if 0.0 < abs(float(word)) < 1e-300 else word for word in words)
 

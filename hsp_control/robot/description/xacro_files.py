@@ -1,18 +1,46 @@
 """Expand xacro, the macro language of URDFs, where the package ``xacro`` is installed.
 
 A xacro file is a program: it includes other files and evaluates Python expressions.
+The folders that ``package://`` and $(find) mean are found without ROS.
 """
 
+import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from hsp_control.common.exceptions import ModelError
 from hsp_control.common.suggestions import did_you_mean
-from hsp_control.robot.description.packages import package_folders
-from hsp_control.robot.description.xml_files import MAX_SIZE
+from hsp_control.robot.description.xml_files import MAX_SIZE, XmlError, read_xml
+
+
+def package_folders(package: str, folders: Iterable[Path]) -> list[Path]:
+    """Return the folders that may be a package; the first existing one is meant."""
+    places = [*folders, *_of_environment()]
+    return [
+        *(place / package for place in places),
+        *(place for place in places if package in (place.name, _declared_name(place))),
+    ]
+
+
+def _of_environment() -> list[Path]:
+    ros = os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep)
+    ament = os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
+    return [
+        *(Path(folder) for folder in ros if folder),
+        *(Path(folder) / "share" for folder in ament if folder),
+    ]
+
+
+def _declared_name(folder: Path) -> str | None:
+    """Return the name in a folder's package.xml: a clone may be called otherwise."""
+    try:
+        return read_xml(folder / "package.xml").findtext("name")
+    except (OSError, ValueError, XmlError):  # none, or a path that can be none
+        return None
+
 
 _COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)  # xacro leaves its own as comments
 _MACRO = re.compile(rb"<xacro:\w")
@@ -61,18 +89,7 @@ def expand(
     package_dirs: Sequence[Path],
     defaults: Mapping[str, str] | None = None,
 ) -> str:
-    """Return the URDF that a xacro file makes.
-
-    Args:
-        file: The xacro file.
-        arguments: Its arguments, by name; others have their defaults.
-        package_dirs: Where ``$(find package)`` looks, see `package_folders`.
-        defaults: Arguments where `arguments` have none; the file need not have them.
-
-    Raises:
-        ModelError: If the package xacro is not installed, cannot expand the file, or
-            the file has no such argument.
-    """
+    """Return the URDF that a xacro file makes."""
     try:
         import xacro  # type: ignore[import-not-found,import-untyped,unused-ignore]
         from xacro import (  # type: ignore[import-not-found,import-untyped,unused-ignore]

@@ -20,17 +20,11 @@ MAX_DEPTH = 100
 
 
 class XmlError(Exception):
-    """XML that is malformed or not allowed.
-
-    Attributes:
-        line: Line number, from 1; 0 if the whole file is meant.
-        message: What is wrong.
-        column: Column number, from 1; 0 if the whole line is meant.
-    """
+    """XML that is malformed or not allowed."""
 
     def __init__(self, line: int, message: str, column: int = 0) -> None:
-        """Store all; the caller adds the name of the file."""
         super().__init__(line, message, column)
+        # line and column from 1; 0 if the whole file or line is meant
         self.line, self.message, self.column = line, message, column
 
     def within(self, file: Path | str) -> str:
@@ -40,13 +34,7 @@ class XmlError(Exception):
 
 
 def read_xml(path: Path) -> Element:
-    """Return the top element of an XML file.
-
-    Raises:
-        XmlError: If the file is malformed, too large or too deeply nested, or has a
-            document type.
-        OSError: If it cannot be read.
-    """
+    """Return the top element of an XML file."""
     with path.open("rb") as file:
         data = file.read(MAX_SIZE + 1)
     if len(data) > MAX_SIZE:
@@ -55,11 +43,7 @@ def read_xml(path: Path) -> Element:
 
 
 def parse_xml(data: bytes) -> Element:
-    """Return the top element of an XML text.
-
-    Raises:
-        XmlError: See `read_xml`.
-    """
+    """Return the top element of an XML text."""
     _Limits(MAX_ELEMENTS, MAX_DEPTH).check(data)
     try:
         return ElementTree.fromstring(data)
@@ -71,13 +55,7 @@ def parse_xml(data: bytes) -> Element:
 
 
 def check_no_document_type(data: bytes) -> None:
-    """Check that an XML text of any size has no document type.
-
-    Only the text before the top element is read: a document type can be only there.
-
-    Raises:
-        XmlError: If the text has a document type.
-    """
+    """Check that XML has no document type; it stands before the top element."""
     _Limits(1, MAX_DEPTH).check(data, only_prolog=True)
 
 

@@ -2,8 +2,8 @@
 
 from hsp_control.robot.friction import Friction as Friction
 
-from .contact_plant import ContactPlant as ContactPlant
 from .declared import AnyPlant as AnyPlant
+from .declared import FrictionalPart as FrictionalPart
 from .declared import PlantPart as PlantPart
 from .drives import Drive as Drive
 from .drives import DroppedPeriods as DroppedPeriods
@@ -11,7 +11,6 @@ from .drives import EffortDelay as EffortDelay
 from .drives import EffortNoise as EffortNoise
 from .drives import Jitter as Jitter
 from .drives import Saturation as Saturation
-from .frictional import FrictionalPart as FrictionalPart
 from .imperfect_plant import ImperfectPlant as ImperfectPlant
 from .integrated_plant import IntegratedPlant as IntegratedPlant
 from .model_changes import Inertias as Inertias
@@ -29,9 +28,11 @@ from .plant import check_plant as check_plant
 from .plant import differing_bodies as differing_bodies
 from .push import Push as Push
 from .rigid_body import RigidBody as RigidBody
-from .rigid_body_plant import RigidBodyPlant as RigidBodyPlant
-from .rigid_contact import ContactKind as ContactKind
-from .rigid_contact import RigidContact as RigidContact
+from .rigid_body import RigidBodyPlant as RigidBodyPlant
+from .rigid_body import StickingPlant as StickingPlant
+from .rigid_contacts import ContactKind as ContactKind
+from .rigid_contacts import ContactPlant as ContactPlant
+from .rigid_contacts import RigidContact as RigidContact
 from .rigid_contacts import RigidContacts as RigidContacts
 from .sensors import DifferencedVelocity as DifferencedVelocity
 from .sensors import Encoder as Encoder
@@ -40,4 +41,3 @@ from .sensors import PositionNoise as PositionNoise
 from .sensors import Sensor as Sensor
 from .sensors import SensorDelay as SensorDelay
 from .sensors import VelocityNoise as VelocityNoise
-from .sticking_plant import StickingPlant as StickingPlant

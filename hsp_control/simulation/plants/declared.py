@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, replace
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import AfterValidator, GetJsonSchemaHandler
@@ -17,6 +17,7 @@ from hsp_control.declaration.quantities import Count, Weights
 from hsp_control.robot import Robot
 from hsp_control.robot.description.access import ANYWHERE, Access
 from hsp_control.robot.description.robot_description import RobotDescription
+from hsp_control.robot.friction import Friction, JointFriction
 from hsp_control.robot.integrators import Integrator
 from hsp_control.simulation.plants.drives import Drives
 from hsp_control.simulation.plants.imperfect_plant import ImperfectPlant
@@ -105,17 +106,7 @@ class PlantPart(Part, ABC, family="plants", error=SimulationError):
     def build(
         self, robot: Robot, integrator: Integrator, *, access: Access = ANYWHERE
     ) -> Plant:
-        """Return the plant, which has the controller's joints.
-
-        Args:
-            robot: The controller's robot.
-            integrator: The integrator of the simulation.
-            access: Which files may be read for a robot of its own.
-
-        Raises:
-            SimulationError: If a field does not fit the robot, or the joints differ.
-            HspControlError: If a frame does not exist, or the robot cannot be loaded.
-        """
+        """Return the plant, which has the controller's joints."""
         plant = self.engine(self._simulated(robot, access), integrator)
         check_plant(plant, robot)
         sensors = [sensor for sensor in self.sensors if sensor.active]
@@ -147,6 +138,28 @@ class PlantPart(Part, ABC, family="plants", error=SimulationError):
             with within(key):
                 own = changed(own, [change], self.seed)
         return own
+
+
+class FrictionalPart(PlantPart, ABC):
+    """A plant whose joints may have friction."""
+
+    _: KW_ONLY
+    friction: Literal["urdf"] | Friction | None = None
+    """Friction of the joints [-]; ``urdf`` takes it from the robot's file. None by
+    default."""
+
+    def joint_friction(self, robot: Robot) -> JointFriction | None:
+        """Return the friction of a robot's joints, None if there is none.
+
+        Raises:
+            SimulationError: If it does not fit the robot.
+        """
+        if self.friction is None:
+            return None
+        if self.friction == "urdf":
+            return JointFriction.of_model(robot)
+        with within("friction"):
+            return self.friction.of(robot)
 
 
 def _completed(own: RobotDescription, robot: Robot) -> RobotDescription:

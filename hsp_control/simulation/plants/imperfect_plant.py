@@ -1,7 +1,11 @@
-"""A plant with imperfect sensors and drives."""
+"""A plant with imperfect sensors and drives.
+
+Each part has its own random numbers: adding one does not change those of the others.
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 
@@ -10,10 +14,13 @@ from hsp_control.control.log_channel import LogChannel
 from hsp_control.control.measurement import Inertial
 from hsp_control.declaration import within
 from hsp_control.simulation.plants.drives import Drive, Driving
-from hsp_control.simulation.plants.json_data import to_json_data
-from hsp_control.simulation.plants.plant import SampledPlant
-from hsp_control.simulation.plants.random_numbers import seeded_generator
+from hsp_control.simulation.plants.plant import SampledPlant, to_json_data
 from hsp_control.simulation.plants.sensors import RunningImu, Sensing, Sensor
+
+
+def seeded_generator(seed: int, name: str) -> np.random.Generator:
+    """Return a new generator for a plant's seed and the name of the part's class."""
+    return np.random.default_rng([seed, crc32(name.encode())])
 
 
 class ImperfectPlant(SampledPlant):
@@ -43,9 +50,6 @@ class ImperfectPlant(SampledPlant):
             sensors: The chain from the true state to the controller, in order.
             drives: The chain from the controller to the joints, in order.
             seed: Seed of the random numbers; each sensor and drive has its own.
-
-        Raises:
-            SimulationError: If a sensor or drive does not fit the robot.
         """
         super().__init__(plant.robot)
         self.plant = plant
@@ -130,7 +134,6 @@ class ImperfectPlant(SampledPlant):
         }
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what a copy gets: all but the run under way."""
         return {**vars(self), "_sensing": [], "_driving": []}
 
     def _begin(self, q: Array, v: Array) -> None:

@@ -21,7 +21,6 @@ class IntegratedPlant(SampledPlant):
     """
 
     def __init__(self, plant: ContinuousPlant, integrator: Integrator) -> None:
-        """Set the plant and the integrator."""
         super().__init__(plant.robot)
         self.plant = plant
         self.integrator = integrator
@@ -30,7 +29,6 @@ class IntegratedPlant(SampledPlant):
         self._advance: Advance | None = None  # begun where it is needed
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what a copy or a pickle needs: the integrator begins anew there."""
         return vars(self) | {"_advance": None}
 
     def reset(self, t: float, q: Array, v: Array) -> None:

@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -29,7 +30,6 @@ class Plant:
     effort_delay: int = 0
 
     def __init__(self, robot: Robot) -> None:
-        """Set the robot that moves."""
         self.robot = robot
 
     def log_channels(
@@ -157,11 +157,7 @@ def differing_bodies(plant: Plant, robot: Robot) -> dict[str, Any]:
 
 
 def check_plant(plant: Plant, robot: Robot) -> None:
-    """Check that a plant has the joints of the controller's robot.
-
-    Raises:
-        SimulationError: If their names, order or kinds differ.
-    """
+    """Check that a plant has the joints of the controller's robot."""
     ours, theirs = (
         [(name, j.nq, j.nv) for name, j in r.joints.items()]
         for r in (robot, plant.robot)
@@ -172,3 +168,55 @@ def check_plant(plant: Plant, robot: Robot) -> None:
             f"{', '.join(plant.robot.joint_names)}; the controller's {robot.name} has "
             f"{', '.join(robot.joint_names)}: load both with the same root and locks"
         )
+
+
+def to_json_data(value: Any) -> Any:
+    """Return a setting as JSON data; a dataclass becomes its type and its fields."""
+    if is_dataclass(value):
+        items = {f.name: to_json_data(getattr(value, f.name)) for f in fields(value)}
+        return {"type": type(value).__name__, **items}
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, list | tuple):
+        return [to_json_data(item) for item in value]
+    return value
+
+
+def contact_channels(wrenches: Mapping[str, Array]) -> dict[str, LogChannel]:
+    """Return ``plant.contact.<name>.force`` and ``.moment`` for each contact.
+
+    A wrench (6,) of the world on the robot is force and moment in world axes, about the
+    origin of the contact's frame.
+    """
+    channels: dict[str, LogChannel] = {}
+    for name, wrench in wrenches.items():
+        force = LogChannel(wrench[:3], "N", "of the world on the robot, in world axes")
+        moment = LogChannel(wrench[3:], "N·m", "on the robot, about the frame's origin")
+        channels[f"plant.contact.{name}.force"] = force
+        channels[f"plant.contact.{name}.moment"] = moment
+    return channels
+
+
+MAX_ROOT_EFFORT = 1e-3
+"""Largest effort on a root [N or N·m] that a solver's tolerance explains; removed."""
+
+
+class FloatingRoots:
+    """The degrees of freedom of a robot's free-flyer joints."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._unactuated = np.zeros(robot.nv, dtype=bool)
+        for joint in robot.joints.values():
+            if joint.shortname() == "JointModelFreeFlyer":
+                self._unactuated[joint.idx_v : joint.idx_v + 6] = True
+
+    def remove_effort(self, t: float, tau: Array) -> Array:
+        """Return an effort, shape (nv,), with zeros for the roots."""
+        largest = float(np.abs(tau[self._unactuated]).max(initial=0.0))
+        if largest > MAX_ROOT_EFFORT:
+            raise SimulationError(
+                f"the effort at t = {t:.6g} s pushes the floating root with "
+                f"{largest:.3g} N or N·m, but the root has no motor: the controller "
+                "must move it through its contacts"
+            )
+        return np.where(self._unactuated, 0.0, tau)

@@ -33,21 +33,14 @@ class Push(Part, error=SimulationError):
 
 
 class Spring:
-    """A spring from a point of a link to a hand that moves: f = k (hand - point).
-
-    Attributes:
-        joint: Index of the link's joint.
-        point: The point in the joint's frame, shape (3,) [m].
-        hand: Where the hand is in the world, shape (3,) [m].
-        stiffness: k [N/m].
-        largest: Largest force [N].
-    """
+    """A spring from a point of a link to a hand that moves: f = k (hand - point)."""
 
     def __init__(
         self, joint: int, point: Array, hand: Array, stiffness: float, largest: float
     ) -> None:
-        """Set all of them."""
+        # index of the link's joint; the point in its frame, the hand in the world [m]
         self.joint, self.point, self.hand = joint, point, hand
+        # k [N/m] and the largest force [N]
         self.stiffness, self.largest = stiffness, largest
 
     def force(self, point: Array) -> Array:
@@ -58,23 +51,14 @@ class Spring:
 
 
 class Pushes:
-    """All pushes on a robot, as a generalised effort.
-
-    Attributes:
-        pushes: The pushes that were declared.
-        spring: That of somebody who pulls now; None: nobody does.
-        reachable: Whether somebody may pull, so that an integrator must ask again.
-    """
+    """All pushes on a robot, as a generalised effort."""
 
     def __init__(self, robot: Robot, pushes: Sequence[Push] = ()) -> None:
-        """Set the robot and the pushes.
-
-        Raises:
-            FrameNotFoundError: If the robot lacks a frame.
-        """
         self.robot = robot
-        self.pushes = tuple(pushes)
+        self.pushes = tuple(pushes)  # the pushes that were declared
+        # that of somebody who pulls now; None: nobody does
         self.spring: Spring | None = None
+        # whether somebody may pull, so that an integrator must ask again
         self.reachable = False
         self._frames = {}
         for k, push in enumerate(pushes):

@@ -1,11 +1,178 @@
-"""The plant of rigid bodies, as a value."""
+"""Rigid bodies with friction, pushed and held: the plant of most simulations."""
 
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import SimulationError
+from hsp_control.common.kernels import kernel
 from hsp_control.robot import Robot
+from hsp_control.robot.acceleration import Acceleration
+from hsp_control.robot.friction import JointFriction
 from hsp_control.robot.integrators import Integrator
-from hsp_control.simulation.plants.frictional import FrictionalPart
-from hsp_control.simulation.plants.plant import Plant
-from hsp_control.simulation.plants.rigid_body_plant import RigidBodyPlant
-from hsp_control.simulation.plants.sticking_plant import StickingPlant
+from hsp_control.robot.step_count import number_of_steps
+from hsp_control.simulation.plants.declared import FrictionalPart
+from hsp_control.simulation.plants.plant import (
+    ContinuousPlant,
+    Plant,
+    SampledPlant,
+    to_json_data,
+)
+from hsp_control.simulation.plants.push import Push, Pushes
+
+
+class RigidBodyPlant(ContinuousPlant):
+    """v' = M(q)⁻¹(tau + Σ Jᵀ push - N(q, v)), the model itself.
+
+    Attributes:
+        pushes: External wrenches.
+    """
+
+    def __init__(self, robot: Robot, pushes: Sequence[Push] = ()) -> None:
+        super().__init__(robot)
+        self.pushes = Pushes(robot, pushes)
+
+    def acceleration(self, t: float, q: Array, v: Array, tau: Array) -> Array:
+        """Return v'; see `ContinuousPlant.acceleration`."""
+        if self.pushes.any_active(t, t):
+            tau = tau + self.pushes.effort(t, q)
+        return self.robot.forward_dynamics(q, v, tau)
+
+    def bind(self, q: Array, v: Array, tau: Array) -> Acceleration:
+        """Return v'; see `ContinuousPlant.bind`."""
+        changed = type(self).acceleration is not RigidBodyPlant.acceleration
+        pushed = self.pushes.pushes or self.pushes.reachable
+        if pushed or changed:  # a subclass has another one
+            return super().bind(q, v, tau)
+        return self.robot.bind_forward_dynamics(q, v, tau)
+
+    def describe(self) -> dict[str, Any]:
+        """Return its pushes."""
+        return {"type": "RigidBodyPlant", "pushes": to_json_data(self.pushes.pushes)}
+
+
+class StickingPlant(SampledPlant):
+    """M v' + N = tau - D v - f, where f_i = c_i sign(v_i), or |f_i| <= c_i at v_i = 0.
+
+    Each step of length h solves for the velocity v⁺ at its end
+
+        v⁺ = argmin ½ xᵀ(M + ½hD)x - xᵀ[(M - ½hD)v + h(tau - N)] + h Σ c_i |x_i|,
+
+    M and N at its middle. This is the implicit law of dry friction: joints stick and
+    break away exactly, and the equations do not become stiff. A step in which no joint
+    sticks or reverses is of second order.
+
+    Attributes:
+        friction: Friction of the joints.
+        step: The largest step [s].
+        pushes: External wrenches.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        friction: JointFriction,
+        step: float = 1e-3,
+        pushes: Sequence[Push] = (),
+    ) -> None:
+        """Set the robot, its friction, the step and the pushes.
+
+        Args:
+            robot: The robot that moves.
+            friction: Friction of the joints.
+            step: The largest step [s].
+            pushes: External wrenches.
+
+        Raises:
+            SimulationError: If the step is not positive.
+            FrameNotFoundError: If a push's frame does not exist.
+        """
+        super().__init__(robot)
+        if not 0.0 < step < np.inf:
+            raise SimulationError(f"step is {step}; must be positive")
+        self.friction, self.step = friction, step
+        self.pushes = Pushes(robot, pushes)
+        self._data = robot.model.createData()
+        self._q, self._v = robot.neutral(), np.zeros(robot.nv)
+
+    def reset(self, t: float, q: Array, v: Array) -> None:
+        """Set the state; see `SampledPlant.reset`."""
+        self._q, self._v = q.copy(), v.copy()
+
+    def advance(self, t: float, end: float, tau: Array) -> tuple[Array, Array]:
+        """Step from t to ``end``; see `SampledPlant.advance`."""
+        steps = number_of_steps(end - t, self.step)
+        h = (end - t) / steps
+        for k in range(steps):
+            effort = tau
+            if self.pushes.any_active(t + k * h, t + (k + 1) * h):
+                effort = tau + self.pushes.effort(t + (k + 0.5) * h, self._q)
+            self._step(h, effort)
+        return self._q.copy(), self._v.copy()
+
+    def describe(self) -> dict[str, Any]:
+        """Return its friction, step and pushes."""
+        return {
+            "type": "StickingPlant",
+            "friction": to_json_data(self.friction),
+            "step": self.step,
+            "pushes": to_json_data(self.pushes.pushes),
+        }
+
+    def _step(self, h: float, tau: Array) -> None:
+        q, v, robot = self._q, self._v, self.robot
+        half = self._velocity(0.5 * h, q, v, v, tau)
+        middle = robot.integrate(q, 0.25 * h * (v + half))
+        after = self._velocity(h, middle, half, v, tau)
+        self._q = robot.integrate(q, 0.5 * h * (v + after))
+        self._v = after
+
+    def _velocity(
+        self, h: float, q: Array, v: Array, start: Array, tau: Array
+    ) -> Array:
+        """Return v⁺ after a time h from velocity ``start``, with M and N at (q, v)."""
+        model, data = self.robot.model, self._data
+        M = np.triu(pin.crba(model, data, q))
+        M += np.triu(M, 1).T
+        N = pin.nonLinearEffects(model, data, q, v)
+        damping = np.diag(0.5 * h * self.friction.viscous)
+        after = start.copy()
+        _minimize(
+            M + damping,
+            (M - damping) @ start + h * (tau - N),
+            h * self.friction.coulomb,
+            after,
+        )
+        return after
+
+
+@kernel
+def _minimize(A: Array, b: Array, c: Array, x: Array) -> None:
+    """Move x to the minimum of ½ xᵀA x - bᵀx + Σ c_i |x_i|, A positive definite."""
+    n = x.shape[0]
+    for _ in range(10_000):
+        largest = 0.0
+        size = 1e-9
+        for i in range(n):
+            rest = b[i]
+            for k in range(n):
+                if k != i:
+                    rest -= A[i, k] * x[k]
+            if rest > c[i]:
+                new = (rest - c[i]) / A[i, i]
+            elif rest < -c[i]:
+                new = (rest + c[i]) / A[i, i]
+            else:
+                new = 0.0
+            largest = max(largest, abs(new - x[i]))
+            size = max(size, abs(new))
+            x[i] = new
+        if largest <= 1e-13 * size:
+            return
+
 
 _STEP = 1e-3
 """Largest step of a plant with stiction, if the integrator has no step [s]."""
@@ -15,12 +182,7 @@ class RigidBody(FrictionalPart, type="rigid_body"):
     """Pinocchio's rigid-body dynamics; with friction, joints stick and slip."""
 
     def engine(self, robot: Robot, integrator: Integrator) -> Plant:
-        """Return a `RigidBodyPlant`, or with friction a `StickingPlant`.
-
-        Raises:
-            FrameNotFoundError: If the frame of a push does not exist.
-            SimulationError: If the friction does not fit the robot.
-        """
+        """Return a `RigidBodyPlant`, or with friction a `StickingPlant`."""
         friction = self.joint_friction(robot)
         if friction is None:
             return RigidBodyPlant(robot, self.pushes)

@@ -4,12 +4,12 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from hsp_control.simulation import Rollout
-from hsp_control.simulation.decay import predicted_decay
-from hsp_control.simulation.log_distances import logged_distances
 from hsp_control.simulation.log_series import (
     column_unit,
     field_terms,
     held_period,
+    logged_distances,
+    predicted_decay,
     rate_unit,
 )
 from hsp_control.visualization import palette

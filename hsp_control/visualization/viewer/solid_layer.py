@@ -8,7 +8,7 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.geometry.shapes import Shape, shape_from_log
-from hsp_control.simulation.plants.mujoco.solids import Solid
+from hsp_control.simulation.plants.mujoco.mjcf import Solid
 from hsp_control.visualization.viewer.appearance import SOLID
 from hsp_control.visualization.viewer.clip import Track
 from hsp_control.visualization.viewer.commands import Command, set_object, set_transform

@@ -45,7 +45,7 @@ from hsp_control.constraints.contacts import (
     SlidingContact,
     SurfaceContact,
 )
-from hsp_control.constraints.contacts.unactuated import UnactuatedRows
+from hsp_control.constraints.contacts.contact import UnactuatedRows
 from hsp_control.control.actuation import Status
 from hsp_control.control.actuation.support import Support
 from hsp_control.control.evolution import PRESENT

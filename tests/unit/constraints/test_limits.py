@@ -77,9 +77,9 @@ def test_by_default_they_are_the_robots_own() -> None:
     lower, upper = robot.position_limits()
     np.testing.assert_array_equal(limits.lower, lower)
     np.testing.assert_array_equal(limits.upper, upper)
-    np.testing.assert_array_equal(limits.guarded_lower, lower + 0.005)
-    np.testing.assert_array_equal(limits.guarded_upper, upper - 0.005)
-    np.testing.assert_array_equal(limits.guarded_velocity, 0.98 * limits.velocity)
+    np.testing.assert_array_equal(limits.motion.lower, lower + 0.005)
+    np.testing.assert_array_equal(limits.motion.upper, upper - 0.005)
+    np.testing.assert_array_equal(limits.motion.velocity, 0.98 * limits.velocity)
     np.testing.assert_array_equal(limits.effort_rate, np.full(7, 11.0 * 87.0))
     jerk = limits.effort_rate / robot.largest_inertias
     np.testing.assert_array_equal(limits.motion.jerk, jerk)
@@ -123,8 +123,8 @@ def test_a_joint_that_hardly_moves_has_a_small_margin() -> None:
     """0.005, and a tenth of a range that is small: a suspension has 10 mm in all."""
     upper = [0.004, *np.arange(1.0, 7.0)]
     limits = of(panda(), position=PositionRange(-0.006, upper))
-    np.testing.assert_allclose(upper - limits.guarded_upper, [1e-3] + 6 * [0.005])
-    np.testing.assert_allclose(limits.guarded_lower + 0.006, [1e-3] + 6 * [0.005])
+    np.testing.assert_allclose(upper - limits.motion.upper, [1e-3] + 6 * [0.005])
+    np.testing.assert_allclose(limits.motion.lower + 0.006, [1e-3] + 6 * [0.005])
 
 
 def test_one_number_or_one_for_each() -> None:
@@ -144,11 +144,11 @@ def test_one_number_or_one_for_each() -> None:
     np.testing.assert_array_equal(limits.effort, np.full(7, 3.0))
     np.testing.assert_array_equal(limits.effort_rate, np.full(7, 1000.0))
     np.testing.assert_array_equal(limits.velocity, numbers)
-    np.testing.assert_array_equal(limits.guarded_velocity, 0.5 * numbers)
+    np.testing.assert_array_equal(limits.motion.velocity, 0.5 * numbers)
     unlimited = [1.0, np.inf, np.inf, 4.0, 5.0, 6.0, 7.0]
     np.testing.assert_array_equal(limits.acceleration, unlimited)
     np.testing.assert_array_equal(limits.lower, np.full(7, -1.0))
-    np.testing.assert_array_equal(limits.guarded_upper, numbers - 0.25)
+    np.testing.assert_array_equal(limits.motion.upper, numbers - 0.25)
     assert limits.motion.bandwidth == limits.bandwidth == 7.0
 
 
@@ -181,7 +181,7 @@ def test_positions_of_some_joints() -> None:
     lower[3], upper[3] = -2.5, -0.5
     np.testing.assert_array_equal(limits.lower, lower)
     np.testing.assert_array_equal(limits.upper, upper)
-    assert limits.guarded_upper[3] == -0.505
+    assert limits.motion.upper[3] == -0.505
     np.testing.assert_array_equal(of(panda()).lower, own.lower)  # the robot's stay
 
 

@@ -138,7 +138,7 @@ def test_speeds_may_be_held_against_a_steady_force(seed: int, steady: float) -> 
     A drift that has ended changes nothing.
     """
     rng, limits = np.random.default_rng(seed), of(panda(), position=None)
-    v = limits.guarded_velocity * rng.uniform(-0.9, 0.9, 7)
+    v = limits.motion.velocity * rng.uniform(-0.9, 0.9, 7)
     q = panda().home()
     plain = bounds(limits, q, v)
     np.testing.assert_array_equal(bounds(limits, q, v, 0.0, steady), plain)
@@ -153,7 +153,7 @@ def test_a_drift_moves_a_limit_by_a_tenth_of_the_range_at_most(drift: float) -> 
     limits = of(panda(), velocity=None, bandwidth=8.0)
     q, v = panda().home(), np.zeros(7)
     plain, drifting = bounds(limits, q, v), bounds(limits, q, v, 0.0, drift)
-    span = limits.guarded_upper - limits.guarded_lower
+    span = limits.motion.upper - limits.motion.lower
     moved = [(new - old) / 64.0 for new, old in zip(drifting, plain, strict=True)]
     np.testing.assert_allclose(
         moved[0 if drift < 0.0 else 1], -np.sign(drift) * span / 10.0
@@ -165,7 +165,7 @@ def test_a_drift_moves_a_limit_by_a_tenth_of_the_range_at_most(drift: float) -> 
 def test_too_fast_is_slowed_down_more_steeply() -> None:
     """Beyond the guarded speed the barrier is four times as steep."""
     limits = of(panda(), velocity=1.0, position=None, bandwidth=8.0)
-    guarded = limits.guarded_velocity[0]
+    guarded = limits.motion.velocity[0]
     for excess, slope in ((-0.01, 16.0), (0.01, 64.0)):
         _, a_upper = bounds(limits, panda().home(), np.full(7, guarded + excess))
         np.testing.assert_allclose(a_upper, -slope * excess, rtol=1e-12)
@@ -176,7 +176,7 @@ def test_too_fast_is_slowed_down_more_steeply() -> None:
 def test_the_margin_of_the_speed_covers_an_error_up_to_half_the_speed() -> None:
     """And a quarter more, since it may grow until the next period ends."""
     limits = of(panda(), velocity=1.0, effort_rate=None, position=None, bandwidth=8.0)
-    guarded, v = limits.guarded_velocity[0], np.full(7, 0.4)
+    guarded, v = limits.motion.velocity[0], np.full(7, 0.4)
     for error, speed in ((3.2, guarded - 0.0625), (1e3, 0.5 * guarded)):
         a_lower, a_upper = bounds(limits, panda().home(), v, error)
         np.testing.assert_allclose(a_upper, 16.0 * (speed - v), rtol=1e-12)

@@ -9,7 +9,7 @@ from robot_texts import ARM
 from hsp_control import Robot
 from hsp_control.common.exceptions import AccessError, ModelError, RobotNotFoundError
 from hsp_control.robot import PlacedRobot, RobotDescription
-from hsp_control.robot.description import described
+from hsp_control.robot.description import sources
 from hsp_control.robot.description.access import only_within
 from hsp_control.robot.description.sources import find_robot
 
@@ -73,7 +73,7 @@ def test_robots_that_it_does_not_have() -> None:
 
 
 def test_without_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(described, "find_spec", lambda _: None)
+    monkeypatch.setattr(sources, "find_spec", lambda _: None)
     with pytest.raises(RobotNotFoundError, match="pip install robot_descriptions"):
         Robot.load("gen3_description")
 

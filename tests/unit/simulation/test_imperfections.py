@@ -31,6 +31,7 @@ from hsp_control.simulation.plants.drives import (
     Jitter,
     Saturation,
 )
+from hsp_control.simulation.plants.imperfect_plant import seeded_generator
 from hsp_control.simulation.plants.model_changes import (
     Inertias,
     ModelChange,
@@ -38,7 +39,6 @@ from hsp_control.simulation.plants.model_changes import (
     Payload,
     changed,
 )
-from hsp_control.simulation.plants.random_numbers import seeded_generator
 from hsp_control.simulation.plants.sensors import (
     DifferencedVelocity,
     Encoder,

@@ -8,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hsp_control.common.exceptions import LogError
-from hsp_control.simulation.journal import JournalWriter, read_journal
-from hsp_control.simulation.journal_tail import JournalTail
+from hsp_control.simulation.journal import JournalTail, JournalWriter, read_journal
 
 
 def columns(k: int, width: int = 2) -> dict[str, np.ndarray]:

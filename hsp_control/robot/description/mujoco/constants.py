@@ -12,11 +12,7 @@ _log = logging.getLogger(__name__)
 
 
 def import_mujoco() -> Any:
-    """Return the module ``mujoco``; its warnings go to our log, not to a file.
-
-    Raises:
-        ModelError: If it is not installed.
-    """
+    """Return the module ``mujoco``; its warnings go to our log, not to a file."""
     try:
         mujoco = importlib.import_module("mujoco")
     except ImportError as error:
@@ -31,13 +27,6 @@ def import_mujoco() -> Any:
 
 @cache
 def constants(kind: str) -> Any:
-    """Return the members of one of MuJoCo's enumerations, such as ``mjtJoint``.
-
-    As integers: MuJoCo's own members do not equal the numbers in its arrays if they
-    stand on the left of ``==`` (seen with 4.0).
-
-    Raises:
-        ModelError: If MuJoCo is not installed.
-    """
+    """Return the members of ``mjtJoint`` and so on, as integers: these compare."""
     members = getattr(import_mujoco(), kind).__members__
     return SimpleNamespace(**{name: int(value) for name, value in members.items()})

@@ -36,11 +36,7 @@ def pose(position: Array, wxyz: Array) -> pin.SE3:
 
 
 def build_model(selection: Selection) -> pin.Model:
-    """Return the Pinocchio model, with a frame for each body, joint and site.
-
-    Raises:
-        ModelError: If two joints or frames would have the same name.
-    """
+    """Return the Pinocchio model, with a frame for each body, joint and site."""
     return _Builder(selection).model
 
 
@@ -53,11 +49,7 @@ def dofs_of(model: Any, joint: int) -> slice:
 
 
 class _Builder:
-    """Adds the bodies of a scene to a model, from the world outwards.
-
-    Attributes:
-        model: The model.
-    """
+    """Adds the bodies of a scene to a model, from the world outwards."""
 
     def __init__(self, selection: Selection) -> None:
         self._selection, self._scene = selection, selection.model

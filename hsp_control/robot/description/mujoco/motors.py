@@ -11,21 +11,13 @@ from hsp_control.robot.description.mujoco.constants import constants
 
 @dataclass(frozen=True)
 class Motor:
-    """An actuator whose force on one hinge or slide is its control, times a factor.
+    """An actuator whose force on one hinge or slide is its control, times a factor."""
 
-    Attributes:
-        actuator: Its number.
-        control: The address of its control in ``ctrl``.
-        factor: Effort per control: its gain times its gear.
-        lower: Its lowest effort [N·m or N].
-        upper: Its highest effort [N·m or N].
-    """
-
-    actuator: int
-    control: int
-    factor: float
-    lower: float
-    upper: float
+    actuator: int  # its number
+    control: int  # the address of its control in ``ctrl``
+    factor: float  # effort per control: its gain times its gear
+    lower: float  # its lowest effort [N·m or N]
+    upper: float  # its highest effort [N·m or N]
 
 
 def joint_actuators(model: Any) -> dict[int, list[int]]:
@@ -42,11 +34,7 @@ def joint_actuators(model: Any) -> dict[int, list[int]]:
 
 
 def motor(model: Any, actuator: int) -> Motor | None:
-    """Return a direct torque motor, or None if the actuator is of another kind.
-
-    Direct means: it acts on a hinge or a slide; its gain is a constant; it has no bias,
-    no dynamics of its own and no delay.
-    """
+    """Return a direct torque motor, or None if the actuator is of another kind."""
     joint = int(model.actuator_trnid[actuator, 0])
     kinds = constants("mjtJoint")
     scalar = kinds.mjJNT_HINGE, kinds.mjJNT_SLIDE
@@ -102,11 +90,7 @@ def _range(model: Any, actuator: int) -> tuple[float, float]:
 
 
 def _added(model: Any, joint: int, quantity: str) -> float:
-    """Return what a joint's actuators add to its armature or damping.
-
-    Since MuJoCo 4 an actuator has an armature and a damping of its own, which count
-    with its gear squared.
-    """
+    """Return what a joint's actuators add to its armature or damping."""
     owner = getattr(model, "jnt_actuatorid", None)
     if owner is None or owner[joint] < 0:
         return 0.0

@@ -12,7 +12,6 @@ class Names:
     """
 
     def __init__(self, model: Any) -> None:
-        """Set the compiled model."""
         self._model = model
 
     @cached_property

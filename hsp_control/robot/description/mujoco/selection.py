@@ -21,25 +21,18 @@ from hsp_control.robot.description.mujoco.names import Names
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """A robot in a MuJoCo scene.
+    """A robot in a MuJoCo scene."""
 
-    Attributes:
-        model: The compiled model of the scene.
-        names: Its names.
-        root: The body whose subtree is the robot; 0: the robot is the whole scene.
-        bodies: The bodies of that subtree, in ascending order.
-        moving: The joints that move, in ascending order: the order of q and v.
-        qpos: The scene's configuration, shape (model.nq,): all other joints are locked
-            there, and the robot's home is there.
-        chosen: Whether that configuration was chosen; otherwise it is the model's own.
-    """
-
-    model: Any
-    names: Names
-    root: int
-    bodies: tuple[int, ...]
+    model: Any  # the compiled model of the scene
+    names: Names  # its names
+    root: int  # the body whose subtree is the robot; 0: the robot is the whole scene
+    bodies: tuple[int, ...]  # the bodies of that subtree, in ascending order
+    # the joints that move, in ascending order: the order of q and v
     moving: tuple[int, ...]
+    # the scene's configuration, shape (model.nq,): all other joints are locked there,
+    # and the robot's home is there
     qpos: Array
+    # whether that configuration was chosen; otherwise it is the model's own
     chosen: bool
 
     @property
@@ -63,21 +56,9 @@ def select(
 ) -> Selection:
     """Return the robot that a root and the names of its moving joints select.
 
-    Args:
-        model: The compiled model.
-        root: Name of the body whose subtree is the robot; None: the whole scene.
-        joints: Names of the joints that move; None: all joints of the subtree.
-        qpos: The scene's configuration, shape (model.nq,).
-        keyframe: The name of that configuration in the model, instead.
-        locked: Joints that do not move, name to value [rad or m]: there, whatever the
-            configuration says.
-
-    Raises:
-        FrameNotFoundError: If there is no such body.
-        JointNotFoundError: If the subtree has no such joint.
-        ModelError: If no joint moves, both configurations are given, there is no such
-            keyframe, the configuration is not one of the scene, or a joint to lock
-            is to move, or is no hinge or slide.
+    ``root`` None: the whole scene; ``joints`` None: all of the subtree. The scene's
+    configuration is ``qpos`` (model.nq,), or that of a ``keyframe``. ``locked`` joints
+    stay at these values [rad or m], whatever the configuration says.
     """
     names = Names(model)
     top = 0

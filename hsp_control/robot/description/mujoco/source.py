@@ -1,26 +1,113 @@
-"""What a robot keeps of the MuJoCo model that it comes from."""
+"""From an MJCF or a compiled MuJoCo model to a Pinocchio model."""
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import Element
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import AccessError, ModelError, RobotNotFoundError
+from hsp_control.common.suggestions import did_you_mean
 from hsp_control.declaration import within
 from hsp_control.robot.description.access import ANYWHERE, Access
 from hsp_control.robot.description.loading import completed
-from hsp_control.robot.description.mujoco.compiling import compile_mjcf
-from hsp_control.robot.description.mujoco.constants import constants
+from hsp_control.robot.description.mujoco.constants import constants, import_mujoco
 from hsp_control.robot.description.mujoco.dynamics import build_model
-from hsp_control.robot.description.mujoco.omissions import omissions
 from hsp_control.robot.description.mujoco.selection import Selection, select
-from hsp_control.robot.description.mujoco.shapes import body_shapes, excluded_pairs
+from hsp_control.robot.description.mujoco.shapes import (
+    body_shapes,
+    excluded_pairs,
+    omissions,
+)
 from hsp_control.robot.description.robot_description import RobotDescription, ToolFrame
 from hsp_control.robot.description.sources import RobotSource
+from hsp_control.robot.description.urdf_checks import MAX_DOFS, MAX_LINKS
+from hsp_control.robot.description.xml_files import XmlError, read_xml
+
+_FOLDERS = "meshdir", "texturedir", "assetdir"
+_REFUSED = "plugin", "replicate", "composite", "flexcomp"
+"""Elements that run code, or that stand for any number of bodies."""
+_MAX_FILES = 200
+"""Maximum number of files that an MJCF may include; a loop of them ends there."""
+
+
+def compile_mjcf(path: Path, access: Access) -> Any:
+    """Return the ``mujoco.MjModel`` of an MJCF file."""
+    access.check(path, "mjcf")
+    if not path.is_file():
+        near = sorted(file.name for file in path.parent.glob("*.xml"))
+        raise RobotNotFoundError(f"{path}: no such file{did_you_mean(path.name, near)}")
+    top = _read(path)
+    if top.tag != "mujoco":
+        hint = "; give a URDF as name" if top.tag == "robot" else ""
+        raise ModelError(
+            f"{path}: the top element is <{top.tag}>; in an MJCF it is <mujoco>{hint}"
+        )
+    if access.strict:
+        _check_access(path, top, access)
+    mujoco = import_mujoco()
+    try:
+        model = mujoco.MjModel.from_xml_path(str(path))
+    except ValueError as error:
+        reason = " ".join(str(error).split())
+        raise ModelError(f"{path}: MuJoCo rejects it: {reason}") from error
+    for count, limit, what in (
+        (model.nbody, MAX_LINKS, "bodies"),
+        (model.nv, MAX_DOFS, "degrees of freedom"),
+    ):
+        if count > limit:
+            raise ModelError(f"{path}: {count} {what}; at most {limit}")
+    return model
+
+
+def _read(path: Path) -> Element:
+    try:
+        return read_xml(path)
+    except XmlError as error:
+        raise ModelError(error.within(path)) from None
+    except OSError as error:
+        raise RobotNotFoundError(f"{path}: {error.strerror}") from error
+
+
+def _check_access(path: Path, top: Element, access: Access) -> None:
+    """Check every file that an MJCF names, also in the files that it includes."""
+    pending, checked = [(path, top)], 0
+    while pending:
+        file, root = pending.pop()
+        checked += 1
+        if checked > _MAX_FILES:
+            raise AccessError(f"{path}: includes more than {_MAX_FILES} files")
+        for tag in _REFUSED:
+            if next(root.iter(tag), None) is not None:
+                raise AccessError(f"{file}: strict reading allows no <{tag}>")
+        for name, element in _named(root):
+            for place in _places(path.parent, file.parent, root, name):
+                access.check(place, f"{file}: <{element.tag}>")
+                if element.tag in ("include", "model") and place.is_file():
+                    pending.append((place, _read(place)))
+
+
+def _named(root: Element) -> Iterator[tuple[str, Element]]:
+    """Yield the value of every attribute ``file...`` with its element."""
+    for element in root.iter():
+        for attribute, value in element.attrib.items():
+            if attribute.startswith("file"):
+                yield value, element
+
+
+def _places(main: Path, own: Path, root: Element, name: str) -> set[Path]:
+    """Return where MuJoCo may look for a file: in more places rather than in fewer."""
+    folders = [Path()]
+    for compiler in root.iter("compiler"):
+        folders += [Path(compiler.get(key, "")) for key in _FOLDERS]
+    return {base / folder / name for base in (main, own) for folder in folders}
+
 
 _log = logging.getLogger(__name__)
 
@@ -28,15 +115,7 @@ _log = logging.getLogger(__name__)
 def load_mjcf(
     description: RobotDescription, access: Access
 ) -> tuple[pin.Model, RobotSource]:
-    """Return the Pinocchio model of a description with an MJCF, and its source.
-
-    Raises:
-        RobotNotFoundError: If the MJCF cannot be read.
-        AccessError: If it, or a file that it names, is not allowed.
-        ModelError: If MuJoCo rejects it, or what `load_selection` raises.
-        FrameNotFoundError: If the root or a tool frame's parent does not exist.
-        JointNotFoundError: If a joint does not exist or is not below the root.
-    """
+    """Return the Pinocchio model of a description with an MJCF, and its source."""
     assert description.mjcf is not None
     file = Path(description.mjcf)
     with within("mjcf"):
@@ -59,20 +138,7 @@ def load_selection(
     file: Path | None = None,
     access: Access = ANYWHERE,
 ) -> tuple[pin.Model, RobotSource]:
-    """Return the Pinocchio model of a robot in a MuJoCo scene, and its source.
-
-    Args:
-        selection: The robot.
-        tool_frames: Frames to add, by name.
-        gravity: Acceleration of gravity [m/s²], shape (3,); None: the scene's.
-        file: The MJCF that the scene was compiled from, if it was a file.
-        access: Which files that one may name.
-
-    Raises:
-        ModelError: If two joints or frames would have the same name, or the mass
-            matrix is singular.
-        FrameNotFoundError: If a tool frame's parent does not exist.
-    """
+    """Return the Pinocchio model of a robot in a MuJoCo scene, and its source."""
     model = build_model(selection)
     name = model.name if selection.root else _name_of_scene(selection, file)
     floating = any(joint.shortname() == "JointModelFreeFlyer" for joint in model.joints)
@@ -119,11 +185,7 @@ def _name_of_scene(selection: Selection, file: Path | None) -> str:
 
 
 def _home(selection: Selection, model: pin.Model) -> Array:
-    """Return the displacement from neutral to the scene's configuration, shape (nv,).
-
-    If nobody chose that configuration, a joint which is not within its limits there is
-    in their middle: many arms are straight at zero, or beyond a limit.
-    """
+    """Return the scene's configuration from neutral (nv,); within limits."""
     scene, kinds = selection.model, constants("mjtJoint")
     q = pin.neutral(model)
     for index, joint in enumerate(selection.moving, start=1):

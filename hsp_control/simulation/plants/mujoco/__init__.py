@@ -1,10 +1,10 @@
 """MuJoCo as a plant; the package mujoco is imported when such a plant is built."""
 
-from .contact_shapes import ContactShape as ContactShape
-from .ground import Ground as Ground
-from .mujoco import Mujoco as Mujoco
-from .mujoco_scene import MujocoScene as MujocoScene
+from .mjcf import ContactShape as ContactShape
+from .mjcf import Ground as Ground
+from .mjcf import Solid as Solid
+from .plant import Mujoco as Mujoco
 from .plant import MujocoIntegrator as MujocoIntegrator
 from .plant import MujocoPlant as MujocoPlant
+from .scene_plant import MujocoScene as MujocoScene
 from .scene_plant import MujocoScenePlant as MujocoScenePlant
-from .solids import Solid as Solid

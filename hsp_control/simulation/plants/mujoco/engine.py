@@ -12,11 +12,7 @@ from hsp_control.robot.description.mujoco import constants
 
 
 def import_mujoco() -> Any:
-    """Return the module ``mujoco``; its warnings go to our log, not to a file.
-
-    Raises:
-        SimulationError: If it is not installed.
-    """
+    """Return the module ``mujoco``; its warnings go to our log, not to a file."""
     try:
         return constants.import_mujoco()
     except ModelError as error:
@@ -24,15 +20,7 @@ def import_mujoco() -> Any:
 
 
 def check_motion(data: Any, end: float) -> None:
-    """Check that a motion has not diverged.
-
-    Args:
-        data: MuJoCo's data.
-        end: The time it was to reach [s], for the message.
-
-    Raises:
-        SimulationError: If MuJoCo found a number that is not finite, or very large.
-    """
+    """Check that a motion has not diverged."""
     kinds = import_mujoco().mjtWarning
     bad = (
         kinds.mjWARN_BADQPOS,
@@ -48,19 +36,12 @@ def check_motion(data: Any, end: float) -> None:
 
 
 def contact_wrenches(
-    model: Any,
-    data: Any,
-    owners: Mapping[int, str],
-    origins: Mapping[str, Array],
+    model: Any, data: Any, owners: Mapping[int, str], origins: Mapping[str, Array]
 ) -> dict[str, Array]:
     """Return the wrench of all contacts on each owner, shape (6,), in world axes.
 
-    Args:
-        model: MuJoCo's model.
-        data: MuJoCo's data, after ``mj_forward``.
-        owners: The owner of each geom that counts; contacts between two of the same
-            owner cancel.
-        origins: The point of each owner about which its moment is, shape (3,) [m].
+    ``owners`` are those of the geoms that count, contacts between two of one owner
+    cancel; ``origins`` are the points about which their moments are.
     """
     mujoco, count = import_mujoco(), data.ncon
     names = list(origins)
@@ -89,10 +70,7 @@ def _add_wrenches(
     world: Array,
     sums: Array,
 ) -> None:
-    """Add the wrench of each contact to those that it touches, about their origins.
-
-    A contact pushes from its first geom on its second, along the rows of its frame.
-    """
+    """Add the wrench of each contact to those that it touches, about their origins."""
     for k in range(touched.shape[0]):
         for i in range(3):
             world[i] = world[3 + i] = 0.0

@@ -1,18 +1,35 @@
-"""Writes a Pinocchio model as MJCF.
-
-It uses the Pinocchio model and not the URDF, so that locked joints, added parts and
-changed inertias are the same in MuJoCo.
-"""
+"""The MJCF of a robot and of what it can touch: contact shapes, ground and solids."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import KW_ONLY, dataclass, replace
+from typing import Annotated, Any, ClassVar
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
+import coal
 import numpy as np
 import pinocchio as pin
+from pydantic import AfterValidator, Field
 
 from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import SimulationError
+from hsp_control.declaration import Part
+from hsp_control.declaration.named import BY_FRAME, BY_NAME, stored, stored_by_frame
+from hsp_control.declaration.quantities import (
+    ArrayField,
+    Name,
+    NonNegative,
+    Number,
+    Positive,
+    PositiveCount,
+    ProperFraction,
+    Vector3,
+)
+from hsp_control.declaration.rotation import Rotation, matrix_of
+from hsp_control.geometry import link_shapes
+from hsp_control.geometry.capsule_fit import enclosing_capsule
+from hsp_control.geometry.hulls import hull_corners
+from hsp_control.geometry.shapes import Box, Capsule, Cylinder, Shape, Sphere
 from hsp_control.robot import Robot
 from hsp_control.robot.friction import JointFriction
 from hsp_control.robot.mujoco_coordinates import (
@@ -24,9 +41,192 @@ from hsp_control.robot.mujoco_coordinates import (
     SPHERICAL,
     Joint,
 )
-from hsp_control.simulation.plants.mujoco.contact_shapes import Geom
-from hsp_control.simulation.plants.mujoco.ground import Ground
-from hsp_control.simulation.plants.mujoco.solids import Solid
+
+
+class Ground(Part, error=SimulationError):
+    """A horizontal floor."""
+
+    height: Number = 0.0
+    """Height of the floor above the world's origin [m]."""
+    friction: NonNegative = 0.8
+    """Coulomb friction coefficient of the floor [-]."""
+
+
+_MIN_HALF_HEIGHT = 1e-3
+"""Half the height of the box for a flat mesh [m]; MuJoCo needs a positive one."""
+
+
+def supported_shape(shape: Shape) -> Shape:
+    """Return a shape that MuJoCo has."""
+    if not isinstance(shape, Sphere | Capsule | Cylinder | Box):
+        raise ValueError(
+            f"{shape.yaml_type} is not possible here; needs a sphere, capsule, "
+            "cylinder or box"
+        )
+    return shape
+
+
+class ContactShape(Part, error=SimulationError):
+    """A shape at a frame that may touch the ground.
+
+    Without a shape it is the collision geometry of the frame's link, or if that has
+    none, of all links fixed to it. A mesh with a flat sole is replaced by its box in
+    the frame's axes, any other mesh by its capsule, because a robot chatters on the
+    corners of a mesh.
+    """
+
+    yaml_key: ClassVar[str | None] = "frame"
+
+    frame: str
+    """Name of the frame [-]; forces are logged under it. In YAML, its key."""
+    shape: Annotated[Shape, AfterValidator(supported_shape)] | None = None
+    """The shape [-]; by default made from the link's collision geometry."""
+    position: Vector3 = (0.0, 0.0, 0.0)
+    """Position of the shape in the frame [m]."""
+    rotation: Rotation = (0.0, 0.0, 0.0)
+    """Rotation of the shape in the frame: roll, pitch and yaw [rad], a quaternion
+    (x, y, z, w) [-], or a matrix [-]."""
+
+
+ContactShapes = Annotated[
+    Sequence[ContactShape],
+    ArrayField(dict[str, ContactShape], stored_by_frame),
+    BY_FRAME,
+]
+"""Shapes: a sequence in Python, a mapping by frame in YAML."""
+
+
+@dataclass(frozen=True)
+class Geom:
+    """A MuJoCo geom."""
+
+    type: str  # its MuJoCo type
+    size: tuple[float, ...]  # its MuJoCo size [m]
+    placement: pin.SE3  # its placement in its joint's frame
+
+
+def geoms_of(robot: Robot, contact: ContactShape) -> list[Geom]:
+    """Return the geoms of a contact, placed in the frame of its joint."""
+    frame = robot.model.frames[robot.frame_id(contact.frame)]
+    if frame.parentJoint == 0:
+        raise SimulationError("it is fixed to the world and never moves")
+    if contact.shape is not None:
+        offset = pin.SE3(matrix_of(contact.rotation), np.asarray(contact.position))
+        return [geom_of(contact.shape.geometry(), frame.placement * offset)]
+    fixed = [s for s in link_shapes(robot, "meshes") if s.joint == frame.parentJoint]
+    own = [s for s in fixed if s.link == contact.frame] or fixed
+    # For a robot without any geometry, `link_shapes` invents capsules between joints.
+    bodies = {f.name for f in robot.model.frames if f.type == pin.FrameType.BODY}
+    real = [s for s in own if s.link in bodies]
+    if not real:
+        raise SimulationError("no collision geometry is fixed to it; give a shape")
+    return [geom_of(s.geometry, s.placement, frame.placement) for s in real]
+
+
+def geom_of(geometry: Any, place: pin.SE3, frame: pin.SE3 | None = None) -> Geom:
+    """Return the geom of Coal's geometry, a mesh as a box in the axes of ``frame``."""
+    if isinstance(geometry, coal.Sphere):
+        return Geom("sphere", (geometry.radius,), place)
+    if isinstance(geometry, coal.Box):
+        return Geom("box", tuple(map(float, geometry.halfSide)), place)
+    if isinstance(geometry, coal.Capsule):
+        return Geom("capsule", (geometry.radius, geometry.halfLength), place)
+    if isinstance(geometry, coal.Cylinder):
+        return Geom("cylinder", (geometry.radius, geometry.halfLength), place)
+    assert frame is not None
+    vertices = geometry.vertices if hasattr(geometry, "vertices") else geometry.points
+    points = np.array([frame.actInv(place.act(point)) for point in vertices()])
+    return _box_of_sole(points, frame) or _capsule(points, frame)
+
+
+def _box_of_sole(points: Array, frame: pin.SE3) -> Geom | None:
+    """Return the bounding box of points that have a flat sole, None for others."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    sole = points[points[:, 2] <= low[2] + 0.1 * (high[2] - low[2])]
+    if (np.ptp(sole[:, :2], axis=0) < 0.5 * (high - low)[:2]).any():
+        return None
+    middle = pin.SE3(np.eye(3), 0.5 * (low + high))
+    half = np.maximum(0.5 * (high - low), _MIN_HALF_HEIGHT)
+    return Geom("box", tuple(map(float, half)), frame * middle)
+
+
+def _capsule(points: Array, frame: pin.SE3) -> Geom:
+    first, second, radius = enclosing_capsule(hull_corners(points))
+    length = float(np.linalg.norm(second - first))
+    if length < 1e-6:
+        return Geom("sphere", (radius,), frame * pin.SE3(np.eye(3), first))
+    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), second - first)
+    place = pin.SE3(turn.matrix(), 0.5 * (first + second))
+    return Geom("capsule", (radius, 0.5 * length), frame * place)
+
+
+class Solid(Part, error=SimulationError):
+    """A fixed body: a wall, a table, a slope; with copies, stairs; a loose one: a box.
+
+    The robot touches it with the shapes that the plant's ``contacts`` declare. What is
+    loose also touches the ground and the other solids.
+
+    MuJoCo's friction is soft: it damps the slip u as if the surfaces were to stop at
+    the rate b, until the friction cone limits the force. A shape that goes on sliding
+    is pushed off by the acceleration μ b ‖u‖, since the cone's dual couples the two.
+    The surface supplies (1 - d)/d of the acceleration with which the shape is pressed;
+    if that is less, the contact opens and closes for ever. With ``slip_damping`` b and
+    ``impedance`` d things slide as Coulomb says, see ``docs/forces.md``.
+    """
+
+    yaml_key: ClassVar[str | None] = "name"
+
+    name: Name
+    """Its name in the log [-]; in YAML, its key."""
+    shape: Annotated[Shape, AfterValidator(supported_shape)]
+    """Its shape: a box, sphere, cylinder or capsule [-]."""
+    position: Vector3 = (0.0, 0.0, 0.0)
+    """Position of its middle in the world, at the start if it is loose [m]."""
+    rotation: Rotation = (0.0, 0.0, 0.0)
+    """Its rotation, likewise: roll, pitch and yaw [rad], a quaternion (x, y, z, w)
+    [-], or a matrix [-]."""
+    _: KW_ONLY
+    mass: Positive | None = None
+    """Mass of a loose body, evenly distributed [kg]; it is fixed by default."""
+    friction: NonNegative = 0.8
+    """Coulomb friction coefficient of its surface [-]; the ground's does not count."""
+    slip_damping: Positive | None = None
+    """Rate b at which MuJoCo's friction stops a slip [1/s]; MuJoCo's own by default,
+    about 100. The smaller, the faster shapes creep where they stick."""
+    impedance: ProperFraction | None = None
+    """MuJoCo's impedance d of the surface [-]; its own by default, 0.9 to 0.95. The
+    smaller, the deeper things press into it."""
+    copies: PositiveCount = 1
+    """How many there are, one beside the other [-]: the steps of stairs."""
+    spacing: Vector3 = (0.0, 0.0, 0.0)
+    """From each copy to the next, in the world [m]."""
+
+    def __post_init__(self) -> None:
+        if self.copies > 1 and not np.any(np.asarray(self.spacing)):
+            raise SimulationError(
+                f"{self.copies} copies have the spacing [0, 0, 0]; give another one"
+            )
+
+    def geoms(self) -> list[tuple[str, Geom]]:
+        """Return the geoms with their names, placed in the world."""
+        rotation = matrix_of(self.rotation)
+        first, spacing = np.asarray(self.position), np.asarray(self.spacing)
+        return [
+            (
+                f"solid/{self.name}/{k}",
+                geom_of(self.shape.geometry(), pin.SE3(rotation, first + k * spacing)),
+            )
+            for k in range(self.copies)
+        ]
+
+
+Solids = Annotated[
+    Sequence[Solid],
+    ArrayField(Annotated[dict[Name, Solid], Field(max_length=100)], stored),
+    BY_NAME,
+]
+"""Solids: a sequence in Python, a mapping by name in YAML."""
+
 
 MIN_INERTIA = 1e-12
 """Smallest mass and inertia of a body [kg, kg·m²]; MuJoCo needs positive ones."""
@@ -49,18 +249,7 @@ def write_mjcf(
     ground: Ground,
     solids: Sequence[Solid] = (),
 ) -> str:
-    """Return the MJCF text.
-
-    Args:
-        robot: The robot.
-        joints: Its joints.
-        integrator: MuJoCo's name of it.
-        joint_limits: Whether MuJoCo keeps joints within the model's position limits.
-        friction: Friction of the joints.
-        geoms: Geoms with their names to fix to the joints, by index of the joint.
-        ground: The ground; it is written only if there are geoms.
-        solids: The other things that geoms can touch.
-    """
+    """Return the MJCF text."""
     root = Element("mujoco", model=robot.name)
     SubElement(root, "compiler", angle="radian", autolimits="false")
     options = {

@@ -1,7 +1,8 @@
-"""MuJoCo as a plant: a physics engine with its own contacts, friction, integrator."""
+"""MuJoCo as a plant: the robot is translated to a MuJoCo model."""
 
 import importlib
 from collections.abc import Mapping, Sequence
+from dataclasses import KW_ONLY
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -11,23 +12,33 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.control.log_channel import LogChannel
 from hsp_control.declaration import within
+from hsp_control.declaration.quantities import Flag, Positive
 from hsp_control.robot import Robot
 from hsp_control.robot.friction import JointFriction
+from hsp_control.robot.integrators import Integrator
 from hsp_control.robot.mujoco_coordinates import MujocoCoordinates, joints_of
 from hsp_control.robot.step_count import number_of_steps
-from hsp_control.simulation.plants.contact_channels import contact_channels
-from hsp_control.simulation.plants.floating_roots import FloatingRoots
-from hsp_control.simulation.plants.json_data import to_json_data
-from hsp_control.simulation.plants.mujoco.contact_shapes import ContactShape, geoms_of
+from hsp_control.simulation.plants.declared import FrictionalPart
 from hsp_control.simulation.plants.mujoco.engine import (
     check_motion,
     contact_wrenches,
     import_mujoco,
 )
-from hsp_control.simulation.plants.mujoco.ground import Ground
-from hsp_control.simulation.plants.mujoco.mjcf import write_mjcf
-from hsp_control.simulation.plants.mujoco.solids import Solid
-from hsp_control.simulation.plants.plant import SampledPlant
+from hsp_control.simulation.plants.mujoco.mjcf import (
+    ContactShape,
+    ContactShapes,
+    Ground,
+    Solid,
+    Solids,
+    geoms_of,
+    write_mjcf,
+)
+from hsp_control.simulation.plants.plant import (
+    FloatingRoots,
+    SampledPlant,
+    contact_channels,
+    to_json_data,
+)
 from hsp_control.simulation.plants.push import Push, Pushes
 
 MujocoIntegrator = Literal["Euler", "RK4", "implicit", "implicitfast"]
@@ -38,12 +49,6 @@ class MujocoPlant(SampledPlant):
 
     The declared contacts can touch a flat ground and the declared solids; there are no
     other collisions.
-
-    Attributes:
-        mjcf: The model as MJCF text, for MuJoCo's own tools.
-        model: MuJoCo's model.
-        data: MuJoCo's data.
-        coordinates: Converts between Pinocchio's coordinates and MuJoCo's.
     """
 
     def __init__(
@@ -111,6 +116,7 @@ class MujocoPlant(SampledPlant):
                 name = f"{contact.frame}/{len(frame_of_geom)}"
                 geoms.setdefault(joint, []).append((name, geom))
                 frame_of_geom[name] = contact.frame
+        # the model as MJCF text, for MuJoCo's own tools
         self.mjcf = write_mjcf(
             robot,
             joints,
@@ -122,13 +128,15 @@ class MujocoPlant(SampledPlant):
             solids=self.solids,
         )
         try:
+            # MuJoCo's model
             self.model: Any = mujoco.MjModel.from_xml_string(self.mjcf)
         except ValueError as error:
             reason = str(error).strip().splitlines()[0]
             raise SimulationError(f"MuJoCo rejects {robot.name}: {reason}") from error
-        self.data: Any = mujoco.MjData(self.model)
+        self.data: Any = mujoco.MjData(self.model)  # MuJoCo's data
         names = [name for joint in joints for name in joint.mujoco_names]
         made = [self.model.joint(name) for name in names]
+        # converts between Pinocchio's coordinates and MuJoCo's
         self.coordinates = MujocoCoordinates(
             robot,
             joints,
@@ -149,12 +157,7 @@ class MujocoPlant(SampledPlant):
         self.coordinates.to_mujoco(q, v, self.data.qpos, self.data.qvel)
 
     def advance(self, t: float, end: float, tau: Array) -> tuple[Array, Array]:
-        """Step MuJoCo from t to ``end``; see `SampledPlant.advance`.
-
-        Raises:
-            SimulationError: If the effort pushes a root, which has no motor, or the
-                motion diverges.
-        """
+        """Step MuJoCo from t to ``end``; see `SampledPlant.advance`."""
         data = self.data
         motors = self._roots.remove_effort(t, tau)
         steps = number_of_steps(end - t, self.timestep)
@@ -174,10 +177,7 @@ class MujocoPlant(SampledPlant):
     def log_channels(
         self, t: float, q: Array, v: Array, tau: Array
     ) -> Mapping[str, LogChannel]:
-        """Return each contact's force and moment at a true state under an effort.
-
-        Also where each loose solid is.
-        """
+        """Return each contact's force and moment at a true state under an effort."""
         if not self.contacts:
             return {}
         effort = self._roots.remove_effort(t, tau) + self.pushes.effort(t, q)
@@ -259,3 +259,40 @@ class MujocoPlant(SampledPlant):
             for name, frame in self._origins.items()
         }
         return contact_wrenches(self.model, self.data, self._geoms, origins)
+
+
+class Mujoco(FrictionalPart, type="mujoco"):
+    """MuJoCo, with its own integrator, friction and contacts."""
+
+    _: KW_ONLY
+    timestep: Positive = 0.001
+    """Maximum step of MuJoCo [s]."""
+    integrator: MujocoIntegrator = "implicitfast"
+    """Integrator of MuJoCo [-]."""
+    joint_limits: Flag = True
+    """Whether MuJoCo keeps joints within their limits [-]."""
+    contacts: ContactShapes = ()
+    """Shapes that may touch the ground and the solids, by frame name [-]."""
+    ground: Ground = Ground()
+    """The ground [-]; it exists only if `contacts` has entries."""
+    solids: Solids = ()
+    """Walls, tables, slopes and stairs, by name [-]."""
+
+    @property
+    def longest_step(self) -> float:
+        """The longest step of MuJoCo [s]."""
+        return self.timestep
+
+    def engine(self, robot: Robot, integrator: Integrator) -> MujocoPlant:
+        """Return the plant, which has its own integrator."""
+        return MujocoPlant(
+            robot,
+            timestep=self.timestep,
+            integrator=self.integrator,
+            contacts=self.contacts,
+            ground=self.ground,
+            solids=self.solids,
+            joint_limits=self.joint_limits,
+            friction=self.joint_friction(robot),
+            pushes=self.pushes,
+        )

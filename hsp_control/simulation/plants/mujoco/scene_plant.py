@@ -1,8 +1,14 @@
-"""A MuJoCo scene of one's own as a plant: robot, objects and contacts in it."""
+"""A robot in a MuJoCo scene, which moves as MuJoCo says.
+
+MuJoCo has no contacts between a body and its parent, except where the parent stands
+still: a base that its first link overlaps holds this link like a brake.
+"""
 
 import importlib
 import logging
 from collections.abc import Mapping, Sequence
+from dataclasses import KW_ONLY
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,21 +18,60 @@ from hsp_control.common.exceptions import FrameNotFoundError, SimulationError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.control.log_channel import LogChannel
 from hsp_control.declaration import within
+from hsp_control.declaration.quantities import Flag
+from hsp_control.declaration.quantities import Names as NameList
 from hsp_control.robot import MujocoCoordinates, Robot
 from hsp_control.robot.description.mujoco.motors import Motor, joint_actuators, motor
 from hsp_control.robot.description.mujoco.names import Names
+from hsp_control.robot.description.mujoco.source import compile_mjcf
+from hsp_control.robot.integrators import Integrator
 from hsp_control.robot.step_count import number_of_steps
-from hsp_control.simulation.plants.contact_channels import contact_channels
-from hsp_control.simulation.plants.floating_roots import FloatingRoots
-from hsp_control.simulation.plants.json_data import to_json_data
+from hsp_control.simulation.plants.declared import PlantPart
 from hsp_control.simulation.plants.mujoco.engine import (
     check_motion,
     contact_wrenches,
     import_mujoco,
 )
-from hsp_control.simulation.plants.mujoco.own_contacts import own_overlaps
-from hsp_control.simulation.plants.plant import SampledPlant
+from hsp_control.simulation.plants.plant import (
+    FloatingRoots,
+    SampledPlant,
+    contact_channels,
+    to_json_data,
+)
 from hsp_control.simulation.plants.push import Push, Pushes
+
+_DEEP = 1e-3
+"""Depth below which parts touch, and do not overlap [m]."""
+
+
+def own_overlaps(robot: Robot, model: Any, data: Any) -> dict[str, float]:
+    """Return how deep [m] parts of a robot overlap, by ``base and link1``."""
+    names = Names(model)
+    joints = [names.joints.index(name) for name in robot.joints]
+    jointed = {int(model.jnt_bodyid[joint]) for joint in joints}
+    moved = {
+        body for body in range(model.nbody) if jointed & _with_parents(model, body)
+    }
+    mounts = set().union(*(_with_parents(model, body) for body in jointed))
+    found: dict[str, float] = {}
+    for contact in data.contact[: data.ncon]:
+        if min(contact.geom1, contact.geom2) < 0 or contact.dist > -_DEEP:
+            continue  # of a flex, or a touch
+        pair = {int(model.geom_bodyid[g]) for g in (contact.geom1, contact.geom2)}
+        if pair <= moved | mounts and pair & moved:
+            name = " and ".join(names.bodies[body] for body in sorted(pair))
+            found[name] = max(found.get(name, 0.0), -float(contact.dist))
+    return found
+
+
+def _with_parents(model: Any, body: int) -> set[int]:
+    """Return a body and those that carry it, without the world."""
+    found = set()
+    while body:
+        found.add(body)
+        body = int(model.body_parentid[body])
+    return found
+
 
 _log = logging.getLogger(__name__)
 _GROUPS = 31
@@ -74,11 +119,6 @@ class MujocoScenePlant(SampledPlant):
                 get a group of their own in ``model``, which is disabled. Without it
                 they are an error, since they would work against the controller.
             pushes: External wrenches on the robot.
-
-        Raises:
-            SimulationError: If MuJoCo is not installed, or a servo acts on a joint.
-            JointNotFoundError: If the scene lacks a joint of the robot.
-            FrameNotFoundError: If the scene lacks a body, or the robot a frame.
         """
         super().__init__(robot)
         mujoco = import_mujoco()
@@ -119,14 +159,7 @@ class MujocoScenePlant(SampledPlant):
         self._tell_overlaps()
 
     def advance(self, t: float, end: float, tau: Array) -> tuple[Array, Array]:
-        """Step MuJoCo from t to ``end``; see `SampledPlant.advance`.
-
-        The interval is divided into equal steps, at most as long as the scene's own.
-
-        Raises:
-            SimulationError: If the effort pushes a root, which has no motor, or the
-                motion diverges.
-        """
+        """Step MuJoCo from t to ``end``; see `SampledPlant.advance`."""
         data, own = self.data, self.model.opt.timestep
         effort = self._roots.remove_effort(t, tau)
         steps = number_of_steps(end - t, own)
@@ -264,3 +297,57 @@ def _switch_off_servos(
         unused = max({*range(_GROUPS)} - {*map(int, model.actuator_group)})
         model.actuator_group[servos] = unused
         model.opt.disableactuator |= 1 << unused
+
+
+class MujocoScene(PlantPart, type="mujoco_scene"):
+    """The MuJoCo scene that the robot is declared in, with all that is in it.
+
+    The timestep, the integrator, friction and contacts are the scene's own. In Python,
+    `MujocoScenePlant` takes any model and its data.
+    """
+
+    _: KW_ONLY
+    contacts: NameList = ()
+    """Bodies of the scene whose contact forces are logged [-]."""
+    disable_servos: Flag = False
+    """Whether servos on the robot's joints are switched off [-]; if not, they are an
+    error."""
+
+    def __post_init__(self) -> None:
+        own = {"robot", "inertias", "payload", "motor_inertia"}
+        if given := own & {*self.changed_fields()}:
+            raise SimulationError(
+                f"{', '.join(sorted(given))}: the scene has its own bodies; change "
+                "them in the MJCF"
+            )
+
+    def engine(self, robot: Robot, integrator: Integrator) -> MujocoScenePlant:
+        """Return the plant, which has its own integrator."""
+        description = robot.description
+        if description is None or description.mjcf is None:
+            raise SimulationError(
+                f"{robot.name} is not declared by an MJCF, whose scene this plant "
+                "would be; declare it with robot: {mjcf: ...}, or choose the plant "
+                "mujoco, which is made of any robot"
+            )
+        model = compile_mjcf(Path(description.mjcf), robot.source.access)
+        return MujocoScenePlant(
+            robot,
+            model,
+            _start(model, description.keyframe, robot),
+            contacts=self.contacts,
+            disable_servos=self.disable_servos,
+            pushes=self.pushes,
+        )
+
+
+def _start(model: Any, keyframe: str | None, robot: Robot) -> Any:
+    """Return the scene at its keyframe, with locked joints where the robot has them."""
+    mujoco = import_mujoco()
+    data = mujoco.MjData(model)
+    if keyframe is not None:
+        mujoco.mj_resetDataKeyframe(model, data, model.key(keyframe).id)
+    joints = Names(model).joints
+    for name, value in robot.source.locked.items():
+        data.qpos[model.jnt_qposadr[joints.index(name)]] = value
+    return data

@@ -8,8 +8,7 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.control.controller import Controller
 from hsp_control.simulation import Rollout, log_series
-from hsp_control.simulation.decay import predicted_decay
-from hsp_control.simulation.log_distances import logged_distances
+from hsp_control.simulation.log_series import logged_distances, predicted_decay
 from hsp_control.visualization import palette
 from hsp_control.visualization.viewer.packed.held_effort import expected_floor
 

@@ -1,13 +1,49 @@
-"""Errors of the inertial parameters: the same for every body, and random ones."""
+"""What a simulated robot's model has otherwise than the controller's."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable
 
 import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
-from hsp_control.declaration.quantities import NonNegative, Positive, Share, Vector3
+from hsp_control.common.exceptions import SimulationError
+from hsp_control.declaration import Part, within
+from hsp_control.declaration.quantities import (
+    NonNegative,
+    Positive,
+    Share,
+    Vector3,
+    Weights,
+)
 from hsp_control.robot import Robot
-from hsp_control.simulation.plants.model_changes.model_change import ModelChange
-from hsp_control.simulation.plants.random_numbers import seeded_generator
+from hsp_control.robot.per_joint import per_dof
+from hsp_control.simulation.plants.imperfect_plant import seeded_generator
+
+
+class ModelChange(Part, ABC, error=SimulationError):
+    """A change of masses, centres of mass or inertias; joints and frames are kept."""
+
+    @abstractmethod
+    def apply(self, model: pin.Model, robot: Robot, seed: int) -> None:
+        """Change a model in place.
+
+        Args:
+            model: A copy of the robot's model.
+            robot: The robot.
+            seed: Seed of random numbers.
+
+        Raises:
+            HspControlError: If the change does not fit the robot.
+        """
+
+
+def changed(robot: Robot, changes: Iterable[ModelChange], seed: int = 0) -> Robot:
+    """Return a new robot with all changes applied in order."""
+    model = robot.model.copy()
+    for change in changes:
+        change.apply(model, robot, seed)
+    return Robot(model, robot.source, robot.parts)
 
 
 class Inertias(ModelChange):
@@ -66,3 +102,37 @@ def _scale_moments(inertia: Array, factors: Array) -> Array:
     moments, axes = np.linalg.eigh(0.5 * np.trace(inertia) * np.eye(3) - inertia)
     scaled = axes @ np.diag(factors * np.maximum(moments, 0.0)) @ axes.T
     return np.asarray(np.trace(scaled) * np.eye(3) - scaled)
+
+
+class MotorInertia(ModelChange):
+    """Inertia that is added to the diagonal of the mass matrix."""
+
+    inertia: Weights
+    """Rotor inertia times gear ratio squared [kg·m² or kg], one number or nv."""
+
+    def apply(self, model: pin.Model, robot: Robot, seed: int) -> None:
+        """Add the inertia."""
+        model.armature += per_dof(robot, self.inertia)
+
+
+class Payload(ModelChange):
+    """A solid ball at a frame, which the controller does not know about."""
+
+    frame: str
+    """Name of the frame that the payload is fixed to [-]."""
+    mass: Positive
+    """Mass of the payload [kg]."""
+    center: Vector3 = (0.0, 0.0, 0.0)
+    """Centre of the ball in the frame [m]."""
+    radius: NonNegative = 0.0
+    """Radius of the ball [m]; 0 is a point mass."""
+
+    def apply(self, model: pin.Model, robot: Robot, seed: int) -> None:
+        """Add the ball to the body of the frame."""
+        with within("frame"):
+            frame = robot.model.frames[robot.frame_id(self.frame)]
+            if frame.parentJoint == 0:
+                raise SimulationError(f"{self.frame!r} is fixed to the world")
+        center = frame.placement.act(np.asarray(self.center))
+        inertia = 0.4 * self.mass * self.radius**2 * np.eye(3)
+        model.inertias[frame.parentJoint] += pin.Inertia(self.mass, center, inertia)

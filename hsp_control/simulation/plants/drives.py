@@ -1,0 +1,190 @@
+"""Drives: they turn the commanded effort into the applied one."""
+
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Callable, Sequence
+from typing import Annotated, ClassVar, Literal, TypeAlias
+
+import numpy as np
+from pydantic import AfterValidator
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import SimulationError
+from hsp_control.declaration import Part, within
+from hsp_control.declaration.by_type import ByType
+from hsp_control.declaration.quantities import NonNegative, Periods, Share, Weights
+from hsp_control.robot import Robot
+from hsp_control.robot.per_joint import joint_dofs, per_dof
+
+Driving: TypeAlias = Callable[[Array], tuple[Array, float]]
+"""Effort from the drive before, shape (nv,) ↦ the effort that acts, and how long after
+the start of the period it begins to [s]; called once per period."""
+
+
+class Drive(Part, ABC, family="drives", error=SimulationError):
+    """One imperfection of the actuation; several make a chain.
+
+    A subclass declares its parameters as fields (see `Part`) and implements `begin`.
+    A drive knows no robot and has no memory: `begin` makes what runs.
+
+    A plant applies its drives in the order of their stages, whatever the order in which
+    they are given: `DroppedPeriods` 10, `EffortDelay` 20, `Jitter` 30, `EffortNoise`
+    40, `Saturation` 50. A new drive chooses a number between its neighbours; the
+    default is behind all of these.
+
+    Attributes:
+        stage: The place in the chain.
+    """
+
+    stage: ClassVar[float] = 100.0
+
+    @property
+    def active(self) -> bool:
+        """Whether it changes anything; a plant leaves out a drive that does not."""
+        return True
+
+    @property
+    def periods(self) -> int:
+        """By how many control periods it delays the effort, for the rate check."""
+        return 0
+
+    @abstractmethod
+    def begin(self, robot: Robot, random: np.random.Generator) -> Driving:
+        """Return what drives in one run: a function with a memory of its own.
+
+        Args:
+            robot: The simulated robot.
+            random: The random numbers of this drive in this run.
+
+        Raises:
+            SimulationError: If a field does not fit the robot.
+        """
+
+
+def _in_order(drives: tuple[Drive, ...]) -> tuple[Drive, ...]:
+    return tuple(sorted(drives, key=lambda drive: drive.stage))
+
+
+Drives = Annotated[Sequence[Drive], ByType(Drive), AfterValidator(_in_order)]
+"""A chain: a sequence in Python, a mapping by type in YAML; stored by stage."""
+
+
+class DroppedPeriods(Drive, type="dropped"):
+    """Efforts are lost at random, and the drive keeps the last one that arrived."""
+
+    stage: ClassVar[float] = 10.0
+
+    probability: Share
+    """Probability that an effort is lost, independent of the others [-]; the first is
+    never lost."""
+
+    @property
+    def active(self) -> bool:
+        """Whether efforts are lost."""
+        return self.probability > 0.0
+
+    def begin(self, robot: Robot, random: np.random.Generator) -> Driving:
+        """Return what keeps the last effort that arrived; see `Drive.begin`."""
+        last: Array | None = None
+
+        def drive(tau: Array) -> tuple[Array, float]:
+            nonlocal last
+            lost = random.random() < self.probability
+            if last is None or not lost:
+                last = tau.copy()
+            return last, 0.0
+
+        return drive
+
+
+class EffortDelay(Drive, type="delay"):
+    """The effort commanded some periods ago; the first effort until there is one."""
+
+    stage: ClassVar[float] = 20.0
+
+    periods: Periods
+    """Delay of the efforts [control periods]."""
+
+    @property
+    def active(self) -> bool:
+        """Whether there is a delay."""
+        return self.periods > 0
+
+    def begin(self, robot: Robot, random: np.random.Generator) -> Driving:
+        """Return a queue of efforts, empty at first; see `Drive.begin`."""
+        queue: deque[Array] = deque()
+
+        def drive(tau: Array) -> tuple[Array, float]:
+            while len(queue) <= self.periods:
+                queue.append(tau.copy())
+            return queue.popleft(), 0.0
+
+        return drive
+
+
+class EffortNoise(Drive, type="noise"):
+    """Gaussian white noise on the effort, constant during a period."""
+
+    stage: ClassVar[float] = 40.0
+
+    std: Weights
+    """Standard deviation of effort noise [N·m or N], one number or nv."""
+
+    @property
+    def active(self) -> bool:
+        """Whether there is noise."""
+        return bool(np.any(self.std))
+
+    def begin(self, robot: Robot, random: np.random.Generator) -> Driving:
+        """Return what adds noise to the effort; see `Drive.begin`."""
+        with within("std"):
+            std = per_dof(robot, self.std)
+        return lambda tau: (tau + std * random.standard_normal(std.shape), 0.0)
+
+
+class Jitter(Drive, type="jitter"):
+    """Every effort takes effect after a uniformly random delay."""
+
+    stage: ClassVar[float] = 30.0
+
+    longest: NonNegative
+    """Maximum additional delay [s], drawn for each period; an effort takes effect at
+    the end of its period at the latest."""
+
+    @property
+    def active(self) -> bool:
+        """Whether there is a delay."""
+        return self.longest > 0.0
+
+    def begin(self, robot: Robot, random: np.random.Generator) -> Driving:
+        """Return what draws a delay for each effort; see `Drive.begin`."""
+        return lambda tau: (tau, float(random.uniform(0.0, self.longest)))
+
+
+class Saturation(Drive, type="saturation"):
+    """Each joint's effort is clipped at its limit."""
+
+    stage: ClassVar[float] = 50.0
+
+    limit: Literal["model"] | Weights = "model"
+    """Maximum effort [N·m or N], one number or nv, 0 for no limit; ``model`` takes it
+    from the URDF, where that has one."""
+
+    def begin(self, robot: Robot, random: np.random.Generator) -> Driving:
+        """Return what clips the effort; see `Drive.begin`."""
+        with within("limit"):
+            limit = self._limit(robot)
+        limit = np.where(limit > 0.0, limit, np.inf)
+        return lambda tau: (np.clip(tau, -limit, limit), 0.0)
+
+    def _limit(self, robot: Robot) -> Array:
+        """Return the limits, shape (nv,), with 0 for none."""
+        if not isinstance(self.limit, str):
+            return per_dof(robot, self.limit)
+        own = np.asarray(robot.model.upperEffortLimit, dtype=float)
+        given = joint_dofs(robot) & (own > 0.0) & np.isfinite(own)
+        if not given.any():
+            raise SimulationError(
+                f"the URDF of {robot.name} gives no effort limits; state them"
+            )
+        return np.where(given, own, 0.0)
