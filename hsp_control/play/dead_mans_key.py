@@ -15,11 +15,7 @@ class DeadMansKey:
     """Whether the key is held."""
 
     def __init__(self, clock: Callable[[], float] = monotonic) -> None:
-        """Begin with a key that is not held.
-
-        Args:
-            clock: A monotonic clock [s].
-        """
+        """Begin with a key that is not held."""
         self._clock = clock
         self._until = -float("inf")
 

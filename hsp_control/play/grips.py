@@ -40,11 +40,7 @@ DELAY = 0.03
 
 
 class Grip(ABC):
-    """Something that can be dragged.
-
-    Attributes:
-        name: Its name.
-    """
+    """Something that can be dragged."""
 
     def __init__(self, name: str, controller: Controller) -> None:
         """Begin on its own path."""
@@ -53,11 +49,7 @@ class Grip(ABC):
         self._stream: Streamed | None = None
 
     def move(self, value: Any, t: float) -> None:
-        """Lead it somewhere from time t on [s].
-
-        Raises:
-            HspControlError: If the value is none of this kind.
-        """
+        """Lead it somewhere from time t on [s]."""
         wanted = self._wanted(np.asarray(value, dtype=float))
         stream = self._stream or self._make_stream()
         stream.send(wanted)  # before it leads: it may refuse
@@ -116,10 +108,7 @@ class TargetGrip(Grip):
         }
 
     def where(self, state: RobotState) -> list[float]:
-        """Return the reference: x, y, z and a quaternion.
-
-        What the task does not control is the frame's own.
-        """
+        """Return x, y, z and a quaternion; the frame's own where the task is free."""
         frame = state.frame(self._frame)
         pose = pin.SE3ToXYZQUAT(pin.SE3(frame.rotation, frame.position))
         task = self._task()
@@ -202,10 +191,7 @@ class ObstacleGrip(Grip):
 
 
 def targets_of(controller: Controller) -> dict[str, TargetGrip]:
-    """Return the grips of the tasks whose targets can be dragged, by name.
-
-    What a plan writes is the plan's: nobody takes it away.
-    """
+    """Return the draggable targets by name; what a plan writes is the plan's."""
     kinds = FramePose, FramePosition, FrameOrientation
     return {
         task.name: TargetGrip(task, controller)

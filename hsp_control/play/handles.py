@@ -16,24 +16,10 @@ KNOB_PERIOD = 0.1
 
 
 class Handles:
-    """Turns what a page says into streams and changes of a controller.
-
-    Attributes:
-        targets: What can be dragged of tasks and of the field, by name.
-        obstacles: The obstacles that can be dragged, by name.
-        knobs: What can be turned, by its id.
-        values: What the knobs are set to.
-        message: What there is to say.
-        warning: Whether that is a warning.
-    """
+    """Turns what a page says into streams and changes of a controller."""
 
     def __init__(self, controller: Controller, period: float) -> None:
-        """Find what can be touched; nothing is touched yet.
-
-        Args:
-            controller: The controller, at its first state.
-            period: The control period [s].
-        """
+        """Find what can be touched; nothing is touched yet."""
         self._controller = controller
         self.targets: dict[str, Grip] = {
             **targets_of(controller),
@@ -64,14 +50,7 @@ class Handles:
             self.say(str(error), warning=True)
 
     def obey(self, message: Mapping[str, Any]) -> None:
-        """Do what a page says; see `take`.
-
-        Raises:
-            HspControlError: If the controller refuses it.
-            ValueError: If there is no such thing.
-            TypeError: If a value is of no use.
-            OverflowError: If a number is too large.
-        """
+        """Do what a page says; see `take`."""
         t = self._controller.state.t
         match message:
             case {"do": "move", "target": str(name), "pose": list(pose)}:

@@ -28,24 +28,13 @@ _BORNE = 0.2
 
 
 class Knob(NamedTuple):
-    """One control of the page.
+    """One control of the page."""
 
-    Attributes:
-        id: Its name among the knobs.
-        group: Heading under which it is shown.
-        label: What it is called there.
-        unit: Its unit.
-        value: What it is now: a number, or whether it is on.
-        low: Smallest number.
-        high: Largest number.
-        turn: Makes the change to a value, with what `Controller.at` returns.
-    """
-
-    id: str
-    group: str
-    label: str
+    id: str  # its name among the knobs
+    group: str  # heading under which it is shown
+    label: str  # what it is called there
     unit: str
-    value: float | bool
+    value: float | bool  # what it is now: a number, or whether it is on
     low: float
     high: float
     turn: Callable[[Changes, Any], object]
@@ -66,11 +55,7 @@ class Knob(NamedTuple):
         }
 
     def checked(self, value: object) -> float | bool:
-        """Return a value that a page sent, within the bounds.
-
-        Raises:
-            ValueError: If it is none.
-        """
+        """Return a value that a page sent, within the bounds."""
         if isinstance(self.value, bool):
             if not isinstance(value, bool):
                 raise ValueError(f"{self.id} is on or off; got {value!r}")
@@ -83,12 +68,7 @@ class Knob(NamedTuple):
 
 
 def knobs_of(controller: Controller, period: float) -> dict[str, Knob]:
-    """Return the knobs of a controller, by their ids.
-
-    Args:
-        controller: The controller, before any change by a knob.
-        period: The control period [s].
-    """
+    """Return the knobs of a controller, by their ids."""
     found = [*_null_space(controller, period), *_tasks(controller, period)]
     return {knob.id: knob for knob in found}
 
@@ -113,16 +93,7 @@ def _null_space(controller: Controller, period: float) -> Iterator[Knob]:
 
 
 class _FieldSwitch:
-    """Lets the field go, and brings it back as it is by then.
-
-    Its terms stay, with the weight 0: obstacles that are moved meanwhile, and a posture
-    that is led, move in them, too.
-
-    Attributes:
-        weights: What each term weighs while the field is on, by its name; without those
-            that share a name, or whose weight is a function.
-        whole: Whether these are all terms; else the field cannot be switched.
-    """
+    """Lets the field go (its terms stay, with weight 0), and brings it back."""
 
     def __init__(self, field: NullSpaceField) -> None:
         """Begin with the field as it is."""

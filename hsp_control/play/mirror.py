@@ -48,18 +48,7 @@ class ToldHandles(Handles):
 
 
 class Mirror:
-    """What a picture needs of a live loop; see `Played`.
-
-    Attributes:
-        experiment: What the loop controls.
-        controller: A controller like the loop's, at the state of the last row.
-        period: The control period [s].
-        recorder: The journal's rows; before them, the start.
-        handles: What can be touched.
-        kind: Whether a key must be held.
-        over: How the loop has ended; empty: it goes on.
-        pushes: None: nobody pulls at this robot with a mouse.
-    """
+    """What a picture needs of a live loop; see `Played`."""
 
     pushes = None
 
@@ -72,15 +61,7 @@ class Mirror:
         *,
         held: bool,
     ) -> None:
-        """Begin at the experiment's start.
-
-        Args:
-            experiment: What the loop controls.
-            period: The control period [s].
-            journal: The loop's journal; it may appear later.
-            channel: The way to the loop.
-            held: Whether a key must be held.
-        """
+        """Begin at the experiment's start."""
         self.experiment, self.period = experiment, period
         self.kind: Kind = "held" if held else "live"
         self.controller = experiment.controller
@@ -114,11 +95,7 @@ class Mirror:
             self.handles.take(message)  # zones and distances follow it here, too
 
     def read(self) -> None:
-        """Read what has come from the loop.
-
-        Raises:
-            LogError: If the journal cannot be read.
-        """
+        """Read what has come from the loop."""
         for word in self._channel.receive():
             self.handles.hear(word)
         if self._tail.read():

@@ -44,32 +44,19 @@ _JOINTS = 8
 
 
 class Curve(NamedTuple):
-    """One curve of a plot.
-
-    Attributes:
-        name: What it shows.
-        column: Column of the log.
-        rows: Which components, of which the norm is shown.
-    """
+    """One curve of a plot."""
 
     name: str
-    column: str
-    rows: slice
+    column: str  # column of the log
+    rows: slice  # which components, of which the norm is shown
 
 
 class Plot(NamedTuple):
-    """One plot.
-
-    Attributes:
-        title: What it shows.
-        unit: The unit.
-        log: Whether its scale is logarithmic.
-        curves: Its curves.
-    """
+    """One plot."""
 
     title: str
     unit: str
-    log: bool
+    log: bool  # whether its scale is logarithmic
     curves: list[Curve]
 
 
@@ -163,10 +150,7 @@ class Picture:
         viewer.transport.send([self._setup(title), *self.frame(running=True, rate=1.0)])
 
     def _layers(self, motion: Motion) -> dict[str, Layer]:
-        """Return the layers of the present instant, those of the present field too.
-
-        Not those of a whole run: what a controller was at its start is not drawn.
-        """
+        """Return the layers of the present instant, those of the present field too."""
         robot, controller = self._session.experiment.robot, self._session.controller
         dark = self._viewer.dark
         layers = all_layers(robot, motion, None, dark=dark)
@@ -184,15 +168,7 @@ class Picture:
         return layers
 
     def draw(self, *, running: bool, rate: float) -> None:
-        """Send a picture of the present instant.
-
-        Args:
-            running: Whether the session goes on by itself.
-            rate: Seconds of the session per second.
-
-        Raises:
-            ViewerError: If the server has ended.
-        """
+        """Send a picture of the present instant."""
         self._viewer.transport.send(self.frame(running=running, rate=rate))
 
     def frame(self, *, running: bool, rate: float) -> list[Command]:

@@ -57,10 +57,7 @@ class PostureGrip(Grip):
         }
 
     def where(self, state: RobotState) -> list[float]:
-        """Return where the joint is in the target posture, and its orientation.
-
-        While one target takes over from another, it is between them by their weights.
-        """
+        """Return the joint's pose in the target posture, x, y, z and a quaternion."""
         terms = [
             t for t in terms_of(self._controller.field) if isinstance(t, TargetPosture)
         ]

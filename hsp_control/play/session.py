@@ -44,33 +44,15 @@ _log = logging.getLogger(__name__)
 
 
 class Session:
-    """A robot that moves in its simulated world, and changes as it is told to.
+    """The sampled loop of `simulate`, row by row; between two, a page may change it.
 
-    It is the sampled loop of `simulate`, row by row: between two rows, messages of a
-    page become streams, changes of the controller and forces. All but the forces are
-    in the log, which repeats the run.
-
-    Attributes:
-        experiment: What is simulated.
-        period: The control period [s].
-        row: Time between two rows [s].
-        recorder: The rows so far.
-        handles: What can be touched, but for the links.
-        over: Why it goes on no more, until it is reset; empty: it does.
+    All but the forces of a page is in the log, which repeats the run.
     """
 
     kind: Literal["simulated"] = "simulated"
 
     def __init__(self, experiment: Experiment) -> None:
-        """Begin at the experiment's start.
-
-        Args:
-            experiment: The experiment; it has a control period, and its log period is a
-                multiple of it. See `playable`.
-
-        Raises:
-            SimulationError: If it has no control period.
-        """
+        """Begin at the experiment's start."""
         settings = experiment.scenario.simulation
         if settings.control_period is None:
             raise SimulationError("a session needs a control period")

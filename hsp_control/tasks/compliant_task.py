@@ -55,10 +55,7 @@ class CompliantTask(SecondOrderTask):
             )
 
     def _rotating(self, state: RobotState) -> Rotating:
-        """Return which rows are a rotation vector, of a frame that is kept up to date.
-
-        By default none are.
-        """
+        """Return which rows are a rotation vector; by default none are."""
         return Rotating(self.rows, np.eye(3), np.zeros(3))
 
     def checked(self, robot: Robot) -> Self:

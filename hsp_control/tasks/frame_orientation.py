@@ -125,14 +125,8 @@ def orientation_error(
 
     w̃ = Rᵀ(w - w_d) is the relative angular velocity in the axes of the frame.
 
-    Args:
-        R: World ← frame, shape (3, 3).
-        w: Angular velocity, world axes, shape (3,) [rad/s].
-        R_d: Desired orientation, world ← frame, shape (3, 3).
-        w_d: Desired angular velocity, world axes, shape (3,) [rad/s].
-        scratch: Shape (ORIENTATION_SCRATCH, 3), overwritten.
-        e: Error, written, shape (3,) [rad].
-        e_dot: Error rate, written, shape (3,) [rad/s].
+    Shapes: w (3,) [rad/s], w_d (3,) [rad/s], scratch (ORIENTATION_SCRATCH, 3), e (3,)
+    [rad], e_dot (3,) [rad/s].
     """
     w_tilde, y, E = scratch[0], scratch[1], scratch[6:9]
     compose_back(R_d, R, E)
@@ -163,15 +157,8 @@ def orientation_acceleration(
     w̃ = Jexp(y) y' gives w̃' = Jexp y'' + Jexp' y'. The motion of the desired frame adds
     the transport term: w' = R w̃' - w × w_d + w_d'.
 
-    Args:
-        R: World ← frame, shape (3, 3).
-        w: Angular velocity, world axes, shape (3,) [rad/s].
-        w_d: Desired angular velocity, world axes, shape (3,) [rad/s].
-        w_d_dot: Desired angular acceleration, world axes, shape (3,) [rad/s²].
-        e: Error, shape (3,) [rad].
-        e_dot: Error rate, shape (3,) [rad/s].
-        scratch: Shape (ORIENTATION_SCRATCH, 3), overwritten.
-        out: y'', overwritten by w' in world axes, shape (3,) [rad/s²].
+    Shapes: w (3,) [rad/s], w_d (3,) [rad/s], w_d_dot (3,) [rad/s²], e (3,) [rad], e_dot
+    (3,) [rad/s], scratch (ORIENTATION_SCRATCH, 3), out (3,) [rad/s²].
     """
     y, y_dot, w_tilde_dot, term = scratch[0], scratch[1], scratch[2], scratch[3]
     for i in range(3):

@@ -142,31 +142,19 @@ class FramePose(FrameTask, TrackingTask, CompliantTask, type="frame_pose"):
 
 
 class _Reference(NamedTuple):
-    """The reference of a pose at a state's time.
-
-    Attributes:
-        sample: The reference.
-        follow: Writes it for a time [s].
-        measure: Writes `values` for the reference and the frame.
-        values: What `FramePose.measure` returns, shape (2, 7).
-    """
+    """The reference of a pose at a state's time."""
 
     sample: PoseSample
-    follow: Callable[[float], object]
-    measure: Callable[[], object]
-    values: Array
+    follow: Callable[[float], object]  # writes it for a time [s]
+    measure: Callable[[], object]  # writes `values` for the reference and the frame
+    values: Array  # what `FramePose.measure` returns, (2, 7)
 
 
 @kernel
 def _measured_pose(desired: Array, position: Array, R: Array, values: Array) -> None:
     """Write the desired and the actual pose; see `FramePose.measure`.
 
-    Args:
-        desired: See `pose_error_equation`.
-        position: The actual position, shape (3,).
-        R: The actual rotation, shape (3, 3).
-        values: Written, shape (2, 7); of the two quaternions that mean the actual
-            rotation, it has the one nearer to the desired one.
+    Shapes: values (2, 7).
     """
     for i in range(3):
         values[0, i], values[1, i] = desired[0, i], position[i]

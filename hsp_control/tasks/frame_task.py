@@ -53,17 +53,7 @@ class FrameTask(SecondOrderTask):
     def _compile(
         self, frame: FrameKinematics, feedback: Feedback, out: TaskSample
     ) -> tuple[Follower, Callable[[], Any]]:
-        """Return two calls: one updates the reference, the other writes ``out``.
-
-        Args:
-            frame: The kinematics of the frame, computed before the second call.
-            feedback: The gains and the offset that the second call reads.
-            out: The sample that the second call writes.
-
-        Returns:
-            A function of time [s] that updates the reference, and a function without
-            arguments that reads reference and frame and writes ``out``.
-        """
+        """Return what updates the reference at a time [s], and what writes ``out``."""
 
     def compile(
         self, state: RobotState, feedback: Feedback, out: TaskSample
@@ -79,11 +69,7 @@ class FrameTask(SecondOrderTask):
 
 
 def frame_of(frame: str | None, robot: Robot) -> str:
-    """Return the frame, checked to exist, or the robot's end effector.
-
-    Raises:
-        FrameNotFoundError: If the robot has no such frame.
-    """
+    """Return the frame, checked to exist, or the robot's end effector."""
     if frame is None:
         return robot.end_effector
     with within("frame"):

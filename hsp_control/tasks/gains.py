@@ -83,11 +83,7 @@ class Gains(Part, error=GainError):
 
 
 def as_matrix(gain: Array, size: int, name: str) -> Array:
-    """Return a scalar, per-row or matrix gain as a matrix of shape (size, size).
-
-    Raises:
-        GainError: If a list or a matrix has another size.
-    """
+    """Return a scalar, per-row or matrix gain as a matrix of shape (size, size)."""
     if gain.ndim == 0:
         return np.asarray(np.eye(size) * gain)
     if gain.shape not in {(size,), (size, size)}:
@@ -99,12 +95,7 @@ def as_matrix(gain: Array, size: int, name: str) -> Array:
 
 
 def as_gain(value: ArrayLike, name: str) -> Array:
-    """Return a gain as an array of 0, 1 or 2 dimensions.
-
-    Raises:
-        GainError: If it is not numeric, empty, a matrix that is not square, not finite,
-            or not positive (a matrix: on its diagonal).
-    """
+    """Return a gain as an array of 0, 1 or 2 dimensions."""
     try:
         gain = np.array(value, dtype=float)
     except (TypeError, ValueError):

@@ -78,21 +78,14 @@ class Impedance(Part, error=GainError):
 def parts_of(numbers: Array) -> tuple[Array, Array, Array, Array]:
     """Return views: K and D, shape (m, m), ζ and 1/largest error, shape (m,).
 
-    Args:
-        numbers: The four of them, one below the other, shape (2 m + 2, m).
+    Shapes: numbers (2 m + 2, m).
     """
     m = numbers.shape[1]
     return numbers[:m], numbers[m : 2 * m], numbers[2 * m], numbers[2 * m + 1]
 
 
 def check_bounded(stiffness: Array) -> None:
-    """Check that a stiffness may have a largest error.
-
-    Otherwise its force would be the gradient of no energy.
-
-    Raises:
-        GainError: If it is a matrix that is not diagonal.
-    """
+    """Check that a bounded force has an energy: its stiffness must be diagonal."""
     if stiffness.ndim == 2 and np.any(stiffness != np.diag(np.diag(stiffness))):
         raise GainError(
             "largest_error needs a diagonal stiffness: with "
@@ -101,11 +94,7 @@ def check_bounded(stiffness: Array) -> None:
 
 
 def _definite(value: ArrayLike, name: str) -> Array:
-    """Return a number, a list or a matrix that is symmetric positive definite.
-
-    Raises:
-        GainError: If it is not.
-    """
+    """Return a number, a list or a matrix that is symmetric positive definite."""
     gain = as_gain(value, name)
     if gain.ndim == 2:
         if not np.allclose(gain, gain.T, rtol=1e-9, atol=0.0):

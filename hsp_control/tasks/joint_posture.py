@@ -142,13 +142,7 @@ class JointPosture(CompliantTask, type="joint_posture"):
         return actual + robot.difference(state.q, desired)[indices], actual
 
     def _indices(self, robot: Robot) -> list[int]:
-        """Return the index of each joint in v.
-
-        Raises:
-            JointNotFoundError: If a joint does not exist.
-            TaskError: If there is no joint, a joint is named twice, or a joint has
-                several degrees of freedom.
-        """
+        """Return the index of each joint in v."""
         indices = []
         for k, joint in enumerate(self._joints):
             if joint in self._joints[:k]:

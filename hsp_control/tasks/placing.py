@@ -19,14 +19,7 @@ from hsp_control.trajectories import (
 def place_point(trajectory: Trajectory, here: Array, blend: float | None) -> Trajectory:
     """Return the trajectory of a point in the world, blended if asked for.
 
-    Args:
-        trajectory: The trajectory.
-        here: Where the robot starts, in the coordinates of the task, shape (n,).
-        blend: Duration of the transition from there [s]; None: none.
-
-    Raises:
-        TrajectoryError: If a point of the trajectory has another dimension.
-        TaskError: If the trajectory has another dimension.
+    Shapes: here (n,).
     """
     with within("trajectory"):
         placed = trajectory.anchored(here)
@@ -41,13 +34,7 @@ def place_point(trajectory: Trajectory, here: Array, blend: float | None) -> Tra
 def place_orientation(
     trajectory: OrientationTrajectory, here: Array, blend: float | None
 ) -> OrientationTrajectory:
-    """Return the trajectory of an orientation, blended if asked for.
-
-    Args:
-        trajectory: The trajectory.
-        here: The orientation in which the robot starts, shape (3, 3).
-        blend: Duration of the transition from there [s]; None: none.
-    """
+    """Return the trajectory of an orientation, blended if asked for."""
     with within("trajectory"):
         placed = trajectory.anchored(here)
         if blend is None:
@@ -58,16 +45,7 @@ def place_orientation(
 def place_pose(
     trajectory: PoseTrajectory | Trajectory, here: pin.SE3, blend: float | None
 ) -> PoseTrajectory:
-    """Return the trajectory of a pose, blended if asked for.
-
-    Args:
-        trajectory: The trajectory; of a point: the orientation is held.
-        here: The pose in which the robot starts.
-        blend: Duration of the transition from there [s]; None: none.
-
-    Raises:
-        TaskError: If a trajectory cannot be blended.
-    """
+    """Return the trajectory of a pose, blended if asked for."""
     if isinstance(trajectory, Trajectory):
         point = place_point(trajectory, np.array(here.translation), None)
         trajectory = ComposedPose(point)

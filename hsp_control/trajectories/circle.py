@@ -64,11 +64,7 @@ class Circle(Compiled, Trajectory, type="circle"):
 
     @cached_property
     def _plane(self) -> Array:
-        """u1 and u2, shape (2, n).
-
-        Raises:
-            TrajectoryError: If they are not orthonormal or do not fit the dimension.
-        """
+        """u1 and u2, shape (2, n)."""
         n = self.dimension
         if self.axes is not None:
             return checks.orthonormal(self.axes, "axes", (2, n))
@@ -86,11 +82,7 @@ class Circle(Compiled, Trajectory, type="circle"):
 
 
 def _axes_from_normal(normal: Array, toward: ArrayLike | None) -> Array:
-    """Return u1 and u2 = normal × u1, shape (2, 3); ``normal`` has length 1.
-
-    Raises:
-        TrajectoryError: If ``toward`` is parallel to ``normal``.
-    """
+    """Return u1 and u2 = normal × u1, shape (2, 3); ``normal`` has length 1."""
     if toward is None:
         first = np.eye(3)[np.argmin(np.abs(normal))]
     else:

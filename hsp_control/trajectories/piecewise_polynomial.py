@@ -18,31 +18,17 @@ from hsp_control.trajectories.trajectory import Trajectory
 
 
 class Pieces(NamedTuple):
-    """x(t) = Σ_k c_ik u^k with u = (t - t_i) / (t_{i+1} - t_i) between t_i and t_{i+1}.
+    """x(t) = Σ_k c_ik u^k, u = (t - t_i) / (t_{i+1} - t_i) from t_i to t_{i+1}."""
 
-    Attributes:
-        times: The m knots, increasing, shape (m,) [s].
-        waypoints: The points at the knots, shape (m, n).
-        coefficients: c, shape (m - 1, degree + 1, n).
-    """
-
-    times: Array
-    waypoints: Array
-    coefficients: Array
+    times: Array  # the m knots, increasing, (m,) [s]
+    waypoints: Array  # the points at the knots, (m, n)
+    coefficients: Array  # c, (m - 1, degree + 1, n)
 
 
 def join(times: ArrayLike, coefficients: ArrayLike, end: ArrayLike | None) -> Pieces:
     """Return polynomials joined at their knots, checked.
 
-    Args:
-        times: The knots, increasing, shape (m,) [s].
-        coefficients: c, shape (m - 1, degree + 1, n).
-        end: The point after the last knot, shape (n,); None: the end of the last
-            polynomial, with its rounding error.
-
-    Raises:
-        TrajectoryError: If a shape does not fit, a value is not finite, or the knots do
-            not increase.
+    Shapes: times (m,) [s], coefficients (m - 1, degree + 1, n), end (n,).
     """
     c = checks.array(coefficients, "coefficients", (None, None, None))
     knots = checks.waypoint_times(times, len(c) + 1)

@@ -30,13 +30,8 @@ def horner(
 ) -> None:
     """Write Σ_k c_k u^k and its two time derivatives, where u' = 1 / width.
 
-    Args:
-        u: Relative position in the interval, from 0 to 1.
-        width: Length of the interval [s].
-        coefficients: c, shape (degree + 1, n).
-        position: The value, written, shape (n,).
-        velocity: Its first derivative, written, shape (n,) [1/s].
-        acceleration: Its second derivative, written, shape (n,) [1/s²].
+    Shapes: coefficients (degree + 1, n), position (n,), velocity (n,) [1/s],
+    acceleration (n,) [1/s²].
     """
     for j in range(position.size):
         x, x_dot, half_x_ddot = 0.0, 0.0, 0.0  # Horner's scheme and its derivatives

@@ -56,11 +56,7 @@ class ScrewInterpolation(PoseTrajectory, type="screw"):
 
     @cached_property
     def _ends(self) -> tuple[Array, Array]:
-        """Positions and rotations at both ends, shapes (2, 3) and (2, 3, 3).
-
-        Raises:
-            TrajectoryError: If the start is not known.
-        """
+        """Positions and rotations at both ends, shapes (2, 3) and (2, 3, 3)."""
         if self.start_position is None or self.start_rotation is None:
             raise TrajectoryError(
                 "ScrewInterpolation begins where the robot starts, which only a "

@@ -52,11 +52,7 @@ class Clearance(Cost):
 
     @abstractmethod
     def _pairs(self, robot: Robot) -> Proximity:
-        """Return new memory for the pairs of shapes and their distances.
-
-        Raises:
-            FieldError: If there is no pair.
-        """
+        """Return new memory for the pairs of shapes and their distances."""
 
     def placed(self, start: Start) -> Self:
         """Return the cost with obstacles instead of their names, checked.
@@ -162,16 +158,9 @@ class Clearance(Cost):
 
 
 class _Work(NamedTuple):
-    """What a clearance computes with at one state.
+    """What a clearance computes with at one state."""
 
-    Attributes:
-        proximity: The pairs of shapes and their distances.
-        slopes: ∂f/∂d of each pair, written by ``barrier``.
-        curvatures: ∂²f/∂d² of each pair, written by ``barrier``.
-        barrier: Reads the distances, writes slopes and curvatures, and returns f.
-    """
-
-    proximity: Proximity
-    slopes: Array
-    curvatures: Array
+    proximity: Proximity  # the pairs of shapes and their distances
+    slopes: Array  # ∂f/∂d of each pair, written by ``barrier``
+    curvatures: Array  # ∂²f/∂d² of each pair, written by ``barrier``
     barrier: Callable[[], float]

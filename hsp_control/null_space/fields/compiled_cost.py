@@ -33,10 +33,7 @@ class CompiledCost(Cost):
     def _compile(self, state: RobotState, gradient: Array, rate: Array) -> Derivatives:
         """Return a call that writes ∇f and (∇f)' and returns f.
 
-        Args:
-            state: The state that the call reads. Its values change between calls.
-            gradient: The array that the call writes ∇f into, shape (nv,).
-            rate: The array that the call writes (∇f)' into, shape (nv,).
+        Shapes: gradient (nv,), rate (nv,).
         """
 
     def compile(

@@ -184,10 +184,7 @@ class FunctionCost(Cost):
 
 @kernel
 def descend(L: Array, W_dot: Array, form: int, g: Array, g_dot: Array) -> bool:
-    """Overwrite (∇f, (∇f)') by g = -W⁻¹∇f and g' = -W⁻¹((∇f)' + W'g).
-
-    Return whether all entries are finite.
-    """
+    """Overwrite (∇f, (∇f)') by g = -W⁻¹∇f and g'; return whether all are finite."""
     raise_covector(g, L, form)
     total = 0.0
     for i in range(g.shape[0]):

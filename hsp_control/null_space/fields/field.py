@@ -259,21 +259,13 @@ class FieldSum(NullSpaceField):
 
 
 class _Adding(NamedTuple):
-    """What a sum computes with at one state.
+    """What a sum computes with at one state."""
 
-    Attributes:
-        sample: The sample of a term.
-        weights: Its w and w', shape (2,).
-        total: The sum.
-        start: Begins the sum with the sample.
-        add: Adds the sample to the sum.
-    """
-
-    sample: FieldSample
-    weights: Array
+    sample: FieldSample  # the sample of a term
+    weights: Array  # its w and w', (2,)
     total: FieldSample
-    start: Callable[[], object]
-    add: Callable[[], object]
+    start: Callable[[], object]  # begins the sum with the sample
+    add: Callable[[], object]  # adds the sample to the sum
 
     @classmethod
     def allocate(cls, nv: int) -> "_Adding":

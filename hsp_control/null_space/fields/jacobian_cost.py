@@ -165,9 +165,6 @@ class CompiledJacobianCost(JacobianCost):
         The further arguments are J, J', ∂φ/∂J and its rate, shape (k, nv) each, and a
         scratch array of shape (8, k, nv). The kernel writes ∂φ/∂J and its rate, and
         returns φ.
-
-        Args:
-            nv: Number of degrees of freedom of the robot.
         """
 
     def terms(self, J: Array, J_dot: Array) -> JacobianTerms:
@@ -239,18 +236,9 @@ def chain_gradient(
 ) -> None:
     """Write the gradient of φ(J) and its rate from B = ∂φ/∂J, as the module describes.
 
-    Args:
-        J: Jacobian of the frame, in world axes at its origin, shape (6, nv).
-        J_dot: J', shape (6, nv).
-        B: ∂φ/∂J, shape (6, nv).
-        B_dot: B', shape (6, nv).
-        dofs: The k degrees of freedom that move the frame, from the root on, shape
-            (k,).
-        first: For each of them, the position in ``dofs`` of the first degree of freedom
-            of its joint, shape (k,).
-        sums: Scratch, shape (4, k + 1, 3).
-        gradient: ∂φ/∂q, shape (nv,); only the entries ``dofs`` are written.
-        rate: Its time derivative, shape (nv,); only the entries ``dofs`` are written.
+    ``dofs`` (k,) are those that move the frame, from the root on, and the entries that
+    are written; ``first`` (k,) is where in ``dofs`` the joint of each begins. J, B: (6,
+    nv).
     """
     k = dofs.shape[0]
     carried, carried_dot, before, before_dot = sums[0], sums[1], sums[2], sums[3]
@@ -296,12 +284,7 @@ def chain_gradient(
 
 
 def _chain(robot: Robot, frame: str) -> tuple[Indices, Indices]:
-    """Return ``dofs`` and ``first`` of `chain_gradient`, shape (k,) each.
-
-    Raises:
-        FieldError: If a joint of the chain mimics another one: its degree of freedom is
-            then in the chain twice, which the running sums do not support.
-    """
+    """Return ``dofs`` and ``first`` of `chain_gradient`, shape (k,) each."""
     model = robot.model
     dofs: list[int] = []
     first: list[int] = []

@@ -96,11 +96,7 @@ def _centering(
 
 
 def per_dof(weights: ArrayLike, nv: int) -> Array:
-    """Return weights of the joints as an array of shape (nv,).
-
-    Raises:
-        FieldError: If they are neither one number nor nv.
-    """
+    """Return weights of the joints as an array of shape (nv,)."""
     array = np.array(weights, dtype=float)
     if array.ndim == 0:
         return np.full(nv, float(array))

@@ -79,11 +79,7 @@ class ObstacleClearance(Clearance, type="obstacle_clearance"):
 def _moving_shapes(
     shapes: Sequence[LinkShape], links: Sequence[str] | None
 ) -> list[int]:
-    """Return the indices of the shapes of links that move and are among ``links``.
-
-    Raises:
-        FieldError: If one of ``links`` has no shape.
-    """
+    """Return the indices of the shapes of links that move and are among ``links``."""
     known = tuple(dict.fromkeys(shape.link for shape in shapes))
     for k, link in enumerate(links or ()):
         if link not in known:

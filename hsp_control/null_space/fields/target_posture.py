@@ -105,10 +105,7 @@ def _posture(
     gradient: Array,
     rate: Array,
 ) -> float:
-    """Write ∇f = w_i d_i and (∇f)' = w_i d_i', and return f.
-
-    For continuous joints ∇f = w_i sin d_i and (∇f)' = w_i cos d_i d_i'.
-    """
+    """Write ∇f = w d (continuous joints: w sin d) and its rate, and return f."""
     for i in range(v.shape[0]):
         gradient[i] = rate[i] = 0.0
     joint_displacements(q, target, single_dof_joints, gradient)

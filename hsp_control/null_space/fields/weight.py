@@ -116,11 +116,7 @@ def sample_weight(weight: Weight | float, state: RobotState) -> tuple[float, flo
 
 
 def product(first: Weight | float, second: Weight | float) -> Weight | float:
-    """Return the product of two weights; of numbers it is a number.
-
-    Raises:
-        FieldError: If a number is negative or not finite, and the other one no number.
-    """
+    """Return the product of two weights; of numbers it is a number."""
     if isinstance(first, Weight) and isinstance(second, Weight):
         return Product(first, second)
     if not isinstance(first, Weight) and not isinstance(second, Weight):

@@ -14,11 +14,7 @@ _Row = Annotated[list[Number], Field(min_length=1)]
 
 
 def _array(value: list[Any]) -> Array:
-    """Return the matrix or its diagonal, read-only.
-
-    Raises:
-        ValueError: If it is neither.
-    """
+    """Return the matrix or its diagonal, read-only."""
     if len({isinstance(entry, list) for entry in value}) > 1:
         raise ValueError("mixes numbers and rows; needs rows, or numbers (a diagonal)")
     return read_only(value)

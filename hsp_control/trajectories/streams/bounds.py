@@ -16,27 +16,18 @@ points are then at most a tenth too cautious for a motion from rest to rest."""
 
 
 class MotionBounds(NamedTuple):
-    """Largest magnitude of the first three derivatives, for each coordinate.
+    """Largest magnitude of the first three derivatives, for each coordinate."""
 
-    Attributes:
-        speed: Shape (n,) [1/s].
-        acceleration: Shape (n,) [1/s²].
-        jerk: Shape (n,) [1/s³].
-    """
-
-    speed: Array
-    acceleration: Array
-    jerk: Array
+    speed: Array  # (n,) [1/s]
+    acceleration: Array  # (n,) [1/s²]
+    jerk: Array  # (n,) [1/s³]
 
     def keep(self, ends: Array, duration: float) -> bool:
         """Return whether a quintic keeps the bounds throughout.
 
-        Its derivatives are Bézier curves, which lie between their control points; so
-        True is certain, and False may be too cautious.
-
-        Args:
-            ends: x, T x', T² x'' at the start, then at the end, shape (6, n).
-            duration: T [s].
+        ``ends`` (6, n) are x, T x', T² x'' at the start, then at the end. The
+        derivatives are Bézier curves, between their control points: True is certain,
+        False too cautious.
         """
         T, scale = duration, 1.0
         for matrix, bound in zip(_DERIVATIVES, self, strict=True):
@@ -49,11 +40,7 @@ class MotionBounds(NamedTuple):
 def linear_bounds(
     speed: ArrayLike, acceleration: ArrayLike, jerk: ArrayLike, n: int
 ) -> MotionBounds:
-    """Return bounds for each of n coordinates.
-
-    Raises:
-        TrajectoryError: If there are neither one nor n numbers for a bound.
-    """
+    """Return bounds for each of n coordinates."""
     given = {"speed": speed, "acceleration": acceleration, "jerk": jerk}
     found = []
     for name, value in given.items():
@@ -73,9 +60,6 @@ def angular_bounds(speed: float, acceleration: float, jerk: float) -> MotionBoun
     own; where one begins, a component of ω may be beyond its bound while all of ω is
     not, and is then brought back. For that the speed is planned 5 % smaller; what was
     seen in 400 hostile streams is 0.5 %.
-
-    Raises:
-        TrajectoryError: If the acceleration or the jerk are too small for the speed.
     """
     curved = acceleration - speed**2 / pi
     if curved <= 0.0:

@@ -13,30 +13,14 @@ CAPACITY = 4096
 
 
 class Received(NamedTuple):
-    """A message and its number; numbers increase by one.
+    """A message and its number; numbers increase by one."""
 
-    Attributes:
-        number: The number of the message.
-        message: The message.
-    """
-
-    number: int
+    number: int  # the number of the message
     message: Message
 
 
 class Inbox:
-    """Messages of one source, for any number of readers.
-
-    A reader remembers the number of the last message that it took; so several
-    controllers may read one stream.
-
-    Attributes:
-        space: What a value is.
-        count: How many messages have arrived.
-        rejected: How many were invalid.
-        reason: Why the last invalid one was.
-        taken: The number of the last message that any reader took.
-    """
+    """Messages of one source; each reader remembers the number of its last message."""
 
     def __init__(self, space: Space) -> None:
         """Set what a value is."""
@@ -47,11 +31,7 @@ class Inbox:
         self._lock = Lock()
 
     def put(self, **data: Any) -> None:
-        """Add a message, given by its entries; see `message_of`.
-
-        Raises:
-            StreamError: If it is not valid.
-        """
+        """Add a message, given by its entries; see `message_of`."""
         self._add(message_of(data, self.space))
 
     def put_text(self, text: bytes) -> None:
@@ -68,12 +48,7 @@ class Inbox:
             self.reason = reason
 
     def after(self, number: int, *, take: bool) -> list[Received]:
-        """Return the messages that wait, later than a number, in order of arrival.
-
-        Args:
-            number: The number.
-            take: Whether later readers begin after them.
-        """
+        """Return the messages that wait, later than a number, in order of arrival."""
         with self._lock:
             if take:
                 self.taken = self.count

@@ -11,30 +11,16 @@ from hsp_control.trajectories.streams.recording import Recording
 
 
 class Mailbox:
-    """The messages of one stream, whichever controller it was placed in.
-
-    Attributes:
-        record: What the last run has taken, and when.
-        inbox: The messages that wait.
-    """
+    """The messages of one stream, whichever controller it was placed in."""
 
     def __init__(self, hears: str, space: Space) -> None:
-        """Begin without messages.
-
-        Args:
-            hears: The source, if there is one besides `put`.
-            space: What a value is, as far as it is known.
-        """
+        """Begin without messages."""
         self._hears = hears
         self.inbox = Inbox(space)
         self.record = Record()
 
     def put(self, **data: Any) -> None:
-        """Add a message; see `message_of`.
-
-        Raises:
-            StreamError: If it is not valid, or the stream has another source.
-        """
+        """Add a message; see `message_of`."""
         if self._hears:
             raise StreamError(
                 f"this stream hears {self._hears}; only a stream without source and "
@@ -43,16 +29,7 @@ class Mailbox:
         self.inbox.put(**data)
 
     def reader(self, space: Space, *, kept: bool) -> InboxReader:
-        """Return the reader of a new run; a source is opened here.
-
-        Args:
-            space: What a value is.
-            kept: Whether what it takes is recorded, and not taken again by later runs;
-                otherwise it is a preview.
-
-        Raises:
-            StreamError: If the source cannot be opened, or carries other values.
-        """
+        """Return the reader of a new run; a source is opened here."""
         if is_address(self._hears):
             self.inbox = listening_inbox(self._hears, space)
         elif self.inbox.space.linear not in (None, space.linear):

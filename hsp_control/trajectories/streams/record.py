@@ -10,11 +10,7 @@ MOST = 5_000_000
 
 
 class Record:
-    """Messages and the controller's times at which they were taken.
-
-    Attributes:
-        lost: How many messages came after the record was full.
-    """
+    """Messages and the controller's times at which they were taken."""
 
     def __init__(self) -> None:
         """Begin without messages."""

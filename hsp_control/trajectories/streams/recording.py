@@ -18,12 +18,7 @@ class Recording:
     def __init__(
         self, entries: Iterable[tuple[float, Message]], record: Record
     ) -> None:
-        """Begin at the first message, and record what is taken.
-
-        Args:
-            entries: Times [s] and messages, in order of time.
-            record: The record of the run.
-        """
+        """Begin at the first message, and record what is taken."""
         self._entries, self._record = list(entries), record
         self._next = 0
 
@@ -47,15 +42,7 @@ class Recording:
 def recorded(
     data: Sequence[Mapping[str, Any]], space: Space
 ) -> list[tuple[float, Message]]:
-    """Return the messages of a recording, and when they were taken [s].
-
-    Args:
-        data: Messages, see `message_of`, each with a time ``at``, which never falls.
-        space: What a value is.
-
-    Raises:
-        StreamError: If one is invalid; says which.
-    """
+    """Return the messages of a recording, and when they were taken [s]."""
     entries: list[tuple[float, Message]] = []
     for k, each in enumerate(data):
         try:
@@ -72,11 +59,7 @@ def recorded(
 
 
 def read_recording(path: Path) -> list[dict[str, Any]]:
-    """Return the messages in a file of JSON lines.
-
-    Raises:
-        StreamError: If it cannot be read, is too large, or a line is not JSON.
-    """
+    """Return the messages in a file of JSON lines."""
     try:
         if (size := path.stat().st_size) > LARGEST_FILE:
             raise StreamError(

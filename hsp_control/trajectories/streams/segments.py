@@ -21,19 +21,12 @@ _SHORTEST = 1e-3
 
 
 class Goal(NamedTuple):
-    """Where the reference should be at a time, in local coordinates.
+    """Where the reference should be at a time, in local coordinates."""
 
-    Attributes:
-        time: When [s].
-        x: Shape (n,).
-        rate: x', shape (n,) [1/s].
-        acceleration: x'', shape (n,) [1/s²].
-    """
-
-    time: float
-    x: Array
-    rate: Array
-    acceleration: Array
+    time: float  # when [s]
+    x: Array  # (n,)
+    rate: Array  # x', (n,) [1/s]
+    acceleration: Array  # x'', (n,) [1/s²]
 
     def at(self, t: float) -> Array:
         """Return where it is at another time, at its velocity, shape (n,)."""
@@ -90,34 +83,19 @@ class Quintic(Segment):
 
 
 class FastestTask(NamedTuple):
-    """What Ruckig is asked for, in a frame that moves with the target.
+    """What Ruckig is asked for, in a frame that moves with the target."""
 
-    Attributes:
-        x: x at the start, counted from the target, shape (n,).
-        rate: x' at the start, in the frame, shape (n,) [1/s].
-        acceleration: x'' at the start, shape (n,) [1/s²].
-        target_rate: x' at the end, in the frame, shape (n,) [1/s].
-        drift: Velocity of the frame, shape (n,) [1/s].
-        positions: Whether the target is a position; else only a velocity.
-        together: How many of the coordinates, from the first on, arrive together.
-        duration: The motion is not shorter [s].
-    """
-
-    x: Array
-    rate: Array
-    acceleration: Array
-    target_rate: Array
-    drift: Array
-    positions: bool
-    together: int
-    duration: float
+    x: Array  # x at the start, counted from the target, (n,)
+    rate: Array  # x' at the start, in the frame, (n,) [1/s]
+    acceleration: Array  # x'' at the start, (n,) [1/s²]
+    target_rate: Array  # x' at the end, in the frame, (n,) [1/s]
+    drift: Array  # velocity of the frame, (n,) [1/s]
+    positions: bool  # whether the target is a position; else only a velocity
+    together: int  # how many of the coordinates, from the first on, arrive together
+    duration: float  # the motion is not shorter [s]
 
     def solve(self, bounds: MotionBounds) -> ruckig.Trajectory:
-        """Return the fastest motion.
-
-        Raises:
-            StreamError: If Ruckig finds none.
-        """
+        """Return the fastest motion."""
         for synchronization in _SYNCHRONIZATIONS:
             task = self._input(bounds)
             alone = len(self.x) - self.together

@@ -228,11 +228,7 @@ class Streamed(Remembering, error=TrajectoryError):
         return other
 
     def _placed(self, placed: Self) -> Self:
-        """Return this stream, placed.
-
-        Raises:
-            StreamError: If its messages do not fit.
-        """
+        """Return this stream, placed."""
         if placed.messages is not None:
             start, rotational = placed._start(), placed.space.rotational
             recorded(placed.messages, Space(len(start.x) - 3 * rotational, rotational))
@@ -315,11 +311,7 @@ class Streamed(Remembering, error=TrajectoryError):
         return copy
 
     def _start(self) -> State:
-        """Return where the reference is before the first message.
-
-        Raises:
-            StreamError: If only a controller knows it.
-        """
+        """Return where the reference is before the first message."""
         raise NotImplementedError
 
     def _placeless(self) -> StreamError:
@@ -513,12 +505,7 @@ class StreamPose(Turning, PoseTrajectory, type="stream"):
 
 
 def stream_for(followed: object, stream: Streamed) -> Any:
-    """Return a stream of the kind that can follow a reference.
-
-    Args:
-        followed: What a task follows so far.
-        stream: The stream.
-    """
+    """Return a stream of the kind that can follow a reference."""
     if isinstance(followed, PoseTrajectory):
         return stream if isinstance(stream, Stream) else stream.like(StreamPose)
     if isinstance(followed, OrientationTrajectory):

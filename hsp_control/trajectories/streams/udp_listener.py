@@ -18,11 +18,7 @@ _POLL = 0.2
 
 
 def check_address(source: str) -> tuple[str, int]:
-    """Return host and port of an address ``udp://host:port``.
-
-    Raises:
-        StreamError: If it is none.
-    """
+    """Return host and port of an address ``udp://host:port``."""
     try:
         parts = urlsplit(source)
         host, port = parts.hostname, parts.port
@@ -47,11 +43,7 @@ def is_local(source: str) -> bool:
 
 
 def opened(source: str, space: Space) -> Callable[["ref[Inbox]"], None]:
-    """Open the port of an address; return what listens there.
-
-    Raises:
-        StreamError: If the address is wrong or in use.
-    """
+    """Open the port of an address; return what listens there."""
     host, port = check_address(source)
     opened = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:

@@ -14,17 +14,11 @@ from hsp_control.visualization.plots.views import View
 
 
 class _Edge(NamedTuple):
-    """The edge with the tick labels of an axis; the eye is at high x, low y, high z.
+    """The edge with the tick labels of an axis; the eye is at high x, low y, high z."""
 
-    Attributes:
-        sides: The edge, as sides of the two other axes: 0 low, 1 high.
-        shift: Offset of the labels from the edge [pt].
-        align: Horizontal alignment of the labels.
-    """
-
-    sides: tuple[int, int]
-    shift: tuple[float, float]
-    align: str
+    sides: tuple[int, int]  # the edge, as sides of the two other axes: 0 low, 1 high
+    shift: tuple[float, float]  # offset of the labels from the edge [pt]
+    align: str  # horizontal alignment of the labels
 
 
 _EDGES = (
@@ -45,11 +39,7 @@ _WALLS = ((0, 0), (1, 1), (2, 0))
 def draw_box(axes: Axes, view: View, lower: Array, upper: Array) -> None:
     """Draw the back walls of a box with a grid, and tick labels along three edges.
 
-    Args:
-        axes: The axes; their own lines and labels are switched off.
-        view: The oblique view.
-        lower: Lower corner [m], shape (3,).
-        upper: Upper corner [m], shape (3,).
+    Shapes: lower (3,) [m], upper (3,) [m].
     """
     axes.set_axis_off()
     ends = np.stack([lower, upper])

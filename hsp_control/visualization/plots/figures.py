@@ -43,22 +43,7 @@ def paper_figure(
     times: Sequence[float] | None = None,
     title: str | None = None,
 ) -> Figure:
-    """Return a figure of one run with the paper's five panels.
-
-    (a) the end effector's path, (b) the joints, (c) manipulability, (d) the robot at
-    selected times (frames) and (e) these frames in one plot. The frames are numbered;
-    the numbers mark their times above (b) and (c).
-
-    Args:
-        rollout: The log.
-        absolute: Draw absolute angles where the literature on the robot does.
-        frames: Number of frames, evenly over the run.
-        times: Times of the frames [s], instead.
-        title: The title; None: the run's own.
-
-    Raises:
-        PlotError: If the log has no row, or no frame is requested.
-    """
+    """Return the paper's five panels: path, joints, manipulability, frames twice."""
     _check(rollout)
     rows = chosen_rows(rollout, frames, times)
     if not rows:
@@ -93,15 +78,7 @@ def paper_figure(
 
 
 def diagnostics_figure(rollout: Rollout) -> Figure:
-    """Return a figure that compares a run with the law's predictions.
-
-    Task errors, null-space error, field, efforts, singular values, manipulability; and,
-    if the log has them, distances to obstacles and the contributions of the field's
-    terms.
-
-    Raises:
-        PlotError: If the log has no row.
-    """
+    """Return a figure that compares a run with the law's predictions."""
     _check(rollout)
     with styled():
         panels = [

@@ -16,14 +16,7 @@ from hsp_control.visualization.plots.lines import draw_lines, time_axis
 def draw_joint_positions(
     axes: Axes, rollout: Rollout, *, absolute: bool = True
 ) -> None:
-    """Draw the joint positions, unwrapped: not limited to one turn.
-
-    Args:
-        axes: The axes.
-        rollout: The log.
-        absolute: Draw absolute angles theta = A q where the literature on the robot
-            does; False: always the joint angles q.
-    """
+    """Draw the joint positions, unwrapped: not limited to one turn."""
     positions, what = joint_positions(rollout, absolute=absolute)
     names, units = joint_names(rollout), position_units(rollout)
     unit = draw_lines(axes, rollout.t, positions, names, units)

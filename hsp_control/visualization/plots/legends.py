@@ -35,11 +35,7 @@ def note(axes: Axes, text: str) -> None:
 
 
 def literal_text(name: str) -> str:
-    """Return a text that matplotlib shows literally.
-
-    Dollar signs are escaped, as they begin a formula. A leading underscore is preceded
-    by a space, as matplotlib leaves such names out of legends.
-    """
+    """Return a text that matplotlib shows as it is, also with $ or a leading _."""
     shown = name.replace("$", r"\$")
     return f" {shown}" if shown.startswith("_") else shown
 

@@ -22,18 +22,10 @@ def draw_lines(
     names: Sequence[str],
     units: Sequence[str] | None = None,
 ) -> str:
-    """Draw one line per column, with names in the legend.
+    """Draw one line per column, named in the legend; return the units of what is drawn.
 
-    Args:
-        axes: The axes.
-        t: Time [s], shape (N,).
-        values: Shape (N, k).
-        names: The columns' names.
-        units: The columns' units. If the named lines differ in them, names tell them;
-            lines without a name are drawn only if they share a unit with named ones.
-
-    Returns:
-        The units of what is drawn, for the axis; "" without units.
+    If the named lines differ in their units, names tell them; lines without a name are
+    drawn only if they share a unit with named ones. Shapes: t (N,), values (N, k).
     """
     units = list(units or [""] * len(names))
     named, others = list(range(len(names))), []
@@ -73,13 +65,7 @@ def time_axis(axes: Axes, t: Array) -> None:
 
 
 def log_scale(axes: Axes, values: Array, *, top: float = 0.0) -> None:
-    """Make the y axis logarithmic, with limits around the positive finite values.
-
-    Args:
-        axes: The axes.
-        values: The drawn values.
-        top: Minimum upper end of the axis, so that rounding errors do not fill it.
-    """
+    """Make the y axis logarithmic, up to ``top`` at least: rounding looks small."""
     floor = 1e-17  # values up to it are rounding errors and do not extend the axis
     shown = values[np.isfinite(values) & (values > floor)]
     highest = max(float(shown.max(initial=floor)), top)
@@ -105,12 +91,7 @@ def mark_damped(axes: Axes, rollout: Rollout) -> None:
 
 
 def mark_frames(axes: Axes, times: Array) -> None:
-    """Mark the times of frames with their numbers, from 1, at the upper edge.
-
-    Args:
-        axes: The axes, of curves over time.
-        times: The frames' times [s].
-    """
+    """Mark the times of frames with their numbers, from 1, at the upper edge."""
     upper = axes.secondary_xaxis("top")
     few = len(times) <= MAX_NAMED
     upper.set_xticks(

@@ -93,10 +93,7 @@ def draw_field_terms(axes: Axes, rollout: Rollout) -> None:
 
 
 def draw_distances(axes: Axes, rollout: Rollout) -> None:
-    """Draw the minimum distances, and a line at each where there is contact.
-
-    Surfaces touch at zero; a distance to a centre must not fall below the radius.
-    """
+    """Draw the minimum distances, and a line at each where there is contact."""
     watched = logged_distances(rollout)
     values = np.column_stack([each.values for each in watched])
     draw_lines(axes, rollout.t, values, [each.label for each in watched])

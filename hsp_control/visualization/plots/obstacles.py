@@ -17,29 +17,17 @@ _DISK = np.column_stack([np.cos(_CIRCLE), np.sin(_CIRCLE)])
 
 
 class LoggedObstacle(NamedTuple):
-    """An obstacle during a run: the convex hull of balls around rigidly moving points.
-
-    One point gives a ball, two points a capsule, the corners of a box a box. A
-    non-convex shape is replaced by its convex hull.
-
-    Attributes:
-        name: Its name.
-        center: The origin of its frame [m], shape (N, 3).
-        rotation: The rotation of its frame, world ← obstacle, shape (N, 3, 3).
-        points: The points in its frame [m], shape (K, 3); K = 0: a half-space, below
-            its x-y plane.
-        radius: The balls' radius [m].
-        exact: False if only a bounding ball is known.
-        oversized: Whether it is larger than the robot, such as a floor; figures need
-            not show all of it.
-    """
+    """An obstacle during a run: the convex hull of balls around moving points."""
 
     name: str
-    center: Array
-    rotation: Array
+    center: Array  # the origin of its frame [m], (N, 3)
+    rotation: Array  # the rotation of its frame, world ← obstacle, (N, 3, 3)
+    # The points in its frame [m], (K, 3); K = 0: a half-space, below its x-y plane.
     points: Array
-    radius: float
-    exact: bool
+    radius: float  # the balls' radius [m]
+    exact: bool  # false if only a bounding ball is known
+    # Whether it is larger than the robot, such as a floor; figures need not show all of
+    # it.
     oversized: bool
 
     @property

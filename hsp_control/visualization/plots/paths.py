@@ -30,12 +30,7 @@ NEARLY_FLAT = 0.05
 
 
 def path_view(rollout: Rollout) -> View:
-    """Return the best view of the end effector's path.
-
-    The robot's plane if its motion is planar; the plane that the tasks track if they
-    track two axes; the plane of paths and obstacles if they are nearly flat; else an
-    oblique view.
-    """
+    """Return the plane of robot, tasks or flat paths; else an oblique view."""
     if is_flat(whole := center_points(rollout)):
         return plane(best_plane(whole))
     tracked = {"".join(sorted(path.axes)) for path in task_paths(rollout)}
@@ -51,15 +46,7 @@ def path_view(rollout: Rollout) -> View:
 
 
 def draw_end_effector(axes: Axes, rollout: Rollout, *, names: str = "") -> None:
-    """Draw desired and actual path of every point that a task controls, and obstacles.
-
-    Obstacles are drawn at the end of the run, and dashed at its start.
-
-    Args:
-        axes: The axes.
-        rollout: The log.
-        names: Two world axes to draw, such as ``"xz"``; "": see `path_view`.
-    """
+    """Draw desired and actual paths, and obstacles (dashed: at the start)."""
     view = plane(names) if names else path_view(rollout)
     paths = task_paths(rollout)
     for place, path in enumerate(paths):

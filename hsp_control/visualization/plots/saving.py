@@ -20,21 +20,7 @@ def save_figures(
     *,
     absolute: bool = True,
 ) -> list[Path]:
-    """Write ``<stem>-paper`` and ``<stem>-diagnostics`` in every format.
-
-    Args:
-        rollout: The log.
-        folder: The folder; created if necessary.
-        stem: The beginning of the files' names.
-        formats: Such as ``png``, ``pdf`` or ``svg``.
-        absolute: Draw absolute angles where the literature on the robot does.
-
-    Returns:
-        The files.
-
-    Raises:
-        PlotError: If a format is unknown, or a file cannot be written.
-    """
+    """Write ``<stem>-paper`` and ``<stem>-diagnostics`` in every format."""
     figures = {
         "paper": paper_figure(rollout, absolute=absolute),
         "diagnostics": diagnostics_figure(rollout),
@@ -49,11 +35,7 @@ def save_figures(
 
 
 def save_figure(figure: Figure, path: Path, suffix: str) -> None:
-    """Write one figure in one format.
-
-    Raises:
-        PlotError: If the format is unknown, or the file cannot be written.
-    """
+    """Write one figure in one format."""
     known = figure.canvas.get_supported_filetypes()
     if suffix not in known:
         raise PlotError(

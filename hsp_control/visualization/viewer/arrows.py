@@ -35,12 +35,7 @@ def arrow_tracks(
 ) -> Iterator[Track]:
     """Yield the tracks that turn a unit arrow into vectors; short arrows are thinner.
 
-    Args:
-        path: The arrow's node.
-        times: Times [s], shape (N,).
-        origins: Start points [m], shape (N, 3).
-        vectors: From start to end [m], shape (N, 3); length 0 hides the arrow.
-        radius: The unit arrow's shaft radius [m].
+    Shapes: times (N,) [s], origins (N, 3) [m], vectors (N, 3) [m].
     """
     lengths = np.linalg.norm(vectors, axis=1)
     widths = np.minimum(lengths / (_FULL_WIDTH * radius), 1.0)
@@ -52,12 +47,7 @@ def bar_tracks(
 ) -> Iterator[Track]:
     """Yield the tracks with which a unit bar connects two points.
 
-    Args:
-        path: The bar's node.
-        times: Times [s], shape (N,).
-        starts: Start points [m], shape (N, 3).
-        ends: End points [m], shape (N, 3).
-        shown: Whether the bar is visible, shape (N,).
+    Shapes: times (N,) [s], starts (N, 3) [m], ends (N, 3) [m], shown (N,).
     """
     vectors = ends - starts
     ones = np.ones(len(times))

@@ -30,15 +30,8 @@ def look_at(
     """Return the command that places the camera.
 
     A planar arm is seen along its joint axes, any other robot from its front and above.
-    If the camera looks down or up steeply, y is up in the picture, else z.
-
-    Args:
-        robot: The robot.
-        points: The points that must be visible [m], shape (K, 3).
-        eye: The camera's position [m], farther in a narrow window; None: far enough to
-            see all points.
-        target: The point that it looks at [m]; None: the middle of the points.
-        fit: Keep only the direction of ``eye``, and move away to see all points.
+    ``eye`` None: far enough to see all ``points``, (K, 3) [m]; ``fit``: only its
+    direction.
     """
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     center = middle if target is None or fit else np.asarray(target, float)
@@ -64,13 +57,7 @@ def look_at(
 def viewing_direction(
     robot: Robot, eye: ArrayLike | None, target: ArrayLike | None
 ) -> Array:
-    """Return the direction from the target to the eye, shape (3,), not normalised.
-
-    Args:
-        robot: The robot.
-        eye: The camera's position [m]; None: the robot's default direction.
-        target: The point that it looks at [m]; None: the origin.
-    """
+    """Return the direction from the target to the eye, shape (3,), not normalised."""
     if eye is not None:
         return np.subtract(eye, np.zeros(3) if target is None else target)
     normal = plane_normal(robot)
@@ -80,13 +67,7 @@ def viewing_direction(
 def right_direction(
     robot: Robot, eye: ArrayLike | None, target: ArrayLike | None
 ) -> Array:
-    """Return the horizontal direction to the right in the picture, a unit vector.
-
-    Args:
-        robot: The robot.
-        eye: See `viewing_direction`.
-        target: See `viewing_direction`.
-    """
+    """Return the horizontal direction to the right in the picture, a unit vector."""
     direction = viewing_direction(robot, eye, target)
     right = np.array([-direction[1], direction[0], 0.0])
     length = float(np.linalg.norm(right))

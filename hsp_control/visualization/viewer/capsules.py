@@ -28,19 +28,10 @@ from hsp_control.visualization.viewer.scene_path import path_element
 
 
 class Capsules:
-    """Capsules, spheres, hulls or meshes of the links, one node per joint.
-
-    They are those that a clearance field or a minimum distance of the controller
-    measures: larger than the drawn links, so that distances end on them.
-    """
+    """The links' shapes that the controller measures, larger than the drawn links."""
 
     def __init__(self, controller: Controller, root: str) -> None:
-        """Find the links that are measured.
-
-        Args:
-            controller: The controller.
-            root: The path of the layer's node.
-        """
+        """Find the links that are measured."""
         self._root = root
         self._names = list(controller.robot.model.names)
         measured = list(_clearances(controller))

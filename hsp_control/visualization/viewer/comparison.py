@@ -53,11 +53,7 @@ class ComparedRun(NamedTuple):
 
 
 class Comparison:
-    """Several runs that are played together, on one time axis.
-
-    Attributes:
-        roots: The root node of each run; "" for the first.
-    """
+    """Several runs that are played together, on one time axis."""
 
     def __init__(
         self,
@@ -69,18 +65,7 @@ class Comparison:
         dark: bool,
         ghosts: bool = True,
     ) -> None:
-        """Read the logs.
-
-        Args:
-            drawing: The first robot in the scene; the others are drawn here.
-            runs: The runs.
-            shown: Whether each layer is shown initially.
-            beside: The direction in which the runs stand side by side, a unit vector of
-                shape (3,); None: overlaid, all but the first as ghosts.
-            dark: Whether the background is dark.
-            ghosts: Whether overlaid runs after the first are ghosts, with no more than
-                their paths; else each has all layers, for a page with a switch.
-        """
+        """Read the logs."""
         self._names = [run.name for run in runs]
         self.roots = run_roots(self._names)
         self._beside = beside

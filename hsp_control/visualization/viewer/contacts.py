@@ -79,8 +79,7 @@ class Contacts:
 def _held(positions: Array) -> Array:
     """Return positions with NaN, of inactive contacts, replaced by the last position.
 
-    Args:
-        positions: Shape (N, 3) [m].
+    Shapes: positions (N, 3) [m].
     """
     known = np.flatnonzero(np.isfinite(positions).all(axis=1))
     if not known.size:

@@ -30,35 +30,21 @@ _ENDS = ("start", "end")
 
 
 class ClosestPoints(NamedTuple):
-    """The two closest points, and whether their distance is active in the field.
+    """The two closest points, and whether their distance is active in the field."""
 
-    Attributes:
-        start: On the robot [m], shape (3,).
-        end: On the obstacle, or on another link [m], shape (3,).
-        active: Whether their distance is below the field's influence distance.
-    """
-
-    start: Array
-    end: Array
-    active: bool
+    start: Array  # on the robot [m], (3,)
+    end: Array  # on the obstacle, or on another link [m], (3,)
+    active: bool  # whether their distance is below the field's influence distance
 
 
 class Distances:
     """One bar per obstacle, from the closest link, while the field is active there.
 
-    Bars and the balls at their ends are seen through all else: a link's drawn mesh lies
-    inside the capsule or hull whose distance the field evaluates, so that a bar may
-    start beside the mesh; and the paper's cost measures from a joint to a centre.
+    Bars are seen through all else: meshes lie inside the capsules that are measured.
     """
 
     def __init__(self, controller: Controller, root: str, color: str) -> None:
-        """Find the distances that the controller's field evaluates.
-
-        Args:
-            controller: The controller.
-            root: The path of the layer's node.
-            color: The bars' colour, ``#RRGGBB``.
-        """
+        """Find the distances that the controller's field evaluates."""
         self._root = root
         self._color = color
         field = controller.field

@@ -70,14 +70,7 @@ class Ellipsoid:
 
 
 def principal_axes(J: Array, last: Array) -> tuple[Array, Array]:
-    """Return the principal axes of {J v : |v| = 1} as a rotation, and the semi-axes.
-
-    Order and signs of the axes are chosen for the smallest rotation from ``last``.
-
-    Args:
-        J: Linear Jacobian, shape (3, nv).
-        last: The previous rotation, shape (3, 3).
-    """
+    """Return the axes of {J v : |v| = 1}, nearest to ``last``, and semi-axes."""
     axes, lengths, _ = np.linalg.svd(J)
     padded = np.zeros(3)
     padded[: len(lengths)] = lengths

@@ -33,13 +33,7 @@ class Influence:
     """The zone of influence of each obstacle of a clearance field."""
 
     def __init__(self, field: Any, shown: dict[str, Shape], root: str) -> None:
-        """Find the zones of influence.
-
-        Args:
-            field: The controller's field.
-            shown: The obstacles' shapes by name.
-            root: The path of the layer's node.
-        """
+        """Find the zones of influence."""
         self._root = root
         self._zones: dict[str, tuple[Shape, float]] = {}
         for term in terms_of_type(field, ObstacleClearance):
@@ -81,15 +75,7 @@ class Influence:
 
 
 def zone(shape: Shape, influence: float, extent: float) -> Json:
-    """Return the surface at a distance from a shape, as a three.js object.
-
-    A non-convex shape is replaced by its convex hull.
-
-    Args:
-        shape: The shape.
-        influence: The distance [m].
-        extent: The edge of the square that shows a half-space [m].
-    """
+    """Return the surface at a distance [m] from a shape's convex hull, for three.js."""
     # Only its back faces are drawn: it never covers the robot.
     surface = material(OBSTACLE, opacity=ZONE_OPACITY, glow=0.6) | {"side": 1}
     pose = np.eye(4)
@@ -119,12 +105,7 @@ def zone(shape: Shape, influence: float, extent: float) -> Json:
 
 
 def _rounded(points: Array, distance: float) -> Json:
-    """Return the convex hull of balls around points.
-
-    Args:
-        points: The centres [m], shape (K, 3).
-        distance: The radius [m].
-    """
+    """Return the convex hull of balls around points; points (K, 3) [m]."""
     from scipy.spatial import ConvexHull  # here: SciPy takes long to import
 
     cloud = (hull_corners(points)[:, None, :] + distance * _unit_sphere()).reshape(

@@ -10,24 +10,14 @@ from hsp_control.robot import Robot
 
 
 class RowPosition(NamedTuple):
-    """The position of a time between two rows of a log.
+    """The position of a time between two rows of a log."""
 
-    Attributes:
-        row: The row before the time.
-        fraction: The fraction of the way to the next row, from 0 to 1.
-    """
-
-    row: int
-    fraction: float
+    row: int  # the row before the time
+    fraction: float  # the fraction of the way to the next row, from 0 to 1
 
 
 def row_position(t: Array, time: float) -> RowPosition:
-    """Return where a time lies between the rows of a log.
-
-    Args:
-        t: The rows' times [s], ascending, shape (N,).
-        time: The time [s]; the first or the last row is taken outside ``t``.
-    """
+    """Return where a time lies between the rows of a log; t (N,) [s]."""
     row = int(np.clip(np.searchsorted(t, time, side="right") - 1, 0, len(t) - 1))
     if row == len(t) - 1 or time <= t[row]:
         return RowPosition(row, 0.0)
@@ -49,9 +39,7 @@ def interpolate_orientation(
 ) -> pin.Quaternion:
     """Return the orientation at a position, by slerp between two rows.
 
-    Args:
-        quaternions: One quaternion per row, (x, y, z, w), shape (N, 4).
-        position: The position.
+    Shapes: quaternions (N, 4).
     """
     row, fraction = position
     start, end = (
@@ -64,10 +52,7 @@ def interpolate_orientation(
 def interpolate_configuration(robot: Robot, q: Array, position: RowPosition) -> Array:
     """Return the configuration at a position, on the geodesic between two rows.
 
-    Args:
-        robot: The robot.
-        q: One configuration per row, shape (N, nq).
-        position: The position.
+    Shapes: q (N, nq).
     """
     row, fraction = position
     here: Array = q[row]

@@ -9,13 +9,7 @@ from hsp_control.visualization.viewer.threejs import unique_name
 def material(
     color: str | Sequence[float], *, opacity: float = 1.0, glow: float = 0.0
 ) -> Json:
-    """Return a material that is lit by the scene's lights.
-
-    Args:
-        color: ``#RRGGBB``, or red, green and blue from 0 to 1.
-        opacity: 1 solid, 0 invisible.
-        glow: The share of its colour that is emitted, from 0 to 1; the rest is lit.
-    """
+    """Return a material that is lit by the scene's lights."""
     number = color_number(color)
     lit = color_number([(1.0 - glow) * (number >> k & 255) / 255 for k in (16, 8, 0)])
     surface: Json = {

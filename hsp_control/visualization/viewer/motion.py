@@ -23,15 +23,10 @@ COARSEST = 1 / 30
 
 
 class Motion(NamedTuple):
-    """A robot's motion in a run.
-
-    Attributes:
-        robot: The robot.
-        rows: The rows to draw, as a log.
-    """
+    """A robot's motion in a run."""
 
     robot: Robot
-    rows: Rollout
+    rows: Rollout  # the rows to draw, as a log
 
     @property
     def times(self) -> Array:
@@ -61,14 +56,7 @@ def motion_of(
     finest: float = FINEST,
     coarsest: float = COARSEST,
 ) -> Motion:
-    """Return the rows of a log that are drawn: thinned, or with interpolated rows.
-
-    Args:
-        robot: The robot.
-        rollout: The log.
-        finest: Minimum time between two rows [s].
-        coarsest: Maximum time between two rows [s].
-    """
+    """Return the rows of a log that are drawn: thinned, or with interpolated rows."""
     times = drawn_times(rollout.t, finest, coarsest)
     if len(times) == len(rollout.t) and np.array_equal(times, rollout.t):
         return Motion(robot, rollout)
@@ -114,10 +102,7 @@ def drawn_times(times: Array, finest: float, coarsest: float) -> Array:
 
     The first and the last time are always included.
 
-    Args:
-        times: Ascending [s], shape (N,).
-        finest: Minimum time between two drawn times [s].
-        coarsest: Maximum time between two drawn times [s].
+    Shapes: times (N,) [s].
     """
     kept = [0]
     for row in range(1, len(times)):

@@ -33,9 +33,7 @@ def move_obstacle(name: str, placement: pin.SE3) -> Command:
 def enclosing_corners(shape: Shape, center: Array) -> list[Array]:
     """Return the two corners of the box around a shape; none if it is unbounded.
 
-    Args:
-        shape: The shape.
-        center: Its centre, or its centres at several times [m], shape (..., 3).
+    Shapes: center (..., 3) [m].
     """
     reach = shape.bounding_radius
     if not np.isfinite(reach):
@@ -44,12 +42,7 @@ def enclosing_corners(shape: Shape, center: Array) -> list[Array]:
 
 
 def obstacle_legend(names: Iterable[str], root: str = ROOT) -> list[LegendEntry]:
-    """Return the legend of the obstacles: one entry, as all have the same colour.
-
-    Args:
-        names: Their names; of many, only the first are told.
-        root: The path of their parent node.
-    """
+    """Return the legend of the obstacles: one entry, as all have the same colour."""
     known = list(names)
     if not known:
         return []

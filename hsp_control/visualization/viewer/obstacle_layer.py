@@ -18,11 +18,7 @@ from hsp_control.visualization.viewer.scene_path import path_element
 
 
 class ObstacleLayer:
-    """The obstacles of a log.
-
-    Attributes:
-        shapes: The obstacles' shapes by name.
-    """
+    """The obstacles of a log."""
 
     def __init__(self, motion: Motion, root: str) -> None:
         """Read the log's obstacles."""
@@ -62,13 +58,7 @@ class ObstacleLayer:
 
 
 def obstacle_tracks(path: str, name: str, motion: Motion) -> Iterator[Track]:
-    """Yield the tracks of a node that follows a logged obstacle.
-
-    Args:
-        path: The node.
-        name: The obstacle's name.
-        motion: The run.
-    """
+    """Yield the tracks of a node that follows a logged obstacle."""
     yield Track(path, "position", motion.times, motion.rows[f"obstacle.{name}"])
     turns = f"obstacle.{name}.quaternion"
     if turns in motion.rows:

@@ -40,22 +40,13 @@ _FLUSH_PERIOD = 0.005  # s
 
 
 class Door(NamedTuple):
-    """Who is let in.
+    """Who is let in."""
 
-    Attributes:
-        host: The address that the server listens on.
-        key: What an address must contain; empty: nothing, and no page may steer.
-    """
-
-    host: str
-    key: str
+    host: str  # the address that the server listens on
+    key: str  # what an address must contain; empty: nothing, and no page may steer
 
     def check(self, handler: RequestHandler, *, needs_key: bool) -> None:
-        """Check a request.
-
-        Raises:
-            HTTPError: If it names another host, or the key is missing.
-        """
+        """Check a request."""
         names = _LOOPBACK_NAMES if self.host in _LOOPBACK_NAMES else {self.host}
         if handler.request.host_name not in names:
             raise HTTPError(403, reason="Another host")
@@ -65,14 +56,7 @@ class Door(NamedTuple):
 
 
 class Hub:
-    """The scene, and the pages that show it.
-
-    Attributes:
-        scene: All commands that a newly opened page needs.
-        pages: The open pages.
-        asked: The number of the parent's latest request: does a page show everything?
-        steering: Which page steers; None: none may.
-    """
+    """The scene, and the pages that show it."""
 
     def __init__(self, steering: Steering | None) -> None:
         """Start with an empty scene and no page."""
@@ -155,11 +139,7 @@ class Page(WebSocketHandler):
             raise HTTPError(403, reason="The connection names no origin")
 
     def open(self, *args: str, **kwargs: str) -> None:
-        """Send the page the whole scene, then all changes.
-
-        The stage comes first, and once more in its turn: meshes may be older than it,
-        and would be shown in the dark, without a word, until the last one is read.
-        """
+        """Send the page the stage, which must not wait for meshes, then all else."""
         self.pending = self.hub.scene.copy()
         self.has_pending.set()
         self.hub.pages.add(self)
@@ -169,10 +149,7 @@ class Page(WebSocketHandler):
             self.hub.tell_who_steers()
 
     def on_message(self, message: str | bytes) -> None:
-        """Process an answer, the number of a request, or what a page that steers says.
-
-        A page that says anything else is not ours: its connection is closed.
-        """
+        """Process an answer, or what a page that steers says; hang up on others."""
         steering = self.hub.steering
         try:
             if message == TAKEN:
@@ -255,15 +232,7 @@ class FileHandler(RequestHandler):
 
 
 def main(meshcat: str, port: int, parent: int, host: str, key: str) -> NoReturn:
-    """Serve until the parent has ended.
-
-    Args:
-        meshcat: The folder of Meshcat's page.
-        port: The port to listen on, or 0 for a free one.
-        parent: The parent's process id.
-        host: The address to listen on.
-        key: The key that the page's address contains; empty: none, and no page steers.
-    """
+    """Serve until the parent has ended."""
     asyncio.run(_serve(Path(meshcat), port, parent, Door(host, key)))
     os._exit(0)
 

@@ -20,15 +20,7 @@ _TAPER = 0.55
 
 
 def placeholder(robot: Robot, joint: int) -> Json | None:
-    """Return the placeholder of a joint: its drum, and capsules to its child joints.
-
-    Args:
-        robot: The robot.
-        joint: The joint's index; 0: the fixed base.
-
-    Returns:
-        The object in the joint's frame; None if there is nothing to draw.
-    """
+    """Return a drum at a joint and capsules to its children; None if there are none."""
     radius = _radius(robot, joint)
     surface = material(LINK, glow=0.5)
     things = [_drum(robot, joint, radius)] if joint else _feet(robot, radius)

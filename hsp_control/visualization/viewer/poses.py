@@ -15,11 +15,7 @@ def pose_at(position: ArrayLike) -> Array:
 
 
 def pose_along(direction: Array) -> Array:
-    """Return the smallest rotation of z to a direction, as a pose of shape (4, 4).
-
-    Args:
-        direction: Shape (3,), non-zero, of any length.
-    """
+    """Return the smallest rotation of z to a direction, as a pose of shape (4, 4)."""
     z = np.array([0.0, 0.0, 1.0])
     turn = pin.Quaternion.FromTwoVectors(z, direction / np.linalg.norm(direction))
     pose = np.eye(4)
@@ -30,8 +26,7 @@ def pose_along(direction: Array) -> Array:
 def quaternions_along(directions: Array) -> Array:
     """Return the smallest rotations of z to directions, as (x, y, z, w), shape (N, 4).
 
-    Args:
-        directions: Shape (N, 3), of any length; length 0: no rotation.
+    Shapes: directions (N, 3).
     """
     lengths = np.linalg.norm(directions, axis=1, keepdims=True)
     x, y, z = (directions / np.where(lengths > 0.0, lengths, 1.0)).T

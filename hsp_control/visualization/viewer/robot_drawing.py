@@ -40,18 +40,10 @@ def robot_entry(root: str = ROOT) -> LegendEntry:
 
 
 class RobotDrawing:
-    """A robot's nodes: one per joint, with the links of that joint below it.
-
-    Capsules and drums replace missing meshes, and a robot without visuals.
-    """
+    """A robot's nodes, one per joint; capsules and drums replace missing meshes."""
 
     def __init__(self, robot: Robot, root: str = ROOT) -> None:
-        """Read the robot's visuals; log a warning if meshes are missing.
-
-        Args:
-            robot: The robot.
-            root: The path of its node.
-        """
+        """Read the robot's visuals; log a warning if meshes are missing."""
         self.robot = robot
         self._visuals = read_visuals(robot)
         self._nodes = [f"{root}/{path_element(name)}" for name in robot.model.names]

@@ -50,16 +50,7 @@ def all_layers(
     root: str = "",
     dark: bool = False,
 ) -> dict[str, Layer]:
-    """Return the layers of a run, by name.
-
-    Args:
-        robot: The robot.
-        motion: The run.
-        controller: The run's controller; None: only layers that need no more than the
-            log's columns.
-        root: The path of their parent node.
-        dark: Whether the background is dark.
-    """
+    """Return the layers of a run, by name."""
     ink = CHALK if dark else INK
     obstacles = ObstacleLayer(motion, f"{root}/obstacles")
     layers: dict[str, Layer] = {
@@ -91,12 +82,7 @@ def ghost_layers(motion: Motion, color: str, root: str) -> dict[str, Layer]:
 
 
 class RunDrawing:
-    """A run: the robot's motion and the layers.
-
-    Attributes:
-        motion: The drawn rows.
-        layers: The layers by name.
-    """
+    """A run: the robot's motion and the layers."""
 
     def __init__(
         self,
@@ -108,16 +94,7 @@ class RunDrawing:
         shown: Mapping[str, bool] | None = None,
         bands: Sequence[Band] = (),
     ) -> None:
-        """Compose the drawing.
-
-        Args:
-            drawing: The robot in the scene.
-            motion: The run.
-            layers: The layers to draw besides the robot.
-            root: The path of their parent node.
-            shown: Whether each layer is shown initially; default: it is.
-            bands: What the time line marks.
-        """
+        """Compose the drawing."""
         self.motion = motion
         self.layers = layers
         self._drawing = drawing

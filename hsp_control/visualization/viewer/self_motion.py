@@ -44,11 +44,7 @@ _WIDENING = 2.2
 class SelfMotion:
     """Two arrows at the joints that self-motion moves most, such as the elbow.
 
-    The thin arrow is the null-space velocity P v. The wide, pale arrow around it is the
-    projected field P g, to which the law makes P v converge.
-
-    Attributes:
-        seconds: The time of motion that an arrow shows [s].
+    Thin: the null-space velocity P v. Wide and pale: the projected field P g.
     """
 
     def __init__(self, controller: Controller, motion: Motion, root: str) -> None:
@@ -106,10 +102,7 @@ class SelfMotion:
         return [LegendEntry(name, FIELD, (self._root,))]
 
     def _velocities(self, motion: Motion) -> tuple[Array, Array, Array]:
-        """Return the joints' positions [m] and velocities due to P v and P g [m/s].
-
-        Each has the shape (N, njoints - 1, 3).
-        """
+        """Return positions, P v and P g of the joints, (N, njoints - 1, 3) each."""
         controller = from_the_start(self._controller)
         data = controller.robot.model.createData()
         rows: list[tuple[Array, Array, Array]] = []
@@ -146,10 +139,7 @@ def _joint_velocities(state: RobotState, v: Array, data: pin.Data) -> Array:
 def _select_joints(positions: Array, speeds: Array, spacing: float) -> list[int]:
     """Return the indices of the fastest joints that keep a distance from each other.
 
-    Args:
-        positions: Of all joints but the universe [m], shape (N, njoints - 1, 3).
-        speeds: Their mean speeds [m/s], shape (njoints - 1,).
-        spacing: Minimum mean distance of two selected joints [m].
+    Shapes: positions (N, njoints - 1, 3) [m], speeds (njoints - 1,) [m/s].
     """
     joints: list[int] = []
     for k in np.argsort(-speeds):

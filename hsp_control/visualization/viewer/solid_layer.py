@@ -20,27 +20,16 @@ from hsp_control.visualization.viewer.scene_path import path_element
 
 
 class _Drawn(NamedTuple):
-    """A solid, or one of its copies.
-
-    Attributes:
-        path: Its node.
-        shape: Its shape.
-        placement: Where it is, or where it starts if it is loose.
-        column: Where the log has its motion: the start of two columns' names.
-    """
+    """A solid, or one of its copies."""
 
     path: str
     shape: Shape
-    placement: pin.SE3
-    column: str
+    placement: pin.SE3  # where it is, or where it starts if it is loose
+    column: str  # where the log has its motion: the start of two columns' names
 
 
 class SolidLayer:
-    """The solids of the plant that a log names: fixed ones, and loose ones that move.
-
-    Attributes:
-        names: Their names.
-    """
+    """The solids of the plant that a log names: fixed ones, and loose ones."""
 
     def __init__(self, motion: Motion, root: str) -> None:
         """Read the log's plant."""
@@ -91,11 +80,7 @@ class SolidLayer:
 
 
 def solids_of(meta: Mapping[str, Any]) -> list[Solid]:
-    """Return the solids of a log's plant.
-
-    Args:
-        meta: The meta data of a log.
-    """
+    """Return the solids of a log's plant."""
     found = []
     for entry in (meta.get("plant") or {}).get("solids", ()):
         given = {key: entry[key] for key in _FIELDS if key in entry}

@@ -25,13 +25,7 @@ _SHADOW = translucent(palette.MUTED, 0.4)
 
 
 def draw_stage(points: Array, floor: float, view: ViewSettings) -> Iterator[Command]:
-    """Yield the background, the lights and the floor.
-
-    Args:
-        points: Points that enclose the scene [m], shape (K, 3).
-        floor: The floor's height [m].
-        view: The settings: background colour, light, grid.
-    """
+    """Yield the background, the lights and the floor; points (K, 3) [m]."""
     yield from draw_background(view)
     center = 0.5 * (points.min(axis=0) + points.max(axis=0))
     size = scene_size(points)
@@ -41,11 +35,7 @@ def draw_stage(points: Array, floor: float, view: ViewSettings) -> Iterator[Comm
 
 
 def draw_background(view: ViewSettings) -> Iterator[Command]:
-    """Yield the background alone.
-
-    Args:
-        view: The settings: its colour.
-    """
+    """Yield the background alone."""
     sky = view.background
     horizon = palette.blend(sky, palette.MUTED, HAZE)
     yield set_property("/Background", "top_color", _channels(sky))
@@ -67,15 +57,7 @@ def is_dark(color: str) -> bool:
 
 
 def in_sight(subject: Array, others: Array) -> Array:
-    """Return the points that the camera must show: the subject's, and others near it.
-
-    Other points are clipped to a distance of the subject's size from it, so that far or
-    large obstacles do not make the subject small.
-
-    Args:
-        subject: Points of the robot and its paths [m], shape (K, 3).
-        others: Points of obstacles [m], shape (L, 3).
-    """
+    """Return the subject's points, and others clipped to the subject's size."""
     size = scene_size(subject)
     low, high = subject.min(axis=0) - size, subject.max(axis=0) + size
     return np.vstack([subject, np.clip(others, low, high)])

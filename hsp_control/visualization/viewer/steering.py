@@ -13,19 +13,10 @@ LONGEST = 4000
 
 
 class Steering:
-    """One page steers at a time; its messages wait until the parent can take them.
-
-    A newer message replaces an older one of the same kind and object that still waits,
-    so that no page can flood the parent, and a parent that is busy misses nothing that
-    still counts.
-    """
+    """One page steers; a message replaces a waiting one of its kind and object."""
 
     def __init__(self, parent: int) -> None:
-        """Begin without a page.
-
-        Args:
-            parent: Descriptor of the pipe to the parent.
-        """
+        """Begin without a page."""
         self.page: object | None = None
         self._parent = parent
         self._waiting: dict[tuple[str, str], str] = {}
@@ -45,11 +36,7 @@ class Steering:
         return True
 
     def take(self, page: object, text: str) -> bool:
-        """Take a page's message; return whether the page steers only from now on.
-
-        Raises:
-            ValueError: If it is no message.
-        """
+        """Take a page's message; return whether the page steers only from now on."""
         if len(text.encode()) > LONGEST:
             raise ValueError("the message is too long")
         message = json.loads(text, parse_constant=_refuse)

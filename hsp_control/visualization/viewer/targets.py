@@ -8,22 +8,16 @@ from hsp_control.simulation.log_series import drawn_parts, task_names, task_path
 
 
 class Target(NamedTuple):
-    """The target of one task at every row, and the actual position.
-
-    Attributes:
-        name: The task's name.
-        actual: The actual position of the task's point [m], shape (N, 3).
-        desired: Its desired position [m], shape (N, 3); the actual one along world axes
-            that the task does not track. None if the task tracks no position.
-        rotation: The desired orientation as a quaternion (x, y, z, w), shape (N, 4).
-        direction: The desired direction, unit vectors, shape (N, 3).
-    """
+    """The target of one task at every row, and the actual position."""
 
     name: str
-    actual: Array
+    actual: Array  # the actual position of the task's point [m], (N, 3)
+    # Its desired position [m], (N, 3); the actual one along world axes that the task
+    # does not track. None if the task tracks no position.
     desired: Array | None = None
+    # The desired orientation as a quaternion (x, y, z, w), (N, 4).
     rotation: Array | None = None
-    direction: Array | None = None
+    direction: Array | None = None  # the desired direction, unit vectors, (N, 3)
 
 
 def read_targets(rollout: Rollout) -> list[Target]:

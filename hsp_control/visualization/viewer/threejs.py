@@ -65,11 +65,7 @@ def arrow(length: float, radius: float) -> Json:
 
 
 def lathe(profile: Array) -> Json:
-    """Return the solid of revolution about z of a profile.
-
-    Args:
-        profile: Rows of (radius, z) [m], in ascending order along the profile.
-    """
+    """Return the solid of revolution about z of a profile."""
     points = [{"x": float(max(r, 0.0)), "y": float(z)} for r, z in profile]
     return _geometry("LatheGeometry", points=points, segments=48)
 
@@ -82,14 +78,7 @@ def plane(size: float) -> Json:
 def mesh(
     geometry: Json, surface: Json, pose: Array | None = None, *, shadow: bool = True
 ) -> Json:
-    """Return an object of a geometry and a material.
-
-    Args:
-        geometry: The geometry.
-        surface: The material, see `materials`.
-        pose: Its pose in its node, shape (4, 4); None: the identity.
-        shadow: Whether it casts and receives shadows.
-    """
+    """Return an object of a geometry and a material."""
     total = np.eye(4) if pose is None else pose
     if geometry["type"] in {"CylinderGeometry", "LatheGeometry"}:
         total = total @ _Y_TO_Z
@@ -123,12 +112,7 @@ def group(things: Sequence[Json]) -> Json:
 
 
 def buffer_geometry(attributes: dict[str, Array]) -> Json:
-    """Return a geometry of explicit vertices.
-
-    Args:
-        attributes: ``position``, and optionally ``normal`` and ``color``; one row per
-            vertex.
-    """
+    """Return a geometry of explicit vertices."""
     packed = {
         name: {
             "itemSize": rows.shape[1],
@@ -142,12 +126,7 @@ def buffer_geometry(attributes: dict[str, Array]) -> Json:
 
 
 def segments(points: Array, colors: Array) -> Json:
-    """Return line segments of one pixel width.
-
-    Args:
-        points: Pairs of end points [m], shape (2n, 3).
-        colors: Their colours in RGBA from 0 to 1, shape (2n, 4).
-    """
+    """Return line segments of one pixel width; points (2n, 3) [m], colors (2n, 4)."""
     geometry = buffer_geometry({"position": points, "color": colors})
     surface = {
         "uuid": unique_name(),
@@ -162,12 +141,7 @@ def segments(points: Array, colors: Array) -> Json:
 
 
 def shadow_catcher(size: float, opacity: float) -> Json:
-    """Return a square in the x-y plane that shows only the shadows on it.
-
-    Args:
-        size: Its edge [m].
-        opacity: The shadows' opacity.
-    """
+    """Return a square in the x-y plane that shows only the shadows on it."""
     surface = {
         "uuid": unique_name(),
         "type": "ShadowMaterial",

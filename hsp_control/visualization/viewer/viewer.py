@@ -272,11 +272,7 @@ class Viewer:
         self.close()
 
     def _repr_html_(self) -> str:
-        """Return the HTML for a notebook: what is shown now, which needs no server.
-
-        The live page is shown in a frame, with the reason, where a robot's meshes
-        cannot be read.
-        """
+        """Return the HTML for a notebook; with unreadable meshes, the live page."""
         try:
             return InlineView(self.transport.scene, url=self.url)._repr_html_()
         except ExportError as error:
@@ -380,11 +376,7 @@ class Viewer:
     ) -> list[Command]:
         """Return the commands that clear the stage, fit it, and draw a scene.
 
-        Args:
-            scene: The scene.
-            title: The title; None: the robot's name.
-            moving: Points of the robot [m], shape (K, 3); None: the scene's own.
-            fit: Show all points, even if the view sets the camera's position.
+        Shapes: moving (K, 3) [m].
         """
         view = self.view
         subject = self._subject(scene.points() if moving is None else moving)

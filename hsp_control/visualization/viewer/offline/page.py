@@ -28,12 +28,7 @@ _POLICY = (
 
 
 def assemble(title: str, content: Json) -> str:
-    """Return the page's HTML: the live page with its files inlined, and its content.
-
-    Args:
-        title: The page's title.
-        content: The content that ``export.js`` shows: see ``show`` there.
-    """
+    """Return the page's HTML: the live page with its files inlined, and its content."""
     live = (_LIVE / "index.html").read_text(encoding="utf-8")
     body = live[live.index("<body>") + len("<body>") : live.index("</body>")]
     names = re.findall(r'<script src="([^"]+)"></script>', body)

@@ -25,15 +25,7 @@ _TRAIL_STEP = 5e-5
 
 
 def reduce_scene(commands: Iterable[Json], arrays: ArrayTable) -> list[Json]:
-    """Return commands that show the same scene in fewer bytes.
-
-    Args:
-        commands: A recorded scene, oldest first, as plain data.
-        arrays: The table that stores the numbers.
-
-    Raises:
-        ExportError: If a mesh cannot be read, or the library for it is not installed.
-    """
+    """Return commands that show the same scene in fewer bytes."""
     return [_reduced(command, arrays) for command in commands]
 
 
@@ -65,12 +57,7 @@ def _packed(value: Any, arrays: ArrayTable) -> Any:
 
 
 class _MeshFileReplacer:
-    """Replaces the mesh files of one object by triangles.
-
-    Attributes:
-        geometries: The object's geometries.
-        materials: The object's materials.
-    """
+    """Replaces the mesh files of one object by triangles."""
 
     def __init__(self, thing: Json, owner: str, arrays: ArrayTable) -> None:
         self._owner, self._arrays = owner, arrays
@@ -87,12 +74,7 @@ class _MeshFileReplacer:
         self.materials = list(thing.get("materials", []))
 
     def replaced(self, node: Json, scale: float) -> Json:
-        """Return a node of the object without mesh files.
-
-        Args:
-            node: The node.
-            scale: Metres in the world per unit of its parent's length.
-        """
+        """Return a node of the object without mesh files."""
         if "matrix" in node:
             axes = np.reshape(node["matrix"], (4, 4))[:3, :3]
             scale *= float(np.linalg.norm(axes, axis=1).max())

@@ -25,18 +25,10 @@ def expected_floor(rollout: Rollout, controller: Controller | None) -> Array | N
 
         e_N' = -K_N e_N + h/2 P M⁻¹ τ'.
 
-    Its solution from e_N = 0 is the floor: what is left once the start has decayed.
-    The efforts are taken to change linearly between two rows.
-
-    Args:
-        rollout: The run.
-        controller: Its controller; only its model and projector are used.
-
-    Returns:
-        None where the equation is not known or does not hold: without a controller, a
-        control period or a gain, with contacts or a floating base, whose forces react
-        to the effort at once, if the law changes during the run, or if the rows are too
-        far apart.
+    Its solution from e_N = 0 is the floor. The efforts are taken to change linearly
+    between two rows. None where the equation is not known or does not hold: without a
+    controller, a control period or a gain, with contacts or a floating base, if the law
+    changes during the run, or if the rows are too far apart.
     """
     period, gain = held_period(rollout), rollout.meta.get("null_space_gain")
     if controller is None or period is None or gain is None or len(rollout) < 2:

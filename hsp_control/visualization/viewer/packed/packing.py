@@ -26,11 +26,7 @@ _MAX_STEPS = 2**31
 
 
 class ArrayTable:
-    """The arrays of a page; equal arrays are stored once.
-
-    Attributes:
-        entries: The packed arrays, in the order of their numbers.
-    """
+    """The arrays of a page; equal arrays are stored once."""
 
     def __init__(self) -> None:
         """Start without arrays."""
@@ -40,11 +36,7 @@ class ArrayTable:
     def numbers(self, values: ArrayLike, step: float, dtype: Any = np.float32) -> Json:
         """Store numbers to within half a step; return a reference to the array.
 
-        Args:
-            values: Shape (n,) or (n, k), finite.
-            step: Resolution, positive; coarser for a column that would need more than
-                31 bits.
-            dtype: The type in the page: ``float32`` or ``float64``.
+        Shapes: values (n,).
         """
         rows = np.asarray(values, float)
         rows = rows[:, None] if rows.ndim == 1 else rows

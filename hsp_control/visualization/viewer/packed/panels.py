@@ -18,64 +18,37 @@ _MAX_CURVES, _SELECTED = 14, 7
 
 
 class Series(NamedTuple):
-    """One curve.
+    """One curve."""
 
-    Attributes:
-        name: Its name in the legend.
-        values: One per row of the log, shape (N,).
-        color: Its colour, ``#RRGGBB``.
-        dashed: Draw it dashed.
-        predicted: It is a prediction, not measured: the axis need not reach it.
-        band: Fill the plot below it.
-    """
-
-    name: str
-    values: Array
-    color: str
+    name: str  # its name in the legend
+    values: Array  # one per row of the log, (N,)
+    color: str  # its colour, ``#RRGGBB``
     dashed: bool = False
+    # It is a prediction, not measured: the axis need not reach it.
     predicted: bool = False
-    band: bool = False
+    band: bool = False  # fill the plot below it
 
 
 class Edge(NamedTuple):
-    """A value that curves must not fall below, drawn as a line: contact.
+    """A value that curves must not fall below, drawn as a line: contact."""
 
-    Attributes:
-        value: The value, in the panel's unit.
-        name: Its label; "" for zero, which needs none.
-    """
-
-    value: float
-    name: str
+    value: float  # the value, in the panel's unit
+    name: str  # its label; "" for zero, which needs none
 
 
 class Panel(NamedTuple):
-    """One plot over time.
-
-    Attributes:
-        title: Its title.
-        unit: The unit of the curves.
-        series: The curves.
-        logarithmic: Whether its axis is logarithmic.
-        edges: Values that the axis includes and draws as lines.
-        note: A remark beside the title, or "".
-    """
+    """One plot over time."""
 
     title: str
-    unit: str
+    unit: str  # the unit of the curves
     series: Sequence[Series]
-    logarithmic: bool = False
-    edges: Sequence[Edge] = ()
-    note: str = ""
+    logarithmic: bool = False  # whether its axis is logarithmic
+    edges: Sequence[Edge] = ()  # values that the axis includes and draws as lines
+    note: str = ""  # A remark beside the title, or ""
 
 
 def panels_of(rollout: Rollout, controller: Controller | None = None) -> list[Panel]:
-    """Return the plots of a log, without those whose columns it lacks.
-
-    Args:
-        rollout: The log.
-        controller: Its controller, for what is expected of held efforts.
-    """
+    """Return the plots of a log, without those whose columns it lacks."""
     return list(_panels(rollout, controller))
 
 
@@ -151,10 +124,7 @@ def _null_space(rollout: Rollout, controller: Controller | None) -> Iterator[Ser
 def _lines(
     values: Array, names: Sequence[str], units: Sequence[str] | None = None
 ) -> tuple[list[Series], str]:
-    """Return one curve per column, and their units; of very many, those that vary most.
-
-    Names tell the units if the curves differ in them.
-    """
+    """Return one curve per column (of many, those that vary most), and units."""
     count = len(names) if len(names) <= _MAX_CURVES else _SELECTED
     order = np.argsort(-np.ptp(values, axis=0), kind="stable")[:count]
     units = list(units or [""] * len(names))

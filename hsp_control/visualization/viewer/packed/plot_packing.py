@@ -25,42 +25,23 @@ _FLOOR, _TOP = 1e-17, 1e-6
 
 
 class PlottedRun(NamedTuple):
-    """A run whose curves are plotted.
+    """A run whose curves are plotted."""
 
-    Attributes:
-        name: Its name in the page's switch.
-        rollout: The run.
-        controller: Its controller: see `panels_of`.
-    """
-
-    name: str
+    name: str  # its name in the page's switch
     rollout: Rollout
-    controller: Controller | None = None
+    controller: Controller | None = None  # its controller: see `panels_of`
 
 
 class _Curve(NamedTuple):
-    """A curve of one of the runs.
+    """A curve of one of the runs."""
 
-    Attributes:
-        run: The number of its run.
-        times: Its times [s], shape (N,).
-        series: The curve.
-    """
-
-    run: int
-    times: Array
+    run: int  # the number of its run
+    times: Array  # its times [s], (N,)
     series: Series
 
 
 def pack_panels(runs: Sequence[PlottedRun], arrays: ArrayTable) -> Json:
-    """Return the plots of runs in the page's format: see ``plots.js``.
-
-    Panels of the same title and unit are one plot with the curves of all runs.
-
-    Args:
-        runs: The runs; at least one.
-        arrays: The table that stores the numbers.
-    """
+    """Return plots of runs for ``plots.js``, one for each title and unit."""
     panels: dict[tuple[str, str], Panel] = {}
     curves: dict[tuple[str, str], list[_Curve]] = {}
     for number, run in enumerate(runs):
