@@ -19,19 +19,20 @@ from hsp_control.simulation.unreached import unreached
 from hsp_control.visualization.palette import SERIES
 from hsp_control.visualization.viewer import Viewer
 from hsp_control.visualization.viewer.appearance import CHALK, INK
-from hsp_control.visualization.viewer.capsules import Capsules
 from hsp_control.visualization.viewer.commands import (
     Command,
     delete,
     play_command,
     typed_array,
 )
-from hsp_control.visualization.viewer.distances import Distances
-from hsp_control.visualization.viewer.influence import Influence
-from hsp_control.visualization.viewer.layer import Layer
+from hsp_control.visualization.viewer.measured_links import (
+    Capsules,
+    Distances,
+    Influence,
+)
 from hsp_control.visualization.viewer.motion import Motion
 from hsp_control.visualization.viewer.obstacle_layer import ObstacleLayer
-from hsp_control.visualization.viewer.run_drawing import RunDrawing, all_layers
+from hsp_control.visualization.viewer.run_drawing import Layer, RunDrawing, all_layers
 from hsp_control.visualization.viewer.scene_path import path_element
 
 FRAME = 1.0 / 30.0

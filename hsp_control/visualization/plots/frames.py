@@ -15,10 +15,10 @@ from hsp_control.visualization import palette
 from hsp_control.visualization.plots.logged_geometry import (
     center_points,
     enclosing_points,
+    logged_obstacles,
     parents,
     task_paths,
 )
-from hsp_control.visualization.plots.obstacles import logged_obstacles
 from hsp_control.visualization.plots.views import View, fit, view_of
 from hsp_control.visualization.plots.world_drawing import (
     draw_axis_directions,

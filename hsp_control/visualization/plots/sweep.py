@@ -15,8 +15,8 @@ from hsp_control.common.exceptions import PlotError
 from hsp_control.sweeps import Sensitivity, Sweep, sensitivity
 from hsp_control.sweeps.sensitivity import has_order
 from hsp_control.visualization import palette
-from hsp_control.visualization.plots.legends import literal_text
-from hsp_control.visualization.plots.saving import save_figure
+from hsp_control.visualization.plots.figures import save_figure
+from hsp_control.visualization.plots.lines import literal_text
 from hsp_control.visualization.plots.style import new_figure, styled
 
 MAX_PARAMETERS, MAX_OUTCOMES = 8, 6

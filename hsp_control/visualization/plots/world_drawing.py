@@ -9,7 +9,7 @@ from matplotlib.patches import Circle, Polygon
 
 from hsp_control.common.arrays import Array
 from hsp_control.visualization import palette
-from hsp_control.visualization.plots.obstacles import LoggedObstacle
+from hsp_control.visualization.plots.logged_geometry import LoggedObstacle
 from hsp_control.visualization.plots.views import View
 
 

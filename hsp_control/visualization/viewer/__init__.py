@@ -8,7 +8,7 @@ from .export import FilmStyle as FilmStyle
 from .export import export_film as export_film
 from .export import export_html as export_html
 from .live import LiveView as LiveView
-from .offline.inline import InlineView as InlineView
+from .offline.page import InlineView as InlineView
 from .recorder import Recorder as Recorder
 from .replay import robot_of as robot_of
 from .replay import show as show

@@ -11,6 +11,7 @@ from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
 from hsp_control.visualization import palette
 from hsp_control.visualization.viewer.appearance import ACTUAL
+from hsp_control.visualization.viewer.arrows import SelfMotion
 from hsp_control.visualization.viewer.bands import Band, bands_of
 from hsp_control.visualization.viewer.clip import Clip
 from hsp_control.visualization.viewer.commands import Command, set_ghost, set_transform
@@ -25,7 +26,6 @@ from hsp_control.visualization.viewer.run_drawing import (
     ghost_layers,
 )
 from hsp_control.visualization.viewer.scene_path import path_element
-from hsp_control.visualization.viewer.self_motion import SelfMotion
 from hsp_control.visualization.viewer.stage import in_sight
 
 GHOSTS = (palette.TASK, palette.SERIES[4], palette.WARNING)

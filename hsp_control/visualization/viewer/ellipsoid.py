@@ -14,9 +14,9 @@ from hsp_control.visualization.viewer.appearance import ELLIPSOID, ELLIPSOID_OPA
 from hsp_control.visualization.viewer.clip import Track
 from hsp_control.visualization.viewer.commands import Command, set_object
 from hsp_control.visualization.viewer.legend import LegendEntry, translucent
-from hsp_control.visualization.viewer.materials import material
 from hsp_control.visualization.viewer.motion import Motion
 from hsp_control.visualization.viewer.scene_path import path_element
+from hsp_control.visualization.viewer.threejs import material
 
 SECONDS = 0.2
 """A semi-axis is the hand's travel in this time at a joint speed of norm 1 [s]."""

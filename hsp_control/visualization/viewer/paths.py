@@ -15,10 +15,10 @@ from hsp_control.visualization.viewer.appearance import (
 from hsp_control.visualization.viewer.clip import Track
 from hsp_control.visualization.viewer.commands import Command, extend_trail, set_trail
 from hsp_control.visualization.viewer.legend import LegendEntry
-from hsp_control.visualization.viewer.materials import color_number
 from hsp_control.visualization.viewer.motion import Motion
 from hsp_control.visualization.viewer.scene_path import path_element
 from hsp_control.visualization.viewer.targets import read_targets
+from hsp_control.visualization.viewer.threejs import color_number
 
 _MAX_RINGS = 1500
 

@@ -1,6 +1,7 @@
 """Draws a run: the motion of its robot, and the layers."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from typing import Protocol
 
 import numpy as np
 
@@ -8,24 +9,37 @@ from hsp_control.common.arrays import Array
 from hsp_control.control.controller import Controller
 from hsp_control.robot import Robot
 from hsp_control.visualization.viewer.appearance import CHALK, INK
+from hsp_control.visualization.viewer.arrows import Contacts, SelfMotion
 from hsp_control.visualization.viewer.bands import Band
-from hsp_control.visualization.viewer.capsules import Capsules
 from hsp_control.visualization.viewer.clip import Clip, Track
 from hsp_control.visualization.viewer.commands import Command, delete, set_property
-from hsp_control.visualization.viewer.contacts import Contacts
 from hsp_control.visualization.viewer.controller_analysis import from_the_start
-from hsp_control.visualization.viewer.distances import Distances
 from hsp_control.visualization.viewer.ellipsoid import Ellipsoid
-from hsp_control.visualization.viewer.influence import Influence
-from hsp_control.visualization.viewer.layer import Layer
 from hsp_control.visualization.viewer.legend import LegendEntry
+from hsp_control.visualization.viewer.measured_links import (
+    Capsules,
+    Distances,
+    Influence,
+)
 from hsp_control.visualization.viewer.motion import Motion
-from hsp_control.visualization.viewer.obstacle_layer import ObstacleLayer
+from hsp_control.visualization.viewer.obstacle_layer import ObstacleLayer, SolidLayer
 from hsp_control.visualization.viewer.paths import Paths
 from hsp_control.visualization.viewer.robot_drawing import RobotDrawing, robot_entry
-from hsp_control.visualization.viewer.self_motion import SelfMotion
-from hsp_control.visualization.viewer.solid_layer import SolidLayer
-from hsp_control.visualization.viewer.target_markers import TargetMarkers
+from hsp_control.visualization.viewer.targets import TargetMarkers
+
+
+class Layer(Protocol):
+    """Draws itself once, and returns the tracks of its motion."""
+
+    def draw(self, size: float) -> Iterator[Command]:
+        """Yield the commands that draw it in a scene of the given size [m]."""
+
+    def tracks(self, motion: Motion) -> Iterator[Track]:
+        """Yield its tracks along a run, or along a part of one."""
+
+    def legend(self) -> list[LegendEntry]:
+        """Return the legend's entries."""
+
 
 LAYERS = (
     "paths",

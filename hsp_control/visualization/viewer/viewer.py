@@ -1,9 +1,9 @@
 """The viewer: shows a robot, its surroundings and its runs in a browser."""
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from html import escape
-from typing import Any, Self
+from typing import Any, Protocol, Self
 
 import numpy as np
 import pinocchio as pin
@@ -17,7 +17,6 @@ from hsp_control.robot import Robot, RobotState
 from hsp_control.simulation import Rollout
 from hsp_control.visualization.viewer import browser
 from hsp_control.visualization.viewer.bands import bands_of
-from hsp_control.visualization.viewer.camera import look_at, right_direction
 from hsp_control.visualization.viewer.clip import remove_clip, set_clip
 from hsp_control.visualization.viewer.commands import (
     Command,
@@ -29,9 +28,10 @@ from hsp_control.visualization.viewer.commands import (
     set_time,
 )
 from hsp_control.visualization.viewer.comparison import ComparedRun, Comparison
+from hsp_control.visualization.viewer.legend import LegendEntry
 from hsp_control.visualization.viewer.motion import motion_of
-from hsp_control.visualization.viewer.obstacle_drawing import ObstacleDrawing
-from hsp_control.visualization.viewer.offline.inline import InlineView
+from hsp_control.visualization.viewer.obstacle_layer import ObstacleDrawing
+from hsp_control.visualization.viewer.offline.page import InlineView
 from hsp_control.visualization.viewer.robot_drawing import RobotDrawing
 from hsp_control.visualization.viewer.run_drawing import RunDrawing, all_layers, clear
 from hsp_control.visualization.viewer.run_plots import plots_of
@@ -40,11 +40,29 @@ from hsp_control.visualization.viewer.stage import (
     draw_stage,
     in_sight,
     is_dark,
+    look_at,
+    right_direction,
     scene_size,
     stage_legend,
 )
-from hsp_control.visualization.viewer.stage_content import StageContent
 from hsp_control.visualization.viewer.transport import Transport
+
+
+class StageContent(Protocol):
+    """Draws itself once, and returns the points that it will occupy."""
+
+    def draw(self, size: float) -> Iterator[Command]:
+        """Yield the commands that draw it in a scene of the given size [m]."""
+
+    def points(self) -> Array:
+        """Return where robots and targets will be [m], shape (K, 3); K may be 0."""
+
+    def obstacle_points(self) -> Array:
+        """Return points that enclose the obstacles [m], shape (L, 3); L may be 0."""
+
+    def legend(self) -> list[LegendEntry]:
+        """Return the legend's entries."""
+
 
 _log = logging.getLogger(__name__)
 

@@ -7,7 +7,6 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.visualization.viewer.commands import Json
-from hsp_control.visualization.viewer.materials import material
 from hsp_control.visualization.viewer.offline.clip_reduction import reduce_clip
 from hsp_control.visualization.viewer.offline.meshes import Piece, read_mesh
 from hsp_control.visualization.viewer.offline.triangle_meshes import (
@@ -16,7 +15,7 @@ from hsp_control.visualization.viewer.offline.triangle_meshes import (
     weld,
 )
 from hsp_control.visualization.viewer.packed.packing import ArrayTable, step_of
-from hsp_control.visualization.viewer.threejs import matrix, unique_name
+from hsp_control.visualization.viewer.threejs import material, matrix, unique_name
 
 VERTEX_STEP = 2e-5
 """Resolution of vertices [m], or 2⁻¹⁶ of a mesh's size if that is larger."""

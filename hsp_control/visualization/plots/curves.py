@@ -1,4 +1,4 @@
-"""Self-motion: the error e_N and its predicted decay, and the field."""
+"""Curves of a run over time: task errors, joints, singularities, self-motion."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -8,19 +8,119 @@ from hsp_control.simulation.decay import predicted_decay
 from hsp_control.simulation.log_distances import logged_distances
 from hsp_control.simulation.log_series import (
     column_unit,
+    effort_units,
     field_terms,
     held_period,
+    joint_names,
+    joint_positions,
+    position_units,
     rate_unit,
+    task_errors,
 )
 from hsp_control.visualization import palette
-from hsp_control.visualization.plots.legends import legend_below, literal_text, note
 from hsp_control.visualization.plots.lines import (
     draw_lines,
+    legend_below,
+    literal_text,
     log_scale,
     mark_damped,
+    note,
     point_marker,
     time_axis,
 )
+
+_UNIT_DASHES = {"rad": "--", "–": ":"}
+"""Line styles by unit: all units share one axis; the legend names them."""
+
+
+def draw_task_errors(axes: Axes, rollout: Rollout) -> None:
+    """Draw the norm of every task's error, one line per unit, with a log axis."""
+    t, parts = rollout.t, task_errors(rollout)
+    if not parts:
+        note(axes, "the log has no task")
+    for part in parts:
+        axes.plot(
+            t,
+            part.norm,
+            color=palette.task(part.task),
+            linestyle=_UNIT_DASHES.get(part.unit, "-"),
+            marker=point_marker(t),
+            label=literal_text(f"{part.label} [{part.unit}]"),
+        )
+    mark_damped(axes, rollout)
+    norms = [np.zeros(0), *(part.norm for part in parts)]
+    log_scale(axes, np.concatenate(norms), top=1e-6)
+    units = ", ".join(dict.fromkeys(part.unit for part in parts))
+    axes.set_ylabel(rf"task error $\Vert e \Vert$ [{units}]")
+    time_axis(axes, t)
+    legend_below(axes)
+
+
+def draw_joint_positions(
+    axes: Axes, rollout: Rollout, *, absolute: bool = True
+) -> None:
+    """Draw the joint positions, unwrapped: not limited to one turn."""
+    positions, what = joint_positions(rollout, absolute=absolute)
+    names, units = joint_names(rollout), position_units(rollout)
+    unit = draw_lines(axes, rollout.t, positions, names, units)
+    axes.set_ylabel(f"{what} [{unit}]")
+    time_axis(axes, rollout.t)
+    legend_below(axes)
+
+
+def draw_efforts(axes: Axes, rollout: Rollout) -> None:
+    """Draw the joints' efforts tau."""
+    names, units = joint_names(rollout), effort_units(rollout)
+    unit = draw_lines(axes, rollout.t, rollout.tau, names, units)
+    axes.set_ylabel(f"effort τ [{unit}]")
+    time_axis(axes, rollout.t)
+    legend_below(axes)
+
+
+_SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+
+
+def draw_manipulability(axes: Axes, rollout: Rollout) -> None:
+    """Draw det(J W⁻¹ Jᵀ), the square of Yoshikawa's measure, and mark its minimum."""
+    t, values = rollout.t, rollout["manipulability"]
+    axes.plot(t, values, color=palette.TASK, marker=point_marker(t))
+    minimum = int(np.argmin(values))
+    axes.plot(
+        t[minimum],
+        values[minimum],
+        linestyle="none",
+        marker="o",
+        markersize=6.5,
+        markerfacecolor=palette.PAPER,
+        markeredgecolor=palette.WARNING,
+        markeredgewidth=1.6,
+        clip_on=False,
+        zorder=3,
+        label=f"minimum {values[minimum]:.3g} at {t[minimum]:.2f} s",
+    )
+    mark_damped(axes, rollout)
+    maximum = float(values[np.isfinite(values)].max(initial=1e-12))
+    axes.set_ylim(0.0, 1.08 * maximum)
+    unit = column_unit(rollout, "manipulability")
+    axes.set_ylabel(rf"$\det(J\,W^{{-1}}J^{{\mathsf{{T}}}})$ [{unit}]")
+    time_axis(axes, t)
+    legend_below(axes)
+
+
+def draw_singular_values(axes: Axes, rollout: Rollout) -> None:
+    """Draw the singular values of the stacked task Jacobian in the metric W = L Lᵀ."""
+    values = rollout["singular_values"]
+    names = [f"σ{k + 1}".translate(_SUBSCRIPTS) for k in range(values.shape[1])]
+    draw_lines(axes, rollout.t, values, names)
+    mark_damped(axes, rollout)
+    if float(values.min()) < 0.05 * float(values.max()):
+        log_scale(axes, values)
+    else:
+        axes.set_ylim(bottom=0.0)
+    unit = column_unit(rollout, "singular_values")
+    axes.set_ylabel(rf"singular values of $J\,L^{{-\mathsf{{T}}}}$ [{unit}]")
+    time_axis(axes, rollout.t)
+    legend_below(axes)
 
 
 def draw_null_space_error(axes: Axes, rollout: Rollout) -> None:
