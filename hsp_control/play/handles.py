@@ -7,9 +7,8 @@ import numpy as np
 
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.control.controller import Controller
-from hsp_control.play.grips import Grip, obstacles_of, targets_of
+from hsp_control.play.grips import Grip, obstacles_of, posture_of, targets_of
 from hsp_control.play.knobs import RAMP, Knob, knobs_of
-from hsp_control.play.posture_grip import posture_of
 
 KNOB_PERIOD = 0.1
 """Time between two changes by one knob [s]: a slider says much more."""

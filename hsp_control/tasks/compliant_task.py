@@ -14,8 +14,7 @@ from hsp_control.common.step_plan import StepPlan
 from hsp_control.declaration import within
 from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
-from hsp_control.tasks.gains import Gains
-from hsp_control.tasks.impedance import Impedance, parts_of
+from hsp_control.tasks.gains import Gains, Impedance, parts_of
 from hsp_control.tasks.impedance_gains import Rotating, Scratch, impedance_gains
 from hsp_control.tasks.task import Feedback, InForce, SecondOrderTask, Task
 

@@ -26,9 +26,13 @@ from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
 from hsp_control.robot.kinematics import FrameKinematics, FrameMotion
 from hsp_control.tasks.compliant_task import CompliantTask
-from hsp_control.tasks.frame_task import FrameTask, TrackingTask, frame_of
+from hsp_control.tasks.frame_task import (
+    FrameTask,
+    TrackingTask,
+    frame_of,
+    place_orientation,
+)
 from hsp_control.tasks.impedance_gains import Rotating
-from hsp_control.tasks.placing import place_orientation
 from hsp_control.tasks.task import Drawn, ErrorPart, Feedback, add_feedback, copy_rows
 from hsp_control.trajectories import (
     HoldOrientation,
@@ -113,13 +117,7 @@ class FrameOrientation(
 
 @kernel
 def orientation_error(
-    R: Array,
-    w: Array,
-    R_d: Array,
-    w_d: Array,
-    scratch: Array,
-    e: Array,
-    e_dot: Array,
+    R: Array, w: Array, R_d: Array, w_d: Array, scratch: Array, e: Array, e_dot: Array
 ) -> None:
     """Write e = -y and e' = -y' with y = log(R_dᵀ R) and y' = Jlog(y) w̃.
 

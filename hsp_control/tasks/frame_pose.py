@@ -23,9 +23,8 @@ from hsp_control.tasks.frame_orientation import (
     orientation_acceleration,
     orientation_error,
 )
-from hsp_control.tasks.frame_task import FrameTask, TrackingTask, frame_of
+from hsp_control.tasks.frame_task import FrameTask, TrackingTask, frame_of, place_pose
 from hsp_control.tasks.impedance_gains import Rotating
-from hsp_control.tasks.placing import place_pose
 from hsp_control.tasks.task import Drawn, ErrorPart, Feedback, add_feedback, copy_rows
 from hsp_control.trajectories import (
     ComposedPose,

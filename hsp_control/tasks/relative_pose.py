@@ -19,8 +19,7 @@ from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.kinematics import FrameMotion
 from hsp_control.tasks.frame_orientation import ORIENTATION_SCRATCH
 from hsp_control.tasks.frame_pose import POSE_ERROR, PoseOrPoint, pose_error_equation
-from hsp_control.tasks.frame_task import TrackingTask, frame_of
-from hsp_control.tasks.placing import place_pose
+from hsp_control.tasks.frame_task import TrackingTask, frame_of, place_pose
 from hsp_control.tasks.task import ErrorPart, Feedback, default_name
 from hsp_control.trajectories import ComposedPose, PoseSample, PoseTrajectory
 

@@ -459,11 +459,7 @@ def copy_rows(
 
 @kernel
 def add_feedback(
-    feed_forward: Array,
-    feedback: Feedback,
-    e: Array,
-    e_dot: Array,
-    out: Array,
+    feed_forward: Array, feedback: Feedback, e: Array, e_dot: Array, out: Array
 ) -> None:
     """Write feed_forward + offset + Kv e' + Kp s(e), perhaps in place."""
     Kp, Kv, offset, largest = feedback

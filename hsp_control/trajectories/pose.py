@@ -1,6 +1,7 @@
-"""The abstract trajectory of a pose in SE(3), and one composed of two trajectories."""
+"""The abstract trajectory of a pose, one composed of two, and a constant one."""
 
 from abc import ABC, abstractmethod
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -9,9 +10,10 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TrajectoryError
 from hsp_control.declaration import Part
+from hsp_control.declaration.quantities import Vector3
+from hsp_control.declaration.rotation import Rotation
 from hsp_control.trajectories.following import Follower, follow_all, follow_by
-from hsp_control.trajectories.hold import Hold
-from hsp_control.trajectories.hold_orientation import HoldOrientation
+from hsp_control.trajectories.hold import Hold, HoldOrientation
 from hsp_control.trajectories.orientation import (
     OrientationSample,
     OrientationTrajectory,
@@ -130,6 +132,39 @@ class ComposedPose(PoseTrajectory, type="composed"):
     def follow(self, out: PoseSample) -> Follower:
         """Return a function of time that updates ``out``; see `Trajectory.follow`."""
         return follow_all(
-            self.position.follow(out.position),
-            self.orientation.follow(out.orientation),
+            self.position.follow(out.position), self.orientation.follow(out.orientation)
         )
+
+
+class HoldPose(PoseTrajectory, type="hold_pose"):
+    """M(t) = M0, a constant pose."""
+
+    position: Vector3 | None = None
+    """The origin in the world, shape (3,) [m]; where the robot starts by default."""
+    rotation: Rotation | None = None
+    """The orientation, body to world: roll, pitch and yaw [rad], a quaternion or a
+    matrix [-]; that in which the robot starts by default."""
+
+    @property
+    def relative(self) -> bool:
+        """Whether it depends on where the robot starts."""
+        return self.position is None or self.rotation is None
+
+    def anchored(self, start: pin.SE3) -> "HoldPose":
+        """Return the pose, where the robot starts if it is not given."""
+        return HoldPose(
+            start.translation if self.position is None else self.position,
+            start.rotation if self.rotation is None else self.rotation,
+        )
+
+    def sample(self, t: float, out: PoseSample | None = None) -> PoseSample:
+        """Return the pose and zero rates; see `PoseTrajectory.sample`."""
+        return self._parts.sample(t, out)
+
+    def follow(self, out: PoseSample) -> Follower:
+        """Write ``out`` once, and return a follower that does nothing."""
+        return self._parts.follow(out)
+
+    @cached_property
+    def _parts(self) -> ComposedPose:
+        return ComposedPose(Hold(self.position), HoldOrientation(self.rotation))

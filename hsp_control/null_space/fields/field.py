@@ -288,12 +288,7 @@ def _update(weight: Weight, state: RobotState, weights: Array) -> None:
 
 @kernel
 def _add(
-    first: bool,
-    weights: Array,
-    g: Array,
-    g_dot: Array,
-    sum_g: Array,
-    sum_g_dot: Array,
+    first: bool, weights: Array, g: Array, g_dot: Array, sum_g: Array, sum_g_dot: Array
 ) -> None:
     """Scale a sample by w and w', and add it to the sum; ``first`` starts the sum."""
     w, w_dot = weights[0], weights[1]

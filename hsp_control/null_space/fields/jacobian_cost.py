@@ -30,7 +30,7 @@ from hsp_control.common.step_plan import CallSequence
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Axes
 from hsp_control.geometry.start import Start
-from hsp_control.null_space.fields.compiled_cost import CompiledCost, Derivatives
+from hsp_control.null_space.fields.cost import CompiledCost, Derivatives
 from hsp_control.robot import Robot, RobotState
 
 Rows = Literal["position", "orientation", "pose"]

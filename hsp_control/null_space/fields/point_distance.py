@@ -14,7 +14,7 @@ from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Name, Names, OrInstance
 from hsp_control.geometry.scene import Obstacle
 from hsp_control.geometry.start import Start
-from hsp_control.null_space.fields.compiled_cost import CompiledCost, Derivatives
+from hsp_control.null_space.fields.cost import CompiledCost, Derivatives
 from hsp_control.robot import RobotState
 from hsp_control.trajectories import TrajectorySample
 

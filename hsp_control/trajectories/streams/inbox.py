@@ -1,12 +1,38 @@
-"""Where messages wait: any thread puts them in, the control loop takes them out."""
+"""The messages that wait, and those that were taken."""
 
 from collections import deque
+from collections.abc import Iterable
 from threading import Lock
 from typing import Any, NamedTuple
 
 from hsp_control.common.exceptions import StreamError
 from hsp_control.trajectories.streams.message import Message, Space, decoded, message_of
-from hsp_control.trajectories.streams.record import Record
+
+MOST = 5_000_000
+"""Most numbers that are recorded: poses at 60 Hz for three hours, 0.1 GB."""
+
+
+class Record:
+    """Messages and the controller's times at which they were taken."""
+
+    def __init__(self) -> None:
+        """Begin without messages."""
+        self.lost = self._size = 0
+        self._entries: list[tuple[float, Message]] = []
+
+    def add(self, t: float, messages: Iterable[Message]) -> None:
+        """Record messages that are taken at a time [s], as long as there is room."""
+        for each in messages:
+            if self._size + each.size <= MOST:
+                self._entries.append((t, each))
+                self._size += each.size
+            else:
+                self.lost += 1
+
+    def to_list(self) -> list[dict[str, Any]]:
+        """Return the messages as `recorded` reads them."""
+        return [{"at": t, **each.to_dict()} for t, each in self._entries]
+
 
 CAPACITY = 4096
 """Most messages that wait; where more come, the oldest are dropped."""

@@ -12,7 +12,7 @@ import ruckig
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import StreamError
-from hsp_control.trajectories.polynomial import QUINTIC, horner
+from hsp_control.trajectories.piecewise_polynomial import QUINTIC, horner
 from hsp_control.trajectories.streams.bounds import MotionBounds
 from hsp_control.trajectories.streams.chart import State
 

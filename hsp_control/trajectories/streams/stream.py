@@ -34,9 +34,8 @@ from hsp_control.trajectories.streams.bounds import (
 )
 from hsp_control.trajectories.streams.chart import Chart, State
 from hsp_control.trajectories.streams.listeners import check_address, is_address
-from hsp_control.trajectories.streams.mailbox import Mailbox
+from hsp_control.trajectories.streams.mailbox import Mailbox, read_recording, recorded
 from hsp_control.trajectories.streams.message import ORIENTATION, POSE, Space
-from hsp_control.trajectories.streams.recording import read_recording, recorded
 from hsp_control.trajectories.streams.running import Policy, RunningStream, Source
 from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
 

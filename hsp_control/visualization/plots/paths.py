@@ -145,11 +145,9 @@ def _draw_tick_labels(
     axes.annotate(
         f"{'xyz'[axis]} [m]",
         (float(x), float(y)),
-        xytext=(
-            (-16.0, -18.0),
-            (8.0 + 0.5 * widest, -16.0),
-            (-9.0 - widest, 0.0),
-        )[axis],
+        xytext=((-16.0, -18.0), (8.0 + 0.5 * widest, -16.0), (-9.0 - widest, 0.0))[
+            axis
+        ],
         textcoords="offset points",
         ha=("right", "left", "right")[axis],
         va="center" if upright else "top",

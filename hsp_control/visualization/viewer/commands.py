@@ -59,12 +59,7 @@ def set_ghost(path: str, color: str, opacity: float) -> Command:
 
 
 def set_trail(
-    path: str,
-    points: Array,
-    radius: float,
-    color: int,
-    *,
-    sleeve: bool = False,
+    path: str, points: Array, radius: float, color: int, *, sleeve: bool = False
 ) -> Command:
     """Return the command that sets a node's object to a path in space, a tube.
 

@@ -99,10 +99,7 @@ class Motion(NamedTuple):
 
 
 def motion_of(
-    robot: Robot,
-    rollout: Rollout,
-    finest: float = FINEST,
-    coarsest: float = COARSEST,
+    robot: Robot, rollout: Rollout, finest: float = FINEST, coarsest: float = COARSEST
 ) -> Motion:
     """Return the rows of a log that are drawn: thinned, or with interpolated rows."""
     times = drawn_times(rollout.t, finest, coarsest)

@@ -80,10 +80,7 @@ def facets(vertices: Array, triangles: Indices) -> Json:
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     normals /= np.where(lengths > 0.0, lengths, 1.0)
     return threejs.buffer_geometry(
-        {
-            "position": corners.reshape(-1, 3),
-            "normal": np.repeat(normals, 3, axis=0),
-        }
+        {"position": corners.reshape(-1, 3), "normal": np.repeat(normals, 3, axis=0)}
     )
 
 

@@ -114,9 +114,7 @@ def _visual(
     )
 
 
-def _materials(
-    tree: Element,
-) -> Iterator[tuple[str, tuple[float, ...]]]:
+def _materials(tree: Element) -> Iterator[tuple[str, tuple[float, ...]]]:
     """Yield (name, colour) of all named materials in the file."""
     for material in tree.iter("material"):
         color = material.find("color")
