@@ -43,11 +43,7 @@ class CompliantTask(SecondOrderTask):
     fades by itself where the hand cannot move: `largest_error` does not count."""
 
     def __post_init__(self) -> None:
-        """Check that there are not both gains and an impedance.
-
-        Raises:
-            GainError: If there are.
-        """
+        """Check that there are not both gains and an impedance."""
         if self.impedance is not None and self.gains != _NO_GAINS:
             raise GainError(
                 "give either gains [1/s², 1/s] or impedance [N/m, N·s/m], not both"
@@ -58,11 +54,7 @@ class CompliantTask(SecondOrderTask):
         return Rotating(self.rows, np.eye(3), np.zeros(3))
 
     def checked(self, robot: Robot) -> Self:
-        """Return the task itself, whose rows and gains fit; see `Task.checked`.
-
-        Raises:
-            GainError: If it has an impedance, and the robot a floating base.
-        """
+        """Return the task itself, whose rows and gains fit; see `Task.checked`."""
         if self.impedance is not None and robot.unactuated:
             with within("impedance"):
                 raise GainError(

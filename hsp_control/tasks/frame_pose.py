@@ -66,11 +66,7 @@ class FramePose(FrameTask, TrackingTask, CompliantTask, type="frame_pose"):
 
     @property
     def pose(self) -> PoseTrajectory:
-        """The trajectory of a placed task.
-
-        Raises:
-            TaskError: If the task is not placed.
-        """
+        """The trajectory of a placed task."""
         if not isinstance(self.trajectory, PoseTrajectory):
             raise self._not_placed("orientation")
         return self.trajectory
@@ -151,10 +147,7 @@ class _Reference(NamedTuple):
 
 @kernel
 def _measured_pose(desired: Array, position: Array, R: Array, values: Array) -> None:
-    """Write the desired and the actual pose; see `FramePose.measure`.
-
-    Shapes: values (2, 7).
-    """
+    """Write the desired and the actual pose; see `FramePose.measure`."""
     for i in range(3):
         values[0, i], values[1, i] = desired[0, i], position[i]
     quaternion_from_rotation(desired[3:6], values[0, 3:])

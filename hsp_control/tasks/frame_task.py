@@ -29,10 +29,7 @@ from hsp_control.trajectories.following import Follower
 
 
 def place_point(trajectory: Trajectory, here: Array, blend: float | None) -> Trajectory:
-    """Return the trajectory of a point in the world, blended if asked for.
-
-    Shapes: here (n,).
-    """
+    """Return the trajectory of a point in the world, blended if asked for."""
     with within("trajectory"):
         placed = trajectory.anchored(here)
         if placed.dimension != len(here):
@@ -98,11 +95,7 @@ class FrameTask(SecondOrderTask):
 
     @property
     def frame_name(self) -> str:
-        """Name of the frame of a placed task.
-
-        Raises:
-            TaskError: If the task is not placed.
-        """
+        """Name of the frame of a placed task."""
         if self.frame is None:
             raise self._not_placed("frame")
         return self.frame

@@ -64,12 +64,7 @@ class Gains(Part, error=GainError):
         return frequency**2, 2.0 * damping * frequency
 
     def matrices(self, rows: int) -> tuple[Array, Array]:
-        """Return Kp and Kv as matrices of shape (rows, rows).
-
-        Raises:
-            GainError: If a gain has another size, or the solution of
-                e'' + Kv e' + Kp e = 0 does not decay.
-        """
+        """Return Kp and Kv as matrices of shape (rows, rows)."""
         kp, kv = self._pair()
         Kp = as_matrix(kp, rows, "kp")
         Kv = as_matrix(kv, rows, "kv")
@@ -154,16 +149,9 @@ class Impedance(Part, error=GainError):
             check_bounded(stiffness)
 
     def numbers(self, rows: int) -> Array:
-        """Return K, D, ζ and 1/largest error in one array; `parts_of` takes it apart.
+        """Return K, D, ζ and 1/largest error, shape (2 rows + 2, rows), see `parts_of`.
 
-        Numbers between those of two impedances are those of an impedance as well, so
-        that one may change into the other.
-
-        Returns:
-            Shape (2 rows + 2, rows).
-
-        Raises:
-            GainError: If one of them has another size.
+        Numbers between those of two impedances are those of an impedance as well.
         """
         out = np.zeros((2 * rows + 2, rows))
         K, D, ratio, inverse_bound = parts_of(out)
@@ -179,10 +167,7 @@ class Impedance(Part, error=GainError):
 
 
 def parts_of(numbers: Array) -> tuple[Array, Array, Array, Array]:
-    """Return views: K and D, shape (m, m), ζ and 1/largest error, shape (m,).
-
-    Shapes: numbers (2 m + 2, m).
-    """
+    """Return views: K and D, shape (m, m), ζ and 1/largest error, shape (m,)."""
     m = numbers.shape[1]
     return numbers[:m], numbers[m : 2 * m], numbers[2 * m], numbers[2 * m + 1]
 

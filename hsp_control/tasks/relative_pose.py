@@ -50,22 +50,14 @@ class RelativePose(TrackingTask, type="relative_pose"):
 
     @property
     def frame_name(self) -> str:
-        """Name of the frame of a placed task.
-
-        Raises:
-            TaskError: If the task is not placed.
-        """
+        """Name of the frame of a placed task."""
         if self.frame is None:
             raise self._not_placed("frame")
         return self.frame
 
     @property
     def pose(self) -> PoseTrajectory:
-        """The trajectory of a placed task.
-
-        Raises:
-            TaskError: If the task is not placed.
-        """
+        """The trajectory of a placed task."""
         if not isinstance(self.trajectory, PoseTrajectory):
             raise self._not_placed("orientation")
         return self.trajectory
@@ -76,12 +68,7 @@ class RelativePose(TrackingTask, type="relative_pose"):
         return self.pose
 
     def placed(self, start: Start) -> Self:
-        """Return the task with its trajectory in the reference; see `Task.placed`.
-
-        Raises:
-            FrameNotFoundError: If the robot has no such frame.
-            TaskError: If frame and reference are the same.
-        """
+        """Return the task with its trajectory in the reference; see `Task.placed`."""
         robot: Robot = start.state.robot
         frame = frame_of(self.frame, robot)
         with within("reference"):

@@ -196,10 +196,7 @@ class Task(Part, ABC, family="tasks", error=TaskError):
         return self.feedback()
 
     def linear_feedback(self, state: RobotState, in_force: InForce) -> Feedback:
-        """Return the feedback for small errors about a state, at which it may depend.
-
-        The check of the control rate uses it.
-        """
+        """Return the feedback for small errors at a state, for the rate check."""
         return in_force.feedback
 
     def placed(self, start: Start) -> Self:
@@ -267,11 +264,7 @@ class Task(Part, ABC, family="tasks", error=TaskError):
         return False
 
     def __init_subclass__(cls, **arguments: Any) -> None:
-        """Reset `compile` if a subclass overrides `evaluate` only.
-
-        Otherwise a subclass of a compiled task would inherit a step plan that ignores
-        its `evaluate`.
-        """
+        """Reset `compile` if a subclass overrides `evaluate`, which it would ignore."""
         super().__init_subclass__(**arguments)
         if "evaluate" in vars(cls) and "compile" not in vars(cls):
             cls.compile = Task.compile  # type: ignore[method-assign]
@@ -386,11 +379,7 @@ class SecondOrderTask(Task):
         return Feedback(Kp, Kv, np.zeros(rows), self._largest())
 
     def checked(self, robot: Robot) -> Self:
-        """Return the task with its largest errors in numbers; see `Task.checked`.
-
-        Raises:
-            TaskError: If there is neither one number nor one for each part.
-        """
+        """Return the task with its largest errors in numbers; see `Task.checked`."""
         with within("largest_error"):
             largest = largest_errors(self.largest_error, self.error_parts, robot)
         changes: dict[str, Any] = {"largest_error": largest}

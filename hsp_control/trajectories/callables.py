@@ -68,11 +68,7 @@ class CallableTrajectory(Trajectory):
     """Time between the seven points of the differences [s]."""
 
     def sample(self, t: float, out: TrajectorySample | None = None) -> TrajectorySample:
-        """Return x(t), x'(t) and x''(t); see `Trajectory.sample`.
-
-        Raises:
-            TrajectoryError: If a function does not return n finite numbers.
-        """
+        """Return x(t), x'(t) and x''(t); see `Trajectory.sample`."""
         out = self._output(out)
         velocity, acceleration = self._rates(t)
         out.position[:] = self._call(self.function, "function", t)
@@ -116,11 +112,7 @@ class CallableOrientation(OrientationTrajectory):
     def sample(
         self, t: float, out: OrientationSample | None = None
     ) -> OrientationSample:
-        """Return R(t), ω(t) and ω'(t); see `OrientationTrajectory.sample`.
-
-        Raises:
-            TrajectoryError: If the function does not return a rotation matrix.
-        """
+        """Return R(t), ω(t) and ω'(t); see `OrientationTrajectory.sample`."""
         out = self._output(out)
         R = self._call(t)
 

@@ -74,10 +74,7 @@ class OrientationTrajectory(Part, ABC, family="orientations", error=TrajectoryEr
         """
 
     def follow(self, out: OrientationSample) -> Follower:
-        """Return a function of time [s] that writes the sample into ``out``.
-
-        See `Trajectory.follow`.
-        """
+        """Return a call that writes ``out`` for a time [s]; see `Trajectory.follow`."""
         return follow_by(self.sample, out)
 
     def _output(self, out: OrientationSample | None) -> OrientationSample:

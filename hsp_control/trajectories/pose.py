@@ -38,11 +38,7 @@ class PoseSample(NamedTuple):
 
     @classmethod
     def over(cls, memory: Array) -> "PoseSample":
-        """Return a sample whose arrays are views of ``memory``.
-
-        Args:
-            memory: Shape (8, 3); its rows are x, x', x'', R (three rows), ω, ω'.
-        """
+        """Return a sample whose arrays are views of ``memory``; memory (8, 3)."""
         return cls(
             TrajectorySample(memory[0], memory[1], memory[2]),
             OrientationSample(memory[3:6], memory[6], memory[7]),
@@ -81,10 +77,7 @@ class PoseTrajectory(Part, ABC, family="poses", error=TrajectoryError):
         """
 
     def follow(self, out: PoseSample) -> Follower:
-        """Return a function of time [s] that writes the sample into ``out``.
-
-        See `Trajectory.follow`.
-        """
+        """Return a call that writes ``out`` for a time [s]; see `Trajectory.follow`."""
 
         def sampler(t: float, own: tuple[Array, ...]) -> tuple[Array, ...]:
             sample = self.sample(t, out)

@@ -60,13 +60,7 @@ class Clearance(Cost):
         """Return new memory for the pairs of shapes and their distances."""
 
     def placed(self, start: Start) -> Self:
-        """Return the cost with obstacles instead of their names, checked.
-
-        Raises:
-            SceneError: If the scene has no such obstacle, or the robot starts in
-                contact: a barrier cannot resolve a contact.
-            FieldError: If there is no pair, or a link has no geometry.
-        """
+        """Return the cost with obstacles instead of their names, checked."""
         fitted = self.fitted(start)
         distance, pair = fitted.proximity(start.state).nearest(start.state)
         if start.known and distance <= 0.0:
@@ -81,11 +75,7 @@ class Clearance(Cost):
         return self
 
     def proximity(self, state: RobotState) -> Proximity:
-        """Return the pairs of shapes and their distances, for this state only.
-
-        It belongs to the state, and is the same one every time: what it measured
-        changes with its next `Proximity.measure`.
-        """
+        """Return the pairs of shapes and their distances, for this state only."""
         return self._work(state).proximity
 
     def minimum_distance(self, state: RobotState) -> float:

@@ -50,11 +50,7 @@ class Cost(NullSpaceField):
     """
 
     def __init_subclass__(cls, **arguments: Any) -> None:
-        """Reset `differentiate` and `compile` if a subclass overrides what they use.
-
-        Otherwise a subclass of a concrete cost would inherit a method that ignores its
-        gradient or its gradient rate.
-        """
+        """Reset `differentiate` and `compile` if a subclass overrides what they use."""
         super().__init_subclass__(**arguments)
         own = vars(cls)
         if "differentiate" not in own and {"gradient", "gradient_rate"} & own.keys():
@@ -152,11 +148,7 @@ class FunctionCost(Cost):
     default."""
 
     def value(self, state: RobotState) -> float:
-        """Return f.
-
-        Raises:
-            FieldError: If the function does not return one finite number.
-        """
+        """Return f."""
         value = self.function(state.seen)
         try:
             number = float(value)

@@ -92,11 +92,7 @@ class NullSpaceField(Part, ABC, family="fields", error=FieldError):
         )
 
     def __init_subclass__(cls, **arguments: Any) -> None:
-        """Reset `compile` and `bind_value` if a subclass overrides what they do.
-
-        Otherwise a subclass of a concrete field would inherit a step plan that ignores
-        its `evaluate`, or a call that ignores its `value`.
-        """
+        """Reset `compile` and `bind_value` if a subclass overrides what they do."""
         super().__init_subclass__(**arguments)
         own = vars(cls)
         if "evaluate" in own and "compile" not in own:
@@ -227,15 +223,7 @@ class FieldSum(NullSpaceField):
         out: FieldSample,
         samples: Sequence[FieldSample],
     ) -> StepPlan:
-        """Return the step plan, which also writes the weighted sample of each term.
-
-        Args:
-            state: See `NullSpaceField.compile`; so are the next three.
-            metric: The metric's sample.
-            form: The metric's form.
-            out: The sample of the sum.
-            samples: The samples of the terms, as `allocate_terms` returns them.
-        """
+        """Return the step plan, which also writes the weighted sample of each term."""
         follow: list[Callable[[float], object]] = []
         write: list[Callable[[], object]] = []
         for k, (term, sample) in enumerate(zip(self.terms, samples, strict=True)):

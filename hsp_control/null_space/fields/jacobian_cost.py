@@ -77,13 +77,7 @@ class JacobianCost(CompiledCost):
         return 1.0
 
     def placed(self, start: Start) -> Self:
-        """Return the cost with the name of its frame, checked.
-
-        Raises:
-            FrameNotFoundError: If the robot has no such frame.
-            FieldError: If there are more rows than degrees of freedom that move the
-                frame, or a mimic joint moves it.
-        """
+        """Return the cost with the name of its frame, checked."""
         robot = start.state.robot
         frame = self._frame(robot)
         with within("frame"):

@@ -37,11 +37,7 @@ class JointCentering(CompiledCost, type="joint_centering"):
     """w_i of the joints [1/s], one number or nv."""
 
     def placed(self, start: Start) -> Self:
-        """Return the cost, checked.
-
-        Raises:
-            FieldError: If the weights do not fit the robot, or no joint has limits.
-        """
+        """Return the cost, checked."""
         robot = start.state.robot
         with within("weights"):
             per_dof(self.weights, robot.nv)
@@ -130,13 +126,7 @@ class TargetPosture(CompiledCost, type="target_posture"):
     default. A stream leads it only in a change of the running controller."""
 
     def placed(self, start: Start) -> Self:
-        """Return the cost with its posture as a configuration, checked.
-
-        Raises:
-            FieldError: If the weights do not fit the robot, or every weight of a joint
-                with one degree of freedom is 0.
-            HspControlError: If the posture does not fit the robot.
-        """
+        """Return the cost with its posture as a configuration, checked."""
         robot = start.state.robot
         with within("weights"):
             weights = per_dof(self.weights, robot.nv)
@@ -226,12 +216,7 @@ class EqualJointAngles(CompiledCost, type="equal_joint_angles"):
     """Names of two or more joints with one degree of freedom each, in order [-]."""
 
     def placed(self, start: Start) -> Self:
-        """Return the cost, checked.
-
-        Raises:
-            JointNotFoundError: If a joint does not exist.
-            FieldError: If a joint has several degrees of freedom.
-        """
+        """Return the cost, checked."""
         for k, joint in enumerate(self.joints):
             with within("joints", k):
                 where = start.state.robot.velocity_index(joint)
@@ -302,11 +287,7 @@ class LimitBarrier(CompiledCost, type="limit_barrier"):
     """w_i of the joints [1/s], one number or nv."""
 
     def placed(self, start: Start) -> Self:
-        """Return the cost, checked; see `NullSpaceField.placed`.
-
-        Raises:
-            FieldError: If the weights do not fit the robot, or no joint has limits.
-        """
+        """Return the cost, checked; see `NullSpaceField.placed`."""
         robot = start.state.robot
         with within("weights"):
             per_dof(self.weights, robot.nv)

@@ -33,12 +33,7 @@ class PointDistance(CompiledCost, type="point_distance"):
     Python, the obstacle itself."""
 
     def placed(self, start: Start) -> Self:
-        """Return the cost with its obstacle from the scene, checked.
-
-        Raises:
-            FrameNotFoundError: If a frame does not exist.
-            SceneError: If the scene has no such obstacle.
-        """
+        """Return the cost with its obstacle from the scene, checked."""
         for k, frame in enumerate(self.frames):
             with within("frames", k):
                 start.state.robot.frame_id(frame)

@@ -80,11 +80,7 @@ class StateWeight(Weight):
     frames, but not v."""
 
     def sample(self, state: RobotState) -> tuple[float, float]:
-        """Return w and w'; see `Weight.sample`.
-
-        Raises:
-            FieldError: If w is negative or not finite.
-        """
+        """Return w and w'; see `Weight.sample`."""
         value = float(self.function(state))
         if not 0.0 <= value < np.inf:
             raise FieldError(f"weight is {value}; must be at least 0")

@@ -34,11 +34,7 @@ class FixedMetric(Metric):
 
     @cached_property
     def W(self) -> Array:
-        """The matrix, read-only, shape (nv, nv).
-
-        Raises:
-            MetricError: If it is not finite, square, symmetric and positive definite.
-        """
+        """The matrix, read-only, shape (nv, nv)."""
         matrix = self._matrix()
         if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
             raise MetricError(f"the metric has shape {matrix.shape}; needs (nv, nv)")

@@ -150,15 +150,7 @@ class Streamed(Remembering, error=TrajectoryError):
         self._mailbox.put(values=values, times=times, velocities=velocities, t=t)
 
     def recorded_in(self, folder: Path, allow: Callable[[Path], object]) -> Self:
-        """Return the stream with the messages of its recording, if it names one.
-
-        Args:
-            folder: Where a relative path begins.
-            allow: Raises if a file may not be read.
-
-        Raises:
-            StreamError: If the recording cannot be read, or a message is invalid.
-        """
+        """Return the stream with the messages of its recording, if it names one."""
         if self.source is None or self.live:
             return self
         path = folder / self.source
@@ -235,11 +227,7 @@ class Streamed(Remembering, error=TrajectoryError):
         return self._shared(placed)
 
     def like(self, kind: "type[Streamed]") -> "Streamed":
-        """Return the stream as one of another kind, which hears the same.
-
-        Raises:
-            TrajectoryError: If it has settings that the other kind does not know.
-        """
+        """Return the stream as one of another kind, which hears the same."""
         if isinstance(self, kind):
             return self
         settings = self.changed_fields()
@@ -472,11 +460,7 @@ class StreamPose(Turning, PoseTrajectory, type="stream"):
         return self._placed(replace(self, **given))
 
     def sample(self, t: float, out: PoseSample | None = None) -> PoseSample:
-        """Return the pose at time t; see `PoseTrajectory.sample`.
-
-        Raises:
-            TrajectoryError: If it is relative to where the robot starts.
-        """
+        """Return the pose at time t; see `PoseTrajectory.sample`."""
         if self.relative:
             raise TrajectoryError(
                 "StreamPose begins where the robot starts, which only a controller "

@@ -54,10 +54,7 @@ _WALLS = ((0, 0), (1, 1), (2, 0))
 
 
 def draw_box(axes: Axes, view: View, lower: Array, upper: Array) -> None:
-    """Draw the back walls of a box with a grid, and tick labels along three edges.
-
-    Shapes: lower (3,) [m], upper (3,) [m].
-    """
+    """Draw the back walls of a box with a grid, and tick labels along three edges."""
     axes.set_axis_off()
     ends = np.stack([lower, upper])
     ticks = [_apart(view, ends, _ticks(view, ends, axis), axis) for axis in range(3)]

@@ -40,10 +40,7 @@ def oblique() -> View:
 
 
 def best_plane(points: Array) -> str:
-    """Return the two world axes with the largest spread of points, such as ``"xy"``.
-
-    Shapes: points (K, 3).
-    """
+    """Return the two world axes with the largest spread of points, such as ``"xy"``."""
     spread = np.ptp(points, axis=0)
     depth = 2 - int(
         np.argmin(spread[::-1])
@@ -58,10 +55,7 @@ def is_flat(points: Array, depth: float = FLAT) -> bool:
 
 
 def view_of(points: Array) -> View:
-    """Return the view onto the plane of flat points, or else the oblique view.
-
-    Shapes: points (K, 3).
-    """
+    """Return the view onto the plane of flat points, or else the oblique view."""
     return plane(best_plane(points)) if is_flat(points) else oblique()
 
 

@@ -57,10 +57,7 @@ def draw_skeleton(
 def draw_shadow(
     axes: Axes, view: View, points: Array, parents: Sequence[int], floor: float
 ) -> None:
-    """Draw a robot's shadow on the floor, and a vertical line from each root.
-
-    Shapes: points (K, 3) [m].
-    """
+    """Draw a robot's shadow on the floor, and a vertical line from each root."""
     projected = points.copy()
     projected[:, 2] = floor
     axes.plot(
@@ -131,10 +128,7 @@ def _draw_half_space(
 
 
 def draw_axis_directions(axes: Axes, view: View, origin: Array, length: float) -> None:
-    """Draw the world's axes as three lines of a round length, with that length.
-
-    Shapes: origin (3,) [m].
-    """
+    """Draw the world's axes as three lines of a round length, with that length."""
     power = 10.0 ** np.floor(np.log10(length))
     size = max(digit * power for digit in (1.0, 2.0, 5.0) if digit * power <= length)
     for axis, name in enumerate("xyz"):

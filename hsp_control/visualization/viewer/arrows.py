@@ -51,10 +51,7 @@ def unit_bar(surface: Json, radius: float) -> Json:
 def arrow_tracks(
     path: str, times: Array, origins: Array, vectors: Array, radius: float
 ) -> Iterator[Track]:
-    """Yield the tracks that turn a unit arrow into vectors; short arrows are thinner.
-
-    Shapes: times (N,) [s], origins (N, 3) [m], vectors (N, 3) [m].
-    """
+    """Yield the tracks that turn a unit arrow into vectors; short ones are thinner."""
     lengths = np.linalg.norm(vectors, axis=1)
     widths = np.minimum(lengths / (_FULL_WIDTH * radius), 1.0)
     yield from _tracks(path, times, origins, vectors, np.c_[widths, widths, lengths])
@@ -63,10 +60,7 @@ def arrow_tracks(
 def bar_tracks(
     path: str, times: Array, starts: Array, ends: Array, shown: Array
 ) -> Iterator[Track]:
-    """Yield the tracks with which a unit bar connects two points.
-
-    Shapes: times (N,) [s], starts (N, 3) [m], ends (N, 3) [m], shown (N,).
-    """
+    """Yield the tracks with which a unit bar connects two points."""
     vectors = ends - starts
     ones = np.ones(len(times))
     scales = np.c_[ones, ones, np.linalg.norm(vectors, axis=1)]
@@ -143,10 +137,7 @@ class Contacts:
 
 
 def _held(positions: Array) -> Array:
-    """Return positions with NaN, of inactive contacts, replaced by the last position.
-
-    Shapes: positions (N, 3) [m].
-    """
+    """Return positions; those with NaN, of inactive contacts, stay the last ones."""
     known = np.flatnonzero(np.isfinite(positions).all(axis=1))
     if not known.size:
         return np.zeros_like(positions)
@@ -265,10 +256,7 @@ def _joint_velocities(state: RobotState, v: Array, data: pin.Data) -> Array:
 
 
 def _select_joints(positions: Array, speeds: Array, spacing: float) -> list[int]:
-    """Return the indices of the fastest joints that keep a distance from each other.
-
-    Shapes: positions (N, njoints - 1, 3) [m], speeds (njoints - 1,) [m/s].
-    """
+    """Return the indices of the fastest joints that keep a distance from each other."""
     joints: list[int] = []
     for k in np.argsort(-speeds):
         if len(joints) == _MAX_ARROWS or speeds[k] <= _MIN_SPEED * speeds.max():

@@ -48,10 +48,7 @@ def bands_of(
 def spans_of(
     times: Array, active: NDArray[np.bool_], closed: float = 0.0
 ) -> list[tuple[float, float]]:
-    """Return the intervals in which rows are active; each row lasts until the next.
-
-    Shapes: times (N,) [s], active (N,).
-    """
+    """Return the intervals in which rows are active; each row lasts until the next."""
     edges = np.diff(np.concatenate([[False], active, [False]]).astype(np.int8))
     starts = times[np.flatnonzero(edges > 0)].tolist()
     stops = times[np.flatnonzero(edges < 0).clip(max=len(times) - 1)].tolist()

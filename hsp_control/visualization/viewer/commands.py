@@ -61,10 +61,7 @@ def set_ghost(path: str, color: str, opacity: float) -> Command:
 def set_trail(
     path: str, points: Array, radius: float, color: int, *, sleeve: bool = False
 ) -> Command:
-    """Return the command that sets a node's object to a path in space, a tube.
-
-    Shapes: points (N, 3) [m].
-    """
+    """Return the command that sets a node's object to a path in space, a tube."""
     return _command(
         "trail",
         path,

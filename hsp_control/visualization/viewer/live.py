@@ -46,15 +46,7 @@ class LiveView:
     """
 
     def __init__(self, viewer: Viewer, experiment: Experiment) -> None:
-        """Show the robot at its start, the obstacles, and the desired paths.
-
-        Args:
-            viewer: The viewer, of the experiment's robot.
-            experiment: The experiment that will run.
-
-        Raises:
-            ViewerError: If the server has ended.
-        """
+        """Show the robot at its start, the obstacles, and the desired paths."""
         self._viewer = viewer
         self._experiment = experiment
         viewer.show(experiment.q0)
@@ -99,11 +91,7 @@ class LiveView:
         self._next = now + min(max(MIN_PERIOD, took / DRAWING_SHARE), MAX_PERIOD)
 
     def finish(self, rollout: Rollout) -> None:
-        """Replace the drawn rows by the whole run; the page keeps its time.
-
-        Raises:
-            ViewerError: If the server has ended.
-        """
+        """Replace the drawn rows by the whole run; the page keeps its time."""
         elapsed = time.perf_counter() - (self._begin or 0.0)
         rate = (rollout.t[-1] - rollout.t[0]) / max(elapsed, 1e-9)
         self._viewer.replace_run(

@@ -40,10 +40,7 @@ def interpolate_column(column: Array, position: RowPosition) -> Array:
 def interpolate_orientation(
     quaternions: Array, position: RowPosition
 ) -> pin.Quaternion:
-    """Return the orientation at a position, by slerp between two rows.
-
-    Shapes: quaternions (N, 4).
-    """
+    """Return the orientation at a position, by slerp between two rows."""
     row, fraction = position
     start, end = (
         pin.Quaternion(*quaternions[k, [3, 0, 1, 2]]).normalized()
@@ -53,10 +50,7 @@ def interpolate_orientation(
 
 
 def interpolate_configuration(robot: Robot, q: Array, position: RowPosition) -> Array:
-    """Return the configuration at a position, on the geodesic between two rows.
-
-    Shapes: q (N, nq).
-    """
+    """Return the configuration at a position, on the geodesic between two rows."""
     row, fraction = position
     here: Array = q[row]
     if fraction == 0.0:
@@ -146,8 +140,6 @@ def drawn_times(times: Array, finest: float, coarsest: float) -> Array:
     """Return the times to draw: a choice of the given ones, and times between them.
 
     The first and the last time are always included.
-
-    Shapes: times (N,) [s].
     """
     kept = [0]
     for row in range(1, len(times)):

@@ -35,10 +35,7 @@ def move_obstacle(name: str, placement: pin.SE3) -> Command:
 
 
 def enclosing_corners(shape: Shape, center: Array) -> list[Array]:
-    """Return the two corners of the box around a shape; none if it is unbounded.
-
-    Shapes: center (..., 3) [m].
-    """
+    """Return the two corners of the box around a shape; none if it is unbounded."""
     reach = shape.bounding_radius
     if not np.isfinite(reach):
         return []

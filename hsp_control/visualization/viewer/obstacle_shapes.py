@@ -71,10 +71,7 @@ def obstacle(shape: Shape, extent: float, color: str = OBSTACLE) -> Json:
 
 
 def facets(vertices: Array, triangles: Indices) -> Json:
-    """Return flat-shaded triangles: each has its own vertices and normal.
-
-    Shapes: vertices (n, 3) [m], triangles (k, 3).
-    """
+    """Return flat-shaded triangles: each has its own vertices and normal."""
     corners = vertices[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)

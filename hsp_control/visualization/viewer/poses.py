@@ -24,10 +24,7 @@ def pose_along(direction: Array) -> Array:
 
 
 def quaternions_along(directions: Array) -> Array:
-    """Return the smallest rotations of z to directions, as (x, y, z, w), shape (N, 4).
-
-    Shapes: directions (N, 3).
-    """
+    """Return the smallest rotations of z to directions, quaternions, shape (N, 4)."""
     lengths = np.linalg.norm(directions, axis=1, keepdims=True)
     x, y, z = (directions / np.where(lengths > 0.0, lengths, 1.0)).T
     turns = np.column_stack([-y, x, np.zeros_like(x), 1.0 + z])

@@ -254,18 +254,11 @@ class Viewer:
         self._plot(runs)
 
     def open_browser(self) -> bool:
-        """Open the page in the user's browser; return whether there is one.
-
-        Logs a warning if there is none.
-        """
+        """Open the page in the user's browser; return whether there is one."""
         return self.url is not None and browser.open_browser(self.url)
 
     def wait_until_closed(self) -> None:
-        """Wait until no page is open any more.
-
-        Raises:
-            ViewerError: If the server has ended.
-        """
+        """Wait until no page is open any more."""
         self.transport.wait_until_closed()
 
     def wait_for_browser(self, timeout: float) -> bool:
@@ -312,17 +305,7 @@ class Viewer:
     def replace_run(
         self, rollout: Rollout, size: float, controller: Controller, status: str
     ) -> None:
-        """Replace a partly drawn run by the complete one; the page keeps its time.
-
-        Args:
-            rollout: The run.
-            size: The scene's size, as `set_stage` returned it [m].
-            controller: The run's controller.
-            status: The status line beside the scene.
-
-        Raises:
-            ViewerError: If the server has ended.
-        """
+        """Replace a partly drawn run by the complete one; the page keeps its time."""
         run = self._run(rollout, controller)
         playing = self._playing(None, None)
         clip = set_clip(run.clip(), play=True, keep=True, **playing)
@@ -334,14 +317,7 @@ class Viewer:
         self._plot([ComparedRun("", self.robot, rollout, controller)])
 
     def show_plots(self, plots: Command) -> None:
-        """Show plots beside the scene, until another scene is drawn.
-
-        Args:
-            plots: See `run_plots`.
-
-        Raises:
-            ViewerError: If the server has ended.
-        """
+        """Show plots beside the scene, until another scene is drawn."""
         self._plotted = True
         self.transport.send([plots])
 
@@ -392,10 +368,7 @@ class Viewer:
         moving: Array | None = None,
         fit: bool = False,
     ) -> list[Command]:
-        """Return the commands that clear the stage, fit it, and draw a scene.
-
-        Shapes: moving (K, 3) [m].
-        """
+        """Return the commands that clear the stage, fit it, and draw a scene."""
         view = self.view
         subject = self._subject(scene.points() if moving is None else moving)
         points = in_sight(subject, scene.obstacle_points())

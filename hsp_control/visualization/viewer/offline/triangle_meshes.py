@@ -13,10 +13,7 @@ CREASE = np.radians(38.0)
 def weld(
     vertices: Array, triangles: Indices, tolerance: float
 ) -> tuple[Array, Indices]:
-    """Merge vertices at the same position; drop triangles that become degenerate.
-
-    Shapes: vertices (n, 3), triangles (k, 3).
-    """
+    """Merge vertices at the same position; drop triangles that become degenerate."""
     cells = np.rint((vertices - vertices.min(axis=0)) / tolerance).astype(np.int64)
     _, first, cell = np.unique(cells, axis=0, return_index=True, return_inverse=True)
     triangles = cell.reshape(-1)[triangles]

@@ -34,10 +34,7 @@ class ArrayTable:
         self._numbers: dict[bytes, int] = {}
 
     def numbers(self, values: ArrayLike, step: float, dtype: Any = np.float32) -> Json:
-        """Store numbers to within half a step; return a reference to the array.
-
-        Shapes: values (n,).
-        """
+        """Store numbers to within half a step; return a reference to the array."""
         rows = np.asarray(values, float)
         rows = rows[:, None] if rows.ndim == 1 else rows
         offset = rows.min(axis=0) if len(rows) else np.zeros(rows.shape[1])
