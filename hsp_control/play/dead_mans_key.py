@@ -7,8 +7,7 @@ loses the network says nothing more, and the robot stops.
 from collections.abc import Callable
 from time import monotonic
 
-TIMEOUT = 0.5
-"""Silence after which the key counts as released [s]."""
+TIMEOUT = 0.5  # silence after which the key counts as released [s]
 
 
 class DeadMansKey:

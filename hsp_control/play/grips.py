@@ -45,8 +45,7 @@ _TURNING: dict[str, Any] = {
     "angular_jerk": 200.0,
 }
 """The same for turning [rad/s, rad/s², rad/s³]."""
-DELAY = 0.03
-"""Time to a target that is dragged [s]: about two of a page's pictures."""
+DELAY = 0.03  # time to a target that is dragged [s]: about two of a page's pictures
 
 
 class Grip(ABC):

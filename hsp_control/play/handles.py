@@ -10,8 +10,7 @@ from hsp_control.control.controller import Controller
 from hsp_control.play.grips import Grip, obstacles_of, posture_of, targets_of
 from hsp_control.play.knobs import RAMP, Knob, knobs_of
 
-KNOB_PERIOD = 0.1
-"""Time between two changes by one knob [s]: a slider says much more."""
+KNOB_PERIOD = 0.1  # time between two changes by one knob [s]: a slider says much more
 
 
 class Handles:

@@ -35,13 +35,11 @@ from hsp_control.visualization.viewer.obstacle_layer import ObstacleLayer
 from hsp_control.visualization.viewer.run_drawing import Layer, RunDrawing, all_layers
 from hsp_control.visualization.viewer.scene_path import path_element
 
-FRAME = 1.0 / 30.0
-"""Time between two pictures [s]."""
+FRAME = 1.0 / 30.0  # time between two pictures [s]
 _FIELD_LAYERS = ("influence", "distances", "capsules")
 _BATCHES = 64
 """Batches of samples that wait for a page at most; what is older is left out."""
-_JOINTS = 8
-"""Most joints whose efforts have a curve each."""
+_JOINTS = 8  # most joints whose efforts have a curve each
 
 
 class Curve(NamedTuple):

@@ -17,8 +17,7 @@ from hsp_control.play.session import ROW
 from hsp_control.robot import Robot
 from hsp_control.robot.description.sources import is_robot
 
-_PERIOD = 0.001
-"""Control period where a configuration has none [s]."""
+_PERIOD = 0.001  # control period where a configuration has none [s]
 
 
 def playable(

@@ -28,17 +28,12 @@ from hsp_control.visualization.viewer.scene_path import path_element
 
 ROW = 0.01
 """Time between two rows of the log, at which messages are taken [s]; whole periods."""
-LONGEST = 1200.0
-"""Longest time that is recorded [s]."""
-LARGEST_LOG = 3e8
-"""Largest log [bytes]."""
-PULL = 300.0
-"""Stiffness of the spring of somebody who pulls at a link [N/m]."""
-LARGEST_PULL = 100.0
-"""Largest force of that spring [N]."""
+LONGEST = 1200.0  # longest time that is recorded [s]
+LARGEST_LOG = 3e8  # largest log [bytes]
+PULL = 300.0  # stiffness of the spring of somebody who pulls at a link [N/m]
+LARGEST_PULL = 100.0  # largest force of that spring [N]
 
-_REHEARSED = 40
-"""Rows of a rehearsal: beyond the ramps of changes."""
+_REHEARSED = 40  # rows of a rehearsal: beyond the ramps of changes
 
 _log = logging.getLogger(__name__)
 

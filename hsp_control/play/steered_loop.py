@@ -15,10 +15,8 @@ from hsp_control.play.channel import Channel
 from hsp_control.play.dead_mans_key import DeadMansKey
 from hsp_control.play.handles import Handles
 
-TOLD = 1.0 / 30.0
-"""Time between two words to the page [s]."""
-_MESSAGES = 4
-"""Messages that are taken in one period at most."""
+TOLD = 1.0 / 30.0  # time between two words to the page [s]
+_MESSAGES = 4  # messages that are taken in one period at most
 
 
 class SteeredLoop:

@@ -38,8 +38,7 @@ from hsp_control.common.rotations import compose, jexp3_dot, jlog3
 from hsp_control.law import TaskSample
 from hsp_control.tasks.task import Feedback
 
-_THRESHOLD = 0.03
-"""Default threshold of the law's singularities: see `Controller`."""
+_THRESHOLD = 0.03  # default threshold of the law's singularities: see `Controller`
 
 
 class Rotating(NamedTuple):

@@ -24,8 +24,7 @@ from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
 
 PointFunction = Callable[[float], ArrayLike]
 
-STEP = 5e-3
-"""Default step h [s]."""
+STEP = 5e-3  # default step h [s]
 _OFFSETS = (-3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0)
 _FIRST = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60.0
 _SECOND = np.array([2.0, -27.0, 270.0, -490.0, 270.0, -27.0, 2.0]) / 180.0

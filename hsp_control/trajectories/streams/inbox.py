@@ -34,8 +34,7 @@ class Record:
         return [{"at": t, **each.to_dict()} for t, each in self._entries]
 
 
-CAPACITY = 4096
-"""Most messages that wait; where more come, the oldest are dropped."""
+CAPACITY = 4096  # most messages that wait; where more come, the oldest are dropped
 
 
 class Received(NamedTuple):

@@ -9,8 +9,7 @@ from hsp_control.trajectories.streams.inbox import Inbox, InboxReader, Record
 from hsp_control.trajectories.streams.listeners import is_address, listening_inbox
 from hsp_control.trajectories.streams.message import Message, Space, message_of, parsed
 
-LARGEST_FILE = 100_000_000
-"""Size of the largest recording that is read [bytes]."""
+LARGEST_FILE = 100_000_000  # size of the largest recording that is read [bytes]
 
 
 class Recording:

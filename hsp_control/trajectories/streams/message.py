@@ -10,13 +10,11 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import StreamError
 
-MOST_WAYPOINTS = 1000
-"""Most waypoints of one message."""
+MOST_WAYPOINTS = 1000  # most waypoints of one message
 LARGEST = 1e6
 """Numbers beyond this are refused [m or rad]: they are mistakes, and would
 overflow."""
-LATEST = 1e12
-"""Times beyond this are refused [s]; a clock of 1970 shows 2e9."""
+LATEST = 1e12  # times beyond this are refused [s]; a clock of 1970 shows 2e9
 _UNIT = 1e-3
 """Deviation of a quaternion's norm from 1 that counts as a sender's rounding."""
 

@@ -30,12 +30,9 @@ from hsp_control.trajectories.streams.waypoints import Waypoints, derivatives
 
 _KEPT = 1.0
 """Pieces are kept for this time; an integrator may ask for earlier times [s]."""
-_SAME = 1e-7
-"""States that differ by less are the same, in x, x' and x''."""
-_CONSIDERED = 256
-"""The reference joins one of the next waypoints, at most this many."""
-_AT_ONCE = 256
-"""Of more messages that come at once the oldest do not count."""
+_SAME = 1e-7  # states that differ by less are the same, in x, x' and x''
+_CONSIDERED = 256  # the reference joins one of the next waypoints, at most this many
+_AT_ONCE = 256  # of more messages that come at once the oldest do not count
 
 
 class Policy(NamedTuple):

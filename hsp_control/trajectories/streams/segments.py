@@ -16,8 +16,7 @@ from hsp_control.trajectories.piecewise_polynomial import QUINTIC, horner
 from hsp_control.trajectories.streams.bounds import MotionBounds
 from hsp_control.trajectories.streams.chart import State
 
-_SHORTEST = 1e-3
-"""No motion between different states is shorter [s]."""
+_SHORTEST = 1e-3  # no motion between different states is shorter [s]
 
 
 class Goal(NamedTuple):

@@ -13,8 +13,7 @@ from hsp_control.trajectories.streams.message import Space
 
 SCHEME = "udp://"
 _LARGEST = 65_536
-_POLL = 0.2
-"""How soon a listener notices that nobody needs it any more [s]."""
+_POLL = 0.2  # how soon a listener notices that nobody needs it any more [s]
 
 
 def check_address(source: str) -> tuple[str, int]:

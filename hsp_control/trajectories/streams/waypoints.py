@@ -9,14 +9,12 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.trajectories.streams.message import Message
 
-_WINDOW = 2.0
-"""The sender's clock is compared with the controller's over this time [s]."""
+_WINDOW = 2.0  # the sender's clock is compared with the controller's over this time [s]
 _NEW_CLOCK = 1.0
 """A sender whose time jumps back by more than this has started again [s]."""
 _KEPT = 1.0
 """Waypoints that were passed are kept for this time, to estimate velocities [s]."""
-MOST = 4096
-"""Most waypoints that are kept."""
+MOST = 4096  # most waypoints that are kept
 _APART = 0.01
 """Neighbours for derivatives are at least so far in time [s]: of waypoints that are
 closer, noise would be most of the difference."""

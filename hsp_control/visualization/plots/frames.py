@@ -27,10 +27,8 @@ from hsp_control.visualization.plots.world_drawing import (
     draw_skeleton,
 )
 
-_NEAR = 0.035
-"""Width and height of a letter of a number, over the size of the scene."""
-MAX_TICKS = 10
-"""With more frames, their times are not the ticks of the time scale."""
+_NEAR = 0.035  # width and height of a letter of a number, over the size of the scene
+MAX_TICKS = 10  # with more frames, their times are not the ticks of the time scale
 
 
 def draw_frame(axes: Axes, rollout: Rollout, row: int, *, key: bool = True) -> None:

@@ -20,9 +20,8 @@ def legend_below(axes: Axes) -> None:
     if not handles:
         return
     figure = axes.get_figure(root=False)
-    drop = (
-        32.0 if axes.axison else 22.0
-    )  # height of the tick labels below the axes [pt]
+    # Height of the tick labels below the axes [pt].
+    drop = 32.0 if axes.axison else 22.0
     below = ScaledTranslation(0.0, -drop / 72.0, figure.dpi_scale_trans)  # type: ignore[union-attr]
     axes.legend(
         handles,

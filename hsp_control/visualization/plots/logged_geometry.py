@@ -52,9 +52,8 @@ class LoggedObstacle(NamedTuple):
     def outline(self, view: View, row: int) -> Array:
         """Return its outline in the view's plane at a row [m], shape (P, 2)."""
         page = np.column_stack(view.project(self.world_points(row)))
-        thinnest = 1e-4 * float(
-            np.ptp(page, axis=0).max()
-        )  # a flat shape, seen edge-on
+        # A flat shape, seen edge-on.
+        thinnest = 1e-4 * float(np.ptp(page, axis=0).max())
         disk = max(self.radius, thinnest) * _DISK
         cloud = (page[:, None] + disk).reshape(-1, 2)
         return np.asarray(cloud[ConvexHull(cloud).vertices])

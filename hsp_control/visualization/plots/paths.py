@@ -43,12 +43,10 @@ _EDGES = (
     _Edge((1, 0), (4.0, -4.0), "left"),
     _Edge((0, 0), (-5.0, 0.0), "right"),
 )
-_DIGIT_WIDTH = 4.8
-"""Width of a digit [pt]."""
+_DIGIT_WIDTH = 4.8  # width of a digit [pt]
 _NARROWEST = 115.0
 """Width or height, the larger one, of the smallest box in a figure [pt]."""
-_HEIGHT = 11.0
-"""Height of a line of tick labels [pt]."""
+_HEIGHT = 11.0  # height of a line of tick labels [pt]
 _WALLS = ((0, 0), (1, 1), (2, 0))
 """The sides behind the scene, (axis, side): low x, high y and the floor."""
 
@@ -157,8 +155,7 @@ def corners(lower: Array, upper: Array) -> Array:
     return np.array(list(product(*np.stack([lower, upper]).T)))
 
 
-NEARLY_FLAT = 0.05
-"""Depth over width below which a path is drawn in one plane."""
+NEARLY_FLAT = 0.05  # depth over width below which a path is drawn in one plane
 
 
 def path_view(rollout: Rollout) -> View:

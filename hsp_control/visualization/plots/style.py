@@ -67,8 +67,7 @@ STYLE: dict[str, Any] = {
     "ytick.minor.size": 1.5,
 }
 
-NOTEBOOK_DPI = 100.0
-"""Dots per inch of figures in notebooks, which store them as text."""
+NOTEBOOK_DPI = 100.0  # dots per inch of figures in notebooks, which store them as text
 
 
 @contextmanager

@@ -8,10 +8,8 @@ from matplotlib.axes import Axes
 
 from hsp_control.common.arrays import Array
 
-FLAT = 1e-6
-"""Depth over width below which motion counts as planar."""
-AZIMUTH, ELEVATION = -60.0, 22.0
-"""Direction of the eye in an oblique view [deg]."""
+FLAT = 1e-6  # depth over width below which motion counts as planar
+AZIMUTH, ELEVATION = -60.0, 22.0  # direction of the eye in an oblique view [deg]
 
 
 class View(NamedTuple):
@@ -42,9 +40,8 @@ def oblique() -> View:
 def best_plane(points: Array) -> str:
     """Return the two world axes with the largest spread of points, such as ``"xy"``."""
     spread = np.ptp(points, axis=0)
-    depth = 2 - int(
-        np.argmin(spread[::-1])
-    )  # the last axis of those with the smallest spread
+    # The last axis of those with the smallest spread.
+    depth = 2 - int(np.argmin(spread[::-1]))
     return "xyz".replace("xyz"[depth], "")
 
 

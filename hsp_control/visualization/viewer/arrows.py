@@ -28,8 +28,7 @@ from hsp_control.visualization.viewer.poses import quaternions_along
 from hsp_control.visualization.viewer.scene_path import path_element
 from hsp_control.visualization.viewer.threejs import always_visible, material
 
-_FULL_WIDTH = 12.0
-"""Length over radius from which an arrow has its full radius."""
+_FULL_WIDTH = 12.0  # length over radius from which an arrow has its full radius
 
 
 def unit_arrow(surface: Json, radius: float) -> Json:
@@ -102,9 +101,8 @@ class Contacts:
     def draw(self, size: float) -> Iterator[Command]:
         """Yield the commands that draw it in a scene of the given size [m]."""
         for name in self._names:
-            surface = always_visible(
-                material(CONTACT, glow=0.5)
-            )  # contacts lie inside the legs' meshes
+            # Contacts lie inside the legs' meshes.
+            surface = always_visible(material(CONTACT, glow=0.5))
             arrow = unit_arrow(surface, ARROW_RADIUS * self._size)
             yield set_object(self._path(name, "force"), arrow)
             ball = threejs.sphere(1.5 * ARROW_RADIUS * self._size)
@@ -150,14 +148,11 @@ SECONDS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 _TYPICAL_LENGTH = 0.22
 """Maximum length of a fast arrow, over the robot's size; it chooses the time."""
 _MAX_ARROWS = 4
-_MIN_SPACING = 0.06
-"""Minimum distance of two joints with arrows, over the robot's size."""
+_MIN_SPACING = 0.06  # minimum distance of two joints with arrows, over the robot's size
 _MIN_SPEED = 0.1
 """Minimum mean speed of a joint with an arrow, over that of the fastest joint."""
-_MAX_LENGTH = 0.6
-"""Maximum length of an arrow, over the robot's size."""
-_WIDENING = 2.2
-"""Radius of a field arrow over that of a velocity arrow."""
+_MAX_LENGTH = 0.6  # maximum length of an arrow, over the robot's size
+_WIDENING = 2.2  # radius of a field arrow over that of a velocity arrow
 
 
 class SelfMotion:

@@ -30,10 +30,8 @@ from hsp_control.visualization.viewer.stage import in_sight
 
 GHOSTS = (palette.TASK, palette.SERIES[4], palette.WARNING)
 """Colours of the second run, the third and so on."""
-GHOST_OPACITY = 0.38
-"""Opacity of a ghost."""
-_GAP = 0.35
-"""Gap between two robots, over the width of one."""
+GHOST_OPACITY = 0.38  # opacity of a ghost
+_GAP = 0.35  # gap between two robots, over the width of one
 
 
 class ComparedRun(NamedTuple):

@@ -58,8 +58,7 @@ def interpolate_configuration(robot: Robot, q: Array, position: RowPosition) -> 
     return robot.integrate(here, fraction * robot.difference(here, q[row + 1]))
 
 
-FINEST = 0.01
-"""Minimum time between two drawn rows [s]."""
+FINEST = 0.01  # minimum time between two drawn rows [s]
 COARSEST = 1 / 30
 """Maximum time between two drawn rows [s]; the page interpolates linearly."""
 

@@ -20,8 +20,7 @@ from hsp_control.visualization.viewer.robot_drawing import robot_entry
 from hsp_control.visualization.viewer.scene_path import path_element
 
 ROOT = "/obstacles"
-_TOLD = 3
-"""Number of obstacles that the legend names."""
+_TOLD = 3  # number of obstacles that the legend names
 
 
 def draw_obstacle(name: str, shape: Shape, extent: float) -> Command:

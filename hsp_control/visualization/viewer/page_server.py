@@ -289,9 +289,8 @@ class Page(WebSocketHandler):
                     await self.write_message(message, binary=True)
                 except WebSocketClosedError:
                     return
-                await (
-                    self._ready.wait()
-                )  # meanwhile newer commands replace pending ones
+                # Meanwhile newer commands replace pending ones.
+                await self._ready.wait()
             await self.has_pending.wait()
             self.has_pending.clear()
             commands = self.pending.take()

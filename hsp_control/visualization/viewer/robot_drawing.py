@@ -26,10 +26,8 @@ from hsp_control.visualization.viewer.scene_path import path_element
 from hsp_control.visualization.viewer.threejs import material
 from hsp_control.visualization.viewer.visuals import Visual, read_visuals
 
-_THICKNESS = 0.034
-"""A link's radius at the base, over the robot's reach."""
-_TAPER = 0.55
-"""The radius at the last joint, over that at the base."""
+_THICKNESS = 0.034  # a link's radius at the base, over the robot's reach
+_TAPER = 0.55  # the radius at the last joint, over that at the base
 
 
 def placeholder(robot: Robot, joint: int) -> Json | None:
@@ -129,8 +127,7 @@ def reach(robot: Robot) -> float:
     return float(lengths.max()) or 1.0
 
 
-ROOT = "/robot"
-"""Default node of a robot in the scene tree."""
+ROOT = "/robot"  # default node of a robot in the scene tree
 
 
 _log = logging.getLogger(__name__)

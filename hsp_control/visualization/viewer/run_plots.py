@@ -15,8 +15,7 @@ from hsp_control.visualization.viewer.comparison import ComparedRun
 from hsp_control.visualization.viewer.packed.packing import ArrayTable
 from hsp_control.visualization.viewer.packed.plot_packing import PlottedRun, pack_panels
 
-PREVIEW_ROWS = 500
-"""About so many rows of a run that is being computed are plotted."""
+PREVIEW_ROWS = 500  # about so many rows of a run that is being computed are plotted
 
 
 def plots_of(runs: Sequence[ComparedRun]) -> Command:

@@ -171,9 +171,8 @@ class Server:
         except OSError as error:
             self._fail(f"has ended ({error.strerror})")
         finally:
-            self._unsent = bytes(
-                rest
-            )  # not empty after Ctrl-C: no record is cut in two
+            # Not empty after Ctrl-C: no record is cut in two.
+            self._unsent = bytes(rest)
 
     def _answer(self, deadline: float) -> dict[str, Any]:
         """Return the process's next answer; messages that come before it are kept."""

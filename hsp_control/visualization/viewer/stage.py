@@ -151,8 +151,7 @@ def _channels(color: str) -> list[float]:
 
 FIELD_OF_VIEW = 32.0
 """Vertical field of view [deg]: narrow, for little perspective distortion."""
-_THICKNESS = 0.11
-"""Radius of the balls around the points, over the size of the scene."""
+_THICKNESS = 0.11  # radius of the balls around the points, over the size of the scene
 _DEFAULT_DIRECTION = np.array([1.0, -1.35, 0.62])
 _COS_STEEP = np.cos(np.radians(30.0))
 _MAX_POINTS = 300

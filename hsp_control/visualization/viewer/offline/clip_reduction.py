@@ -18,10 +18,8 @@ from hsp_control.visualization.viewer.packed.keyframes import (
 )
 from hsp_control.visualization.viewer.packed.packing import CLOCK_STEP, ArrayTable
 
-POSITION_BOUND = 2e-4
-"""Maximum position error of a node [m]."""
-ANGLE_BOUND = np.radians(0.1)
-"""Maximum rotation error of a node [rad]."""
+POSITION_BOUND = 2e-4  # maximum position error of a node [m]
+ANGLE_BOUND = np.radians(0.1)  # maximum rotation error of a node [rad]
 
 
 class _Property(NamedTuple):

@@ -85,8 +85,7 @@ def _block(name: str, data: bytes) -> str:
     return f'<script type="application/octet-stream" id="{name}">{packed}</script>'
 
 
-HEIGHT = 520
-"""Height of a view in a notebook [pixels]."""
+HEIGHT = 520  # height of a view in a notebook [pixels]
 
 
 class InlineView:

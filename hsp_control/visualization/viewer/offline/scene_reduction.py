@@ -19,8 +19,7 @@ from hsp_control.visualization.viewer.threejs import material, matrix, unique_na
 
 VERTEX_STEP = 2e-5
 """Resolution of vertices [m], or 2⁻¹⁶ of a mesh's size if that is larger."""
-_TRAIL_STEP = 5e-5
-"""Resolution of a trail's points [m]."""
+_TRAIL_STEP = 5e-5  # resolution of a trail's points [m]
 
 
 def reduce_scene(commands: Iterable[Json], arrays: ArrayTable) -> list[Json]:

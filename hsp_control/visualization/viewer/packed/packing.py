@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.visualization.viewer.commands import Json, typed_array
 
-CLOCK_STEP = 1e-6
-"""Resolution of times [s]."""
+CLOCK_STEP = 1e-6  # resolution of times [s]
 _KINDS = {
     np.dtype("f4"): "Float32Array",
     np.dtype("f8"): "Float64Array",

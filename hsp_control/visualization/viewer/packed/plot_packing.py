@@ -18,8 +18,7 @@ from hsp_control.visualization.viewer.packed.keyframes import (
 from hsp_control.visualization.viewer.packed.packing import CLOCK_STEP, ArrayTable
 from hsp_control.visualization.viewer.packed.panels import Panel, Series, panels_of
 
-CURVE_BOUND = 1 / 500
-"""Maximum error of a curve, over the height of its plot."""
+CURVE_BOUND = 1 / 500  # maximum error of a curve, over the height of its plot
 _FLOOR, _TOP = 1e-17, 1e-6
 """Values up to the floor are rounding errors; a logarithmic axis reaches the top."""
 
