@@ -4,7 +4,7 @@ from hsp_control.law import TaskSample as TaskSample
 
 from .centroidal import AngularMomentum as AngularMomentum
 from .centroidal import CenterOfMass as CenterOfMass
-from .frame_orientation import FrameOrientation as FrameOrientation
+from .frame_pose import FrameOrientation as FrameOrientation
 from .frame_pose import FramePose as FramePose
 from .frame_position import FramePosition as FramePosition
 from .gains import Gains as Gains

@@ -17,8 +17,12 @@ from hsp_control.geometry.start import Start
 from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.kinematics import FrameMotion
-from hsp_control.tasks.frame_orientation import ORIENTATION_SCRATCH
-from hsp_control.tasks.frame_pose import POSE_ERROR, PoseOrPoint, pose_error_equation
+from hsp_control.tasks.frame_pose import (
+    ORIENTATION_SCRATCH,
+    POSE_ERROR,
+    PoseOrPoint,
+    pose_error_equation,
+)
 from hsp_control.tasks.frame_task import TrackingTask, frame_of, place_pose
 from hsp_control.tasks.task import ErrorPart, Feedback, default_name
 from hsp_control.trajectories import ComposedPose, PoseSample, PoseTrajectory

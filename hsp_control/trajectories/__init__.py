@@ -25,8 +25,8 @@ from .pose import ComposedPose as ComposedPose
 from .pose import HoldPose as HoldPose
 from .pose import PoseSample as PoseSample
 from .pose import PoseTrajectory as PoseTrajectory
+from .pose import ScrewInterpolation as ScrewInterpolation
 from .schedule import Schedule as Schedule
-from .screw_interpolation import ScrewInterpolation as ScrewInterpolation
 from .streams.stream import Stream as Stream
 from .streams.stream import StreamOrientation as StreamOrientation
 from .streams.stream import StreamPose as StreamPose

@@ -139,7 +139,7 @@ MUTANTS = (
     ),
     Mutant(
         "orientation without its transport term",
-        TASKS + "frame_orientation.py",
+        TASKS + "frame_pose.py",
         "out[i] += w_d_dot[i] - term[i]",
         "out[i] += w_d_dot[i]",
         EVERY_TASK + "panda-orientation",
@@ -216,7 +216,7 @@ MUTANTS = (
     ),
     Mutant(
         "streams: quintics ignore the jerk",
-        STREAMS + "bounds.py",
+        STREAMS + "segments.py",
         "for k in (1, 2, 3):",
         "for k in (1, 2):",
         OF_STREAMS + "points_keep_their_bounds",

@@ -16,13 +16,13 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import StreamError
-from hsp_control.trajectories.streams.bounds import MotionBounds
 from hsp_control.trajectories.streams.chart import Chart, State
 from hsp_control.trajectories.streams.message import Message
 from hsp_control.trajectories.streams.segments import (
     Coast,
     Goal,
     Joiner,
+    MotionBounds,
     Quintic,
     Segment,
 )

@@ -24,9 +24,12 @@ from hsp_control.visualization.viewer.controller_analysis import (
 )
 from hsp_control.visualization.viewer.legend import LegendEntry
 from hsp_control.visualization.viewer.motion import Motion
-from hsp_control.visualization.viewer.poses import quaternions_along
 from hsp_control.visualization.viewer.scene_path import path_element
-from hsp_control.visualization.viewer.threejs import always_visible, material
+from hsp_control.visualization.viewer.threejs import (
+    always_visible,
+    material,
+    quaternions_along,
+)
 
 _FULL_WIDTH = 12.0  # length over radius from which an arrow has its full radius
 

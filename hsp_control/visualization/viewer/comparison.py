@@ -17,7 +17,6 @@ from hsp_control.visualization.viewer.clip import Clip
 from hsp_control.visualization.viewer.commands import Command, set_ghost, set_transform
 from hsp_control.visualization.viewer.legend import LegendEntry, merged
 from hsp_control.visualization.viewer.motion import motion_of
-from hsp_control.visualization.viewer.poses import pose_at
 from hsp_control.visualization.viewer.robot_drawing import RobotDrawing
 from hsp_control.visualization.viewer.run_drawing import (
     LAYERS,
@@ -27,6 +26,7 @@ from hsp_control.visualization.viewer.run_drawing import (
 )
 from hsp_control.visualization.viewer.scene_path import path_element
 from hsp_control.visualization.viewer.stage import in_sight
+from hsp_control.visualization.viewer.threejs import pose_at
 
 GHOSTS = (palette.TASK, palette.SERIES[4], palette.WARNING)
 """Colours of the second run, the third and so on."""

@@ -40,11 +40,11 @@ from hsp_control.visualization.viewer.legend import LegendEntry, translucent
 from hsp_control.visualization.viewer.motion import Motion
 from hsp_control.visualization.viewer.obstacle_layer import obstacle_tracks
 from hsp_control.visualization.viewer.obstacle_shapes import facets, triangles_of
-from hsp_control.visualization.viewer.poses import pose_at
 from hsp_control.visualization.viewer.scene_path import path_element
 from hsp_control.visualization.viewer.threejs import (
     always_visible,
     material,
+    pose_at,
     unlit_material,
 )
 

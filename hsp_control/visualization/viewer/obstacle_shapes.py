@@ -14,8 +14,7 @@ from hsp_control.geometry.shapes import Shape, shape_from_log
 from hsp_control.visualization.viewer import threejs
 from hsp_control.visualization.viewer.appearance import OBSTACLE, OBSTACLE_OPACITY
 from hsp_control.visualization.viewer.commands import Json
-from hsp_control.visualization.viewer.poses import pose_at
-from hsp_control.visualization.viewer.threejs import material
+from hsp_control.visualization.viewer.threejs import material, pose_at
 
 _CORNERS = np.array(list(product((-0.5, 0.5), repeat=3)))
 _FACES = np.array(

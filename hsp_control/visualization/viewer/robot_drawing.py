@@ -21,9 +21,8 @@ from hsp_control.visualization.viewer.legend import LegendEntry
 from hsp_control.visualization.viewer.mesh_files import collada_object, mesh_geometry
 from hsp_control.visualization.viewer.motion import Motion
 from hsp_control.visualization.viewer.obstacle_shapes import facets
-from hsp_control.visualization.viewer.poses import pose_along, pose_at
 from hsp_control.visualization.viewer.scene_path import path_element
-from hsp_control.visualization.viewer.threejs import material
+from hsp_control.visualization.viewer.threejs import material, pose_along, pose_at
 from hsp_control.visualization.viewer.visuals import Visual, read_visuals
 
 _THICKNESS = 0.034  # a link's radius at the base, over the robot's reach

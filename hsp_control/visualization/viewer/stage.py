@@ -22,7 +22,7 @@ from hsp_control.visualization.viewer.commands import (
     set_transform,
 )
 from hsp_control.visualization.viewer.legend import LegendEntry, translucent
-from hsp_control.visualization.viewer.poses import pose_at
+from hsp_control.visualization.viewer.threejs import pose_at
 
 _LIGHT_FROM = np.array([0.5, -0.45, 1.6])
 _FINE = 1e-3

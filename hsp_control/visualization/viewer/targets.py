@@ -14,9 +14,12 @@ from hsp_control.visualization.viewer.clip import Track
 from hsp_control.visualization.viewer.commands import Command, Json, set_object
 from hsp_control.visualization.viewer.legend import LegendEntry
 from hsp_control.visualization.viewer.motion import Motion
-from hsp_control.visualization.viewer.poses import pose_along, quaternions_along
 from hsp_control.visualization.viewer.scene_path import path_element
-from hsp_control.visualization.viewer.threejs import material
+from hsp_control.visualization.viewer.threejs import (
+    material,
+    pose_along,
+    quaternions_along,
+)
 
 
 class Target(NamedTuple):

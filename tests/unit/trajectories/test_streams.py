@@ -24,8 +24,8 @@ from hsp_control.trajectories import (
 )
 from hsp_control.trajectories.piecewise_polynomial import QUINTIC
 from hsp_control.trajectories.streams import inbox
-from hsp_control.trajectories.streams.bounds import _DERIVATIVES
 from hsp_control.trajectories.streams.mailbox import read_recording
+from hsp_control.trajectories.streams.segments import _DERIVATIVES
 from hsp_control.trajectories.streams.waypoints import SenderClock, derivatives
 
 H = 5e-4

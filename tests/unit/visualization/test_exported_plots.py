@@ -15,15 +15,13 @@ from hsp_control.simulation.log_series import held_period
 from hsp_control.visualization.viewer import ComparedRun, export_html
 from hsp_control.visualization.viewer.comparison import run_parts
 from hsp_control.visualization.viewer.packed.packing import ArrayTable
-from hsp_control.visualization.viewer.packed.panels import (
+from hsp_control.visualization.viewer.packed.plot_packing import (
     Edge,
     Panel,
-    expected_floor,
-    panels_of,
-)
-from hsp_control.visualization.viewer.packed.plot_packing import (
     PlottedRun,
+    expected_floor,
     pack_panels,
+    panels_of,
 )
 
 PLANAR = "paper/4_moving_obstacle"
