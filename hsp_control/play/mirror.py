@@ -7,15 +7,15 @@ the changes that the loop tells of, says what the field is: zones, capsules, dis
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.config import Experiment
 from hsp_control.control.controller import Controller
 from hsp_control.play.channel import Channel
 from hsp_control.play.handles import Handles
 from hsp_control.play.knobs import RAMP
-from hsp_control.play.picture import Kind
 from hsp_control.simulation.journal_tail import JournalTail
 from hsp_control.simulation.recorder import Recorder
 
@@ -48,7 +48,7 @@ class ToldHandles(Handles):
 
 
 class Mirror:
-    """What a picture needs of a live loop; see `Played`."""
+    """What a picture needs of a live loop, as of a `Session`."""
 
     pushes = None
 
@@ -63,7 +63,7 @@ class Mirror:
     ) -> None:
         """Begin at the experiment's start."""
         self.experiment, self.period = experiment, period
-        self.kind: Kind = "held" if held else "live"
+        self.kind: Literal["live", "held"] = "held" if held else "live"
         self.controller = experiment.controller
         output = self.controller.compute(0.0, experiment.q0, experiment.v0)
         start = Recorder(self.controller, experiment.scene, 1)
@@ -85,8 +85,9 @@ class Mirror:
             return self.recorder.meta("", "")
         return self.recorder.meta
 
-    def pull(self) -> None:
+    def pull(self) -> tuple[Array, Array, float] | None:
         """Return None: nobody pulls at this robot with a mouse."""
+        return None
 
     def say(self, message: dict[str, Any]) -> None:
         """Pass on what a page says."""

@@ -2,17 +2,16 @@
 
 import operator
 from collections.abc import Iterator
-from typing import Any, Literal, NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.config import Experiment
-from hsp_control.control.controller import Controller
 from hsp_control.null_space.fields import FieldSum, NullSpaceField, Rest
 from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.fields.weight import sample_weight
-from hsp_control.play.handles import Handles
+from hsp_control.play.mirror import Mirror
+from hsp_control.play.session import Session
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.log_distances import distance_label
 from hsp_control.simulation.unreached import unreached
@@ -59,66 +58,7 @@ class Plot(NamedTuple):
     curves: list[Curve]
 
 
-Kind = Literal["simulated", "live", "held"]
-"""A simulation; a live loop; one that runs only while somebody holds a key."""
-
-
-class Rows(Protocol):
-    """Rows of a log, as of a `Recorder` or a `JournalTail`."""
-
-    @property
-    def count(self) -> int:
-        """How many there were so far."""
-
-    def rows(self, first: int) -> dict[str, Array]:
-        """Return the columns from a row on."""
-
-
-class Played(Protocol):
-    """What a picture shows: a `Session`, or the `Mirror` of a live loop."""
-
-    @property
-    def kind(self) -> Kind:
-        """A simulation, or a live loop."""
-
-    @property
-    def experiment(self) -> Experiment:
-        """What is simulated or controlled."""
-
-    @property
-    def controller(self) -> Controller:
-        """The controller, at the present state."""
-
-    @property
-    def handles(self) -> Handles:
-        """What can be touched."""
-
-    @property
-    def period(self) -> float:
-        """The control period [s]."""
-
-    @property
-    def recorder(self) -> Rows:
-        """The rows so far."""
-
-    @property
-    def meta(self) -> dict[str, Any]:
-        """The meta data of these rows."""
-
-    @property
-    def over(self) -> str:
-        """Why it goes on no more; empty: it does."""
-
-    @property
-    def pushes(self) -> object | None:
-        """What a page pulls with; None: it cannot."""
-
-    @property
-    def t(self) -> float:
-        """The time of the present row [s]."""
-
-    def pull(self) -> tuple[Array, Array, float] | None:
-        """Return where somebody pulls, the hand, both (3,) [m], and the force [N]."""
+Played = Session | Mirror
 
 
 class Picture:

@@ -23,16 +23,6 @@ ROOT = "/obstacles"
 _TOLD = 3  # number of obstacles that the legend names
 
 
-def draw_obstacle(name: str, shape: Shape, extent: float) -> Command:
-    """Return the command that draws an obstacle; see `obstacle`."""
-    return set_object(_path(name), obstacle(shape, extent))
-
-
-def move_obstacle(name: str, placement: pin.SE3) -> Command:
-    """Return the command that moves an obstacle to a placement in the world."""
-    return set_transform(_path(name), placement.homogeneous)
-
-
 def enclosing_corners(shape: Shape, center: Array) -> list[Array]:
     """Return the two corners of the box around a shape; none if it is unbounded."""
     reach = shape.bounding_radius
@@ -62,12 +52,13 @@ class ObstacleDrawing:
     def draw(self, size: float) -> Iterator[Command]:
         """Yield the commands that draw it in a scene of the given size [m]."""
         for item in self._scene.values():
-            yield draw_obstacle(item.name, item.shape, 4.0 * size)
+            yield set_object(_path(item.name), obstacle(item.shape, 4.0 * size))
 
     def move(self, time: float) -> Iterator[Command]:
         """Yield the commands that move the obstacles to a time [s]."""
         for item in self._scene.values():
-            yield move_obstacle(item.name, item.placement(time))
+            placement = item.placement(time).homogeneous
+            yield set_transform(_path(item.name), placement)
 
     def points(self) -> Array:
         """Return no points, shape (0, 3): the viewer knows the robot's."""

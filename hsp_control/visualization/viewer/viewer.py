@@ -1,9 +1,9 @@
 """The viewer: shows a robot, its surroundings and its runs in a browser."""
 
 import logging
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
-from typing import Any, Protocol, Self
+from typing import Any, Self
 
 import numpy as np
 import pinocchio as pin
@@ -28,7 +28,6 @@ from hsp_control.visualization.viewer.commands import (
     set_time,
 )
 from hsp_control.visualization.viewer.comparison import ComparedRun, Comparison
-from hsp_control.visualization.viewer.legend import LegendEntry
 from hsp_control.visualization.viewer.motion import motion_of
 from hsp_control.visualization.viewer.obstacle_layer import ObstacleDrawing
 from hsp_control.visualization.viewer.offline.page import InlineView
@@ -47,22 +46,7 @@ from hsp_control.visualization.viewer.stage import (
 )
 from hsp_control.visualization.viewer.transport import Transport
 
-
-class StageContent(Protocol):
-    """Draws itself once, and returns the points that it will occupy."""
-
-    def draw(self, size: float) -> Iterator[Command]:
-        """Yield the commands that draw it in a scene of the given size [m]."""
-
-    def points(self) -> Array:
-        """Return where robots and targets will be [m], shape (K, 3); K may be 0."""
-
-    def obstacle_points(self) -> Array:
-        """Return points that enclose the obstacles [m], shape (L, 3); L may be 0."""
-
-    def legend(self) -> list[LegendEntry]:
-        """Return the legend's entries."""
-
+StageContent = RunDrawing | Comparison | ObstacleDrawing
 
 _log = logging.getLogger(__name__)
 
