@@ -27,7 +27,7 @@ from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields import NullSpaceField
 from hsp_control.tasks import Gains, Impedance, Task
 from hsp_control.tasks.compliant_task import impedance_of
-from hsp_control.tasks.impedance import check_bounded, parts_of
+from hsp_control.tasks.gains import check_bounded, parts_of
 from hsp_control.trajectories import (
     Crossfade,
     OrientationTrajectory,

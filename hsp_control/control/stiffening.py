@@ -16,7 +16,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.control.evolution import Evolution
 from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
-from hsp_control.tasks.impedance import parts_of
+from hsp_control.tasks.gains import parts_of
 
 
 def changes_impedance(task: Task, numbers: Evolution[Array]) -> bool:

@@ -20,10 +20,6 @@ def gradient(function: Callable[[RobotState], float], state: RobotState) -> Arra
 
     (f(-2h) - 8 f(-h) + 8 f(h) - f(2h)) / 12h along each degree of freedom: 4 nv
     evaluations, with an error of about 1e-11 of the size of f.
-
-    Args:
-        function: f of q and t; it must not depend on v.
-        state: The state at which ∇f is computed.
     """
     nv = state.robot.nv
     result = np.empty(nv)
@@ -39,17 +35,7 @@ def gradient(function: Callable[[RobotState], float], state: RobotState) -> Arra
 
 
 def rate_along_flow(function: Callable[[RobotState], Any], state: RobotState) -> Array:
-    """Return d/ds f(q ⊕ s v, t + s) at s = 0, by fourth-order differences.
-
-    The total time derivative of a function of (q, t): four evaluations.
-
-    Args:
-        function: f of q and t, a number or an array of any shape.
-        state: The state; the flow is q ⊕ s v.
-
-    Returns:
-        An array of the shape of f's value, in its unit per second.
-    """
+    """Return d/ds f(q ⊕ s v, t + s) at s = 0, in the shape of f; four evaluations."""
     step = RATE_STEP / max(1.0, float(np.abs(state.v).max()))
     total: Any = 0.0
     for factor, weight in _STENCIL:

@@ -13,11 +13,7 @@ from hsp_control.null_space.metrics import Metric
 
 
 def _summable(fields: Sequence[NullSpaceField]) -> tuple[NullSpaceField, ...]:
-    """Return the fields in a tuple.
-
-    Raises:
-        FieldError: If one of several cannot be part of a sum.
-    """
+    """Return the fields in a tuple."""
     for k, field in enumerate(fields):
         if len(fields) > 1 and not field.controls:
             with within(k):

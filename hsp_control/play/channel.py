@@ -8,11 +8,7 @@ _LONGEST = 65536
 
 
 class Channel:
-    """One end of a pair of datagram sockets; neither end ever waits for the other.
-
-    Attributes:
-        lost: Whether the other end is gone.
-    """
+    """One end of a pair of datagram sockets; neither end ever waits for the other."""
 
     def __init__(self, end: socket.socket) -> None:
         """Take over an end."""
@@ -32,11 +28,7 @@ class Channel:
             self.lost = True
 
     def receive(self, most: int = 100) -> list[dict[str, Any]]:
-        """Return the words that have arrived, oldest first.
-
-        Args:
-            most: How many at most; the others wait.
-        """
+        """Return the words that have arrived, oldest first."""
         words: list[dict[str, Any]] = []
         while len(words) < most and not self.lost:
             try:

@@ -7,19 +7,14 @@ loses the network says nothing more, and the robot stops.
 from collections.abc import Callable
 from time import monotonic
 
-TIMEOUT = 0.5
-"""Silence after which the key counts as released [s]."""
+TIMEOUT = 0.5  # silence after which the key counts as released [s]
 
 
 class DeadMansKey:
     """Whether the key is held."""
 
     def __init__(self, clock: Callable[[], float] = monotonic) -> None:
-        """Begin with a key that is not held.
-
-        Args:
-            clock: A monotonic clock [s].
-        """
+        """Begin with a key that is not held."""
         self._clock = clock
         self._until = -float("inf")
 

@@ -7,33 +7,17 @@ import numpy as np
 
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.control.controller import Controller
-from hsp_control.play.grips import Grip, obstacles_of, targets_of
+from hsp_control.play.grips import Grip, obstacles_of, posture_of, targets_of
 from hsp_control.play.knobs import RAMP, Knob, knobs_of
-from hsp_control.play.posture_grip import posture_of
 
-KNOB_PERIOD = 0.1
-"""Time between two changes by one knob [s]: a slider says much more."""
+KNOB_PERIOD = 0.1  # time between two changes by one knob [s]: a slider says much more
 
 
 class Handles:
-    """Turns what a page says into streams and changes of a controller.
-
-    Attributes:
-        targets: What can be dragged of tasks and of the field, by name.
-        obstacles: The obstacles that can be dragged, by name.
-        knobs: What can be turned, by its id.
-        values: What the knobs are set to.
-        message: What there is to say.
-        warning: Whether that is a warning.
-    """
+    """Turns what a page says into streams and changes of a controller."""
 
     def __init__(self, controller: Controller, period: float) -> None:
-        """Find what can be touched; nothing is touched yet.
-
-        Args:
-            controller: The controller, at its first state.
-            period: The control period [s].
-        """
+        """Find what can be touched; nothing is touched yet."""
         self._controller = controller
         self.targets: dict[str, Grip] = {
             **targets_of(controller),
@@ -64,14 +48,7 @@ class Handles:
             self.say(str(error), warning=True)
 
     def obey(self, message: Mapping[str, Any]) -> None:
-        """Do what a page says; see `take`.
-
-        Raises:
-            HspControlError: If the controller refuses it.
-            ValueError: If there is no such thing.
-            TypeError: If a value is of no use.
-            OverflowError: If a number is too large.
-        """
+        """Do what a page says; see `take`."""
         t = self._controller.state.t
         match message:
             case {"do": "move", "target": str(name), "pose": list(pose)}:

@@ -19,33 +19,20 @@ from hsp_control.tasks import Gains, Impedance
 from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.task import SecondOrderTask
 
-RAMP = 0.2
-"""Time that a change takes [s]."""
+RAMP = 0.2  # time that a change takes [s]
 _REACH = 10.0
 """A slider goes from a tenth of a setting to ten times it, within what is borne."""
-_BORNE = 0.2
-"""Largest rate times period that a slider offers; see `rate_check.RULE`."""
+_BORNE = 0.2  # largest rate times period that a slider offers; see `rate_check.RULE`
 
 
 class Knob(NamedTuple):
-    """One control of the page.
+    """One control of the page."""
 
-    Attributes:
-        id: Its name among the knobs.
-        group: Heading under which it is shown.
-        label: What it is called there.
-        unit: Its unit.
-        value: What it is now: a number, or whether it is on.
-        low: Smallest number.
-        high: Largest number.
-        turn: Makes the change to a value, with what `Controller.at` returns.
-    """
-
-    id: str
-    group: str
-    label: str
+    id: str  # its name among the knobs
+    group: str  # heading under which it is shown
+    label: str  # what it is called there
     unit: str
-    value: float | bool
+    value: float | bool  # what it is now: a number, or whether it is on
     low: float
     high: float
     turn: Callable[[Changes, Any], object]
@@ -66,11 +53,7 @@ class Knob(NamedTuple):
         }
 
     def checked(self, value: object) -> float | bool:
-        """Return a value that a page sent, within the bounds.
-
-        Raises:
-            ValueError: If it is none.
-        """
+        """Return a value that a page sent, within the bounds."""
         if isinstance(self.value, bool):
             if not isinstance(value, bool):
                 raise ValueError(f"{self.id} is on or off; got {value!r}")
@@ -83,12 +66,7 @@ class Knob(NamedTuple):
 
 
 def knobs_of(controller: Controller, period: float) -> dict[str, Knob]:
-    """Return the knobs of a controller, by their ids.
-
-    Args:
-        controller: The controller, before any change by a knob.
-        period: The control period [s].
-    """
+    """Return the knobs of a controller, by their ids."""
     found = [*_null_space(controller, period), *_tasks(controller, period)]
     return {knob.id: knob for knob in found}
 
@@ -113,16 +91,7 @@ def _null_space(controller: Controller, period: float) -> Iterator[Knob]:
 
 
 class _FieldSwitch:
-    """Lets the field go, and brings it back as it is by then.
-
-    Its terms stay, with the weight 0: obstacles that are moved meanwhile, and a posture
-    that is led, move in them, too.
-
-    Attributes:
-        weights: What each term weighs while the field is on, by its name; without those
-            that share a name, or whose weight is a function.
-        whole: Whether these are all terms; else the field cannot be switched.
-    """
+    """Lets the field go (its terms stay, with weight 0), and brings it back."""
 
     def __init__(self, field: NullSpaceField) -> None:
         """Begin with the field as it is."""

@@ -7,15 +7,15 @@ the changes that the loop tells of, says what the field is: zones, capsules, dis
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.config import Experiment
 from hsp_control.control.controller import Controller
 from hsp_control.play.channel import Channel
 from hsp_control.play.handles import Handles
 from hsp_control.play.knobs import RAMP
-from hsp_control.play.picture import Kind
 from hsp_control.simulation.journal import JournalTail
 from hsp_control.simulation.recorder import Recorder
 
@@ -48,18 +48,7 @@ class ToldHandles(Handles):
 
 
 class Mirror:
-    """What a picture needs of a live loop; see `Played`.
-
-    Attributes:
-        experiment: What the loop controls.
-        controller: A controller like the loop's, at the state of the last row.
-        period: The control period [s].
-        recorder: The journal's rows; before them, the start.
-        handles: What can be touched.
-        kind: Whether a key must be held.
-        over: How the loop has ended; empty: it goes on.
-        pushes: None: nobody pulls at this robot with a mouse.
-    """
+    """What a picture needs of a live loop, as of a `Session`."""
 
     pushes = None
 
@@ -72,17 +61,9 @@ class Mirror:
         *,
         held: bool,
     ) -> None:
-        """Begin at the experiment's start.
-
-        Args:
-            experiment: What the loop controls.
-            period: The control period [s].
-            journal: The loop's journal; it may appear later.
-            channel: The way to the loop.
-            held: Whether a key must be held.
-        """
+        """Begin at the experiment's start."""
         self.experiment, self.period = experiment, period
-        self.kind: Kind = "held" if held else "live"
+        self.kind: Literal["live", "held"] = "held" if held else "live"
         self.controller = experiment.controller
         output = self.controller.compute(0.0, experiment.q0, experiment.v0)
         start = Recorder(self.controller, experiment.scene, 1)
@@ -104,8 +85,9 @@ class Mirror:
             return self.recorder.meta("", "")
         return self.recorder.meta
 
-    def pull(self) -> None:
+    def pull(self) -> tuple[Array, Array, float] | None:
         """Return None: nobody pulls at this robot with a mouse."""
+        return None
 
     def say(self, message: dict[str, Any]) -> None:
         """Pass on what a page says."""
@@ -114,11 +96,7 @@ class Mirror:
             self.handles.take(message)  # zones and distances follow it here, too
 
     def read(self) -> None:
-        """Read what has come from the loop.
-
-        Raises:
-            LogError: If the journal cannot be read.
-        """
+        """Read what has come from the loop."""
         for word in self._channel.receive():
             self.handles.hear(word)
         if self._tail.read():

@@ -19,11 +19,7 @@ from hsp_control.robot import RobotState
 
 
 class ComparedCommand(Command):
-    """A command that can follow the operational-space law instead.
-
-    Attributes:
-        operational: Whether it does.
-    """
+    """A command that can follow the operational-space law instead."""
 
     operational = False
 
@@ -39,14 +35,7 @@ class ComparedCommand(Command):
 
 
 def operational_space(state: RobotState, active: ActiveStack) -> Array:
-    """Return the law's acceleration, shape (nv,).
-
-    Tasks of all priorities count alike; near a singularity it is not damped.
-
-    Args:
-        state: The state.
-        active: The tasks and contacts, resolved at the state.
-    """
+    """Return the law's acceleration, (nv,), all priorities alike, without damping."""
     J, J_dot = active.rows.jacobian, active.rows.jacobian_dot
     problem = active.resolution.problem
     W_inv_Jt = np.linalg.solve(problem.metric.W, J.T)

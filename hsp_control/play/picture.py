@@ -2,137 +2,63 @@
 
 import operator
 from collections.abc import Iterator
-from typing import Any, Literal, NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.config import Experiment
-from hsp_control.control.controller import Controller
 from hsp_control.null_space.fields import FieldSum, NullSpaceField, Rest
 from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.fields.weight import sample_weight
-from hsp_control.play.handles import Handles
+from hsp_control.play.mirror import Mirror
+from hsp_control.play.session import Session
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.log_series import distance_label
 from hsp_control.simulation.unreached import unreached
 from hsp_control.visualization.palette import SERIES
 from hsp_control.visualization.viewer import Viewer
 from hsp_control.visualization.viewer.appearance import CHALK, INK
-from hsp_control.visualization.viewer.capsules import Capsules
 from hsp_control.visualization.viewer.commands import (
     Command,
     delete,
     play_command,
     typed_array,
 )
-from hsp_control.visualization.viewer.distances import Distances
-from hsp_control.visualization.viewer.influence import Influence
-from hsp_control.visualization.viewer.layer import Layer
+from hsp_control.visualization.viewer.measured_links import (
+    Capsules,
+    Distances,
+    Influence,
+)
 from hsp_control.visualization.viewer.motion import Motion
 from hsp_control.visualization.viewer.obstacle_layer import ObstacleLayer
-from hsp_control.visualization.viewer.run_drawing import RunDrawing, all_layers
+from hsp_control.visualization.viewer.run_drawing import Layer, RunDrawing, all_layers
 from hsp_control.visualization.viewer.scene_path import path_element
 
-FRAME = 1.0 / 30.0
-"""Time between two pictures [s]."""
+FRAME = 1.0 / 30.0  # time between two pictures [s]
 _FIELD_LAYERS = ("influence", "distances", "capsules")
 _BATCHES = 64
 """Batches of samples that wait for a page at most; what is older is left out."""
-_JOINTS = 8
-"""Most joints whose efforts have a curve each."""
+_JOINTS = 8  # most joints whose efforts have a curve each
 
 
 class Curve(NamedTuple):
-    """One curve of a plot.
-
-    Attributes:
-        name: What it shows.
-        column: Column of the log.
-        rows: Which components, of which the norm is shown.
-    """
+    """One curve of a plot."""
 
     name: str
-    column: str
-    rows: slice
+    column: str  # column of the log
+    rows: slice  # which components, of which the norm is shown
 
 
 class Plot(NamedTuple):
-    """One plot.
-
-    Attributes:
-        title: What it shows.
-        unit: The unit.
-        log: Whether its scale is logarithmic.
-        curves: Its curves.
-    """
+    """One plot."""
 
     title: str
     unit: str
-    log: bool
+    log: bool  # whether its scale is logarithmic
     curves: list[Curve]
 
 
-Kind = Literal["simulated", "live", "held"]
-"""A simulation; a live loop; one that runs only while somebody holds a key."""
-
-
-class Rows(Protocol):
-    """Rows of a log, as of a `Recorder` or a `JournalTail`."""
-
-    @property
-    def count(self) -> int:
-        """How many there were so far."""
-
-    def rows(self, first: int) -> dict[str, Array]:
-        """Return the columns from a row on."""
-
-
-class Played(Protocol):
-    """What a picture shows: a `Session`, or the `Mirror` of a live loop."""
-
-    @property
-    def kind(self) -> Kind:
-        """A simulation, or a live loop."""
-
-    @property
-    def experiment(self) -> Experiment:
-        """What is simulated or controlled."""
-
-    @property
-    def controller(self) -> Controller:
-        """The controller, at the present state."""
-
-    @property
-    def handles(self) -> Handles:
-        """What can be touched."""
-
-    @property
-    def period(self) -> float:
-        """The control period [s]."""
-
-    @property
-    def recorder(self) -> Rows:
-        """The rows so far."""
-
-    @property
-    def meta(self) -> dict[str, Any]:
-        """The meta data of these rows."""
-
-    @property
-    def over(self) -> str:
-        """Why it goes on no more; empty: it does."""
-
-    @property
-    def pushes(self) -> object | None:
-        """What a page pulls with; None: it cannot."""
-
-    @property
-    def t(self) -> float:
-        """The time of the present row [s]."""
-
-    def pull(self) -> tuple[Array, Array, float] | None:
-        """Return where somebody pulls, the hand, both (3,) [m], and the force [N]."""
+Played = Session | Mirror
 
 
 class Picture:
@@ -163,10 +89,7 @@ class Picture:
         viewer.transport.send([self._setup(title), *self.frame(running=True, rate=1.0)])
 
     def _layers(self, motion: Motion) -> dict[str, Layer]:
-        """Return the layers of the present instant, those of the present field too.
-
-        Not those of a whole run: what a controller was at its start is not drawn.
-        """
+        """Return the layers of the present instant, those of the present field too."""
         robot, controller = self._session.experiment.robot, self._session.controller
         dark = self._viewer.dark
         layers = all_layers(robot, motion, None, dark=dark)
@@ -184,15 +107,7 @@ class Picture:
         return layers
 
     def draw(self, *, running: bool, rate: float) -> None:
-        """Send a picture of the present instant.
-
-        Args:
-            running: Whether the session goes on by itself.
-            rate: Seconds of the session per second.
-
-        Raises:
-            ViewerError: If the server has ended.
-        """
+        """Send a picture of the present instant."""
         self._viewer.transport.send(self.frame(running=running, rate=rate))
 
     def frame(self, *, running: bool, rate: float) -> list[Command]:

@@ -17,20 +17,13 @@ from hsp_control.play.session import ROW
 from hsp_control.robot import Robot
 from hsp_control.robot.description.sources import is_robot
 
-_PERIOD = 0.001
-"""Control period where a configuration has none [s]."""
+_PERIOD = 0.001  # control period where a configuration has none [s]
 
 
 def playable(
     source: str | PathLike[str], *overrides: str, **reading: Any
 ) -> Experiment:
-    """Return the experiment of a configuration, or one for a robot.
-
-    See `playable_document` for the arguments.
-
-    Raises:
-        HspControlError: See `playable_document` and `load_experiment`.
-    """
+    """Return the experiment of `playable_document`."""
     return build(playable_document(source, *overrides, **reading))
 
 
@@ -39,18 +32,9 @@ def playable_document(
 ) -> Document:
     """Return a configuration that can be played with, or one for a robot.
 
-    It gets a control period of a millisecond, if it has none, and rows of about 10 ms.
-
-    Args:
-        source: As for `load_experiment`; or a robot with a fixed base, by name or URDF,
-            whose hand then holds its pose, with a ball beside its elbow.
-        overrides: Values to change, each ``key.path=value``.
-        strict: See `load_experiment`.
-        reading: See `load_experiment`.
-
-    Raises:
-        ConfigError: If it is neither, or a robot that needs contacts.
-        HspControlError: See `load_experiment`.
+    ``source`` is one for `load_experiment`, or a robot with a fixed base, by name or
+    URDF: its hand holds its pose, with a ball beside its elbow. Without a control
+    period it gets one of a millisecond, and rows of about 10 ms.
     """
     if str(source) not in bundled_configs() and is_robot(str(source)):
         document = Document(_for_robot(str(source)), {}, str(source))
@@ -72,11 +56,7 @@ def playable_document(
 
 
 def _for_robot(name: str) -> dict[str, Any]:
-    """Return the configuration of a robot that holds its hand, beside a ball.
-
-    Raises:
-        ConfigError: If it has a floating base.
-    """
+    """Return the configuration of a robot that holds its hand, beside a ball."""
     robot = Robot.load(name)
     if robot.unactuated:
         known = [

@@ -21,21 +21,7 @@ def play(
     *,
     end: Callable[[], bool] = lambda: False,
 ) -> None:
-    """Let a session go on in real time until it is interrupted.
-
-    Pages never hold it up: what they show is drawn by themselves, and what they say is
-    taken between two rows.
-
-    Args:
-        session: The session.
-        picture: Its picture.
-        messages: Returns what the page that steers has sent since the last call.
-        save: Saves the log, and returns what to say about it.
-        end: Returns whether to end.
-
-    Raises:
-        ViewerError: If the server has ended.
-    """
+    """Let a session go on in real time until it ends; pages never hold it up."""
     running, begin, rate = True, monotonic(), 1.0
     due = drawn = marked = begin
     marked_at = session.t

@@ -28,49 +28,26 @@ from hsp_control.visualization.viewer.scene_path import path_element
 
 ROW = 0.01
 """Time between two rows of the log, at which messages are taken [s]; whole periods."""
-LONGEST = 1200.0
-"""Longest time that is recorded [s]."""
-LARGEST_LOG = 3e8
-"""Largest log [bytes]."""
-PULL = 300.0
-"""Stiffness of the spring of somebody who pulls at a link [N/m]."""
-LARGEST_PULL = 100.0
-"""Largest force of that spring [N]."""
+LONGEST = 1200.0  # longest time that is recorded [s]
+LARGEST_LOG = 3e8  # largest log [bytes]
+PULL = 300.0  # stiffness of the spring of somebody who pulls at a link [N/m]
+LARGEST_PULL = 100.0  # largest force of that spring [N]
 
-_REHEARSED = 40
-"""Rows of a rehearsal: beyond the ramps of changes."""
+_REHEARSED = 40  # rows of a rehearsal: beyond the ramps of changes
 
 _log = logging.getLogger(__name__)
 
 
 class Session:
-    """A robot that moves in its simulated world, and changes as it is told to.
+    """The sampled loop of `simulate`, row by row; between two, a page may change it.
 
-    It is the sampled loop of `simulate`, row by row: between two rows, messages of a
-    page become streams, changes of the controller and forces. All but the forces are
-    in the log, which repeats the run.
-
-    Attributes:
-        experiment: What is simulated.
-        period: The control period [s].
-        row: Time between two rows [s].
-        recorder: The rows so far.
-        handles: What can be touched, but for the links.
-        over: Why it goes on no more, until it is reset; empty: it does.
+    All but the forces of a page is in the log, which repeats the run.
     """
 
     kind: Literal["simulated"] = "simulated"
 
     def __init__(self, experiment: Experiment) -> None:
-        """Begin at the experiment's start.
-
-        Args:
-            experiment: The experiment; it has a control period, and its log period is a
-                multiple of it. See `playable`.
-
-        Raises:
-            SimulationError: If it has no control period.
-        """
+        """Begin at the experiment's start."""
         settings = experiment.scenario.simulation
         if settings.control_period is None:
             raise SimulationError("a session needs a control period")

@@ -15,19 +15,12 @@ from hsp_control.play.channel import Channel
 from hsp_control.play.dead_mans_key import DeadMansKey
 from hsp_control.play.handles import Handles
 
-TOLD = 1.0 / 30.0
-"""Time between two words to the page [s]."""
-_MESSAGES = 4
-"""Messages that are taken in one period at most."""
+TOLD = 1.0 / 30.0  # time between two words to the page [s]
+_MESSAGES = 4  # messages that are taken in one period at most
 
 
 class SteeredLoop:
-    """Lets a page steer the controller of a live loop.
-
-    Attributes:
-        handles: What can be touched.
-        key: The dead-man's key; None without one.
-    """
+    """Lets a page steer the controller of a live loop."""
 
     def __init__(
         self,
@@ -39,16 +32,7 @@ class SteeredLoop:
         key: DeadMansKey | None = None,
         clock: Callable[[], float] = monotonic,
     ) -> None:
-        """Begin with nothing touched.
-
-        Args:
-            controller: The loop's controller; it has computed once.
-            period: The control period [s].
-            channel: The way to the page's process.
-            requests: The loop's requests, to stop it.
-            key: The dead-man's key; without it the loop goes on when no page is there.
-            clock: A monotonic clock [s].
-        """
+        """Begin with nothing touched."""
         self.handles = Handles(controller, period)
         self.key = key
         self._channel, self._requests = channel, requests

@@ -2,13 +2,13 @@
 
 from hsp_control.law import TaskSample as TaskSample
 
-from .angular_momentum import AngularMomentum as AngularMomentum
-from .center_of_mass import CenterOfMass as CenterOfMass
-from .frame_orientation import FrameOrientation as FrameOrientation
+from .centroidal import AngularMomentum as AngularMomentum
+from .centroidal import CenterOfMass as CenterOfMass
+from .frame_pose import FrameOrientation as FrameOrientation
 from .frame_pose import FramePose as FramePose
 from .frame_position import FramePosition as FramePosition
 from .gains import Gains as Gains
-from .impedance import Impedance as Impedance
+from .gains import Impedance as Impedance
 from .joint_posture import JointPosture as JointPosture
 from .pointing import Pointing as Pointing
 from .relative_pose import RelativePose as RelativePose

@@ -25,11 +25,7 @@ def track_axes(
     feedback: Feedback,
     out: TaskSample,
 ) -> None:
-    """Write a point's sample: e = x_d - x, a_x = x_d'' + Kv e' + Kp e + offset.
-
-    The rows of the point's Jacobian, (3 or more, nv), and its position and velocity
-    are in world axes; ``axes`` selects m of them.
-    """
+    """Write a point's sample; its Jacobian, (3 or more, nv), is in world axes."""
     x_d, x_d_dot, x_d_ddot = desired
     J, J_dot, e, e_dot, a_x = out
     for k in range(axes.shape[0]):

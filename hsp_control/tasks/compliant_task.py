@@ -14,8 +14,7 @@ from hsp_control.common.step_plan import StepPlan
 from hsp_control.declaration import within
 from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
-from hsp_control.tasks.gains import Gains
-from hsp_control.tasks.impedance import Impedance, parts_of
+from hsp_control.tasks.gains import Gains, Impedance, parts_of
 from hsp_control.tasks.impedance_gains import Rotating, Scratch, impedance_gains
 from hsp_control.tasks.task import Feedback, InForce, SecondOrderTask, Task
 
@@ -44,29 +43,18 @@ class CompliantTask(SecondOrderTask):
     fades by itself where the hand cannot move: `largest_error` does not count."""
 
     def __post_init__(self) -> None:
-        """Check that there are not both gains and an impedance.
-
-        Raises:
-            GainError: If there are.
-        """
+        """Check that there are not both gains and an impedance."""
         if self.impedance is not None and self.gains != _NO_GAINS:
             raise GainError(
                 "give either gains [1/s², 1/s] or impedance [N/m, N·s/m], not both"
             )
 
     def _rotating(self, state: RobotState) -> Rotating:
-        """Return which rows are a rotation vector, of a frame that is kept up to date.
-
-        By default none are.
-        """
+        """Return which rows are a rotation vector; by default none are."""
         return Rotating(self.rows, np.eye(3), np.zeros(3))
 
     def checked(self, robot: Robot) -> Self:
-        """Return the task itself, whose rows and gains fit; see `Task.checked`.
-
-        Raises:
-            GainError: If it has an impedance, and the robot a floating base.
-        """
+        """Return the task itself, whose rows and gains fit; see `Task.checked`."""
         if self.impedance is not None and robot.unactuated:
             with within("impedance"):
                 raise GainError(

@@ -1,4 +1,4 @@
-"""The task of a frame's pose: its origin and its orientation together."""
+"""The tasks of a frame's orientation on SO(3), and of its pose."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -9,8 +9,19 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.kernels import kernel
+from hsp_control.common.linalg import multiply
 from hsp_control.common.native import bind
-from hsp_control.common.rotations import quaternion_from_rotation
+from hsp_control.common.rotations import (
+    compose_back,
+    cross,
+    jexp3,
+    jexp3_dot,
+    jlog3,
+    log3,
+    quaternion_from_rotation,
+    rotate,
+    rotate_back,
+)
 from hsp_control.common.step_plan import merged
 from hsp_control.declaration import AnyOf
 from hsp_control.geometry.start import Start
@@ -18,22 +29,178 @@ from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
 from hsp_control.robot.kinematics import FrameKinematics, FrameMotion
 from hsp_control.tasks.compliant_task import CompliantTask
-from hsp_control.tasks.frame_orientation import (
-    ORIENTATION_SCRATCH,
-    orientation_acceleration,
-    orientation_error,
+from hsp_control.tasks.frame_task import (
+    FrameTask,
+    TrackingTask,
+    frame_of,
+    place_orientation,
+    place_pose,
 )
-from hsp_control.tasks.frame_task import FrameTask, TrackingTask, frame_of
 from hsp_control.tasks.impedance_gains import Rotating
-from hsp_control.tasks.placing import place_pose
 from hsp_control.tasks.task import Drawn, ErrorPart, Feedback, add_feedback, copy_rows
 from hsp_control.trajectories import (
     ComposedPose,
+    HoldOrientation,
+    OrientationSample,
+    OrientationTrajectory,
     PoseSample,
     PoseTrajectory,
     Trajectory,
 )
 from hsp_control.trajectories.following import Follower
+
+ORIENTATION_SCRATCH = 12
+"""Rows of the scratch array of `orientation_error` and `orientation_acceleration`."""
+
+
+class FrameOrientation(
+    FrameTask, TrackingTask, CompliantTask, type="frame_orientation"
+):
+    """e = -log(R_dᵀ R), the orientation of a frame in the world [rad].
+
+    e is a rotation vector in the axes of the desired frame. The error equation is
+    exact up to an angle of pi (docs/law.md). At pi the shortest rotation back changes
+    its side: e jumps to -e, and all values stay finite. J are the angular rows of the
+    frame's Jacobian in world axes.
+    """
+
+    drawn: ClassVar[tuple[Drawn, ...]] = ("orientation",)
+    wrench_unit: ClassVar[str | None] = "N·m"
+
+    trajectory: OrientationTrajectory = HoldOrientation()
+    """R_d(t), world ← frame [rad]; held as at the start by default."""
+
+    @property
+    def error_parts(self) -> tuple[ErrorPart, ...]:
+        """The rotation vector."""
+        return (ErrorPart("orientation", "rad", "rad/s", 3),)
+
+    def _default_name(self) -> str:
+        return f"{super()._default_name()}_orientation"
+
+    @property
+    def followed(self) -> OrientationTrajectory:
+        """The trajectory of a placed task."""
+        return self.trajectory
+
+    def placed(self, start: Start) -> Self:
+        """Return the task with its trajectory in the world; see `Task.placed`."""
+        robot = start.state.robot
+        frame = frame_of(self.frame, robot)
+        here = start.state.frame(frame).rotation
+        trajectory = place_orientation(self.trajectory, here, self.blend)
+        placed = replace(self, frame=frame, trajectory=trajectory, blend=None)
+        return placed.checked(robot)
+
+    def _compile(
+        self, frame: FrameKinematics, feedback: Feedback, out: TaskSample
+    ) -> tuple[Follower, Callable[[], Any]]:
+        desired = OrientationSample.allocate()
+        write = bind(
+            _frame_orientation,
+            frame.motion,
+            desired,
+            feedback,
+            np.zeros((ORIENTATION_SCRATCH, 3)),
+            out,
+        )
+        return self.trajectory.follow(desired), write
+
+    def _rotating(self, state: RobotState) -> Rotating:
+        motion = state.frame(self.frame_name).motion
+        return Rotating(0, motion.rotation, motion.velocity[3:])
+
+    def reference_rate(self, state: RobotState) -> Array:
+        """Return the desired angular velocity w_d in world axes, shape (3,) [rad/s]."""
+        return self.trajectory.sample(state.t).angular_velocity
+
+    def measure(self, state: RobotState) -> tuple[Array, Array]:
+        """Return desired and actual orientation, quaternions (x, y, z, w)."""
+        desired, actual = np.zeros(4), np.zeros(4)
+        quaternion_from_rotation(self.trajectory.sample(state.t).rotation, desired)
+        quaternion_from_rotation(state.frame(self.frame_name).rotation, actual)
+        # q and -q are one rotation: choose the sign that is closer to the desired one.
+        return desired, actual if desired @ actual >= 0.0 else -actual
+
+
+@kernel
+def orientation_error(
+    R: Array, w: Array, R_d: Array, w_d: Array, scratch: Array, e: Array, e_dot: Array
+) -> None:
+    """Write e = -y and e' = -y' with y = log(R_dᵀ R) and y' = Jlog(y) w̃.
+
+    w̃ = Rᵀ(w - w_d) is the relative angular velocity in the axes of the frame.
+
+    Shapes: w (3,) [rad/s], w_d (3,) [rad/s], scratch (ORIENTATION_SCRATCH, 3), e (3,)
+    [rad], e_dot (3,) [rad/s].
+    """
+    w_tilde, y, E = scratch[0], scratch[1], scratch[6:9]
+    compose_back(R_d, R, E)
+    log3(E, y)
+    for i in range(3):
+        e[i] = w[i] - w_d[i]
+    rotate_back(R, e, w_tilde)
+    jlog3(y, E)
+    multiply(E, w_tilde, e_dot)
+    for i in range(3):
+        e[i] = -y[i]
+        e_dot[i] = -e_dot[i]
+
+
+@kernel
+def orientation_acceleration(
+    R: Array,
+    w: Array,
+    w_d: Array,
+    w_d_dot: Array,
+    e: Array,
+    e_dot: Array,
+    scratch: Array,
+    out: Array,
+) -> None:
+    """Overwrite y'' = -e'' by the angular acceleration w' that produces it.
+
+    w̃ = Jexp(y) y' gives w̃' = Jexp y'' + Jexp' y'. The motion of the desired frame adds
+    the transport term: w' = R w̃' - w × w_d + w_d'.
+
+    Shapes: w (3,) [rad/s], w_d (3,) [rad/s], w_d_dot (3,) [rad/s²], e (3,) [rad], e_dot
+    (3,) [rad/s], scratch (ORIENTATION_SCRATCH, 3), out (3,) [rad/s²].
+    """
+    y, y_dot, w_tilde_dot, term = scratch[0], scratch[1], scratch[2], scratch[3]
+    for i in range(3):
+        y[i], y_dot[i] = -e[i], -e_dot[i]
+    J_exp, J_exp_dot = scratch[6:9], scratch[9:12]
+    jexp3(y, J_exp)
+    jexp3_dot(y, y_dot, J_exp_dot)
+    multiply(J_exp, out, w_tilde_dot)
+    multiply(J_exp_dot, y_dot, term)
+    for i in range(3):
+        w_tilde_dot[i] += term[i]
+    rotate(R, w_tilde_dot, out)
+    cross(w, w_d, term)
+    for i in range(3):
+        out[i] += w_d_dot[i] - term[i]
+
+
+@kernel
+def _frame_orientation(
+    frame: FrameMotion,
+    desired: OrientationSample,
+    feedback: Feedback,
+    scratch: Array,
+    out: TaskSample,
+) -> None:
+    """Write the sample: the angular acceleration for which e'' = -Kv e' - Kp e."""
+    R, w = frame.rotation, frame.velocity[3:]
+    R_d, w_d, w_d_dot = desired
+    J, J_dot, e, e_dot, a_x = out
+    copy_rows(frame.jacobian, frame.jacobian_dot, 3, J, J_dot)
+    orientation_error(R, w, R_d, w_d, scratch, e, e_dot)
+    for i in range(3):
+        a_x[i] = 0.0
+    add_feedback(a_x, feedback, e, e_dot, a_x)
+    orientation_acceleration(R, w, w_d, w_d_dot, e, e_dot, scratch, a_x)
+
 
 PoseOrPoint = Annotated[PoseTrajectory | Trajectory, AnyOf(PoseTrajectory, Trajectory)]
 """The trajectory of a pose, or of its origin: then the orientation is held."""
@@ -67,11 +234,7 @@ class FramePose(FrameTask, TrackingTask, CompliantTask, type="frame_pose"):
 
     @property
     def pose(self) -> PoseTrajectory:
-        """The trajectory of a placed task.
-
-        Raises:
-            TaskError: If the task is not placed.
-        """
+        """The trajectory of a placed task."""
         if not isinstance(self.trajectory, PoseTrajectory):
             raise self._not_placed("orientation")
         return self.trajectory
@@ -142,32 +305,17 @@ class FramePose(FrameTask, TrackingTask, CompliantTask, type="frame_pose"):
 
 
 class _Reference(NamedTuple):
-    """The reference of a pose at a state's time.
-
-    Attributes:
-        sample: The reference.
-        follow: Writes it for a time [s].
-        measure: Writes `values` for the reference and the frame.
-        values: What `FramePose.measure` returns, shape (2, 7).
-    """
+    """The reference of a pose at a state's time."""
 
     sample: PoseSample
-    follow: Callable[[float], object]
-    measure: Callable[[], object]
-    values: Array
+    follow: Callable[[float], object]  # writes it for a time [s]
+    measure: Callable[[], object]  # writes `values` for the reference and the frame
+    values: Array  # what `FramePose.measure` returns, (2, 7)
 
 
 @kernel
 def _measured_pose(desired: Array, position: Array, R: Array, values: Array) -> None:
-    """Write the desired and the actual pose; see `FramePose.measure`.
-
-    Args:
-        desired: See `pose_error_equation`.
-        position: The actual position, shape (3,).
-        R: The actual rotation, shape (3, 3).
-        values: Written, shape (2, 7); of the two quaternions that mean the actual
-            rotation, it has the one nearer to the desired one.
-    """
+    """Write the desired and the actual pose; see `FramePose.measure`."""
     for i in range(3):
         values[0, i], values[1, i] = desired[0, i], position[i]
     quaternion_from_rotation(desired[3:6], values[0, 3:])

@@ -13,8 +13,7 @@ from hsp_control.robot import RobotState
 from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.tasks.axes import axis_indices, track_axes
 from hsp_control.tasks.compliant_task import CompliantTask
-from hsp_control.tasks.frame_task import FrameTask, TrackingTask, frame_of
-from hsp_control.tasks.placing import place_point
+from hsp_control.tasks.frame_task import FrameTask, TrackingTask, frame_of, place_point
 from hsp_control.tasks.task import Drawn, ErrorPart, Feedback
 from hsp_control.trajectories import Hold, Trajectory, TrajectorySample
 from hsp_control.trajectories.following import Follower

@@ -1,10 +1,15 @@
-"""The base classes of tasks that follow a trajectory, or that track a frame."""
+"""Base classes of tasks that follow a trajectory, or track a frame; its placing."""
 
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import KW_ONLY
 from typing import Any
 
+import numpy as np
+import pinocchio as pin
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import TaskError
 from hsp_control.common.step_plan import StepPlan
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Positive
@@ -12,7 +17,60 @@ from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.tasks.task import Feedback, SecondOrderTask, default_name
+from hsp_control.trajectories import (
+    Blend,
+    BlendOrientation,
+    ComposedPose,
+    OrientationTrajectory,
+    PoseTrajectory,
+    Trajectory,
+)
 from hsp_control.trajectories.following import Follower
+
+
+def place_point(trajectory: Trajectory, here: Array, blend: float | None) -> Trajectory:
+    """Return the trajectory of a point in the world, blended if asked for."""
+    with within("trajectory"):
+        placed = trajectory.anchored(here)
+        if placed.dimension != len(here):
+            raise TaskError(
+                f"the trajectory has dimension {placed.dimension}; the task needs "
+                f"{len(here)}"
+            )
+        return placed if blend is None else Blend(placed, blend, start=here)
+
+
+def place_orientation(
+    trajectory: OrientationTrajectory, here: Array, blend: float | None
+) -> OrientationTrajectory:
+    """Return the trajectory of an orientation, blended if asked for."""
+    with within("trajectory"):
+        placed = trajectory.anchored(here)
+        if blend is None:
+            return placed
+        return BlendOrientation(placed, blend, rotation=here)
+
+
+def place_pose(
+    trajectory: PoseTrajectory | Trajectory, here: pin.SE3, blend: float | None
+) -> PoseTrajectory:
+    """Return the trajectory of a pose, blended if asked for."""
+    if isinstance(trajectory, Trajectory):
+        point = place_point(trajectory, np.array(here.translation), None)
+        trajectory = ComposedPose(point)
+    with within("trajectory"):
+        placed = trajectory.anchored(here)
+    if blend is None:
+        return placed
+    if not isinstance(placed, ComposedPose):
+        with within("blend"):
+            raise TaskError(
+                f"{type(placed).__name__} begins where it says; remove blend"
+            )
+    return ComposedPose(
+        place_point(placed.position, np.array(here.translation), blend),
+        place_orientation(placed.orientation, np.array(here.rotation), blend),
+    )
 
 
 class TrackingTask(SecondOrderTask):
@@ -37,11 +95,7 @@ class FrameTask(SecondOrderTask):
 
     @property
     def frame_name(self) -> str:
-        """Name of the frame of a placed task.
-
-        Raises:
-            TaskError: If the task is not placed.
-        """
+        """Name of the frame of a placed task."""
         if self.frame is None:
             raise self._not_placed("frame")
         return self.frame
@@ -53,17 +107,7 @@ class FrameTask(SecondOrderTask):
     def _compile(
         self, frame: FrameKinematics, feedback: Feedback, out: TaskSample
     ) -> tuple[Follower, Callable[[], Any]]:
-        """Return two calls: one updates the reference, the other writes ``out``.
-
-        Args:
-            frame: The kinematics of the frame, computed before the second call.
-            feedback: The gains and the offset that the second call reads.
-            out: The sample that the second call writes.
-
-        Returns:
-            A function of time [s] that updates the reference, and a function without
-            arguments that reads reference and frame and writes ``out``.
-        """
+        """Return what updates the reference at a time [s], and what writes ``out``."""
 
     def compile(
         self, state: RobotState, feedback: Feedback, out: TaskSample
@@ -79,11 +123,7 @@ class FrameTask(SecondOrderTask):
 
 
 def frame_of(frame: str | None, robot: Robot) -> str:
-    """Return the frame, checked to exist, or the robot's end effector.
-
-    Raises:
-        FrameNotFoundError: If the robot has no such frame.
-    """
+    """Return the frame, checked to exist, or the robot's end effector."""
     if frame is None:
         return robot.end_effector
     with within("frame"):

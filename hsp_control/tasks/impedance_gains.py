@@ -38,40 +38,25 @@ from hsp_control.common.rotations import compose, jexp3_dot, jlog3
 from hsp_control.law import TaskSample
 from hsp_control.tasks.task import Feedback
 
-_THRESHOLD = 0.03
-"""Default threshold of the law's singularities: see `Controller`."""
+_THRESHOLD = 0.03  # default threshold of the law's singularities: see `Controller`
 
 
 class Rotating(NamedTuple):
-    """Which rows of an error are a rotation vector, and what rotates.
+    """Which rows of an error are a rotation vector, and what rotates."""
 
-    Attributes:
-        first: The first of the three rows; the number of rows if there are none.
-        rotation: World ← frame, shape (3, 3).
-        angular_velocity: Of the frame, in world axes, shape (3,) [rad/s].
-    """
-
-    first: int
-    rotation: Array
-    angular_velocity: Array
+    first: int  # the first of the three rows; the number of rows if there are none
+    rotation: Array  # world ← frame, (3, 3)
+    angular_velocity: Array  # of the frame, in world axes, (3,) [rad/s]
 
 
 class Scratch(NamedTuple):
-    """Memory of `impedance_gains`.
+    """Memory of `impedance_gains`."""
 
-    Attributes:
-        factor: Shape (nv, nv).
-        wide: Shape (5, m, nv).
-        square: Shape (6, m, m).
-        turning: Shape (4, 3, 3).
-        vectors: Shape (2, 3).
-    """
-
-    factor: Array
-    wide: Array
-    square: Array
-    turning: Array
-    vectors: Array
+    factor: Array  # (nv, nv)
+    wide: Array  # (5, m, nv)
+    square: Array  # (6, m, m)
+    turning: Array  # (4, 3, 3)
+    vectors: Array  # (2, 3)
 
     @classmethod
     def allocate(cls, rows: int, nv: int) -> "Scratch":
@@ -101,15 +86,7 @@ def impedance_gains(
     Where M is singular they are NaN, so that the law reports that the step is not
     finite.
 
-    Args:
-        M: Mass matrix, shape (nv, nv).
-        M_dot: Its rate, shape (nv, nv).
-        rotating: The rows that are a rotation vector.
-        numbers: K, D, ζ, 1/largest error: see `Impedance.numbers`.
-        sample: J, J', e and e' of the task at the state.
-        scratch: Overwritten.
-        mobility: G = Λ⁻¹, written, shape (m, m).
-        feedback: Its Kp and Kv are written.
+    Shapes: M (nv, nv), M_dot (nv, nv), mobility (m, m).
     """
     m, nv = sample.jacobian.shape
     K, D, ratio = numbers[:m], numbers[m : 2 * m], numbers[2 * m, 0]
@@ -181,13 +158,7 @@ def error_jacobian(
     e = -y with y' = T ω, T = Jlog(y) Rᵀ, plus what the reference does; hence
     T' = -Jlog Jexp' T - T [ω]×.
 
-    Args:
-        rotating: The rows that are a rotation vector.
-        sample: J, J', e and e'.
-        turning: Scratch, shape (4, 3, 3).
-        vectors: Scratch, shape (2, 3).
-        J_e: Shape (m, nv).
-        J_e_dot: Its rate, shape (m, nv).
+    Shapes: turning (4, 3, 3), vectors (2, 3), J_e (m, nv), J_e_dot (m, nv).
     """
     J, J_dot, e, e_dot, _ = sample
     m, nv = J.shape
@@ -233,12 +204,7 @@ def natural_root(B: Array, K: Array, Z: Array, square: Array, out: Array) -> Non
 
     The singular values of Cᵀ B are the natural frequencies of the modes [rad/s].
 
-    Args:
-        B: Whitened Jacobian, shape (m, nv).
-        K: Stiffness, positive definite, shape (m, m).
-        Z: Scratch, shape (m, nv).
-        square: Scratch; the matrices 3, 4 and 5 are overwritten, shape (6, m, m).
-        out: Shape (m, m).
+    Shapes: B (m, nv), K (m, m), Z (m, nv), square (6, m, m), out (m, m).
     """
     m, nv = B.shape
     C, U, S = square[3], square[4], square[5]
@@ -269,12 +235,7 @@ def natural_root(B: Array, K: Array, Z: Array, square: Array, out: Array) -> Non
 def bounded_inertia(B: Array, threshold: float, Q: Array, X: Array, out: Array) -> None:
     """Write Λ = (B#)ᵀ B#, the inverse of B Bᵀ; it fades to zero where B loses rank.
 
-    Args:
-        B: Whitened Jacobian, shape (m, nv).
-        threshold: Singular value of B above which it is the inverse.
-        Q: Scratch, shape (m, nv).
-        X: Scratch, shape (m, m).
-        out: Shape (m, m).
+    Shapes: B (m, nv), Q (m, nv), X (m, m), out (m, m).
     """
     bounded_inverse(B, threshold, Q, X)
     m = B.shape[0]

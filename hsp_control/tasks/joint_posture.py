@@ -64,13 +64,7 @@ class JointPosture(CompliantTask, type="joint_posture"):
         return replace(self, **changes)
 
     def placed(self, start: Start) -> Self:
-        """Return the task with its configuration and its joints; see `Task.placed`.
-
-        Raises:
-            JointNotFoundError: If a joint does not exist.
-            TaskError: If there is no joint, a joint is named twice or has several
-                degrees of freedom, or the displacement has another dimension.
-        """
+        """Return the task with its configuration and its joints; see `Task.placed`."""
         robot: Robot = start.state.robot
         with within("reference"):
             reference = configuration(self.reference, start.state)
@@ -142,13 +136,7 @@ class JointPosture(CompliantTask, type="joint_posture"):
         return actual + robot.difference(state.q, desired)[indices], actual
 
     def _indices(self, robot: Robot) -> list[int]:
-        """Return the index of each joint in v.
-
-        Raises:
-            JointNotFoundError: If a joint does not exist.
-            TaskError: If there is no joint, a joint is named twice, or a joint has
-                several degrees of freedom.
-        """
+        """Return the index of each joint in v."""
         indices = []
         for k, joint in enumerate(self._joints):
             if joint in self._joints[:k]:

@@ -19,8 +19,7 @@ from hsp_control.geometry.start import Start
 from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
 from hsp_control.robot.kinematics import FrameKinematics, FrameMotion
-from hsp_control.tasks.frame_task import FrameTask, frame_of
-from hsp_control.tasks.placing import place_orientation
+from hsp_control.tasks.frame_task import FrameTask, frame_of, place_orientation
 from hsp_control.tasks.task import Drawn, ErrorPart, Feedback, add_feedback
 from hsp_control.trajectories import (
     HoldOrientation,

@@ -17,10 +17,13 @@ from hsp_control.geometry.start import Start
 from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.kinematics import FrameMotion
-from hsp_control.tasks.frame_orientation import ORIENTATION_SCRATCH
-from hsp_control.tasks.frame_pose import POSE_ERROR, PoseOrPoint, pose_error_equation
-from hsp_control.tasks.frame_task import TrackingTask, frame_of
-from hsp_control.tasks.placing import place_pose
+from hsp_control.tasks.frame_pose import (
+    ORIENTATION_SCRATCH,
+    POSE_ERROR,
+    PoseOrPoint,
+    pose_error_equation,
+)
+from hsp_control.tasks.frame_task import TrackingTask, frame_of, place_pose
 from hsp_control.tasks.task import ErrorPart, Feedback, default_name
 from hsp_control.trajectories import ComposedPose, PoseSample, PoseTrajectory
 
@@ -51,22 +54,14 @@ class RelativePose(TrackingTask, type="relative_pose"):
 
     @property
     def frame_name(self) -> str:
-        """Name of the frame of a placed task.
-
-        Raises:
-            TaskError: If the task is not placed.
-        """
+        """Name of the frame of a placed task."""
         if self.frame is None:
             raise self._not_placed("frame")
         return self.frame
 
     @property
     def pose(self) -> PoseTrajectory:
-        """The trajectory of a placed task.
-
-        Raises:
-            TaskError: If the task is not placed.
-        """
+        """The trajectory of a placed task."""
         if not isinstance(self.trajectory, PoseTrajectory):
             raise self._not_placed("orientation")
         return self.trajectory
@@ -77,12 +72,7 @@ class RelativePose(TrackingTask, type="relative_pose"):
         return self.pose
 
     def placed(self, start: Start) -> Self:
-        """Return the task with its trajectory in the reference; see `Task.placed`.
-
-        Raises:
-            FrameNotFoundError: If the robot has no such frame.
-            TaskError: If frame and reference are the same.
-        """
+        """Return the task with its trajectory in the reference; see `Task.placed`."""
         robot: Robot = start.state.robot
         frame = frame_of(self.frame, robot)
         with within("reference"):

@@ -54,18 +54,14 @@ class Feedback(NamedTuple):
 
 
 class InForce(NamedTuple):
-    """What a task's feedback is made of while it runs: the controller owns it.
+    """What a task's feedback is made of while it runs: the controller owns it."""
 
-    Attributes:
-        numbers: What changes change: Kp and Kv, shape (2, m, m), or what another kind
-            of feedback is made of.
-        feedback: What the task reads.
-        mobility: Λ⁻¹ in the coordinates of the error, shape (m, m), of the last step;
-            only of a task with an impedance.
-    """
-
+    # What changes change: Kp and Kv, (2, m, m), or what another kind of feedback is
+    # made of.
     numbers: Array
-    feedback: Feedback
+    feedback: Feedback  # what the task reads
+    # Λ⁻¹ in the coordinates of the error, (m, m), of the last step; only of a task with
+    # an impedance.
     mobility: Array
 
 
@@ -200,10 +196,7 @@ class Task(Part, ABC, family="tasks", error=TaskError):
         return self.feedback()
 
     def linear_feedback(self, state: RobotState, in_force: InForce) -> Feedback:
-        """Return the feedback for small errors about a state, at which it may depend.
-
-        The check of the control rate uses it.
-        """
+        """Return the feedback for small errors at a state, for the rate check."""
         return in_force.feedback
 
     def placed(self, start: Start) -> Self:
@@ -271,11 +264,7 @@ class Task(Part, ABC, family="tasks", error=TaskError):
         return False
 
     def __init_subclass__(cls, **arguments: Any) -> None:
-        """Reset `compile` if a subclass overrides `evaluate` only.
-
-        Otherwise a subclass of a compiled task would inherit a step plan that ignores
-        its `evaluate`.
-        """
+        """Reset `compile` if a subclass overrides `evaluate`, which it would ignore."""
         super().__init_subclass__(**arguments)
         if "evaluate" in vars(cls) and "compile" not in vars(cls):
             cls.compile = Task.compile  # type: ignore[method-assign]
@@ -334,13 +323,7 @@ class Task(Part, ABC, family="tasks", error=TaskError):
 
     @classmethod
     def _compiled_by(cls) -> Callable[..., StepPlan]:
-        """Return the `compile` that does what this class's `evaluate` does.
-
-        Not that of a subclass that overrides `evaluate` and calls this one.
-
-        Raises:
-            TypeError: If there is none.
-        """
+        """Return the `compile` that does what this class's own `evaluate` does."""
         for each in cls.__mro__:
             own = vars(each).get("compile", Task.compile)
             if own is not Task.compile:
@@ -396,11 +379,7 @@ class SecondOrderTask(Task):
         return Feedback(Kp, Kv, np.zeros(rows), self._largest())
 
     def checked(self, robot: Robot) -> Self:
-        """Return the task with its largest errors in numbers; see `Task.checked`.
-
-        Raises:
-            TaskError: If there is neither one number nor one for each part.
-        """
+        """Return the task with its largest errors in numbers; see `Task.checked`."""
         with within("largest_error"):
             largest = largest_errors(self.largest_error, self.error_parts, robot)
         changes: dict[str, Any] = {"largest_error": largest}
@@ -423,16 +402,7 @@ class SecondOrderTask(Task):
 def largest_errors(
     declared: Any, parts: Sequence[ErrorPart], robot: Robot
 ) -> Sequence[float | None] | str:
-    """Return the largest error of each part, None for no bound; or "none" for all.
-
-    Args:
-        declared: As in `SecondOrderTask.largest_error`.
-        parts: The parts of the error.
-        robot: The robot.
-
-    Raises:
-        TaskError: If there is neither one number nor one for each part.
-    """
+    """Return the largest error of each part, None for no bound; or "none" for all."""
     if declared == "none" or declared is None:
         return "none"
     if declared == "robot":
@@ -451,15 +421,7 @@ def largest_errors(
 
 
 def beyond_largest(e: Array, largest: Array) -> float:
-    """Return the length of the longest part of an error that is too long to count.
-
-    Args:
-        e: The error, shape (m,).
-        largest: See `Feedback`.
-
-    Returns:
-        Its length [m or rad]; 0 if no part is longer than its largest length.
-    """
+    """Return the length of the longest part of an error beyond its largest, or 0."""
     found = 0.0
     for first, end, longest in largest.tolist():
         away = float(np.linalg.norm(e[int(first) : int(end)]))
@@ -486,16 +448,9 @@ def copy_rows(
 
 @kernel
 def add_feedback(
-    feed_forward: Array,
-    feedback: Feedback,
-    e: Array,
-    e_dot: Array,
-    out: Array,
+    feed_forward: Array, feedback: Feedback, e: Array, e_dot: Array, out: Array
 ) -> None:
-    """Write feed_forward + offset + Kv e' + Kp s(e), s as in `Feedback`.
-
-    ``out`` may be ``feed_forward``.
-    """
+    """Write feed_forward + offset + Kv e' + Kp s(e), perhaps in place."""
     Kp, Kv, offset, largest = feedback
     for i in range(e.shape[0]):
         total = feed_forward[i] + offset[i]

@@ -1,50 +1,34 @@
 """Reference motions in Rⁿ, SO(3) and SE(3), with their first two derivatives."""
 
-from hsp_control.trajectories.blend import Blend as Blend
-from hsp_control.trajectories.blend_orientation import (
-    BlendOrientation as BlendOrientation,
-)
-from hsp_control.trajectories.callable_orientation import (
-    CallableOrientation as CallableOrientation,
-)
-from hsp_control.trajectories.callable_trajectory import (
-    CallableTrajectory as CallableTrajectory,
-)
-from hsp_control.trajectories.circle import Circle as Circle
-from hsp_control.trajectories.crossfade import Crossfade as Crossfade
-from hsp_control.trajectories.crossfade import (
-    CrossfadeOrientation as CrossfadeOrientation,
-)
-from hsp_control.trajectories.crossfade import crossfade as crossfade
-from hsp_control.trajectories.hold import Hold as Hold
-from hsp_control.trajectories.hold_orientation import HoldOrientation as HoldOrientation
-from hsp_control.trajectories.hold_pose import HoldPose as HoldPose
-from hsp_control.trajectories.line import Line as Line
-from hsp_control.trajectories.lissajous import Lissajous as Lissajous
-from hsp_control.trajectories.minimum_jerk import MinimumJerk as MinimumJerk
-from hsp_control.trajectories.orientation import OrientationSample as OrientationSample
-from hsp_control.trajectories.orientation import (
-    OrientationTrajectory as OrientationTrajectory,
-)
-from hsp_control.trajectories.orientation_path import OrientationPath as OrientationPath
-from hsp_control.trajectories.piecewise_polynomial import (
-    PiecewisePolynomial as PiecewisePolynomial,
-)
-from hsp_control.trajectories.pose import ComposedPose as ComposedPose
-from hsp_control.trajectories.pose import PoseSample as PoseSample
-from hsp_control.trajectories.pose import PoseTrajectory as PoseTrajectory
-from hsp_control.trajectories.schedule import Schedule as Schedule
-from hsp_control.trajectories.screw_interpolation import (
-    ScrewInterpolation as ScrewInterpolation,
-)
-from hsp_control.trajectories.spin import Spin as Spin
-from hsp_control.trajectories.spline import Spline as Spline
-from hsp_control.trajectories.stops import Stops as Stops
-from hsp_control.trajectories.streams.stream import Stream as Stream
-from hsp_control.trajectories.streams.stream import (
-    StreamOrientation as StreamOrientation,
-)
-from hsp_control.trajectories.streams.stream import StreamPose as StreamPose
-from hsp_control.trajectories.trajectory import Trajectory as Trajectory
-from hsp_control.trajectories.trajectory import TrajectorySample as TrajectorySample
-from hsp_control.trajectories.uniform_line import UniformLine as UniformLine
+from .blend import Blend as Blend
+from .blend import BlendOrientation as BlendOrientation
+from .callables import CallableOrientation as CallableOrientation
+from .callables import CallableTrajectory as CallableTrajectory
+from .crossfade import Crossfade as Crossfade
+from .crossfade import CrossfadeOrientation as CrossfadeOrientation
+from .crossfade import crossfade as crossfade
+from .curves import Circle as Circle
+from .curves import Lissajous as Lissajous
+from .curves import UniformLine as UniformLine
+from .hold import Hold as Hold
+from .hold import HoldOrientation as HoldOrientation
+from .orientation import OrientationSample as OrientationSample
+from .orientation import OrientationTrajectory as OrientationTrajectory
+from .orientation_path import OrientationPath as OrientationPath
+from .orientation_path import Spin as Spin
+from .piecewise_polynomial import Line as Line
+from .piecewise_polynomial import MinimumJerk as MinimumJerk
+from .piecewise_polynomial import PiecewisePolynomial as PiecewisePolynomial
+from .piecewise_polynomial import Spline as Spline
+from .piecewise_polynomial import Stops as Stops
+from .pose import ComposedPose as ComposedPose
+from .pose import HoldPose as HoldPose
+from .pose import PoseSample as PoseSample
+from .pose import PoseTrajectory as PoseTrajectory
+from .pose import ScrewInterpolation as ScrewInterpolation
+from .schedule import Schedule as Schedule
+from .streams.stream import Stream as Stream
+from .streams.stream import StreamOrientation as StreamOrientation
+from .streams.stream import StreamPose as StreamPose
+from .trajectory import Trajectory as Trajectory
+from .trajectory import TrajectorySample as TrajectorySample

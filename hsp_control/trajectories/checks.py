@@ -11,11 +11,7 @@ _ORTHONORMAL = 1e-8  # largest entry of A Aᵀ - I that counts as rounding error
 
 
 def array(value: ArrayLike, name: str, shape: tuple[int | None, ...]) -> Array:
-    """Return ``value`` as an array of finite numbers; None in ``shape`` fits any size.
-
-    Raises:
-        TrajectoryError: If it is not numeric, not finite, or has another shape.
-    """
+    """Return ``value`` as finite numbers; None in ``shape`` fits any size."""
     wanted = f"({', '.join('n' if n is None else str(n) for n in shape)})"
     try:
         result = np.array(value, dtype=np.float64)
@@ -35,12 +31,7 @@ def array(value: ArrayLike, name: str, shape: tuple[int | None, ...]) -> Array:
 
 
 def waypoint_times(value: ArrayLike, count: int) -> Array:
-    """Return the times of ``count`` waypoints, shape (count,) [s].
-
-    Raises:
-        TrajectoryError: If there are fewer than two waypoints, or another number of
-            times, or the times do not increase.
-    """
+    """Return the times of ``count`` waypoints, shape (count,) [s]."""
     if count < 2:
         raise TrajectoryError(f"a path needs at least two waypoints; it has {count}")
     times = array(value, "times", (count,))
@@ -54,11 +45,7 @@ def waypoint_times(value: ArrayLike, count: int) -> Array:
 
 
 def direction(value: ArrayLike, name: str) -> Array:
-    """Return the unit vector along ``value``, shape (3,).
-
-    Raises:
-        TrajectoryError: If it is zero, or not three finite numbers.
-    """
+    """Return the unit vector along ``value``, shape (3,)."""
     vector = array(value, name, (3,))
     length = float(np.linalg.norm(vector))
     if not length > 0.0:
@@ -67,11 +54,7 @@ def direction(value: ArrayLike, name: str) -> Array:
 
 
 def orthonormal(value: ArrayLike, name: str, shape: tuple[int, int]) -> Array:
-    """Return ``value`` as a matrix with orthonormal rows.
-
-    Raises:
-        TrajectoryError: If it has another shape, or the rows are not orthonormal.
-    """
+    """Return ``value`` as a matrix with orthonormal rows."""
     matrix = array(value, name, shape)
     error = float(np.abs(matrix @ matrix.T - np.eye(shape[0])).max())
     if error > _ORTHONORMAL:
@@ -83,11 +66,7 @@ def orthonormal(value: ArrayLike, name: str, shape: tuple[int, int]) -> Array:
 
 
 def rotation(value: ArrayLike, name: str) -> Array:
-    """Return ``value`` as a rotation matrix of shape (3, 3).
-
-    Raises:
-        TrajectoryError: If it is not orthonormal, or its determinant is -1.
-    """
+    """Return ``value`` as a rotation matrix of shape (3, 3)."""
     try:
         return matrix_of(array(value, name, (3, 3)), name)
     except ValueError as error:

@@ -9,7 +9,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TrajectoryError
 from hsp_control.common.kernels import kernel
 from hsp_control.declaration.quantities import NonNegative, Number
-from hsp_control.trajectories.blend_orientation import BlendOrientation
+from hsp_control.trajectories.blend import BlendOrientation
 from hsp_control.trajectories.orientation import (
     OrientationSample,
     OrientationTrajectory,

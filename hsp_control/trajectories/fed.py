@@ -44,11 +44,7 @@ class Fed(Written, Compiled, Trajectory):
         return memory
 
     def anchored(self, start: ArrayLike | None) -> Self:
-        """Return the reference itself, at rest where the robot starts.
-
-        Raises:
-            TrajectoryError: If nothing starts there, or with another dimension.
-        """
+        """Return the reference itself, at rest where the robot starts."""
         if start is None:
             raise TrajectoryError("a fed reference is missing: nothing starts here")
         where = np.asarray(start, dtype=float)
@@ -77,10 +73,7 @@ class Fed(Written, Compiled, Trajectory):
 
 
 class FedOrientation(Written, Compiled, OrientationTrajectory):
-    """R(t) that a plan writes, once a control period; see `Fed`.
-
-    From one writing to the next ω' is constant, and R turns about ω + ½ ω' (t - t0).
-    """
+    """R(t) that a plan writes; in between R turns about ω + ½ ω' (t - t0)."""
 
     @property
     def relative(self) -> bool:

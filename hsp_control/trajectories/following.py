@@ -27,10 +27,7 @@ def follow_all(*followers: Follower) -> Follower:
 
 
 def follow_by(sampler: Callable[[float, Any], Any], out: Any) -> Follower:
-    """Return a follower that calls ``sampler(t, out)``.
-
-    If the sampler returns another sample than ``out``, its arrays are copied.
-    """
+    """Return a follower that calls ``sampler(t, out)`` and writes ``out``."""
 
     def follower(t: float) -> None:
         sample = sampler(t, out)
@@ -44,15 +41,7 @@ def follow_by(sampler: Callable[[float, Any], Any], out: Any) -> Follower:
 def follow_blended(
     trajectory: Any, out: Any, blend: Follower, start: float, end: float
 ) -> Follower:
-    """Return the follower of a trajectory whose sample a blend changes in place.
-
-    Args:
-        trajectory: The trajectory, sampled from ``start`` on.
-        out: The sample to write into.
-        blend: The follower that changes ``out`` until ``end``.
-        start: Start of the blend [s].
-        end: End of the blend [s].
-    """
+    """Return the follower of a trajectory that ``blend`` changes until ``end``."""
     target: Follower = trajectory.follow(out)
     if target is stay:  # the blend changes ``out``, so it must be written every time
         target = CallSequence(*map(_restorer, out))
@@ -76,11 +65,7 @@ def _restore(constant: Array, out: Array, t: float) -> None:
 
 
 class Compiled(ABC):
-    """Mixin of trajectories whose sample one kernel writes; implement `_kernel`.
-
-    Name it before the abstract class: ``class Circle(Compiled, Trajectory)``. It
-    provides `sample` and `follow`.
-    """
+    """Mixin, named before the abstract class: the kernel of `_kernel` samples."""
 
     __slots__ = ()
 
@@ -88,11 +73,7 @@ class Compiled(ABC):
 
     @abstractmethod
     def _kernel(self) -> Kernel:
-        """Return the kernel and its parameters.
-
-        The kernel is called as ``function(*parameters, *sample, t)`` and writes all
-        arrays of the sample.
-        """
+        """Return the kernel and its parameters: ``kernel(*parameters, *sample, t)``."""
 
     def sample(self, t: float, out: Any = None) -> Any:
         """Return the sample at time t [s]; see `Trajectory.sample`."""

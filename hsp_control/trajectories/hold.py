@@ -1,12 +1,19 @@
-"""A constant point."""
+"""A constant point, and a constant orientation."""
 
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 
+from hsp_control.common.arrays import Array
 from hsp_control.common.step_plan import stay
 from hsp_control.declaration.quantities import Vector
+from hsp_control.declaration.rotation import Rotation, matrix_of
 from hsp_control.trajectories.following import Follower
+from hsp_control.trajectories.orientation import (
+    OrientationSample,
+    OrientationTrajectory,
+)
 from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
 
 
@@ -32,6 +39,34 @@ class Hold(Trajectory, type="hold"):
         return out
 
     def follow(self, out: TrajectorySample) -> Follower:
+        """Write ``out`` once, and return a follower that does nothing."""
+        self.sample(0.0, out)
+        return stay
+
+
+class HoldOrientation(OrientationTrajectory, type="hold"):
+    """R(t) = R0, a constant orientation."""
+
+    rotation: Rotation | None = None
+    """R0, body to world: roll, pitch and yaw [rad], a quaternion or a matrix [-]; the
+    orientation in which the robot starts by default."""
+
+    def sample(
+        self, t: float, out: OrientationSample | None = None
+    ) -> OrientationSample:
+        """Return R0 and zero rates; see `OrientationTrajectory.sample`."""
+        out = self._output(out)
+        out.rotation[:] = self._matrix
+        out.angular_velocity.fill(0.0)
+        out.angular_acceleration.fill(0.0)
+        return out
+
+    @cached_property
+    def _matrix(self) -> Array:
+        assert self.rotation is not None
+        return matrix_of(self.rotation)
+
+    def follow(self, out: OrientationSample) -> Follower:
         """Write ``out`` once, and return a follower that does nothing."""
         self.sample(0.0, out)
         return stay

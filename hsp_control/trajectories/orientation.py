@@ -74,18 +74,11 @@ class OrientationTrajectory(Part, ABC, family="orientations", error=TrajectoryEr
         """
 
     def follow(self, out: OrientationSample) -> Follower:
-        """Return a function of time [s] that writes the sample into ``out``.
-
-        See `Trajectory.follow`.
-        """
+        """Return a call that writes ``out`` for a time [s]; see `Trajectory.follow`."""
         return follow_by(self.sample, out)
 
     def _output(self, out: OrientationSample | None) -> OrientationSample:
-        """Return ``out``, or a new sample if it is None.
-
-        Raises:
-            TrajectoryError: If the trajectory is relative to where the robot starts.
-        """
+        """Return ``out``, or a new sample if it is None."""
         if self.relative:
             raise TrajectoryError(
                 f"{type(self).__name__} has no rotation: it is that in which the robot "

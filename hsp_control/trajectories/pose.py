@@ -1,6 +1,8 @@
-"""The abstract trajectory of a pose in SE(3), and one composed of two trajectories."""
+"""Trajectories of a pose: the abstract one, composed, constant, and along a screw."""
 
 from abc import ABC, abstractmethod
+from dataclasses import KW_ONLY, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -8,14 +10,18 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TrajectoryError
+from hsp_control.common.kernels import kernel
+from hsp_control.common.rotations import compose_back, jlog3, log3, stumpff, turn
 from hsp_control.declaration import Part
+from hsp_control.declaration.quantities import Number, Positive, Vector3
+from hsp_control.declaration.rotation import Rotation, matrix_of
 from hsp_control.trajectories.following import Follower, follow_all, follow_by
-from hsp_control.trajectories.hold import Hold
-from hsp_control.trajectories.hold_orientation import HoldOrientation
+from hsp_control.trajectories.hold import Hold, HoldOrientation
 from hsp_control.trajectories.orientation import (
     OrientationSample,
     OrientationTrajectory,
 )
+from hsp_control.trajectories.timing import smooth_step
 from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
 
 
@@ -36,11 +42,7 @@ class PoseSample(NamedTuple):
 
     @classmethod
     def over(cls, memory: Array) -> "PoseSample":
-        """Return a sample whose arrays are views of ``memory``.
-
-        Args:
-            memory: Shape (8, 3); its rows are x, x', x'', R (three rows), ω, ω'.
-        """
+        """Return a sample whose arrays are views of ``memory``; memory (8, 3)."""
         return cls(
             TrajectorySample(memory[0], memory[1], memory[2]),
             OrientationSample(memory[3:6], memory[6], memory[7]),
@@ -79,10 +81,7 @@ class PoseTrajectory(Part, ABC, family="poses", error=TrajectoryError):
         """
 
     def follow(self, out: PoseSample) -> Follower:
-        """Return a function of time [s] that writes the sample into ``out``.
-
-        See `Trajectory.follow`.
-        """
+        """Return a call that writes ``out`` for a time [s]; see `Trajectory.follow`."""
 
         def sampler(t: float, own: tuple[Array, ...]) -> tuple[Array, ...]:
             sample = self.sample(t, out)
@@ -130,6 +129,163 @@ class ComposedPose(PoseTrajectory, type="composed"):
     def follow(self, out: PoseSample) -> Follower:
         """Return a function of time that updates ``out``; see `Trajectory.follow`."""
         return follow_all(
-            self.position.follow(out.position),
-            self.orientation.follow(out.orientation),
+            self.position.follow(out.position), self.orientation.follow(out.orientation)
         )
+
+
+class HoldPose(PoseTrajectory, type="hold_pose"):
+    """M(t) = M0, a constant pose."""
+
+    position: Vector3 | None = None
+    """The origin in the world, shape (3,) [m]; where the robot starts by default."""
+    rotation: Rotation | None = None
+    """The orientation, body to world: roll, pitch and yaw [rad], a quaternion or a
+    matrix [-]; that in which the robot starts by default."""
+
+    @property
+    def relative(self) -> bool:
+        """Whether it depends on where the robot starts."""
+        return self.position is None or self.rotation is None
+
+    def anchored(self, start: pin.SE3) -> "HoldPose":
+        """Return the pose, where the robot starts if it is not given."""
+        return HoldPose(
+            start.translation if self.position is None else self.position,
+            start.rotation if self.rotation is None else self.rotation,
+        )
+
+    def sample(self, t: float, out: PoseSample | None = None) -> PoseSample:
+        """Return the pose and zero rates; see `PoseTrajectory.sample`."""
+        return self._parts.sample(t, out)
+
+    def follow(self, out: PoseSample) -> Follower:
+        """Write ``out`` once, and return a follower that does nothing."""
+        return self._parts.follow(out)
+
+    @cached_property
+    def _parts(self) -> ComposedPose:
+        return ComposedPose(Hold(self.position), HoldOrientation(self.rotation))
+
+
+class ScrewInterpolation(PoseTrajectory, type="screw"):
+    """M(t) = M0 exp6(s log6(M0⁻¹ M1)), with s the `smooth_step` from rest to rest.
+
+    The body rotates about one fixed axis and moves along it, so that its origin follows
+    a helix. For a straight line of the origin use `ComposedPose` with a `Line` and an
+    `OrientationPath`. C²; it rests at M0 before and at M1 after.
+    """
+
+    position: Vector3
+    """Final position of the origin in the world, shape (3,) [m]."""
+    rotation: Rotation
+    """Final orientation, body to world: roll, pitch and yaw [rad], a quaternion or a
+    matrix [-]."""
+    duration: Positive
+    """T [s]."""
+    _: KW_ONLY
+    start_time: Number = 0.0
+    """Time at which the motion begins [s]."""
+    start_position: Vector3 | None = None
+    """Position at the start, shape (3,) [m]; where the robot starts by default."""
+    start_rotation: Rotation | None = None
+    """Orientation at the start, as `rotation` [rad or -]; that in which the robot
+    starts by default."""
+
+    @property
+    def relative(self) -> bool:
+        """Whether it depends on where the robot starts."""
+        return self.start_position is None or self.start_rotation is None
+
+    def anchored(self, start: pin.SE3) -> "ScrewInterpolation":
+        """Return the motion from the given start; see `PoseTrajectory.anchored`."""
+        position, rotation = self.start_position, self.start_rotation
+        return replace(
+            self,
+            start_position=start.translation if position is None else position,
+            start_rotation=start.rotation if rotation is None else rotation,
+        )
+
+    @cached_property
+    def _ends(self) -> tuple[Array, Array]:
+        """Positions and rotations at both ends, shapes (2, 3) and (2, 3, 3)."""
+        if self.start_position is None or self.start_rotation is None:
+            raise TrajectoryError(
+                "ScrewInterpolation begins where the robot starts, which only a "
+                "controller knows; give start_position and start_rotation"
+            )
+        positions = np.array([self.start_position, self.position], dtype=float)
+        return positions, np.stack(
+            [matrix_of(self.start_rotation), matrix_of(self.rotation)]
+        )
+
+    @cached_property
+    def _screw(self) -> Array:
+        return _screw(*self._ends)
+
+    def sample(self, t: float, out: PoseSample | None = None) -> PoseSample:
+        """Return the pose at time t; see `PoseTrajectory.sample`."""
+        if out is None:
+            out = PoseSample.allocate()
+        positions, rotations = self._ends
+        s, s_dot, s_ddot = smooth_step(float(t), self.start_time, self.duration)
+        if 0.0 < s < 1.0:
+            p, R = positions[0], rotations[0]
+            _advance(s, s_dot, s_ddot, p, R, self._screw, *out.position, *out[1])
+        else:
+            end = int(s)
+            out.position.position[:] = positions[end]
+            out.orientation.rotation[:] = rotations[end]
+            for rate in (*out.position[1:], *out.orientation[1:]):
+                rate.fill(0.0)
+        return out
+
+
+def _screw(positions: Array, rotations: Array) -> Array:
+    """Return a, b, a × b and a (a·b), shape (4, 3), in the world frame.
+
+    (a, b) is the constant twist that moves the body from start to end in one second: a
+    is the rotation vector [rad], b the velocity of the origin at the start [m];
+    V(a) b = p1 - p0, with the left Jacobian V(y) = Jexp(-y).
+    """
+    body, R, V_inverse = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
+    compose_back(rotations[0], rotations[1], R)
+    log3(R, body)
+    a = rotations[0] @ body
+    jlog3(-a, V_inverse)
+    b = V_inverse @ (positions[1] - positions[0])
+    return np.stack([a, b, np.cross(a, b), a * (a @ b)])
+
+
+@kernel
+def _advance(
+    s: float,
+    s_dot: float,
+    s_ddot: float,
+    start_position: Array,
+    start_rotation: Array,
+    screw: Array,
+    position: Array,
+    velocity: Array,
+    acceleration: Array,
+    rotation: Array,
+    angular_velocity: Array,
+    angular_acceleration: Array,
+) -> None:
+    """Write the pose exp(s a) R0, p0 + V(s a) s b, and its rates.
+
+    p' = s' f and p'' = s'' f + s'² a × f with f = exp(s a) b. The rows of ``screw`` are
+    those of `_screw`.
+    """
+    a, b, a_cross_b, along = screw[0], screw[1], screw[2], screw[3]
+    a_squared = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
+    c0, c1, c2, c3, _, _ = stumpff(s * s * a_squared)
+    turn(start_rotation, a, s, rotation)
+    for i in range(3):
+        offset = s * (c1 * b[i] + s * c2 * a_cross_b[i] + s * s * c3 * along[i])
+        f = c0 * b[i] + s * c1 * a_cross_b[i] + s * s * c2 * along[i]
+        a_cross_f = c0 * a_cross_b[i] + s * c1 * (along[i] - a_squared * b[i])
+        position[i] = start_position[i] + offset
+        velocity[i] = s_dot * f
+        acceleration[i] = s_ddot * f + s_dot * s_dot * a_cross_f
+        angular_velocity[i] = s_dot * a[i]
+        angular_acceleration[i] = s_ddot * a[i]

@@ -52,12 +52,7 @@ Holder = TypeVar("Holder", bound=Part)
 
 
 def with_memories_copied(part: Holder, memo: dict[int, Any]) -> Holder:
-    """Return the deep copy of a part: the part itself, but for those with a memory.
-
-    Args:
-        part: The part.
-        memo: That of `copy.deepcopy`.
-    """
+    """Return the deep copy of a part: the part itself, but for those with a memory."""
     copied: Holder = with_parts_replaced(
         part, Remembering, lambda each: deepcopy(each, memo)
     )

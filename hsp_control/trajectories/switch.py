@@ -36,13 +36,7 @@ class Switch(Written, Schedule):
         return np.array([-np.inf, 0.0, weight, weight])
 
     def throw(self, on: bool, t: float, ramp: float = 0.0) -> None:
-        """Turn it on or off, from a time on.
-
-        Args:
-            on: Whether it shall be on.
-            t: When the ramp begins [s].
-            ramp: How long it takes [s]; 0 is a jump.
-        """
+        """Turn it on or off, from a time on."""
         self.memory[:] = t, ramp, self.weight(t), float(on)
 
     def reset(self) -> None:

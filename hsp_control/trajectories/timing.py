@@ -12,14 +12,6 @@ def smooth_step(
     s goes from 0 to 1 with zero velocity and acceleration at both ends; of all such
     motions it has the minimum jerk. It is exactly 0 before and exactly 1 after, hence
     C². The peaks of s' and s'' are 1.875 / T and 5.77 / T².
-
-    Args:
-        t: Time [s].
-        start_time: t0 [s].
-        duration: T > 0 [s].
-
-    Returns:
-        s [-], s' [1/s] and s'' [1/s²].
     """
     u = (t - start_time) / duration
     if u <= 0.0:

@@ -135,12 +135,7 @@ class Trajectory(Part, ABC, family="trajectories", error=TrajectoryError):
         return follow_by(self.sample, out)
 
     def _output(self, out: TrajectorySample | None) -> TrajectorySample:
-        """Return ``out``, or a new sample if it is None.
-
-        Raises:
-            ShapeError: If ``out`` has another dimension than the trajectory.
-            TrajectoryError: If the trajectory is relative to where the robot starts.
-        """
+        """Return ``out``, or a new sample if it is None."""
         if self.relative:
             raise TrajectoryError(
                 f"{type(self).__name__} is relative to where the robot starts, which "

@@ -35,7 +35,7 @@ from hsp_control.visualization.viewer import (
 )
 from hsp_control.visualization.viewer.commands import CAMERA, CAPTION, CLIP
 from hsp_control.visualization.viewer.latest_commands import LatestCommands, key_of
-from hsp_control.visualization.viewer.offline import inline
+from hsp_control.visualization.viewer.offline import page as offline_page
 from hsp_control.visualization.viewer.pipe_protocol import (
     DELETE,
     SET,
@@ -248,7 +248,7 @@ def test_without_what_reads_meshes_a_notebook_shows_the_live_page(
     def fail(*_: object) -> None:
         raise ExportError("it needs trimesh <here>")
 
-    monkeypatch.setattr(inline, "reduce_scene", fail)
+    monkeypatch.setattr(offline_page, "reduce_scene", fail)
     with Viewer(arm) as viewer:
         shown = viewer._repr_html_()
         assert f'<iframe src="{viewer.url}"' in shown

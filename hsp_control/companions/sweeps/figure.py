@@ -15,8 +15,8 @@ from hsp_control.common.exceptions import PlotError
 from hsp_control.companions.sweeps import Sensitivity, Sweep, sensitivity
 from hsp_control.companions.sweeps.sensitivity import has_order
 from hsp_control.visualization import palette
-from hsp_control.visualization.plots.legends import literal_text
-from hsp_control.visualization.plots.saving import save_figure
+from hsp_control.visualization.plots.figures import save_figure
+from hsp_control.visualization.plots.lines import literal_text
 from hsp_control.visualization.plots.style import new_figure, styled
 
 MAX_PARAMETERS, MAX_OUTCOMES = 8, 6
@@ -28,15 +28,7 @@ _GROWS, _FALLS, _EITHER = palette.ACTUAL, palette.DESIRED, palette.FIELD
 def save_sweep_figure(
     sweep: Sweep, folder: str | Path, stem: str, formats: Sequence[str] = ("png",)
 ) -> list[Path]:
-    """Write ``<stem>-sensitivity`` in every format.
-
-    Returns:
-        The files.
-
-    Raises:
-        PlotError: If a format is not known, or a file cannot be written.
-        SweepError: If too few runs were completed.
-    """
+    """Write ``<stem>-sensitivity`` in every format."""
     figure = sweep_figure(sweep)
     paths = []
     for suffix in formats:
@@ -50,17 +42,9 @@ def sweep_figure(sweep: Sweep, outcomes: Sequence[str] | None = None) -> Figure:
     """Return a figure with a panel for every result over every parameter.
 
     A panel's tint shows the influence: blue if the result increases with the parameter,
-    orange if it decreases, purple for other dependence. Its strength is the share of
-    the variance (of ranks) that the parameter alone explains.
-
-    Args:
-        sweep: The sweep.
-        outcomes: Names of metrics; None: tracking, null space, manipulability,
-            distances and effort.
-
-    Raises:
-        SweepError: If too few runs were completed, or there is no such metric.
-        PlotError: If no parameter varies.
+    orange if it decreases, purple for other dependence; its strength is the share of
+    the variance of ranks. ``outcomes`` None: tracking, null space, distances and
+    effort.
     """
     found = sensitivity(sweep, outcomes)
     rows = range(min(len(found.outcomes), MAX_OUTCOMES))

@@ -15,7 +15,7 @@ from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Names, NonNegative
 from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields import Clearance, ObstacleClearance, SelfClearance
-from hsp_control.null_space.fields.obstacle_clearance import ObstacleOrName
+from hsp_control.null_space.fields.clearance import ObstacleOrName
 from hsp_control.robot import RobotState
 
 _STEP = 3e-4

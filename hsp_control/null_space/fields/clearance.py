@@ -1,18 +1,23 @@
-"""The abstract cost of small distances between shapes."""
+"""Costs that keep links away from obstacles, and from each other."""
 
 from abc import abstractmethod
-from collections.abc import Callable
-from dataclasses import KW_ONLY
-from typing import NamedTuple, Self
+from collections.abc import Callable, Sequence
+from dataclasses import KW_ONLY, replace
+from typing import Annotated, NamedTuple, Self
+from weakref import WeakKeyDictionary
 
 import numpy as np
+from pydantic import AfterValidator
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import SceneError
+from hsp_control.common.exceptions import FieldError, SceneError
 from hsp_control.common.native import bind
 from hsp_control.common.step_plan import StepPlan
-from hsp_control.declaration.quantities import Positive
-from hsp_control.geometry import Proximity, Proxy
+from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.declaration import within
+from hsp_control.declaration.quantities import Name, Names, OrInstance, Positive
+from hsp_control.geometry import LinkShape, Proximity, Proxy, link_shapes, self_pairs
+from hsp_control.geometry.scene import Obstacle
 from hsp_control.geometry.start import Start
 from hsp_control.law import FieldSample, MetricSample
 from hsp_control.null_space.differences import rate_along_flow
@@ -52,20 +57,10 @@ class Clearance(Cost):
 
     @abstractmethod
     def _pairs(self, robot: Robot) -> Proximity:
-        """Return new memory for the pairs of shapes and their distances.
-
-        Raises:
-            FieldError: If there is no pair.
-        """
+        """Return new memory for the pairs of shapes and their distances."""
 
     def placed(self, start: Start) -> Self:
-        """Return the cost with obstacles instead of their names, checked.
-
-        Raises:
-            SceneError: If the scene has no such obstacle, or the robot starts in
-                contact: a barrier cannot resolve a contact.
-            FieldError: If there is no pair, or a link has no geometry.
-        """
+        """Return the cost with obstacles instead of their names, checked."""
         fitted = self.fitted(start)
         distance, pair = fitted.proximity(start.state).nearest(start.state)
         if start.known and distance <= 0.0:
@@ -80,11 +75,7 @@ class Clearance(Cost):
         return self
 
     def proximity(self, state: RobotState) -> Proximity:
-        """Return the pairs of shapes and their distances, for this state only.
-
-        It belongs to the state, and is the same one every time: what it measured
-        changes with its next `Proximity.measure`.
-        """
+        """Return the pairs of shapes and their distances, for this state only."""
         return self._work(state).proximity
 
     def minimum_distance(self, state: RobotState) -> float:
@@ -162,16 +153,125 @@ class Clearance(Cost):
 
 
 class _Work(NamedTuple):
-    """What a clearance computes with at one state.
+    """What a clearance computes with at one state."""
 
-    Attributes:
-        proximity: The pairs of shapes and their distances.
-        slopes: ∂f/∂d of each pair, written by ``barrier``.
-        curvatures: ∂²f/∂d² of each pair, written by ``barrier``.
-        barrier: Reads the distances, writes slopes and curvatures, and returns f.
+    proximity: Proximity  # the pairs of shapes and their distances
+    slopes: Array  # ∂f/∂d of each pair, written by ``barrier``
+    curvatures: Array  # ∂²f/∂d² of each pair, written by ``barrier``
+    barrier: Callable[[], float]
+
+
+ObstacleOrName = Annotated[str | Obstacle, OrInstance(Name, Obstacle)]
+"""The name of an obstacle of the scene; in Python also the obstacle itself."""
+
+
+class ObstacleClearance(Clearance, type="obstacle_clearance"):
+    """f = Σ b(d_k / influence) over pairs of a link's shape and an obstacle."""
+
+    obstacles: Annotated[Sequence[ObstacleOrName], AfterValidator(tuple)] | None = None
+    """Names of the obstacles, which may move; or, in Python, the obstacles themselves
+    [-]; all of the scene by default."""
+    _: KW_ONLY
+    influence: Positive = 0.2
+    links: Names | None = None
+    """Names of the links [-]; all moving links by default."""
+    proxy: Proxy = "capsules"
+    """Shapes that approximate the links [-]; for an obstacle that is not a sphere,
+    ``capsules`` are replaced by spheres along them."""
+
+    def __post_init__(self) -> None:
+        """Check that there is an obstacle."""
+        if self.obstacles is not None and not self.obstacles:
+            with within("obstacles"):
+                raise FieldError("needs at least one obstacle")
+
+    def fitted(self, start: Start) -> Self:
+        """Return the cost with its obstacles from the scene; see `Clearance.placed`."""
+        if self.obstacles is None:
+            if not start.scene:
+                raise FieldError("the scene has no obstacle")
+            return replace(self, obstacles=tuple(start.scene.values()))
+        found = []
+        for k, each in enumerate(self.obstacles):
+            with within("obstacles", k):
+                found.append(each if isinstance(each, Obstacle) else start.scene[each])
+        return replace(self, obstacles=tuple(found))
+
+    def _pairs(self, robot: Robot) -> Proximity:
+        given = dict.fromkeys(self.obstacles or ())  # the same one twice counts once
+        obstacles = [each for each in given if isinstance(each, Obstacle)]
+        if not obstacles or len(obstacles) < len(given):
+            raise self._not_placed("obstacles")
+        rounded = [o for o in obstacles if o.shape.rounded]
+        flat = [o for o in obstacles if not o.shape.rounded]
+        flat_proxy: Proxy = "spheres" if self.proxy == "capsules" else self.proxy
+        chosen = [(self.proxy, rounded), (flat_proxy, flat)]
+        blocks = [(link_shapes(robot, kind), some) for kind, some in chosen if some]
+        first = sum(len(block) for block, _ in blocks)  # index of an obstacle
+        shapes: list[LinkShape] = []
+        pairs: list[tuple[int, int]] = []
+        for block, some in blocks:
+            pairs += [
+                (len(shapes) + i, first + k)
+                for i in _moving_shapes(block, self.links)
+                for k in range(len(some))
+            ]
+            shapes += block
+            first += len(some)
+        return Proximity(robot, shapes, [*rounded, *flat], pairs)
+
+
+def _moving_shapes(
+    shapes: Sequence[LinkShape], links: Sequence[str] | None
+) -> list[int]:
+    """Return the indices of the shapes of links that move and are among ``links``."""
+    known = tuple(dict.fromkeys(shape.link for shape in shapes))
+    for k, link in enumerate(links or ()):
+        if link not in known:
+            with within("links", k):
+                raise FieldError(
+                    f"link {link!r} has no geometry{did_you_mean(link, known)} "
+                    f"(links with geometry: {listing(known)})"
+                )
+    return [
+        i
+        for i, shape in enumerate(shapes)
+        if shape.joint > 0 and (links is None or shape.link in links)
+    ]
+
+
+class SelfClearance(Clearance, type="self_clearance"):
+    """f = Σ b(d_k / influence) over pairs of shapes of different links.
+
+    Neighbouring links and pairs that the SRDF disables do not count. Pairs that overlap
+    at the robot's home configuration do not count either, because the approximating
+    shapes are larger than the links.
+
+    The gradient between two capsules jumps when they become parallel. This is rare in
+    space, but not for a planar arm. With ``spheres`` it does not jump, but the
+    computation takes longer.
     """
 
-    proximity: Proximity
-    slopes: Array
-    curvatures: Array
-    barrier: Callable[[], float]
+    influence: Positive = 0.1
+    _: KW_ONLY
+    proxy: Proxy = "capsules"
+
+    def _pairs(self, robot: Robot) -> Proximity:
+        pairs = _apart_at_home(robot, self.proxy)
+        return Proximity(robot, link_shapes(robot, self.proxy), (), pairs)
+
+
+_Pairs = tuple[tuple[int, int], ...]
+_found: "WeakKeyDictionary[Robot, dict[Proxy, _Pairs]]" = WeakKeyDictionary()
+
+
+def _apart_at_home(robot: Robot, proxy: Proxy) -> _Pairs:
+    """Return the pairs of link shapes that do not overlap at home; found once."""
+    known = _found.setdefault(robot, {})
+    if proxy not in known:
+        shapes = link_shapes(robot, proxy)
+        pairs = self_pairs(robot, shapes)
+        home = robot.state(0.0, robot.home(), np.zeros(robot.nv))
+        apart = Proximity(robot, shapes, (), pairs).measure(home) > 0.0
+        known[proxy] = tuple(pair for pair, ok in zip(pairs, apart, strict=True) if ok)
+    return known[proxy]

@@ -1,10 +1,10 @@
-"""The abstract cost f(q, t), whose field is g = -W⁻¹∇f, and the cost of a function."""
+"""Costs f(q, t): the field is their steepest descent, g = -W⁻¹∇f."""
 
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import KW_ONLY
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -50,11 +50,7 @@ class Cost(NullSpaceField):
     """
 
     def __init_subclass__(cls, **arguments: Any) -> None:
-        """Reset `differentiate` and `compile` if a subclass overrides what they use.
-
-        Otherwise a subclass of a concrete cost would inherit a method that ignores its
-        gradient or its gradient rate.
-        """
+        """Reset `differentiate` and `compile` if a subclass overrides what they use."""
         super().__init_subclass__(**arguments)
         own = vars(cls)
         if "differentiate" not in own and {"gradient", "gradient_rate"} & own.keys():
@@ -152,11 +148,7 @@ class FunctionCost(Cost):
     default."""
 
     def value(self, state: RobotState) -> float:
-        """Return f.
-
-        Raises:
-            FieldError: If the function does not return one finite number.
-        """
+        """Return f."""
         value = self.function(state.seen)
         try:
             number = float(value)
@@ -184,10 +176,7 @@ class FunctionCost(Cost):
 
 @kernel
 def descend(L: Array, W_dot: Array, form: int, g: Array, g_dot: Array) -> bool:
-    """Overwrite (∇f, (∇f)') by g = -W⁻¹∇f and g' = -W⁻¹((∇f)' + W'g).
-
-    Return whether all entries are finite.
-    """
+    """Overwrite (∇f, (∇f)') by g = -W⁻¹∇f and g'; return whether all are finite."""
     raise_covector(g, L, form)
     total = 0.0
     for i in range(g.shape[0]):
@@ -201,3 +190,70 @@ def descend(L: Array, W_dot: Array, form: int, g: Array, g_dot: Array) -> bool:
     for i in range(g.shape[0]):
         total += g[i] + g_dot[i]
     return bool(np.isfinite(total))
+
+
+Derivatives = Callable[[], float]
+"""A call that reads a state, writes ∇f and (∇f)', and returns f."""
+
+
+class _Own(NamedTuple):
+    gradient: Array
+    rate: Array
+    derivatives: Derivatives
+
+
+class CompiledCost(Cost):
+    """g = -W⁻¹∇f with f, ∇f and (∇f)' from one call: a subclass implements `_compile`.
+
+    `value`, `gradient` and `gradient_rate` follow from it and are exact.
+    """
+
+    @abstractmethod
+    def _compile(self, state: RobotState, gradient: Array, rate: Array) -> Derivatives:
+        """Return a call that writes ∇f and (∇f)' and returns f.
+
+        Shapes: gradient (nv,), rate (nv,).
+        """
+
+    def compile(
+        self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
+    ) -> StepPlan:
+        """Return the step plan; see `NullSpaceField.compile`."""
+        derivatives = self._compile(state, out.g, out.g_dot)
+        to_field = bind(descend, metric.L, metric.W_dot, form, *out)
+        return StepPlan(write=(derivatives, to_field))
+
+    def value(self, state: RobotState) -> float:
+        """Return f."""
+        return float(self._own(state).derivatives())
+
+    def bind_value(self, state: RobotState) -> Derivatives:
+        """Return the call of `value`."""
+        return self._own(state).derivatives
+
+    def gradient(self, state: RobotState) -> Array:
+        """Return ∇f, exact, shape (nv,)."""
+        own = self._own(state)
+        own.derivatives()
+        return own.gradient.copy()
+
+    def gradient_rate(self, state: RobotState) -> Array:
+        """Return (∇f)', exact, shape (nv,)."""
+        own = self._own(state)
+        own.derivatives()
+        return own.rate.copy()
+
+    def differentiate(self, state: RobotState, gradient: Array, rate: Array) -> None:
+        """Write ∇f and (∇f)'; see `Cost.differentiate`."""
+        own = self._own(state)
+        own.derivatives()
+        gradient[:], rate[:] = own.gradient, own.rate
+
+    def _own(self, state: RobotState) -> _Own:
+        """Return the call that writes into memory of its own."""
+
+        def make() -> _Own:
+            gradient, rate = np.zeros((2, state.robot.nv))
+            return _Own(gradient, rate, self._compile(state, gradient, rate))
+
+        return state.made(self, "derivatives", make)

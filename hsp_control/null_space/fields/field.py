@@ -92,11 +92,7 @@ class NullSpaceField(Part, ABC, family="fields", error=FieldError):
         )
 
     def __init_subclass__(cls, **arguments: Any) -> None:
-        """Reset `compile` and `bind_value` if a subclass overrides what they do.
-
-        Otherwise a subclass of a concrete field would inherit a step plan that ignores
-        its `evaluate`, or a call that ignores its `value`.
-        """
+        """Reset `compile` and `bind_value` if a subclass overrides what they do."""
         super().__init_subclass__(**arguments)
         own = vars(cls)
         if "evaluate" in own and "compile" not in own:
@@ -227,15 +223,7 @@ class FieldSum(NullSpaceField):
         out: FieldSample,
         samples: Sequence[FieldSample],
     ) -> StepPlan:
-        """Return the step plan, which also writes the weighted sample of each term.
-
-        Args:
-            state: See `NullSpaceField.compile`; so are the next three.
-            metric: The metric's sample.
-            form: The metric's form.
-            out: The sample of the sum.
-            samples: The samples of the terms, as `allocate_terms` returns them.
-        """
+        """Return the step plan, which also writes the weighted sample of each term."""
         follow: list[Callable[[float], object]] = []
         write: list[Callable[[], object]] = []
         for k, (term, sample) in enumerate(zip(self.terms, samples, strict=True)):
@@ -259,21 +247,13 @@ class FieldSum(NullSpaceField):
 
 
 class _Adding(NamedTuple):
-    """What a sum computes with at one state.
+    """What a sum computes with at one state."""
 
-    Attributes:
-        sample: The sample of a term.
-        weights: Its w and w', shape (2,).
-        total: The sum.
-        start: Begins the sum with the sample.
-        add: Adds the sample to the sum.
-    """
-
-    sample: FieldSample
-    weights: Array
+    sample: FieldSample  # the sample of a term
+    weights: Array  # its w and w', (2,)
     total: FieldSample
-    start: Callable[[], object]
-    add: Callable[[], object]
+    start: Callable[[], object]  # begins the sum with the sample
+    add: Callable[[], object]  # adds the sample to the sum
 
     @classmethod
     def allocate(cls, nv: int) -> "_Adding":
@@ -296,12 +276,7 @@ def _update(weight: Weight, state: RobotState, weights: Array) -> None:
 
 @kernel
 def _add(
-    first: bool,
-    weights: Array,
-    g: Array,
-    g_dot: Array,
-    sum_g: Array,
-    sum_g_dot: Array,
+    first: bool, weights: Array, g: Array, g_dot: Array, sum_g: Array, sum_g_dot: Array
 ) -> None:
     """Scale a sample by w and w', and add it to the sum; ``first`` starts the sum."""
     w, w_dot = weights[0], weights[1]

@@ -30,7 +30,7 @@ from hsp_control.common.step_plan import CallSequence
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Axes
 from hsp_control.geometry.start import Start
-from hsp_control.null_space.fields.compiled_cost import CompiledCost, Derivatives
+from hsp_control.null_space.fields.cost import CompiledCost, Derivatives
 from hsp_control.robot import Robot, RobotState
 
 Rows = Literal["position", "orientation", "pose"]
@@ -77,13 +77,7 @@ class JacobianCost(CompiledCost):
         return 1.0
 
     def placed(self, start: Start) -> Self:
-        """Return the cost with the name of its frame, checked.
-
-        Raises:
-            FrameNotFoundError: If the robot has no such frame.
-            FieldError: If there are more rows than degrees of freedom that move the
-                frame, or a mimic joint moves it.
-        """
+        """Return the cost with the name of its frame, checked."""
         robot = start.state.robot
         frame = self._frame(robot)
         with within("frame"):
@@ -165,9 +159,6 @@ class CompiledJacobianCost(JacobianCost):
         The further arguments are J, J', ∂φ/∂J and its rate, shape (k, nv) each, and a
         scratch array of shape (8, k, nv). The kernel writes ∂φ/∂J and its rate, and
         returns φ.
-
-        Args:
-            nv: Number of degrees of freedom of the robot.
         """
 
     def terms(self, J: Array, J_dot: Array) -> JacobianTerms:
@@ -239,18 +230,9 @@ def chain_gradient(
 ) -> None:
     """Write the gradient of φ(J) and its rate from B = ∂φ/∂J, as the module describes.
 
-    Args:
-        J: Jacobian of the frame, in world axes at its origin, shape (6, nv).
-        J_dot: J', shape (6, nv).
-        B: ∂φ/∂J, shape (6, nv).
-        B_dot: B', shape (6, nv).
-        dofs: The k degrees of freedom that move the frame, from the root on, shape
-            (k,).
-        first: For each of them, the position in ``dofs`` of the first degree of freedom
-            of its joint, shape (k,).
-        sums: Scratch, shape (4, k + 1, 3).
-        gradient: ∂φ/∂q, shape (nv,); only the entries ``dofs`` are written.
-        rate: Its time derivative, shape (nv,); only the entries ``dofs`` are written.
+    ``dofs`` (k,) are those that move the frame, from the root on, and the entries that
+    are written; ``first`` (k,) is where in ``dofs`` the joint of each begins. J, B: (6,
+    nv).
     """
     k = dofs.shape[0]
     carried, carried_dot, before, before_dot = sums[0], sums[1], sums[2], sums[3]
@@ -296,12 +278,7 @@ def chain_gradient(
 
 
 def _chain(robot: Robot, frame: str) -> tuple[Indices, Indices]:
-    """Return ``dofs`` and ``first`` of `chain_gradient`, shape (k,) each.
-
-    Raises:
-        FieldError: If a joint of the chain mimics another one: its degree of freedom is
-            then in the chain twice, which the running sums do not support.
-    """
+    """Return ``dofs`` and ``first`` of `chain_gradient`, shape (k,) each."""
     model = robot.model
     dofs: list[int] = []
     first: list[int] = []

@@ -14,7 +14,7 @@ from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Name, Names, OrInstance
 from hsp_control.geometry.scene import Obstacle
 from hsp_control.geometry.start import Start
-from hsp_control.null_space.fields.compiled_cost import CompiledCost, Derivatives
+from hsp_control.null_space.fields.cost import CompiledCost, Derivatives
 from hsp_control.robot import RobotState
 from hsp_control.trajectories import TrajectorySample
 
@@ -33,12 +33,7 @@ class PointDistance(CompiledCost, type="point_distance"):
     Python, the obstacle itself."""
 
     def placed(self, start: Start) -> Self:
-        """Return the cost with its obstacle from the scene, checked.
-
-        Raises:
-            FrameNotFoundError: If a frame does not exist.
-            SceneError: If the scene has no such obstacle.
-        """
+        """Return the cost with its obstacle from the scene, checked."""
         for k, frame in enumerate(self.frames):
             with within("frames", k):
                 start.state.robot.frame_id(frame)

@@ -1,13 +1,15 @@
-"""The abstract vector field g(q, t), and vector fields given as functions."""
+"""Fields that are no gradients: given by a function, rest, or none."""
 
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import KW_ONLY
+from typing import ClassVar
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
+from hsp_control.common.step_plan import StepPlan
 from hsp_control.law import FieldSample, MetricSample
 from hsp_control.null_space.differences import rate_along_flow
 from hsp_control.null_space.fields.field import NullSpaceField
@@ -82,3 +84,42 @@ class FunctionField(VectorField):
         if self.rate_function is None:
             return super().rate(state)
         return self.rate_function(state.seen)
+
+
+class Rest(NullSpaceField, type="rest"):
+    """g = 0: self-motion comes to rest. The paper's second simulation."""
+
+    def evaluate(
+        self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
+    ) -> FieldSample:
+        """Write g = 0 and g' = 0; see `NullSpaceField.evaluate`."""
+        out.g[:] = 0.0
+        out.g_dot[:] = 0.0
+        return out
+
+    def compile(
+        self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
+    ) -> StepPlan:
+        """Write zeros once, and return an empty step plan."""
+        self.evaluate(state, metric, form, out)
+        return StepPlan()
+
+    def value(self, state: RobotState) -> float:
+        """Return 0."""
+        return 0.0
+
+
+class Uncontrolled(Rest, type="uncontrolled"):
+    """φ_N = 0: self-motion is not controlled. The paper's first simulation.
+
+    Only for demonstration. The task is tracked, but nothing damps the self-motion, and
+    the joints drift away while the task error shows nothing. It has no weight, and
+    cannot be added to other fields.
+    """
+
+    controls: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        """Check that it has no weight."""
+        if self.weight != 1.0:
+            raise FieldError("an uncontrolled null space has no weight")

@@ -80,11 +80,7 @@ class StateWeight(Weight):
     frames, but not v."""
 
     def sample(self, state: RobotState) -> tuple[float, float]:
-        """Return w and w'; see `Weight.sample`.
-
-        Raises:
-            FieldError: If w is negative or not finite.
-        """
+        """Return w and w'; see `Weight.sample`."""
         value = float(self.function(state))
         if not 0.0 <= value < np.inf:
             raise FieldError(f"weight is {value}; must be at least 0")
@@ -116,11 +112,7 @@ def sample_weight(weight: Weight | float, state: RobotState) -> tuple[float, flo
 
 
 def product(first: Weight | float, second: Weight | float) -> Weight | float:
-    """Return the product of two weights; of numbers it is a number.
-
-    Raises:
-        FieldError: If a number is negative or not finite, and the other one no number.
-    """
+    """Return the product of two weights; of numbers it is a number."""
     if isinstance(first, Weight) and isinstance(second, Weight):
         return Product(first, second)
     if not isinstance(first, Weight) and not isinstance(second, Weight):

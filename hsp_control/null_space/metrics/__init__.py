@@ -2,9 +2,9 @@
 
 from hsp_control.law import MetricSample as MetricSample
 
-from .constant import ConstantMetric as ConstantMetric
-from .coordinates import CoordinatesMetric as CoordinatesMetric
+from .fixed import ConstantMetric as ConstantMetric
+from .fixed import CoordinatesMetric as CoordinatesMetric
 from .fixed import FixedMetric as FixedMetric
-from .identity import IdentityMetric as IdentityMetric
+from .fixed import IdentityMetric as IdentityMetric
 from .mass_matrix import MassMatrixMetric as MassMatrixMetric
 from .metric import Metric as Metric

@@ -41,11 +41,7 @@ class MassMatrixMetric(Metric, type="mass_matrix"):
         return replace(self, inertia=start.state.robot.typical_inertia)
 
     def compile(self, state: RobotState, out: MetricSample) -> StepPlan:
-        """Return the step plan that does what `evaluate` does; see `Metric.compile`.
-
-        Where M is singular it writes NaN into L, so that the law reports that the step
-        is not finite.
-        """
+        """Return the step plan; where M is singular it writes NaN: the law tells."""
         if state.robot.mimics:
             return super().compile(state, out)
         matrices = state.mass_matrix, state.coriolis_matrix
@@ -58,11 +54,7 @@ class MassMatrixMetric(Metric, type="mass_matrix"):
         return robot.typical_inertia if self.inertia == "robot" else self.inertia
 
     def evaluate(self, state: RobotState, out: MetricSample) -> MetricSample:
-        """Write W = M/m, L and W' = M'/m; see `Metric.evaluate`.
-
-        Raises:
-            MetricError: If M is singular.
-        """
+        """Write W = M/m, L and W' = M'/m; see `Metric.evaluate`."""
         unit = self._unit(state)
         out.W[:] = state.mass_matrix / unit
         if not cholesky(out.W, out.L):

@@ -43,11 +43,7 @@ class Metric(Part, ABC, family="metrics", error=MetricError):
         return self
 
     def __init_subclass__(cls, **arguments: Any) -> None:
-        """Reset `compile` if a subclass overrides `evaluate` only.
-
-        Otherwise a subclass of a concrete metric would inherit a step plan that ignores
-        its `evaluate`.
-        """
+        """Reset `compile` if a subclass overrides `evaluate`, which it would ignore."""
         super().__init_subclass__(**arguments)
         if "evaluate" in vars(cls) and "compile" not in vars(cls):
             cls.compile = Metric.compile  # type: ignore[method-assign]

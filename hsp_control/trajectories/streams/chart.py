@@ -32,14 +32,7 @@ from hsp_control.trajectories.orientation import OrientationSample
 
 
 class State:
-    """x, x' and x'' in local coordinates, in order: linear, then a rotation vector.
-
-    Attributes:
-        x: Shape (n,).
-        rate: x', shape (n,) [1/s].
-        acceleration: x'', shape (n,) [1/s²].
-        base: R_b, body to world, shape (3, 3); the identity without a rotation.
-    """
+    """x, x' and x'' in local coordinates, in order: linear, then a rotation vector."""
 
     def __init__(self, x: Array, rate: Array, acceleration: Array, base: Array) -> None:
         """Keep the arrays."""

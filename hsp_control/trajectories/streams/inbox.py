@@ -1,42 +1,51 @@
-"""Where messages wait: any thread puts them in, the control loop takes them out."""
+"""The messages that wait, and those that were taken."""
 
 from collections import deque
+from collections.abc import Iterable
 from threading import Lock
 from typing import Any, NamedTuple
 
 from hsp_control.common.exceptions import StreamError
 from hsp_control.trajectories.streams.message import Message, Space, decoded, message_of
-from hsp_control.trajectories.streams.record import Record
 
-CAPACITY = 4096
-"""Most messages that wait; where more come, the oldest are dropped."""
+MOST = 5_000_000
+"""Most numbers that are recorded: poses at 60 Hz for three hours, 0.1 GB."""
+
+
+class Record:
+    """Messages and the controller's times at which they were taken."""
+
+    def __init__(self) -> None:
+        """Begin without messages."""
+        self.lost = self._size = 0
+        self._entries: list[tuple[float, Message]] = []
+
+    def add(self, t: float, messages: Iterable[Message]) -> None:
+        """Record messages that are taken at a time [s], as long as there is room."""
+        for each in messages:
+            if self._size + each.size <= MOST:
+                self._entries.append((t, each))
+                self._size += each.size
+            else:
+                self.lost += 1
+
+    def to_list(self) -> list[dict[str, Any]]:
+        """Return the messages as `recorded` reads them."""
+        return [{"at": t, **each.to_dict()} for t, each in self._entries]
+
+
+CAPACITY = 4096  # most messages that wait; where more come, the oldest are dropped
 
 
 class Received(NamedTuple):
-    """A message and its number; numbers increase by one.
+    """A message and its number; numbers increase by one."""
 
-    Attributes:
-        number: The number of the message.
-        message: The message.
-    """
-
-    number: int
+    number: int  # the number of the message
     message: Message
 
 
 class Inbox:
-    """Messages of one source, for any number of readers.
-
-    A reader remembers the number of the last message that it took; so several
-    controllers may read one stream.
-
-    Attributes:
-        space: What a value is.
-        count: How many messages have arrived.
-        rejected: How many were invalid.
-        reason: Why the last invalid one was.
-        taken: The number of the last message that any reader took.
-    """
+    """Messages of one source; each reader remembers the number of its last message."""
 
     def __init__(self, space: Space) -> None:
         """Set what a value is."""
@@ -47,11 +56,7 @@ class Inbox:
         self._lock = Lock()
 
     def put(self, **data: Any) -> None:
-        """Add a message, given by its entries; see `message_of`.
-
-        Raises:
-            StreamError: If it is not valid.
-        """
+        """Add a message, given by its entries; see `message_of`."""
         self._add(message_of(data, self.space))
 
     def put_text(self, text: bytes) -> None:
@@ -68,12 +73,7 @@ class Inbox:
             self.reason = reason
 
     def after(self, number: int, *, take: bool) -> list[Received]:
-        """Return the messages that wait, later than a number, in order of arrival.
-
-        Args:
-            number: The number.
-            take: Whether later readers begin after them.
-        """
+        """Return the messages that wait, later than a number, in order of arrival."""
         with self._lock:
             if take:
                 self.taken = self.count

@@ -38,11 +38,7 @@ def is_address(source: str) -> bool:
 
 
 def check_address(source: str) -> None:
-    """Check an address ``udp://HOST:PORT`` or ``ros2://TOPIC``.
-
-    Raises:
-        StreamError: If it is none.
-    """
+    """Check an address ``udp://HOST:PORT`` or ``ros2://TOPIC``."""
     _kind(source).check_address(source)
 
 
@@ -52,14 +48,7 @@ def is_local(source: str) -> bool:
 
 
 def listening_inbox(source: str, space: Space) -> Inbox:
-    """Return the inbox of an address; all streams of one process share it.
-
-    The thread ends, and the port is free again, when nobody uses the inbox any more.
-
-    Raises:
-        StreamError: If the address is wrong or in use, or another stream of this
-            process receives other values there.
-    """
+    """Return the inbox of an address, one per process; unused, it closes."""
     known = _inboxes.get(source)
     if known is not None:
         if known.space != space:

@@ -1,40 +1,100 @@
-"""What the copies of one stream share: where messages arrive, and what was taken."""
+"""Where a stream's messages come from: `send`, a source, or a recording."""
 
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from hsp_control.common.exceptions import StreamError
-from hsp_control.trajectories.streams.inbox import Inbox, InboxReader
+from hsp_control.trajectories.streams.inbox import Inbox, InboxReader, Record
 from hsp_control.trajectories.streams.listeners import is_address, listening_inbox
-from hsp_control.trajectories.streams.message import Message, Space
-from hsp_control.trajectories.streams.record import Record
-from hsp_control.trajectories.streams.recording import Recording
+from hsp_control.trajectories.streams.message import Message, Space, message_of, parsed
+
+LARGEST_FILE = 100_000_000  # size of the largest recording that is read [bytes]
+
+
+class Recording:
+    """Recorded messages as a source; the same run takes them at the same times."""
+
+    def __init__(
+        self, entries: Iterable[tuple[float, Message]], record: Record
+    ) -> None:
+        """Begin at the first message, and record what is taken."""
+        self._entries, self._record = list(entries), record
+        self._next = 0
+
+    def take(self, t: float) -> list[tuple[float, Message]]:
+        """Return what was recorded up to a time and was not taken, and when [s]."""
+        begin = self._next
+        while self._next < len(self._entries) and self._entries[self._next][0] <= t:
+            self._next += 1
+        found = self._entries[begin : self._next]
+        for at, message in found:
+            self._record.add(at, (message,))
+        return found
+
+    def copy(self) -> "Recording":
+        """Return a source that goes on from here, with a record of its own."""
+        other = Recording(self._entries, Record())
+        other._next = self._next
+        return other
+
+
+def recorded(
+    data: Sequence[Mapping[str, Any]], space: Space
+) -> list[tuple[float, Message]]:
+    """Return the messages of a recording, and when they were taken [s]."""
+    entries: list[tuple[float, Message]] = []
+    for k, each in enumerate(data):
+        try:
+            if not isinstance(each, Mapping) or not _is_number(each.get("at")):
+                raise StreamError("it needs the time at which it is taken: at [s]")
+            at = float(each["at"])
+            if entries and at < entries[-1][0]:
+                raise StreamError(f"at is {at:g}, earlier than {entries[-1][0]:g}")
+            rest = {key: value for key, value in each.items() if key != "at"}
+            entries.append((at, message_of(rest, space)))
+        except StreamError as error:
+            raise StreamError(f"message {k} of the recording: {error}") from None
+    return entries
+
+
+def read_recording(path: Path) -> list[dict[str, Any]]:
+    """Return the messages in a file of JSON lines."""
+    try:
+        if (size := path.stat().st_size) > LARGEST_FILE:
+            raise StreamError(
+                f"{path}: {size} bytes; a recording has at most {LARGEST_FILE}"
+            )
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise StreamError(f"{path}: the recording cannot be read: {error}") from None
+    found = []
+    for k, line in enumerate(lines):
+        if not line.strip():
+            continue
+        try:
+            found.append(parsed(line))
+        except (ValueError, RecursionError) as error:
+            raise StreamError(f"{path}:{k + 1}: not JSON: {error}") from None
+    return found
+
+
+def _is_number(value: object) -> bool:
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return number and abs(value) < float("inf")  # type: ignore[arg-type]
 
 
 class Mailbox:
-    """The messages of one stream, whichever controller it was placed in.
-
-    Attributes:
-        record: What the last run has taken, and when.
-        inbox: The messages that wait.
-    """
+    """The messages of one stream, whichever controller it was placed in."""
 
     def __init__(self, hears: str, space: Space) -> None:
-        """Begin without messages.
-
-        Args:
-            hears: The source, if there is one besides `put`.
-            space: What a value is, as far as it is known.
-        """
+        """Begin without messages."""
         self._hears = hears
         self.inbox = Inbox(space)
         self.record = Record()
 
     def put(self, **data: Any) -> None:
-        """Add a message; see `message_of`.
-
-        Raises:
-            StreamError: If it is not valid, or the stream has another source.
-        """
+        """Add a message; see `message_of`."""
         if self._hears:
             raise StreamError(
                 f"this stream hears {self._hears}; only a stream without source and "
@@ -43,16 +103,7 @@ class Mailbox:
         self.inbox.put(**data)
 
     def reader(self, space: Space, *, kept: bool) -> InboxReader:
-        """Return the reader of a new run; a source is opened here.
-
-        Args:
-            space: What a value is.
-            kept: Whether what it takes is recorded, and not taken again by later runs;
-                otherwise it is a preview.
-
-        Raises:
-            StreamError: If the source cannot be opened, or carries other values.
-        """
+        """Return the reader of a new run; a source is opened here."""
         if is_address(self._hears):
             self.inbox = listening_inbox(self._hears, space)
         elif self.inbox.space.linear not in (None, space.linear):

@@ -10,27 +10,21 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import StreamError
 
-MOST_WAYPOINTS = 1000
-"""Most waypoints of one message."""
+MOST_WAYPOINTS = 1000  # most waypoints of one message
 LARGEST = 1e6
 """Numbers beyond this are refused [m or rad]: they are mistakes, and would
 overflow."""
-LATEST = 1e12
-"""Times beyond this are refused [s]; a clock of 1970 shows 2e9."""
+LATEST = 1e12  # times beyond this are refused [s]; a clock of 1970 shows 2e9
 _UNIT = 1e-3
 """Deviation of a quaternion's norm from 1 that counts as a sender's rounding."""
 
 
 class Space(NamedTuple):
-    """What one value of a stream is: linear coordinates, then perhaps a quaternion.
+    """What one value of a stream is: linear coordinates, then perhaps a quaternion."""
 
-    Attributes:
-        linear: Number of linear coordinates; None: any, as nothing said it yet.
-        rotational: Whether a quaternion (x, y, z, w) follows them.
-    """
-
+    # Number of linear coordinates; None: any, as nothing said it yet.
     linear: int | None
-    rotational: bool
+    rotational: bool  # whether a quaternion (x, y, z, w) follows them
 
     @property
     def width(self) -> int | None:
@@ -57,22 +51,16 @@ ORIENTATION = Space(0, True)
 
 
 class Message(NamedTuple):
-    """Waypoints, or a velocity alone.
+    """Waypoints, or a velocity alone."""
 
-    Attributes:
-        t: When it was made, by the sender's clock [s]; None: unknown, now.
-        times: Times of the waypoints after ``t``, increasing, shape (k,) [s].
-        values: The waypoints, shape (k, width), quaternions of norm 1; None: the
-            message is a velocity alone.
-        velocities: Their velocities, shape (k, rates), in world axes; None: unknown.
-        chunk: Whether they replace those that were to follow.
-    """
-
-    t: float | None
-    times: Array
+    t: float | None  # when it was made, by the sender's clock [s]; None: unknown, now
+    times: Array  # times of the waypoints after ``t``, increasing, (k,) [s]
+    # The waypoints, (k, width), quaternions of norm 1; None: the message is a velocity
+    # alone.
     values: Array | None
+    # Their velocities, (k, rates), in world axes; None: unknown.
     velocities: Array | None
-    chunk: bool = False
+    chunk: bool = False  # whether they replace those that were to follow
 
     @property
     def size(self) -> int:
@@ -95,16 +83,7 @@ class Message(NamedTuple):
 
 
 def message_of(data: Any, space: Space) -> Message:
-    """Return the message that JSON data or the arguments of `send` declare.
-
-    Args:
-        data: A mapping with some of ``value``, ``values``, ``times``, ``velocity``,
-            ``velocities`` and ``t``.
-        space: What a value is.
-
-    Raises:
-        StreamError: If it is no valid message; says which entry is wrong, and why.
-    """
+    """Return the message that JSON data or the arguments of `send` declare."""
     if not isinstance(data, Mapping):
         raise StreamError(f"a message is {_shown(data)}; needs a mapping")
     if unknown := [key for key in data if key not in _KEYS]:
@@ -133,11 +112,7 @@ def message_of(data: Any, space: Space) -> Message:
 
 
 def decoded(text: bytes, space: Space) -> Message:
-    """Return the message in a JSON text.
-
-    Raises:
-        StreamError: If it is no valid message.
-    """
+    """Return the message in a JSON text."""
     try:
         data = parsed(text)
     except (ValueError, RecursionError) as error:
@@ -146,12 +121,7 @@ def decoded(text: bytes, space: Space) -> Message:
 
 
 def parsed(text: str | bytes) -> Any:
-    """Return what a JSON text says; NaN and Infinity are no JSON.
-
-    Raises:
-        ValueError: If it is not JSON.
-        RecursionError: If it is nested too deeply.
-    """
+    """Return what a JSON text says; NaN and Infinity are no JSON."""
     return json.loads(text, parse_constant=_refuse_constant)
 
 
@@ -217,11 +187,7 @@ def _times(given: Mapping[str, Any], count: int) -> Array:
 
 
 def _normalise(values: Array) -> None:
-    """Scale the quaternions to norm 1, in place.
-
-    Raises:
-        StreamError: If one is none.
-    """
+    """Scale the quaternions to norm 1, in place."""
     norms = np.linalg.norm(values[:, -4:], axis=1)
     worst = int(np.abs(norms - 1.0).argmax())
     if abs(norms[worst] - 1.0) > _UNIT:
@@ -234,11 +200,7 @@ def _normalise(values: Array) -> None:
 
 
 def _numbers(value: Any, name: str, ndim: int) -> Array:
-    """Return an array of finite numbers, copied.
-
-    Raises:
-        StreamError: If it is not.
-    """
+    """Return an array of finite numbers, copied."""
     needs = ("a number", "a list of numbers", "a list of lists of numbers")[ndim]
     try:
         array = _as_array(value)

@@ -16,13 +16,13 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import StreamError
-from hsp_control.trajectories.streams.bounds import MotionBounds
 from hsp_control.trajectories.streams.chart import Chart, State
 from hsp_control.trajectories.streams.message import Message
 from hsp_control.trajectories.streams.segments import (
     Coast,
     Goal,
     Joiner,
+    MotionBounds,
     Quintic,
     Segment,
 )
@@ -30,12 +30,9 @@ from hsp_control.trajectories.streams.waypoints import Waypoints, derivatives
 
 _KEPT = 1.0
 """Pieces are kept for this time; an integrator may ask for earlier times [s]."""
-_SAME = 1e-7
-"""States that differ by less are the same, in x, x' and x''."""
-_CONSIDERED = 256
-"""The reference joins one of the next waypoints, at most this many."""
-_AT_ONCE = 256
-"""Of more messages that come at once the oldest do not count."""
+_SAME = 1e-7  # states that differ by less are the same, in x, x' and x''
+_CONSIDERED = 256  # the reference joins one of the next waypoints, at most this many
+_AT_ONCE = 256  # of more messages that come at once the oldest do not count
 
 
 class Policy(NamedTuple):
@@ -60,14 +57,7 @@ class Source(Protocol):
 
 
 class RunningStream:
-    """The reference of one run.
-
-    Attributes:
-        chart: The local coordinates.
-        taken: How many messages it has taken.
-        refused: How many asked for what no motion within the bounds can do.
-        waypoints: The waypoints that were received.
-    """
+    """The reference of one run."""
 
     def __init__(
         self,
@@ -77,15 +67,7 @@ class RunningStream:
         source: Source,
         start: State,
     ) -> None:
-        """Begin at rest.
-
-        Args:
-            chart: The local coordinates.
-            bounds: Bounds in these coordinates.
-            policy: How messages become goals.
-            source: Where they come from.
-            start: Where the reference is until the first message.
-        """
+        """Begin at rest."""
         self.chart, self._policy, self._source = chart, policy, source
         self._joiner = Joiner(bounds, chart.linear)
         self._begin = self._now = self._oldest = -inf
@@ -115,12 +97,7 @@ class RunningStream:
         return self._now - max(self._heard, self._begin) if self._now > -inf else 0.0
 
     def at(self, t: float) -> State:
-        """Return the reference at a time [s]; see `Chart`.
-
-        Raises:
-            StreamError: If no message came for too long, or the time lies so far back
-                that it is not known any more.
-        """
+        """Return the reference at a time [s]; see `Chart`."""
         if t > self._now:
             self._advance(t)
         elif t < self._oldest:
@@ -242,10 +219,7 @@ class RunningStream:
         return self._policy.name != "extrapolate" and not given
 
     def _meet(self, t: float, state: State, goal: Goal, end: float) -> Segment:
-        """Return a piece that catches up with a goal that keeps moving until ``end``.
-
-        It meets the goal in ``delay`` if the bounds permit, else as soon as they do.
-        """
+        """Return a piece that meets a goal that moves, in ``delay`` or later."""
         if _on_line(state, goal, t):
             return Coast(t, end, state)
         soon = t + self._policy.delay

@@ -27,17 +27,16 @@ from hsp_control.trajectories.orientation import (
 )
 from hsp_control.trajectories.pose import PoseSample, PoseTrajectory
 from hsp_control.trajectories.remembering import Remembering
-from hsp_control.trajectories.streams.bounds import (
+from hsp_control.trajectories.streams.chart import Chart, State
+from hsp_control.trajectories.streams.listeners import check_address, is_address
+from hsp_control.trajectories.streams.mailbox import Mailbox, read_recording, recorded
+from hsp_control.trajectories.streams.message import ORIENTATION, POSE, Space
+from hsp_control.trajectories.streams.running import Policy, RunningStream, Source
+from hsp_control.trajectories.streams.segments import (
     MotionBounds,
     angular_bounds,
     linear_bounds,
 )
-from hsp_control.trajectories.streams.chart import Chart, State
-from hsp_control.trajectories.streams.listeners import check_address, is_address
-from hsp_control.trajectories.streams.mailbox import Mailbox
-from hsp_control.trajectories.streams.message import ORIENTATION, POSE, Space
-from hsp_control.trajectories.streams.recording import read_recording, recorded
-from hsp_control.trajectories.streams.running import Policy, RunningStream, Source
 from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
 
 
@@ -151,15 +150,7 @@ class Streamed(Remembering, error=TrajectoryError):
         self._mailbox.put(values=values, times=times, velocities=velocities, t=t)
 
     def recorded_in(self, folder: Path, allow: Callable[[Path], object]) -> Self:
-        """Return the stream with the messages of its recording, if it names one.
-
-        Args:
-            folder: Where a relative path begins.
-            allow: Raises if a file may not be read.
-
-        Raises:
-            StreamError: If the recording cannot be read, or a message is invalid.
-        """
+        """Return the stream with the messages of its recording, if it names one."""
         if self.source is None or self.live:
             return self
         path = folder / self.source
@@ -228,11 +219,7 @@ class Streamed(Remembering, error=TrajectoryError):
         return other
 
     def _placed(self, placed: Self) -> Self:
-        """Return this stream, placed.
-
-        Raises:
-            StreamError: If its messages do not fit.
-        """
+        """Return this stream, placed."""
         if placed.messages is not None:
             start, rotational = placed._start(), placed.space.rotational
             recorded(placed.messages, Space(len(start.x) - 3 * rotational, rotational))
@@ -240,11 +227,7 @@ class Streamed(Remembering, error=TrajectoryError):
         return self._shared(placed)
 
     def like(self, kind: "type[Streamed]") -> "Streamed":
-        """Return the stream as one of another kind, which hears the same.
-
-        Raises:
-            TrajectoryError: If it has settings that the other kind does not know.
-        """
+        """Return the stream as one of another kind, which hears the same."""
         if isinstance(self, kind):
             return self
         settings = self.changed_fields()
@@ -315,11 +298,7 @@ class Streamed(Remembering, error=TrajectoryError):
         return copy
 
     def _start(self) -> State:
-        """Return where the reference is before the first message.
-
-        Raises:
-            StreamError: If only a controller knows it.
-        """
+        """Return where the reference is before the first message."""
         raise NotImplementedError
 
     def _placeless(self) -> StreamError:
@@ -481,11 +460,7 @@ class StreamPose(Turning, PoseTrajectory, type="stream"):
         return self._placed(replace(self, **given))
 
     def sample(self, t: float, out: PoseSample | None = None) -> PoseSample:
-        """Return the pose at time t; see `PoseTrajectory.sample`.
-
-        Raises:
-            TrajectoryError: If it is relative to where the robot starts.
-        """
+        """Return the pose at time t; see `PoseTrajectory.sample`."""
         if self.relative:
             raise TrajectoryError(
                 "StreamPose begins where the robot starts, which only a controller "
@@ -513,12 +488,7 @@ class StreamPose(Turning, PoseTrajectory, type="stream"):
 
 
 def stream_for(followed: object, stream: Streamed) -> Any:
-    """Return a stream of the kind that can follow a reference.
-
-    Args:
-        followed: What a task follows so far.
-        stream: The stream.
-    """
+    """Return a stream of the kind that can follow a reference."""
     if isinstance(followed, PoseTrajectory):
         return stream if isinstance(stream, Stream) else stream.like(StreamPose)
     if isinstance(followed, OrientationTrajectory):

@@ -13,16 +13,11 @@ from hsp_control.trajectories.streams.message import Space
 
 SCHEME = "udp://"
 _LARGEST = 65_536
-_POLL = 0.2
-"""How soon a listener notices that nobody needs it any more [s]."""
+_POLL = 0.2  # how soon a listener notices that nobody needs it any more [s]
 
 
 def check_address(source: str) -> tuple[str, int]:
-    """Return host and port of an address ``udp://host:port``.
-
-    Raises:
-        StreamError: If it is none.
-    """
+    """Return host and port of an address ``udp://host:port``."""
     try:
         parts = urlsplit(source)
         host, port = parts.hostname, parts.port
@@ -47,11 +42,7 @@ def is_local(source: str) -> bool:
 
 
 def opened(source: str, space: Space) -> Callable[["ref[Inbox]"], None]:
-    """Open the port of an address; return what listens there.
-
-    Raises:
-        StreamError: If the address is wrong or in use.
-    """
+    """Open the port of an address; return what listens there."""
     host, port = check_address(source)
     opened = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:

@@ -9,14 +9,12 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.trajectories.streams.message import Message
 
-_WINDOW = 2.0
-"""The sender's clock is compared with the controller's over this time [s]."""
+_WINDOW = 2.0  # the sender's clock is compared with the controller's over this time [s]
 _NEW_CLOCK = 1.0
 """A sender whose time jumps back by more than this has started again [s]."""
 _KEPT = 1.0
 """Waypoints that were passed are kept for this time, to estimate velocities [s]."""
-MOST = 4096
-"""Most waypoints that are kept."""
+MOST = 4096  # most waypoints that are kept
 _APART = 0.01
 """Neighbours for derivatives are at least so far in time [s]: of waypoints that are
 closer, noise would be most of the difference."""
@@ -53,14 +51,7 @@ class SenderClock:
 
 
 class Waypoints:
-    """Values and times, in order of time.
-
-    Attributes:
-        times: When the reference should be there, increasing [s].
-        values: Values as they were sent, shape (width,) each.
-        velocities: Their velocities, shape (rates,) each; None where unknown.
-        late: How many messages came too late to count.
-    """
+    """Values and times, in order of time."""
 
     def __init__(self) -> None:
         """Begin without waypoints."""
@@ -81,15 +72,7 @@ class Waypoints:
         return other
 
     def add(self, message: Message, now: float, delay: float, replace: bool) -> bool:
-        """Add a message's waypoints; return whether it changes what lies ahead.
-
-        Args:
-            message: The message.
-            now: When it arrived [s].
-            delay: From the time of a waypoint to when the reference is there [s].
-            replace: Whether each message replaces all earlier ones. A chunk and a
-                velocity replace what was to follow anyhow.
-        """
+        """Add a message's waypoints; return whether it changes what lies ahead."""
         made = now
         if message.t is not None:
             if self._clock.restarts_at(message.t):
@@ -131,11 +114,7 @@ class Waypoints:
         return bisect_right(self.times, t)
 
     def near(self, t: float, window: float, most: int) -> slice:
-        """Return which waypoints matter at a time [s].
-
-        Some that were passed, within the window [s] and at least three; and ``most`` of
-        those ahead.
-        """
+        """Return which waypoints matter at a time: some passed ones, ``most`` ahead."""
         ahead = self.ahead(t)
         first = min(bisect_left(self.times, t - window), max(ahead - 3, 0))
         return slice(max(first, ahead - most), ahead + most)
@@ -172,11 +151,7 @@ def derivatives(times: Array, x: Array, k: int, window: float) -> tuple[Array, .
     window, nearest to all waypoints not farther from it in time, which smooths noise
     (Savitzky and Golay).
 
-    Args:
-        times: Shape (m,) [s].
-        x: Shape (m, n).
-        k: The waypoint, with at least one neighbour.
-        window: Half the window [s]; 0: the neighbours.
+    Shapes: times (m,) [s], x (m, n).
     """
     if window > 0.0:
         wide = slice(*np.searchsorted(times, [times[k] - window, times[k] + window]))

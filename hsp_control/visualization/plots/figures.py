@@ -1,36 +1,36 @@
-"""Whole figures: the paper's five panels, and diagnostics of a run."""
+"""Whole figures: the paper's five panels, diagnostics of a run, and their files."""
 
 import textwrap
 from collections.abc import Sequence
+from pathlib import Path
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hsp_control.common.exceptions import PlotError
+from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.log_series import chosen_rows, distances, field_terms
 from hsp_control.visualization import palette
-from hsp_control.visualization.plots.conditioning import (
+from hsp_control.visualization.plots.curves import (
+    draw_distances,
+    draw_efforts,
+    draw_field_terms,
+    draw_field_value,
+    draw_joint_positions,
     draw_manipulability,
+    draw_null_space_error,
     draw_singular_values,
+    draw_task_errors,
 )
 from hsp_control.visualization.plots.frames import (
     columns_for,
     draw_frames,
     draw_superimposed,
 )
-from hsp_control.visualization.plots.joints import draw_efforts, draw_joint_positions
-from hsp_control.visualization.plots.legends import literal_text
-from hsp_control.visualization.plots.lines import mark_frames
-from hsp_control.visualization.plots.null_space import (
-    draw_distances,
-    draw_field_terms,
-    draw_field_value,
-    draw_null_space_error,
-)
+from hsp_control.visualization.plots.lines import literal_text, mark_frames
 from hsp_control.visualization.plots.paths import draw_end_effector
 from hsp_control.visualization.plots.style import new_figure, styled
-from hsp_control.visualization.plots.task_errors import draw_task_errors
 
 _HEADING = {"x": 0.01, "ha": "left", "fontsize": 10.0, "fontweight": "bold"}
 
@@ -43,22 +43,7 @@ def paper_figure(
     times: Sequence[float] | None = None,
     title: str | None = None,
 ) -> Figure:
-    """Return a figure of one run with the paper's five panels.
-
-    (a) the end effector's path, (b) the joints, (c) manipulability, (d) the robot at
-    selected times (frames) and (e) these frames in one plot. The frames are numbered;
-    the numbers mark their times above (b) and (c).
-
-    Args:
-        rollout: The log.
-        absolute: Draw absolute angles where the literature on the robot does.
-        frames: Number of frames, evenly over the run.
-        times: Times of the frames [s], instead.
-        title: The title; None: the run's own.
-
-    Raises:
-        PlotError: If the log has no row, or no frame is requested.
-    """
+    """Return the paper's five panels: path, joints, manipulability, frames twice."""
     _check(rollout)
     rows = chosen_rows(rollout, frames, times)
     if not rows:
@@ -93,15 +78,7 @@ def paper_figure(
 
 
 def diagnostics_figure(rollout: Rollout) -> Figure:
-    """Return a figure that compares a run with the law's predictions.
-
-    Task errors, null-space error, field, efforts, singular values, manipulability; and,
-    if the log has them, distances to obstacles and the contributions of the field's
-    terms.
-
-    Raises:
-        PlotError: If the log has no row.
-    """
+    """Return a figure that compares a run with the law's predictions."""
     _check(rollout)
     with styled():
         panels = [
@@ -160,3 +137,42 @@ def _add_title(figure: Figure, rollout: Rollout, title: str | None = None) -> No
 def _check(rollout: Rollout) -> None:
     if len(rollout) == 0:
         raise PlotError(f"the log has no rows to draw ({rollout.status})")
+
+
+def save_figures(
+    rollout: Rollout,
+    folder: str | Path,
+    stem: str,
+    formats: Sequence[str] = ("png",),
+    *,
+    absolute: bool = True,
+) -> list[Path]:
+    """Write ``<stem>-paper`` and ``<stem>-diagnostics`` in every format."""
+    figures = {
+        "paper": paper_figure(rollout, absolute=absolute),
+        "diagnostics": diagnostics_figure(rollout),
+    }
+    paths = []
+    for name, figure in figures.items():
+        for suffix in formats:
+            path = Path(folder) / f"{stem}-{name}.{suffix}"
+            save_figure(figure, path, suffix)
+            paths.append(path)
+    return paths
+
+
+def save_figure(figure: Figure, path: Path, suffix: str) -> None:
+    """Write one figure in one format."""
+    known = figure.canvas.get_supported_filetypes()
+    if suffix not in known:
+        raise PlotError(
+            f"no picture format {suffix!r}{did_you_mean(suffix, known)} "
+            f"(there are {listing(known)})"
+        )
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with styled():
+            figure.savefig(path, format=suffix)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise PlotError(f"{path}: cannot write the picture: {reason}") from error

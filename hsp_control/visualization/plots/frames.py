@@ -15,10 +15,10 @@ from hsp_control.visualization import palette
 from hsp_control.visualization.plots.logged_geometry import (
     center_points,
     enclosing_points,
+    logged_obstacles,
     parents,
     task_paths,
 )
-from hsp_control.visualization.plots.obstacles import logged_obstacles
 from hsp_control.visualization.plots.views import View, fit, view_of
 from hsp_control.visualization.plots.world_drawing import (
     draw_axis_directions,
@@ -27,24 +27,12 @@ from hsp_control.visualization.plots.world_drawing import (
     draw_skeleton,
 )
 
-_NEAR = 0.035
-"""Width and height of a letter of a number, over the size of the scene."""
-MAX_TICKS = 10
-"""With more frames, their times are not the ticks of the time scale."""
+_NEAR = 0.035  # width and height of a letter of a number, over the size of the scene
+MAX_TICKS = 10  # with more frames, their times are not the ticks of the time scale
 
 
 def draw_frame(axes: Axes, rollout: Rollout, row: int, *, key: bool = True) -> None:
-    """Draw the robot and the obstacles at one row, and the tasks' whole desired paths.
-
-    Planar motion is drawn in its plane, spatial motion in an oblique view with a shadow
-    on the floor.
-
-    Args:
-        axes: The axes.
-        rollout: The log.
-        row: The row.
-        key: In an oblique view, draw the directions of the world's axes and a scale.
-    """
+    """Draw robot and obstacles at one row, and the desired paths; ``key``: a scale."""
     scene = _Scene.of(rollout)
     skeleton, tree = rollout["skeleton"][row], parents(rollout)
     if not scene.view.names:
@@ -61,13 +49,7 @@ def draw_frame(axes: Axes, rollout: Rollout, row: int, *, key: bool = True) -> N
 
 
 def draw_frames(axes: Sequence[Axes], rollout: Rollout, rows: Sequence[int]) -> None:
-    """Draw numbered frames side by side; unused axes are switched off.
-
-    Args:
-        axes: One for each row, in reading order.
-        rollout: The log.
-        rows: The rows.
-    """
+    """Draw numbered frames side by side; unused axes are switched off."""
     for place, one in enumerate(axes):
         if place < len(rows):
             draw_frame(one, rollout, rows[place], key=False)
@@ -81,14 +63,7 @@ def draw_frames(axes: Sequence[Axes], rollout: Rollout, rows: Sequence[int]) -> 
 def draw_superimposed(
     axes: Axes, rollout: Rollout, rows: Sequence[int], *, numbered: bool = True
 ) -> None:
-    """Draw the robot at all rows in one plot; later rows are darker.
-
-    Args:
-        axes: The axes.
-        rollout: The log.
-        rows: The rows.
-        numbered: Write the frames' numbers at the robot's end.
-    """
+    """Draw the robot at all rows in one plot; later rows are darker."""
     scene, tree = _Scene.of(rollout), parents(rollout)
     _draw_paths(axes, scene.view, rollout, 2.2)
     times = rollout.t[list(rows)]
@@ -116,14 +91,7 @@ def draw_superimposed(
 
 
 def columns_for(rollout: Rollout, count: int, width: float, height: float) -> int:
-    """Return the number of columns for which the frames are largest.
-
-    Args:
-        rollout: The log.
-        count: Number of frames.
-        width: Width of the available space, in any unit.
-        height: Its height, in the same unit.
-    """
+    """Return the number of columns for which the frames are largest."""
     scene = _Scene.of(rollout)
     page = scene.view.project(scene.shown(shadows=True))
     w, h = (float(np.ptp(coordinate)) + 1e-9 for coordinate in page)
@@ -137,17 +105,11 @@ def columns_for(rollout: Rollout, count: int, width: float, height: float) -> in
 
 
 class _Scene(NamedTuple):
-    """View, extent and floor that all frames of a log share.
-
-    Attributes:
-        view: The view.
-        points: Points that enclose robot, paths and obstacles [m], shape (K, 3).
-        floor: Height of the floor [m]: 0, or that of the lowest point below it.
-    """
+    """View, extent and floor that all frames of a log share."""
 
     view: View
-    points: Array
-    floor: float
+    points: Array  # points that enclose robot, paths and obstacles [m], (K, 3)
+    floor: float  # height of the floor [m]: 0, or that of the lowest point below it
 
     @classmethod
     def of(cls, rollout: Rollout) -> Self:
@@ -185,14 +147,7 @@ class _Scene(NamedTuple):
 def _numbers(
     view: View, rollout: Rollout, rows: Sequence[int], near: float
 ) -> Iterator[tuple[int, str]]:
-    """Yield a row and its frames' numbers; numbers that would overlap are one text.
-
-    Args:
-        view: The view.
-        rollout: The log.
-        rows: The frames' rows.
-        near: Width and height of a letter on the page [m].
-    """
+    """Yield a row and its frames' numbers; numbers that would overlap are one text."""
     ends = np.column_stack(view.project(rollout["skeleton"][list(rows), -1]))
     groups: list[list[int]] = []
     for place in range(len(rows)):

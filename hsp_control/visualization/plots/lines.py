@@ -1,14 +1,64 @@
-"""Curves over time: colours and names of lines, log scales, marked intervals."""
+"""Curves, their colours and names, log scales, marked intervals, and legends."""
 
 from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.transforms import ScaledTranslation
 
 from hsp_control.common.arrays import Array
 from hsp_control.simulation import Rollout
 from hsp_control.visualization import palette
-from hsp_control.visualization.plots.legends import literal_text, note
+
+_HANDLE, _GAP, _LETTER = 2.2, 1.3, 0.55
+"""Widths in a legend over its font size: handle, gap of columns, mean letter."""
+
+
+def legend_below(axes: Axes) -> None:
+    """Add a legend of all labelled artists, if there are any, below the axes."""
+    handles, labels = axes.get_legend_handles_labels()
+    if not handles:
+        return
+    figure = axes.get_figure(root=False)
+    # Height of the tick labels below the axes [pt].
+    drop = 32.0 if axes.axison else 22.0
+    below = ScaledTranslation(0.0, -drop / 72.0, figure.dpi_scale_trans)  # type: ignore[union-attr]
+    axes.legend(
+        handles,
+        labels,
+        loc="upper left",
+        bbox_to_anchor=(0.0, 0.0),
+        bbox_transform=axes.transAxes + below,
+        ncols=_fitting(axes, labels),
+    )
+
+
+def note(axes: Axes, text: str) -> None:
+    """Add a note to the legend; call it before `legend_below`."""
+    axes.plot([], [], linestyle="none", label=text)
+
+
+def literal_text(name: str) -> str:
+    """Return a text that matplotlib shows as it is, also with $ or a leading _."""
+    shown = name.replace("$", r"\$")
+    return f" {shown}" if shown.startswith("_") else shown
+
+
+def _fitting(axes: Axes, labels: Sequence[str]) -> int:
+    """Return how many columns fit below the axes; entries run down the columns."""
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    width = axes.get_window_extent().width / figure.dpi * 72.0 / 8.0 * 1.1
+    for columns in range(len(labels), 1, -1):
+        rows = -(-len(labels) // columns)
+        wide = sum(
+            max(map(len, labels[start : start + rows])) * _LETTER + _HANDLE + _GAP
+            for start in range(0, len(labels), rows)
+        )
+        if wide - _GAP <= width:
+            return -(-len(labels) // rows)
+    return 1
+
 
 MAX_NAMED, SELECTED = 14, 7
 """Of more than 14 lines, only the 7 that vary most get a colour and a name."""
@@ -22,18 +72,10 @@ def draw_lines(
     names: Sequence[str],
     units: Sequence[str] | None = None,
 ) -> str:
-    """Draw one line per column, with names in the legend.
+    """Draw one line per column, named in the legend; return the units of what is drawn.
 
-    Args:
-        axes: The axes.
-        t: Time [s], shape (N,).
-        values: Shape (N, k).
-        names: The columns' names.
-        units: The columns' units. If the named lines differ in them, names tell them;
-            lines without a name are drawn only if they share a unit with named ones.
-
-    Returns:
-        The units of what is drawn, for the axis; "" without units.
+    If the named lines differ in their units, names tell them; lines without a name are
+    drawn only if they share a unit with named ones. Shapes: t (N,), values (N, k).
     """
     units = list(units or [""] * len(names))
     named, others = list(range(len(names))), []
@@ -73,13 +115,7 @@ def time_axis(axes: Axes, t: Array) -> None:
 
 
 def log_scale(axes: Axes, values: Array, *, top: float = 0.0) -> None:
-    """Make the y axis logarithmic, with limits around the positive finite values.
-
-    Args:
-        axes: The axes.
-        values: The drawn values.
-        top: Minimum upper end of the axis, so that rounding errors do not fill it.
-    """
+    """Make the y axis logarithmic, up to ``top`` at least: rounding looks small."""
     floor = 1e-17  # values up to it are rounding errors and do not extend the axis
     shown = values[np.isfinite(values) & (values > floor)]
     highest = max(float(shown.max(initial=floor)), top)
@@ -105,12 +141,7 @@ def mark_damped(axes: Axes, rollout: Rollout) -> None:
 
 
 def mark_frames(axes: Axes, times: Array) -> None:
-    """Mark the times of frames with their numbers, from 1, at the upper edge.
-
-    Args:
-        axes: The axes, of curves over time.
-        times: The frames' times [s].
-    """
+    """Mark the times of frames with their numbers, from 1, at the upper edge."""
     upper = axes.secondary_xaxis("top")
     few = len(times) <= MAX_NAMED
     upper.set_xticks(

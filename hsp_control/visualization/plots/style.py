@@ -67,8 +67,7 @@ STYLE: dict[str, Any] = {
     "ytick.minor.size": 1.5,
 }
 
-NOTEBOOK_DPI = 100.0
-"""Dots per inch of figures in notebooks, which store them as text."""
+NOTEBOOK_DPI = 100.0  # dots per inch of figures in notebooks, which store them as text
 
 
 @contextmanager
@@ -79,19 +78,12 @@ def styled() -> Iterator[None]:
 
 
 def use_style() -> None:
-    """Set matplotlib's parameters to `STYLE` permanently, in a notebook or script.
-
-    Figures made with pyplot then look like those of this package.
-    """
+    """Set matplotlib's parameters to `STYLE` permanently, in a notebook or script."""
     mpl.rcParams.update(STYLE)  # type: ignore[arg-type]  # any str may be a key
 
 
 class StyledFigure(Figure):
-    """A figure that is always drawn in the style, also outside of `styled`.
-
-    Matplotlib creates ticks at the first drawing, with the parameters of that time.
-    In a notebook, the figure is displayed as the value of a cell.
-    """
+    """A figure that is drawn in the style outside of `styled` too: ticks come late."""
 
     def _repr_png_(self) -> bytes:
         """Return the figure as PNG, for notebooks."""

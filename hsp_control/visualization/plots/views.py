@@ -8,22 +8,15 @@ from matplotlib.axes import Axes
 
 from hsp_control.common.arrays import Array
 
-FLAT = 1e-6
-"""Depth over width below which motion counts as planar."""
-AZIMUTH, ELEVATION = -60.0, 22.0
-"""Direction of the eye in an oblique view [deg]."""
+FLAT = 1e-6  # depth over width below which motion counts as planar
+AZIMUTH, ELEVATION = -60.0, 22.0  # direction of the eye in an oblique view [deg]
 
 
 class View(NamedTuple):
-    """A parallel projection onto the figure's plane.
+    """A parallel projection onto the figure's plane."""
 
-    Attributes:
-        rows: The projection matrix, shape (2, 3).
-        names: The world axes of the plane, such as ``"xy"``; "" for an oblique view.
-    """
-
-    rows: Array
-    names: str
+    rows: Array  # the projection matrix, (2, 3)
+    names: str  # the world axes of the plane, such as ``"xy"``; "" for an oblique view
 
     def project(self, points: Array) -> tuple[Array, Array]:
         """Return x and y in the figure's plane, each of shape ``points.shape[:-1]``."""
@@ -45,50 +38,28 @@ def oblique() -> View:
 
 
 def best_plane(points: Array) -> str:
-    """Return the two world axes with the largest spread of points, such as ``"xy"``.
-
-    Args:
-        points: Shape (K, 3).
-    """
+    """Return the two world axes with the largest spread of points, such as ``"xy"``."""
     spread = np.ptp(points, axis=0)
-    depth = 2 - int(
-        np.argmin(spread[::-1])
-    )  # the last axis of those with the smallest spread
+    # The last axis of those with the smallest spread.
+    depth = 2 - int(np.argmin(spread[::-1]))
     return "xyz".replace("xyz"[depth], "")
 
 
 def is_flat(points: Array, depth: float = FLAT) -> bool:
-    """Return whether points lie in a plane normal to a world axis.
-
-    Args:
-        points: Shape (K, 3).
-        depth: Maximum depth over width of flat points.
-    """
+    """Return whether points lie in a plane normal to a world axis; points (K, 3)."""
     spread = np.ptp(points, axis=0)
     return bool(spread.min() <= depth * spread.max())
 
 
 def view_of(points: Array) -> View:
-    """Return the view onto the plane of flat points, or else the oblique view.
-
-    Args:
-        points: Shape (K, 3).
-    """
+    """Return the view onto the plane of flat points, or else the oblique view."""
     return plane(best_plane(points)) if is_flat(points) else oblique()
 
 
 def fit(
     axes: Axes, view: View, points: Array, min_width: float = 0.0, margin: float = 0.06
 ) -> None:
-    """Set the limits around points, equal scales, and labels of world axes.
-
-    Args:
-        axes: The axes.
-        view: The view.
-        points: The points to show [m], shape (K, 3).
-        min_width: Minimum width [m], so that rounding errors are not magnified.
-        margin: Margin around the points, over the larger width.
-    """
+    """Set limits around points (K, 3) [m], equal scales, and the axes' labels."""
     x, y = view.project(points)
     widest = max(float(np.ptp(x)), float(np.ptp(y)), min_width, 1e-6)
     for set_limits, coordinate in ((axes.set_xlim, x), (axes.set_ylim, y)):

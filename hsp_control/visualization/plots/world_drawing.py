@@ -9,7 +9,7 @@ from matplotlib.patches import Circle, Polygon
 
 from hsp_control.common.arrays import Array
 from hsp_control.visualization import palette
-from hsp_control.visualization.plots.obstacles import LoggedObstacle
+from hsp_control.visualization.plots.logged_geometry import LoggedObstacle
 from hsp_control.visualization.plots.views import View
 
 
@@ -23,19 +23,7 @@ def draw_skeleton(
     joint: str = palette.JOINT,
     zorder: float = 3.0,
 ) -> None:
-    """Draw a robot: links from every point to its parent; joints, roots and ends.
-
-    Joints and ends are circles, roots are squares.
-
-    Args:
-        axes: The axes.
-        view: The view.
-        points: The skeleton at one time [m], shape (K, 3).
-        parents: Index of every point's parent, -1 for none.
-        link: Colour of the links.
-        joint: Colour of joints and roots, and of the edge of ends.
-        zorder: Drawing order: higher is in front.
-    """
+    """Draw links from every point (K, 3) [m] to its parent, joints, roots and ends."""
     width = 3.0  # of the links [pt]
     axes.plot(
         *view.project(link_segments(points, parents)),
@@ -69,15 +57,7 @@ def draw_skeleton(
 def draw_shadow(
     axes: Axes, view: View, points: Array, parents: Sequence[int], floor: float
 ) -> None:
-    """Draw a robot's shadow on the floor, and a vertical line from each root.
-
-    Args:
-        axes: The axes.
-        view: The view.
-        points: The skeleton at one time [m], shape (K, 3).
-        parents: Index of every point's parent, -1 for none.
-        floor: The floor's height [m].
-    """
+    """Draw a robot's shadow on the floor, and a vertical line from each root."""
     projected = points.copy()
     projected[:, 2] = floor
     axes.plot(
@@ -108,20 +88,7 @@ def draw_obstacle(
     zorder: float = 2.0,
     label: str | None = None,
 ) -> None:
-    """Draw an obstacle's outline; a half-space only if it is seen edge-on.
-
-    An obstacle larger than the robot is drawn without filling, behind everything.
-
-    Args:
-        axes: The axes.
-        view: The view.
-        obstacle: The obstacle.
-        row: The row.
-        color: Its colour.
-        filled: False: a dashed outline, as for a bounding ball.
-        zorder: Drawing order: higher is in front.
-        label: Its name in the legend; None: no entry.
-    """
+    """Draw an obstacle's outline; a half-space only if it is seen edge-on."""
     patch_style: dict[str, Any] = {
         "facecolor": "none"
         if obstacle.oversized or not (filled and obstacle.exact)
@@ -161,14 +128,7 @@ def _draw_half_space(
 
 
 def draw_axis_directions(axes: Axes, view: View, origin: Array, length: float) -> None:
-    """Draw the world's axes as three lines of a round length, with that length.
-
-    Args:
-        axes: The axes.
-        view: The view.
-        origin: Their origin [m], shape (3,).
-        length: Their maximum length [m].
-    """
+    """Draw the world's axes as three lines of a round length, with that length."""
     power = 10.0 ** np.floor(np.log10(length))
     size = max(digit * power for digit in (1.0, 2.0, 5.0) if digit * power <= length)
     for axis, name in enumerate("xyz"):

@@ -6,7 +6,7 @@ from hsp_control.config.view_settings import ViewSettings as ViewSettings
 from .comparison import ComparedRun as ComparedRun
 from .export_page import export_html as export_html
 from .live import LiveView as LiveView
-from .offline.inline import InlineView as InlineView
+from .offline.page import InlineView as InlineView
 from .recorder import Recorder as Recorder
 from .replay import robot_of as robot_of
 from .replay import show as show

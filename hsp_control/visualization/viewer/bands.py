@@ -24,32 +24,18 @@ _LIMITED = 2  # the log's status from which on a limit changes the motion
 
 
 class Band(NamedTuple):
-    """When something that the law reacts to is active.
+    """When something that the law reacts to is active."""
 
-    Attributes:
-        name: Its name before a time, such as ``limit active``.
-        caption: What is shown while the time is inside: ``a limit is active``.
-        color: Its colour, ``#RRGGBB``.
-        spans: Its intervals [s], ascending and apart.
-    """
-
-    name: str
-    caption: str
-    color: str
-    spans: list[tuple[float, float]]
+    name: str  # its name before a time, such as ``limit active``
+    caption: str  # what is shown while the time is inside: ``a limit is active``
+    color: str  # its colour, ``#RRGGBB``
+    spans: list[tuple[float, float]]  # its intervals [s], ascending and apart
 
 
 def bands_of(
     rollout: Rollout, controller: Controller | None, *, duration: float | None = None
 ) -> list[Band]:
-    """Return the bands of a run, without those that have no interval.
-
-    Args:
-        rollout: The run, or a part of it: all of its rows.
-        controller: Its controller: only it knows from which distance on a clearance
-            field acts; None: no such bands.
-        duration: The time that the whole run takes [s]; None: that of the rows.
-    """
+    """Return the bands of a run, without those that have no interval."""
     times = rollout.t
     whole = float(times[-1] - times[0]) if duration is None else duration
     bands = [
@@ -62,13 +48,7 @@ def bands_of(
 def spans_of(
     times: Array, active: NDArray[np.bool_], closed: float = 0.0
 ) -> list[tuple[float, float]]:
-    """Return the intervals in which rows are active; each row lasts until the next.
-
-    Args:
-        times: The rows' times [s], ascending, shape (N,).
-        active: Whether each row is active, shape (N,).
-        closed: Gaps up to this length are closed [s].
-    """
+    """Return the intervals in which rows are active; each row lasts until the next."""
     edges = np.diff(np.concatenate([[False], active, [False]]).astype(np.int8))
     starts = times[np.flatnonzero(edges > 0)].tolist()
     stops = times[np.flatnonzero(edges < 0).clip(max=len(times) - 1)].tolist()

@@ -10,10 +10,7 @@ _log = logging.getLogger(__name__)
 
 
 def open_browser(url: str) -> bool:
-    """Open a page in the user's browser; return whether there is one.
-
-    Logs a warning if there is none.
-    """
+    """Open a page in the user's browser; return whether there is one."""
     reason = _why_not()
     if reason is not None:
         _log.warning("%s; the view is at %s", reason, url)

@@ -17,38 +17,24 @@ from hsp_control.visualization.viewer.commands import (
 
 
 class Track(NamedTuple):
-    """The animation of one property of one node.
-
-    Attributes:
-        path: The node.
-        property: ``position`` [m], ``quaternion`` (x, y, z, w), ``scale``, ``color``,
-            ``opacity``, ``visible`` or ``length``; see ``page/player.js``.
-        times: Times [s], ascending, shape (n,).
-        values: One row per time, shape (n, k).
-    """
+    """The animation of one property of one node."""
 
     path: str
+    # ``position`` [m], ``quaternion`` (x, y, z, w), ``scale``, ``color``, ``opacity``,
+    # ``visible`` or ``length``; see ``page/player.js``.
     property: str
-    times: Array
-    values: Array
+    times: Array  # times [s], ascending, (n,)
+    values: Array  # one row per time, (n, k)
 
 
 class Clip(NamedTuple):
-    """The animation of the scene from a start to an end.
+    """The animation of the scene from a start to an end."""
 
-    Attributes:
-        start: First time that can be shown [s].
-        end: Last time that can be shown [s].
-        tracks: The animated properties.
-        horizon: The end of the complete clip [s]; None: ``end``.
-        bands: What the time line marks.
-    """
-
-    start: float
-    end: float
+    start: float  # first time that can be shown [s]
+    end: float  # last time that can be shown [s]
     tracks: list[Track]
-    horizon: float | None = None
-    bands: Sequence[Band] = ()
+    horizon: float | None = None  # the end of the complete clip [s]; None: ``end``
+    bands: Sequence[Band] = ()  # what the time line marks
 
     @property
     def open(self) -> bool:
@@ -64,15 +50,7 @@ def set_clip(
     speed: float = 1.0,
     keep: bool = False,
 ) -> list[Command]:
-    """Return the commands that replace the current clip.
-
-    Args:
-        clip: The clip.
-        play: Start playing at once.
-        loop: Repeat the clip.
-        speed: Seconds of the clip per second of real time.
-        keep: Keep the time, speed and state of the clip that is shown now, if any.
-    """
+    """Return the commands that replace the current clip."""
     begin = clip_command(
         "clip",
         "begin",
@@ -92,12 +70,7 @@ def remove_clip() -> list[Command]:
 
 
 def extend_clip(clip: Clip, number: int) -> Command:
-    """Return the command that appends a clip to the current one.
-
-    Args:
-        clip: The part to append.
-        number: The number of this part, counted from 1 after `set_clip`.
-    """
+    """Return the command that appends a clip to the current one."""
     return clip_command("clip", f"more {number}", **_fields(clip), begins=False)
 
 

@@ -18,20 +18,14 @@ PLOTS = "/plots"
 
 
 class Command(NamedTuple):
-    """One command for the page.
+    """One command for the page."""
 
-    Attributes:
-        path: The node of the scene tree that it changes.
-        key: The property that it sets, see `key_of`; a later command with the same key
-            replaces it.
-        packed: The command itself, a map in MessagePack.
-        deletes: Whether it deletes the node and all nodes below it.
-    """
-
-    path: str
+    path: str  # the node of the scene tree that it changes
+    # The property that it sets, see `key_of`; a later command with the same key
+    # replaces it.
     key: str
-    packed: bytes
-    deletes: bool = False
+    packed: bytes  # the command itself, a map in MessagePack
+    deletes: bool = False  # whether it deletes the node and all nodes below it
 
     def keep_in(self, scene: LatestCommands) -> None:
         """Store it in a scene, or remove there what it deletes."""
@@ -60,33 +54,14 @@ def set_property(path: str, name: str, value: Any) -> Command:
 
 
 def set_ghost(path: str, color: str, opacity: float) -> Command:
-    """Return the command that makes a node a ghost: tinted and translucent.
-
-    Args:
-        path: The node; all nodes below it are included.
-        color: The tint, ``#RRGGBB``.
-        opacity: 1 solid, 0 invisible.
-    """
+    """Return the command that makes a node a ghost: tinted and translucent."""
     return _command("ghost", path, "ghost", color=color, opacity=float(opacity))
 
 
 def set_trail(
-    path: str,
-    points: Array,
-    radius: float,
-    color: int,
-    *,
-    sleeve: bool = False,
+    path: str, points: Array, radius: float, color: int, *, sleeve: bool = False
 ) -> Command:
-    """Return the command that sets a node's object to a path in space, a tube.
-
-    Args:
-        path: The node.
-        points: The path [m], shape (N, 3).
-        radius: The tube's radius [m].
-        color: Its colour as a number, see `color_number`; the same in any light.
-        sleeve: Draw only the back faces, so that it never hides its content.
-    """
+    """Return the command that sets a node's object to a path in space, a tube."""
     return _command(
         "trail",
         path,
@@ -99,23 +74,13 @@ def set_trail(
 
 
 def extend_trail(path: str, points: Array, number: int) -> Command:
-    """Return the command that appends points to a path.
-
-    Args:
-        path: The node.
-        points: The points [m], shape (N, 3).
-        number: The number of this extension: each has its own key.
-    """
+    """Return the command that appends points to a path; points (N, 3) [m]."""
     more = typed_array(points, np.float32)
     return _command("trail_more", path, f"more {number}", points=more)
 
 
 def set_length_label(path: str) -> Command:
-    """Return the command that labels a bar with its length [m], however it moves.
-
-    Args:
-        path: The node of a bar of length 1 along z: its scale in z is its length.
-    """
+    """Return the command that labels a bar along z with its length [m]."""
     return _command("length_label", path, "length label")
 
 
@@ -132,13 +97,7 @@ def set_camera(**view: Any) -> Command:
 def set_caption(
     title: str, legend: list[LegendEntry], *, dark: bool = False
 ) -> Command:
-    """Return the command that sets the title and the legend beside the scene.
-
-    Args:
-        title: The title.
-        legend: Its rows; each is also a switch.
-        dark: Whether the background is dark.
-    """
+    """Return the command that sets the title and the legend beside the scene."""
     entries = [{**entry._asdict(), "paths": list(entry.paths)} for entry in legend]
     return _command(
         "caption", CAPTION, "caption", title=title, legend=entries, dark=dark
@@ -161,32 +120,18 @@ def clip_command(kind: str, name: str, **fields: Any) -> Command:
 
 
 def play_command(kind: str, name: str, **fields: Any) -> Command:
-    """Return a command for a page that is played with: see `hsp_control.play`.
-
-    Args:
-        kind: What it is, such as ``play_setup``; see ``page/play.js``.
-        name: What it replaces: an earlier command of the same name.
-        fields: What it says.
-    """
+    """Return a command for a page that is played with: see `hsp_control.play`."""
     return _command(kind, PLAY, name, **fields)
 
 
 def forget_clip() -> Command:
-    """Return the command that drops the clip and its extensions from the scene.
-
-    A page that shows the clip continues until another clip, or ``still``, follows.
-    """
+    """Return the command that drops the clip from the scene; a page still plays on."""
     packed = umsgpack.packb({"type": "nothing", "path": CLIP})
     return Command(CLIP, key_of(CLIP, "nothing"), packed, deletes=True)
 
 
 def set_plots(plots: Json, arrays: list[Json]) -> Command:
-    """Return the command that shows plots beside the scene, in place of earlier ones.
-
-    Args:
-        plots: The plots, as ``packed/plot_packing.py`` packs them.
-        arrays: The packed arrays to which they refer.
-    """
+    """Return the command that shows plots in place of earlier ones."""
     return _command("plots", PLOTS, "plots", plots=plots, arrays=arrays)
 
 
@@ -201,12 +146,7 @@ def seek(time: float) -> Command:
 
 
 def typed_array(values: Any, dtype: type[np.generic]) -> umsgpack.Ext:
-    """Return numbers as one of JavaScript's typed arrays.
-
-    Args:
-        values: The numbers, of any shape.
-        dtype: ``uint8``, ``uint32``, ``float32`` or ``float64``.
-    """
+    """Return numbers as one of JavaScript's typed arrays."""
     kinds: dict[Any, int] = {
         np.uint8: 0x12,
         np.uint32: 0x16,

@@ -11,12 +11,12 @@ from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
 from hsp_control.visualization import palette
 from hsp_control.visualization.viewer.appearance import ACTUAL
+from hsp_control.visualization.viewer.arrows import SelfMotion
 from hsp_control.visualization.viewer.bands import Band, bands_of
 from hsp_control.visualization.viewer.clip import Clip
 from hsp_control.visualization.viewer.commands import Command, set_ghost, set_transform
 from hsp_control.visualization.viewer.legend import LegendEntry, merged
 from hsp_control.visualization.viewer.motion import motion_of
-from hsp_control.visualization.viewer.poses import pose_at
 from hsp_control.visualization.viewer.robot_drawing import RobotDrawing
 from hsp_control.visualization.viewer.run_drawing import (
     LAYERS,
@@ -25,15 +25,13 @@ from hsp_control.visualization.viewer.run_drawing import (
     ghost_layers,
 )
 from hsp_control.visualization.viewer.scene_path import path_element
-from hsp_control.visualization.viewer.self_motion import SelfMotion
 from hsp_control.visualization.viewer.stage import in_sight
+from hsp_control.visualization.viewer.threejs import pose_at
 
 GHOSTS = (palette.TASK, palette.SERIES[4], palette.WARNING)
 """Colours of the second run, the third and so on."""
-GHOST_OPACITY = 0.38
-"""Opacity of a ghost."""
-_GAP = 0.35
-"""Gap between two robots, over the width of one."""
+GHOST_OPACITY = 0.38  # opacity of a ghost
+_GAP = 0.35  # gap between two robots, over the width of one
 
 
 class ComparedRun(NamedTuple):
@@ -53,11 +51,7 @@ class ComparedRun(NamedTuple):
 
 
 class Comparison:
-    """Several runs that are played together, on one time axis.
-
-    Attributes:
-        roots: The root node of each run; "" for the first.
-    """
+    """Several runs that are played together, on one time axis."""
 
     def __init__(
         self,
@@ -69,18 +63,7 @@ class Comparison:
         dark: bool,
         ghosts: bool = True,
     ) -> None:
-        """Read the logs.
-
-        Args:
-            drawing: The first robot in the scene; the others are drawn here.
-            runs: The runs.
-            shown: Whether each layer is shown initially.
-            beside: The direction in which the runs stand side by side, a unit vector of
-                shape (3,); None: overlaid, all but the first as ghosts.
-            dark: Whether the background is dark.
-            ghosts: Whether overlaid runs after the first are ghosts, with no more than
-                their paths; else each has all layers, for a page with a switch.
-        """
+        """Read the logs."""
         self._names = [run.name for run in runs]
         self.roots = run_roots(self._names)
         self._beside = beside

@@ -21,21 +21,14 @@ def terms_of_type(field: NullSpaceField, kind: type[_Term]) -> Iterator[_Term]:
 
 
 def from_the_start(controller: Controller) -> Controller:
-    """Return the controller as it is before a run; its changes are all ahead.
-
-    A controller forgets changes that are complete, but the rows of a run begin before.
-    """
+    """Return the controller as it is before a run; its changes are all ahead."""
     if not controller.changes and not any(t.remembers for t in controller.tasks):
         return controller
     return controller.preview()
 
 
 def null_space_projector(controller: Controller, state: RobotState) -> Array:
-    """Return the null-space projector P = I - J#J in the metric W, shape (nv, nv).
-
-    J stacks the Jacobians of all contacts and tasks that are active at the state's
-    time, and J# = W⁻¹Jᵀ(J W⁻¹Jᵀ)⁻¹. Where J loses rank, J# is the pseudo-inverse.
-    """
+    """Return P = I - J#J in the metric W, (nv, nv), J of all that is active."""
     own = controller.state.update(state.t, state.q, state.v)  # of the same robot object
     J = controller.stack(own).jacobian
     nv = controller.robot.nv

@@ -14,9 +14,9 @@ from hsp_control.visualization.viewer.appearance import ELLIPSOID, ELLIPSOID_OPA
 from hsp_control.visualization.viewer.clip import Track
 from hsp_control.visualization.viewer.commands import Command, set_object
 from hsp_control.visualization.viewer.legend import LegendEntry, translucent
-from hsp_control.visualization.viewer.materials import material
 from hsp_control.visualization.viewer.motion import Motion
 from hsp_control.visualization.viewer.scene_path import path_element
+from hsp_control.visualization.viewer.threejs import material
 
 SECONDS = 0.2
 """A semi-axis is the hand's travel in this time at a joint speed of norm 1 [s]."""
@@ -70,14 +70,7 @@ class Ellipsoid:
 
 
 def principal_axes(J: Array, last: Array) -> tuple[Array, Array]:
-    """Return the principal axes of {J v : |v| = 1} as a rotation, and the semi-axes.
-
-    Order and signs of the axes are chosen for the smallest rotation from ``last``.
-
-    Args:
-        J: Linear Jacobian, shape (3, nv).
-        last: The previous rotation, shape (3, 3).
-    """
+    """Return the axes of {J v : |v| = 1}, nearest to ``last``, and semi-axes."""
     axes, lengths, _ = np.linalg.svd(J)
     padded = np.zeros(3)
     padded[: len(lengths)] = lengths

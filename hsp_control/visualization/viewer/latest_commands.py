@@ -8,21 +8,12 @@ _STAGE = {"Background", "camera", "caption", "floor", "lights"}
 
 
 def key_of(path: str, name: str) -> str:
-    """Return the key of a command that sets the property ``name`` of the node ``path``.
-
-    Args:
-        path: The node's path in the scene tree.
-        name: The property, such as ``object`` or ``transform``.
-    """
+    """Return the key of a command that sets a property of a node."""
     return f"{path}{_SEPARATOR}{name}"
 
 
 class LatestCommands:
-    """Packed commands by key, oldest first.
-
-    Replayed in order they build the whole scene, however long it has been moving. A
-    page that opens late receives all of them; a slow page skips outdated ones.
-    """
+    """Packed commands by key, oldest first: replayed in order they build the scene."""
 
     def __init__(self) -> None:
         """Start without commands."""
@@ -62,10 +53,7 @@ class LatestCommands:
         return other
 
     def stage(self) -> list[bytes]:
-        """Return the packed commands that a page can show without waiting for meshes.
-
-        Title, status, background, lights, floor, camera, and where all nodes are.
-        """
+        """Return the packed commands that a page shows without waiting for meshes."""
         return [
             packed
             for path, name, packed in self.items()

@@ -5,21 +5,14 @@ from typing import NamedTuple
 
 
 class LegendEntry(NamedTuple):
-    """One row of the legend, and the switch of what it names.
-
-    Attributes:
-        name: What is seen.
-        color: Its colour, ``#RRGGBB`` or, if it is translucent, ``#RRGGBBAA``.
-        paths: The nodes of the scene tree that the row shows and hides.
-        shown: Whether they are shown at first.
-        plain: Whether the row is only a switch, as what it names explains itself: films
-            leave it out.
-    """
+    """One row of the legend, and the switch of what it names."""
 
     name: str
-    color: str
-    paths: tuple[str, ...]
-    shown: bool = True
+    color: str  # its colour, ``#RRGGBB`` or, if it is translucent, ``#RRGGBBAA``
+    paths: tuple[str, ...]  # the nodes of the scene tree that the row shows and hides
+    shown: bool = True  # whether they are shown at first
+    # Whether the row is only a switch, as what it names explains itself: films leave it
+    # out.
     plain: bool = False
 
 

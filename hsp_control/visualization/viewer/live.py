@@ -21,18 +21,12 @@ from hsp_control.visualization.viewer.run_drawing import RunDrawing, all_layers
 from hsp_control.visualization.viewer.run_plots import plots_so_far
 from hsp_control.visualization.viewer.viewer import Viewer
 
-MIN_PERIOD = 0.1
-"""Minimum time between two messages to the page [s]."""
-MAX_PERIOD = 1.0
-"""Maximum time between two messages [s]."""
-RATE_WINDOW = 2.0
-"""Time over which the computing rate is measured [s]."""
-DRAWING_SHARE = 0.03
-"""Maximum share of the computing time that drawing takes."""
-PLOTS_SHARE = 0.01
-"""Maximum share of the computing time that the plots take."""
-PLOTS_PERIOD = 1.0
-"""Minimum time between two pictures of the plots [s]."""
+MIN_PERIOD = 0.1  # minimum time between two messages to the page [s]
+MAX_PERIOD = 1.0  # maximum time between two messages [s]
+RATE_WINDOW = 2.0  # time over which the computing rate is measured [s]
+DRAWING_SHARE = 0.03  # maximum share of the computing time that drawing takes
+PLOTS_SHARE = 0.01  # maximum share of the computing time that the plots take
+PLOTS_PERIOD = 1.0  # minimum time between two pictures of the plots [s]
 _PREVIEW_ROWS = 60
 
 _log = logging.getLogger(__name__)
@@ -46,15 +40,7 @@ class LiveView:
     """
 
     def __init__(self, viewer: Viewer, experiment: Experiment) -> None:
-        """Show the robot at its start, the obstacles, and the desired paths.
-
-        Args:
-            viewer: The viewer, of the experiment's robot.
-            experiment: The experiment that will run.
-
-        Raises:
-            ViewerError: If the server has ended.
-        """
+        """Show the robot at its start, the obstacles, and the desired paths."""
         self._viewer = viewer
         self._experiment = experiment
         viewer.show(experiment.q0)
@@ -72,9 +58,8 @@ class LiveView:
         self._pieces = 0
         self._cost = 0.0  # s per drawn row
         self._next = self._next_plots = 0.0
-        self._marks: deque[tuple[float, float]] = (
-            deque()
-        )  # (wall time, time of the run)
+        # (wall time, time of the run).
+        self._marks: deque[tuple[float, float]] = deque()
         self._begin: float | None = None
         self._size = viewer.set_stage(self._run, experiment.scenario.title)
 
@@ -99,11 +84,7 @@ class LiveView:
         self._next = now + min(max(MIN_PERIOD, took / DRAWING_SHARE), MAX_PERIOD)
 
     def finish(self, rollout: Rollout) -> None:
-        """Replace the drawn rows by the whole run; the page keeps its time.
-
-        Raises:
-            ViewerError: If the server has ended.
-        """
+        """Replace the drawn rows by the whole run; the page keeps its time."""
         elapsed = time.perf_counter() - (self._begin or 0.0)
         rate = (rollout.t[-1] - rollout.t[0]) / max(elapsed, 1e-9)
         self._viewer.replace_run(

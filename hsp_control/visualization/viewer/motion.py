@@ -4,34 +4,70 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.robot import Robot, RobotState
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.log_series import drawn_parts, task_names
-from hsp_control.visualization.viewer.interpolation import (
-    interpolate_column,
-    interpolate_configuration,
-    interpolate_orientation,
-    row_position,
-)
 
-FINEST = 0.01
-"""Minimum time between two drawn rows [s]."""
+
+class RowPosition(NamedTuple):
+    """The position of a time between two rows of a log."""
+
+    row: int  # the row before the time
+    fraction: float  # the fraction of the way to the next row, from 0 to 1
+
+
+def row_position(t: Array, time: float) -> RowPosition:
+    """Return where a time lies between the rows of a log; t (N,) [s]."""
+    row = int(np.clip(np.searchsorted(t, time, side="right") - 1, 0, len(t) - 1))
+    if row == len(t) - 1 or time <= t[row]:
+        return RowPosition(row, 0.0)
+    return RowPosition(row, float((time - t[row]) / (t[row + 1] - t[row])))
+
+
+def interpolate_column(column: Array, position: RowPosition) -> Array:
+    """Return a column's value at a position, interpolated linearly between two rows."""
+    row, fraction = position
+    here: Array = column[row]
+    if fraction == 0.0:
+        return here
+    there: Array = column[row + 1]
+    return (1.0 - fraction) * here + fraction * there
+
+
+def interpolate_orientation(
+    quaternions: Array, position: RowPosition
+) -> pin.Quaternion:
+    """Return the orientation at a position, by slerp between two rows."""
+    row, fraction = position
+    start, end = (
+        pin.Quaternion(*quaternions[k, [3, 0, 1, 2]]).normalized()
+        for k in (row, min(row + 1, len(quaternions) - 1))
+    )
+    return start.slerp(fraction, end)
+
+
+def interpolate_configuration(robot: Robot, q: Array, position: RowPosition) -> Array:
+    """Return the configuration at a position, on the geodesic between two rows."""
+    row, fraction = position
+    here: Array = q[row]
+    if fraction == 0.0:
+        return here
+    return robot.integrate(here, fraction * robot.difference(here, q[row + 1]))
+
+
+FINEST = 0.01  # minimum time between two drawn rows [s]
 COARSEST = 1 / 30
 """Maximum time between two drawn rows [s]; the page interpolates linearly."""
 
 
 class Motion(NamedTuple):
-    """A robot's motion in a run.
-
-    Attributes:
-        robot: The robot.
-        rows: The rows to draw, as a log.
-    """
+    """A robot's motion in a run."""
 
     robot: Robot
-    rows: Rollout
+    rows: Rollout  # the rows to draw, as a log
 
     @property
     def times(self) -> Array:
@@ -56,19 +92,9 @@ class Motion(NamedTuple):
 
 
 def motion_of(
-    robot: Robot,
-    rollout: Rollout,
-    finest: float = FINEST,
-    coarsest: float = COARSEST,
+    robot: Robot, rollout: Rollout, finest: float = FINEST, coarsest: float = COARSEST
 ) -> Motion:
-    """Return the rows of a log that are drawn: thinned, or with interpolated rows.
-
-    Args:
-        robot: The robot.
-        rollout: The log.
-        finest: Minimum time between two rows [s].
-        coarsest: Maximum time between two rows [s].
-    """
+    """Return the rows of a log that are drawn: thinned, or with interpolated rows."""
     times = drawn_times(rollout.t, finest, coarsest)
     if len(times) == len(rollout.t) and np.array_equal(times, rollout.t):
         return Motion(robot, rollout)
@@ -113,11 +139,6 @@ def drawn_times(times: Array, finest: float, coarsest: float) -> Array:
     """Return the times to draw: a choice of the given ones, and times between them.
 
     The first and the last time are always included.
-
-    Args:
-        times: Ascending [s], shape (N,).
-        finest: Minimum time between two drawn times [s].
-        coarsest: Maximum time between two drawn times [s].
     """
     kept = [0]
     for row in range(1, len(times)):

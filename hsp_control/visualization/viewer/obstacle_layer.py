@@ -1,28 +1,89 @@
-"""The layer of a run's obstacles."""
+"""Draws obstacles, those of a scene or of a log, and the solids of a plant."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from hsp_control.common.arrays import Array
+from hsp_control.geometry.scene import Scene
+from hsp_control.geometry.shapes import Shape, shape_from_log
+from hsp_control.simulation.plants.mujoco.mjcf import Solid
+from hsp_control.visualization.viewer.appearance import OBSTACLE, SOLID
 from hsp_control.visualization.viewer.clip import Track
-from hsp_control.visualization.viewer.commands import Command, set_object
+from hsp_control.visualization.viewer.commands import Command, set_object, set_transform
 from hsp_control.visualization.viewer.legend import LegendEntry
 from hsp_control.visualization.viewer.motion import Motion
-from hsp_control.visualization.viewer.obstacle_drawing import (
-    enclosing_corners,
-    obstacle_legend,
-)
 from hsp_control.visualization.viewer.obstacle_shapes import logged_shape, obstacle
+from hsp_control.visualization.viewer.robot_drawing import robot_entry
 from hsp_control.visualization.viewer.scene_path import path_element
+
+ROOT = "/obstacles"
+_TOLD = 3  # number of obstacles that the legend names
+
+
+def enclosing_corners(shape: Shape, center: Array) -> list[Array]:
+    """Return the two corners of the box around a shape; none if it is unbounded."""
+    reach = shape.bounding_radius
+    if not np.isfinite(reach):
+        return []
+    return [center - reach, center + reach]
+
+
+def obstacle_legend(names: Iterable[str], root: str = ROOT) -> list[LegendEntry]:
+    """Return the legend of the obstacles: one entry, as all have the same colour."""
+    known = list(names)
+    if not known:
+        return []
+    told, more = known[:_TOLD], len(known) - _TOLD
+    word = "obstacle" if len(known) == 1 else "obstacles"
+    rest = f" and {more} more" if more > 0 else ""
+    return [LegendEntry(f"{word} {', '.join(told)}{rest}", OBSTACLE, (root,))]
+
+
+class ObstacleDrawing:
+    """The obstacles of a scene."""
+
+    def __init__(self, scene: Scene) -> None:
+        """Store the scene."""
+        self._scene = scene
+
+    def draw(self, size: float) -> Iterator[Command]:
+        """Yield the commands that draw it in a scene of the given size [m]."""
+        for item in self._scene.values():
+            yield set_object(_path(item.name), obstacle(item.shape, 4.0 * size))
+
+    def move(self, time: float) -> Iterator[Command]:
+        """Yield the commands that move the obstacles to a time [s]."""
+        for item in self._scene.values():
+            placement = item.placement(time).homogeneous
+            yield set_transform(_path(item.name), placement)
+
+    def points(self) -> Array:
+        """Return no points, shape (0, 3): the viewer knows the robot's."""
+        return np.zeros((0, 3))
+
+    def obstacle_points(self) -> Array:
+        """Return points that enclose the obstacles at the start [m], shape (K, 3)."""
+        corners = [
+            corner
+            for item in self._scene.values()
+            for corner in enclosing_corners(item.shape, item.placement(0.0).translation)
+        ]
+        return np.reshape(corners, (-1, 3))
+
+    def legend(self) -> list[LegendEntry]:
+        """Return the legend's entries."""
+        return [*obstacle_legend(self._scene), robot_entry()]
+
+
+def _path(name: str) -> str:
+    return f"{ROOT}/{path_element(name)}"
 
 
 class ObstacleLayer:
-    """The obstacles of a log.
-
-    Attributes:
-        shapes: The obstacles' shapes by name.
-    """
+    """The obstacles of a log."""
 
     def __init__(self, motion: Motion, root: str) -> None:
         """Read the log's obstacles."""
@@ -62,14 +123,82 @@ class ObstacleLayer:
 
 
 def obstacle_tracks(path: str, name: str, motion: Motion) -> Iterator[Track]:
-    """Yield the tracks of a node that follows a logged obstacle.
-
-    Args:
-        path: The node.
-        name: The obstacle's name.
-        motion: The run.
-    """
+    """Yield the tracks of a node that follows a logged obstacle."""
     yield Track(path, "position", motion.times, motion.rows[f"obstacle.{name}"])
     turns = f"obstacle.{name}.quaternion"
     if turns in motion.rows:
         yield Track(path, "quaternion", motion.times, motion.rows[turns])
+
+
+class _Drawn(NamedTuple):
+    """A solid, or one of its copies."""
+
+    path: str
+    shape: Shape
+    placement: pin.SE3  # where it is, or where it starts if it is loose
+    column: str  # where the log has its motion: the start of two columns' names
+
+
+class SolidLayer:
+    """The solids of the plant that a log names: fixed ones, and loose ones."""
+
+    def __init__(self, motion: Motion, root: str) -> None:
+        """Read the log's plant."""
+        self._root, self._rows = root, motion.rows
+        solids = solids_of(motion.rows.meta)
+        self.names = [solid.name for solid in solids]
+        self._drawn = [
+            _Drawn(
+                f"{root}/{path_element(geom)}",
+                solid.shape,
+                placed.placement,
+                f"plant.solid.{solid.name}" + (f"_{k + 1}" if k else ""),
+            )
+            for solid in solids
+            for k, (geom, placed) in enumerate(solid.geoms())
+        ]
+
+    def draw(self, size: float) -> Iterator[Command]:
+        """Yield the commands that draw it in a scene of the given size [m]."""
+        for each in self._drawn:
+            yield set_object(each.path, obstacle(each.shape, 4.0 * size, SOLID))
+            yield set_transform(each.path, each.placement.homogeneous)
+
+    def tracks(self, motion: Motion) -> Iterator[Track]:
+        """Yield the tracks of loose solids along the run."""
+        for each in self._drawn:
+            for what in ("position", "quaternion"):
+                if (name := f"{each.column}.{what}") in motion.rows:
+                    yield Track(each.path, what, motion.times, motion.rows[name])
+
+    def points(self) -> Array:
+        """Return points that enclose them in the run [m], shape (K, 3)."""
+        clouds = [np.zeros((0, 3))]
+        for each in self._drawn:
+            name = f"{each.column}.position"
+            moved = name in self._rows
+            center = self._rows[name] if moved else each.placement.translation
+            corners = enclosing_corners(each.shape, center)
+            clouds += [corner.reshape(-1, 3) for corner in corners]
+        return np.concatenate(clouds)
+
+    def legend(self) -> list[LegendEntry]:
+        """Return the legend's entry; none without solids."""
+        if not self.names:
+            return []
+        word = "solid" if len(self.names) == 1 else "solids"
+        return [LegendEntry(f"{word} {', '.join(self.names)}", SOLID, (self._root,))]
+
+
+def solids_of(meta: Mapping[str, Any]) -> list[Solid]:
+    """Return the solids of a log's plant."""
+    found = []
+    for entry in (meta.get("plant") or {}).get("solids", ()):
+        given = {key: entry[key] for key in _FIELDS if key in entry}
+        shape = dict(given["shape"])
+        given["shape"] = shape_from_log(shape.pop("type"), shape)
+        found.append(Solid(**given))
+    return found
+
+
+_FIELDS = ("name", "shape", "position", "rotation", "mass", "copies", "spacing")

@@ -14,8 +14,7 @@ from hsp_control.geometry.shapes import Shape, shape_from_log
 from hsp_control.visualization.viewer import threejs
 from hsp_control.visualization.viewer.appearance import OBSTACLE, OBSTACLE_OPACITY
 from hsp_control.visualization.viewer.commands import Json
-from hsp_control.visualization.viewer.materials import material
-from hsp_control.visualization.viewer.poses import pose_at
+from hsp_control.visualization.viewer.threejs import material, pose_at
 
 _CORNERS = np.array(list(product((-0.5, 0.5), repeat=3)))
 _FACES = np.array(
@@ -27,15 +26,7 @@ _FACES = np.array(
 
 
 def logged_shape(about: Mapping[str, Any]) -> Shape | None:
-    """Return the shape that a log describes, or else its bounding ball.
-
-    Args:
-        about: The obstacle's entry in the log: its ``shape``, its ``parameters`` and
-            the ``radius`` of its bounding ball, None if there is none.
-
-    Returns:
-        The shape; None if the log has neither a known shape nor a radius.
-    """
+    """Return the shape that a log describes, or its bounding ball, or None."""
     try:
         shape = shape_from_log(str(about.get("shape")), about.get("parameters", {}))
         if shape is not None:
@@ -48,13 +39,7 @@ def logged_shape(about: Mapping[str, Any]) -> Shape | None:
 
 
 def obstacle(shape: Shape, extent: float, color: str = OBSTACLE) -> Json:
-    """Return a shape as a three.js object.
-
-    Args:
-        shape: The shape.
-        extent: The edge of the square that shows a half-space [m].
-        color: Its colour.
-    """
+    """Return a shape as a three.js object."""
     surface = material(color, opacity=OBSTACLE_OPACITY, glow=0.3)
     pose = np.eye(4)
     match shape:
@@ -85,21 +70,13 @@ def obstacle(shape: Shape, extent: float, color: str = OBSTACLE) -> Json:
 
 
 def facets(vertices: Array, triangles: Indices) -> Json:
-    """Return flat-shaded triangles: each has its own vertices and normal.
-
-    Args:
-        vertices: Shape (n, 3) [m].
-        triangles: Indices of vertices, shape (k, 3).
-    """
+    """Return flat-shaded triangles: each has its own vertices and normal."""
     corners = vertices[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     normals /= np.where(lengths > 0.0, lengths, 1.0)
     return threejs.buffer_geometry(
-        {
-            "position": corners.reshape(-1, 3),
-            "normal": np.repeat(normals, 3, axis=0),
-        }
+        {"position": corners.reshape(-1, 3), "normal": np.repeat(normals, 3, axis=0)}
     )
 
 

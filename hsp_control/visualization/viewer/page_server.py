@@ -14,9 +14,11 @@ import asyncio
 import hmac
 import json
 import os
+import select
 import socket
 import struct
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
@@ -26,9 +28,96 @@ from tornado.web import Application, HTTPError, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
 from hsp_control.visualization.viewer.latest_commands import LatestCommands, key_of
-from hsp_control.visualization.viewer.message_batches import batch_messages
 from hsp_control.visualization.viewer.pipe_protocol import ASK, DELETE, Decoder, Record
-from hsp_control.visualization.viewer.steering import LONGEST, Steering
+
+_MAX_SIZE = 1_000_000  # bytes; the commands that move a robot are far smaller
+
+
+def batch_messages(commands: list[bytes]) -> list[bytes]:
+    """Return packed commands as messages, each an array in MessagePack."""
+    messages: list[bytes] = []
+    batch: list[bytes] = []
+    size = 0
+    for packed in commands:
+        if batch and size + len(packed) > _MAX_SIZE:
+            messages.append(_array(batch))
+            batch, size = [], 0
+        batch.append(packed)
+        size += len(packed)
+    return [*messages, _array(batch)] if batch else messages
+
+
+def _array(batch: list[bytes]) -> bytes:
+    return struct.pack(">BI", 0xDD, len(batch)) + b"".join(batch)
+
+
+LONGEST = 4000
+"""Most bytes of a message of a page: a pipe that is ready takes that many at once."""
+
+
+class Steering:
+    """One page steers; a message replaces a waiting one of its kind and object."""
+
+    def __init__(self, parent: int) -> None:
+        """Begin without a page."""
+        self.page: object | None = None
+        self._parent = parent
+        self._waiting: dict[tuple[str, str], str] = {}
+
+    def enter(self, page: object) -> bool:
+        """Let a page that was opened steer, if no other one does; return whether."""
+        if self.page is None:
+            self.page = page
+        return self.page is page
+
+    def leave(self, page: object) -> bool:
+        """Return whether the page that was closed has steered; the parent is told."""
+        if self.page is not page:
+            return False
+        self.page = None
+        self._put({"do": "left"})
+        return True
+
+    def take(self, page: object, text: str) -> bool:
+        """Take a page's message; return whether the page steers only from now on."""
+        if len(text.encode()) > LONGEST:
+            raise ValueError("the message is too long")
+        message = json.loads(text, parse_constant=_refuse)
+        if not isinstance(message, dict) or not isinstance(message.get("do"), str):
+            raise ValueError("a message is an object with a text `do`")
+        if message["do"] == "take_over":
+            taken = self.page is not page
+            if taken:
+                self.page = page
+                self._put({"do": "left"})  # what the other page held is let go
+            return taken
+        if self.page is page:
+            self._put(message)
+        return False
+
+    def flush(self) -> bool:
+        """Pass on what the parent can take now; return whether nothing waits."""
+        poll = select.poll()
+        poll.register(self._parent, select.POLLOUT)
+        while self._waiting and poll.poll(0):
+            key = next(iter(self._waiting))
+            self._write(self._waiting.pop(key))
+        return not self._waiting
+
+    def _put(self, message: dict[str, Any]) -> None:
+        parts = [message.get(name, "") for name in ("target", "name", "id")]
+        key = message["do"], json.dumps(parts)
+        self._waiting.pop(key, None)  # the newest comes last
+        self._waiting[key] = json.dumps({"message": message})
+
+    def _write(self, line: str) -> None:
+        with open(self._parent, "w", closefd=False) as pipe:
+            pipe.write(line + "\n")
+
+
+def _refuse(word: str) -> Callable[[], None]:
+    raise ValueError(f"{word} is no number")
+
 
 PORTS = (*range(7000, 7100), 0)  # 0: any free port
 TAKEN = "taken"  # a page's acknowledgement of a message
@@ -40,22 +129,13 @@ _FLUSH_PERIOD = 0.005  # s
 
 
 class Door(NamedTuple):
-    """Who is let in.
+    """Who is let in."""
 
-    Attributes:
-        host: The address that the server listens on.
-        key: What an address must contain; empty: nothing, and no page may steer.
-    """
-
-    host: str
-    key: str
+    host: str  # the address that the server listens on
+    key: str  # what an address must contain; empty: nothing, and no page may steer
 
     def check(self, handler: RequestHandler, *, needs_key: bool) -> None:
-        """Check a request.
-
-        Raises:
-            HTTPError: If it names another host, or the key is missing.
-        """
+        """Check a request."""
         names = _LOOPBACK_NAMES if self.host in _LOOPBACK_NAMES else {self.host}
         if handler.request.host_name not in names:
             raise HTTPError(403, reason="Another host")
@@ -65,14 +145,7 @@ class Door(NamedTuple):
 
 
 class Hub:
-    """The scene, and the pages that show it.
-
-    Attributes:
-        scene: All commands that a newly opened page needs.
-        pages: The open pages.
-        asked: The number of the parent's latest request: does a page show everything?
-        steering: Which page steers; None: none may.
-    """
+    """The scene, and the pages that show it."""
 
     def __init__(self, steering: Steering | None) -> None:
         """Start with an empty scene and no page."""
@@ -155,11 +228,7 @@ class Page(WebSocketHandler):
             raise HTTPError(403, reason="The connection names no origin")
 
     def open(self, *args: str, **kwargs: str) -> None:
-        """Send the page the whole scene, then all changes.
-
-        The stage comes first, and once more in its turn: meshes may be older than it,
-        and would be shown in the dark, without a word, until the last one is read.
-        """
+        """Send the page the stage, which must not wait for meshes, then all else."""
         self.pending = self.hub.scene.copy()
         self.has_pending.set()
         self.hub.pages.add(self)
@@ -169,10 +238,7 @@ class Page(WebSocketHandler):
             self.hub.tell_who_steers()
 
     def on_message(self, message: str | bytes) -> None:
-        """Process an answer, the number of a request, or what a page that steers says.
-
-        A page that says anything else is not ours: its connection is closed.
-        """
+        """Process an answer, or what a page that steers says; hang up on others."""
         steering = self.hub.steering
         try:
             if message == TAKEN:
@@ -223,9 +289,8 @@ class Page(WebSocketHandler):
                     await self.write_message(message, binary=True)
                 except WebSocketClosedError:
                     return
-                await (
-                    self._ready.wait()
-                )  # meanwhile newer commands replace pending ones
+                # Meanwhile newer commands replace pending ones.
+                await self._ready.wait()
             await self.has_pending.wait()
             self.has_pending.clear()
             commands = self.pending.take()
@@ -255,15 +320,7 @@ class FileHandler(RequestHandler):
 
 
 def main(meshcat: str, port: int, parent: int, host: str, key: str) -> NoReturn:
-    """Serve until the parent has ended.
-
-    Args:
-        meshcat: The folder of Meshcat's page.
-        port: The port to listen on, or 0 for a free one.
-        parent: The parent's process id.
-        host: The address to listen on.
-        key: The key that the page's address contains; empty: none, and no page steers.
-    """
+    """Serve until the parent has ended."""
     asyncio.run(_serve(Path(meshcat), port, parent, Door(host, key)))
     os._exit(0)
 

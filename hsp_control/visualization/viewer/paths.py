@@ -15,10 +15,10 @@ from hsp_control.visualization.viewer.appearance import (
 from hsp_control.visualization.viewer.clip import Track
 from hsp_control.visualization.viewer.commands import Command, extend_trail, set_trail
 from hsp_control.visualization.viewer.legend import LegendEntry
-from hsp_control.visualization.viewer.materials import color_number
 from hsp_control.visualization.viewer.motion import Motion
 from hsp_control.visualization.viewer.scene_path import path_element
 from hsp_control.visualization.viewer.targets import read_targets
+from hsp_control.visualization.viewer.threejs import color_number
 
 _MAX_RINGS = 1500
 
@@ -29,14 +29,7 @@ class Paths:
     def __init__(
         self, motion: Motion, root: str, color: str = ACTUAL, *, ghost: bool = False
     ) -> None:
-        """Read the desired and actual positions of the tasks' points.
-
-        Args:
-            motion: The run.
-            root: The path of the layer's node.
-            color: The actual path's colour, ``#RRGGBB``.
-            ghost: Draw only the actual path, thinner, so that an equal one encloses it.
-        """
+        """Read the desired and actual positions of the tasks' points."""
         self._root = root
         self._color = color
         self._ghost = ghost
@@ -111,12 +104,7 @@ class GrowingPaths(Paths):
     """Paths of a run that is being computed: the actual path grows."""
 
     def __init__(self, motion: Motion, root: str) -> None:
-        """Read the desired positions from a preview.
-
-        Args:
-            motion: The preview; only its desired positions are used.
-            root: The path of the layer's node.
-        """
+        """Read the desired positions from a preview."""
         super().__init__(motion, root)
         self._rings = dict.fromkeys(self._paths, 0)
         self._pieces = 0

@@ -12,19 +12,14 @@ _HEAD = struct.Struct("<BII")  # kind, length of the name, length of the command
 
 
 class Record(NamedTuple):
-    """One record.
+    """One record."""
 
-    Attributes:
-        kind: ``SET`` a key, ``DELETE`` a path, or ``ASK`` whether a page shows all that
-            was sent.
-        name: The key, the path, or the request's number; a repeated request keeps its
-            number.
-        packed: The command for the page.
-    """
-
+    # ``SET`` a key, ``DELETE`` a path, or ``ASK`` whether a page shows all that was
+    # sent.
     kind: int
+    # The key, the path, or the request's number; a repeated request keeps its number.
     name: str
-    packed: bytes = b""
+    packed: bytes = b""  # the command for the page
 
 
 def encode(record: Record) -> bytes:

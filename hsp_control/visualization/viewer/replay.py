@@ -18,7 +18,7 @@ from hsp_control.robot.description.access import ANYWHERE, Access, only_within
 from hsp_control.robot.description.sources import packaged_folders
 from hsp_control.simulation import Rollout
 from hsp_control.visualization.viewer.comparison import ComparedRun
-from hsp_control.visualization.viewer.offline.inline import HEIGHT, InlineView
+from hsp_control.visualization.viewer.offline.page import HEIGHT, InlineView
 from hsp_control.visualization.viewer.recorder import Recorder
 from hsp_control.visualization.viewer.transport import Transport
 from hsp_control.visualization.viewer.viewer import Viewer
@@ -29,14 +29,7 @@ _log = logging.getLogger(__name__)
 def access_for(
     logs: Sequence[Path], strict: bool, allow: Sequence[str | PathLike[str]]
 ) -> Access:
-    """Return which files logs may read.
-
-    Args:
-        logs: The logs' files.
-        strict: Allow only files in the logs' folders, in the package and in ``allow``;
-            else any file.
-        allow: Further allowed folders.
-    """
+    """Return which files logs may read."""
     if not strict:
         return ANYWHERE
     return only_within([*(log.parent for log in logs), *packaged_folders(), *allow])
@@ -61,19 +54,7 @@ def robot_of(rollout: Rollout, access: Access = ANYWHERE) -> Robot:
 
 
 def rebuild_run(rollout: Rollout, name: str, access: Access = ANYWHERE) -> ComparedRun:
-    """Return a log with its robot and, if it can be rebuilt, its controller.
-
-    Logs a warning if the controller cannot be rebuilt.
-
-    Args:
-        rollout: The log.
-        name: The run's name in the legend.
-        access: Which files it may read.
-
-    Raises:
-        ViewerError: If the log has no configuration, or its robot cannot be rebuilt.
-        AccessError: If it names a file that is not allowed.
-    """
+    """Return a log with its robot and, if it can be rebuilt, its controller."""
     for obstacle, about in rollout.meta.get("obstacles", {}).items():
         if file := about.get("parameters", {}).get("file"):
             access.check(Path(str(file)), f"{name}: obstacle {obstacle!r}: mesh")
@@ -91,19 +72,7 @@ def rebuild_run(rollout: Rollout, name: str, access: Access = ANYWHERE) -> Compa
 
 
 def load_runs(logs: Sequence[Path], access: Access = ANYWHERE) -> list[ComparedRun]:
-    """Return logs with their robots and controllers, by distinct names.
-
-    The names are those of the files.
-
-    Args:
-        logs: The files.
-        access: Which files they may read.
-
-    Raises:
-        LogError: If a log cannot be read.
-        ViewerError: If a log has no configuration, or its robot cannot be rebuilt.
-        AccessError: If it names a file that is not allowed.
-    """
+    """Return logs with their robots and controllers, by the names of their files."""
     names = zip(logs, _names(logs), strict=True)
     return [_load(path, name, access) for path, name in names]
 

@@ -1,6 +1,7 @@
 """Draws a run: the motion of its robot, and the layers."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from typing import Protocol
 
 import numpy as np
 
@@ -8,24 +9,37 @@ from hsp_control.common.arrays import Array
 from hsp_control.control.controller import Controller
 from hsp_control.robot import Robot
 from hsp_control.visualization.viewer.appearance import CHALK, INK
+from hsp_control.visualization.viewer.arrows import Contacts, SelfMotion
 from hsp_control.visualization.viewer.bands import Band
-from hsp_control.visualization.viewer.capsules import Capsules
 from hsp_control.visualization.viewer.clip import Clip, Track
 from hsp_control.visualization.viewer.commands import Command, delete, set_property
-from hsp_control.visualization.viewer.contacts import Contacts
 from hsp_control.visualization.viewer.controller_analysis import from_the_start
-from hsp_control.visualization.viewer.distances import Distances
 from hsp_control.visualization.viewer.ellipsoid import Ellipsoid
-from hsp_control.visualization.viewer.influence import Influence
-from hsp_control.visualization.viewer.layer import Layer
 from hsp_control.visualization.viewer.legend import LegendEntry
+from hsp_control.visualization.viewer.measured_links import (
+    Capsules,
+    Distances,
+    Influence,
+)
 from hsp_control.visualization.viewer.motion import Motion
-from hsp_control.visualization.viewer.obstacle_layer import ObstacleLayer
+from hsp_control.visualization.viewer.obstacle_layer import ObstacleLayer, SolidLayer
 from hsp_control.visualization.viewer.paths import Paths
 from hsp_control.visualization.viewer.robot_drawing import RobotDrawing, robot_entry
-from hsp_control.visualization.viewer.self_motion import SelfMotion
-from hsp_control.visualization.viewer.solid_layer import SolidLayer
-from hsp_control.visualization.viewer.target_markers import TargetMarkers
+from hsp_control.visualization.viewer.targets import TargetMarkers
+
+
+class Layer(Protocol):
+    """Draws itself once, and returns the tracks of its motion."""
+
+    def draw(self, size: float) -> Iterator[Command]:
+        """Yield the commands that draw it in a scene of the given size [m]."""
+
+    def tracks(self, motion: Motion) -> Iterator[Track]:
+        """Yield its tracks along a run, or along a part of one."""
+
+    def legend(self) -> list[LegendEntry]:
+        """Return the legend's entries."""
+
 
 LAYERS = (
     "paths",
@@ -50,16 +64,7 @@ def all_layers(
     root: str = "",
     dark: bool = False,
 ) -> dict[str, Layer]:
-    """Return the layers of a run, by name.
-
-    Args:
-        robot: The robot.
-        motion: The run.
-        controller: The run's controller; None: only layers that need no more than the
-            log's columns.
-        root: The path of their parent node.
-        dark: Whether the background is dark.
-    """
+    """Return the layers of a run, by name."""
     ink = CHALK if dark else INK
     obstacles = ObstacleLayer(motion, f"{root}/obstacles")
     layers: dict[str, Layer] = {
@@ -91,12 +96,7 @@ def ghost_layers(motion: Motion, color: str, root: str) -> dict[str, Layer]:
 
 
 class RunDrawing:
-    """A run: the robot's motion and the layers.
-
-    Attributes:
-        motion: The drawn rows.
-        layers: The layers by name.
-    """
+    """A run: the robot's motion and the layers."""
 
     def __init__(
         self,
@@ -108,16 +108,7 @@ class RunDrawing:
         shown: Mapping[str, bool] | None = None,
         bands: Sequence[Band] = (),
     ) -> None:
-        """Compose the drawing.
-
-        Args:
-            drawing: The robot in the scene.
-            motion: The run.
-            layers: The layers to draw besides the robot.
-            root: The path of their parent node.
-            shown: Whether each layer is shown initially; default: it is.
-            bands: What the time line marks.
-        """
+        """Compose the drawing."""
         self.motion = motion
         self.layers = layers
         self._drawing = drawing

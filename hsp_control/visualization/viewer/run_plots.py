@@ -15,33 +15,18 @@ from hsp_control.visualization.viewer.comparison import ComparedRun
 from hsp_control.visualization.viewer.packed.packing import ArrayTable
 from hsp_control.visualization.viewer.packed.plot_packing import PlottedRun, pack_panels
 
-PREVIEW_ROWS = 500
-"""About so many rows of a run that is being computed are plotted."""
+PREVIEW_ROWS = 500  # about so many rows of a run that is being computed are plotted
 
 
 def plots_of(runs: Sequence[ComparedRun]) -> Command:
-    """Return the command that shows the plots of complete runs.
-
-    Raises:
-        LogError: If a log lacks a column that all runs have.
-    """
+    """Return the command that shows the plots of complete runs."""
     return _command(runs, None)
 
 
 def plots_so_far(
     recorder: Recorder, meta: Json, robot: Robot, duration: float
 ) -> Command:
-    """Return the command that shows the plots of a run that is being computed.
-
-    Their number of points does not grow with the run, and their axis is that of the
-    whole run.
-
-    Args:
-        recorder: The rows computed so far; at least one.
-        meta: The meta data of the log.
-        robot: The run's robot.
-        duration: The time at which the run will end [s].
-    """
+    """Return the command that plots a run so far, on the whole run's axis."""
     rows = recorder.rows(0)
     chosen = _chosen(len(rows["t"]))
     columns = {name: values[chosen] for name, values in rows.items()}  # copies
@@ -60,11 +45,7 @@ def _command(runs: Sequence[ComparedRun], end: float | None) -> Command:
 
 
 def _chosen(count: int) -> Indices:
-    """Return rows at even distances, and the last one.
-
-    The distance is a power of two: so most rows are chosen again the next time, and
-    the curves do not flicker.
-    """
+    """Return rows at distances of a power of two, so that curves don't flicker."""
     step = 1
     while count > step * PREVIEW_ROWS:
         step *= 2

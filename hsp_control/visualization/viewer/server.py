@@ -49,33 +49,12 @@ except Exception as error:
 
 
 class Server:
-    """The server's process, owned by this viewer; see `page_server`.
-
-    It ends with `close`, and when this process ends or is killed.
-
-    Attributes:
-        url: The page's address; with its key, if pages may steer.
-        scene: The commands that build the scene, for what is made of it without a page;
-            they are kept after the process has ended.
-        process: The process.
-    """
+    """The server's process, see `page_server`; it ends with this process."""
 
     def __init__(
         self, port: int | None = None, *, host: str = LOOPBACK, steerable: bool = False
     ) -> None:
-        """Start the process.
-
-        Args:
-            port: The port to listen on; None: the first free one from 7000.
-            host: The address to listen on; with another one than the loopback address
-                pages may be opened on other computers.
-            steerable: Whether a page may send messages; it then needs a key, new for
-                each server, that `url` contains.
-
-        Raises:
-            ViewerError: If Meshcat is not installed, the port is taken, or the process
-                does not start.
-        """
+        """Start the process."""
         if port is not None and not 1 <= port <= 65535:
             raise ViewerError(f"port {port} is not between 1 and 65535")
         if host in {"", "0.0.0.0"}:
@@ -111,11 +90,7 @@ class Server:
             raise
 
     def send(self, commands: Iterable[Command]) -> None:
-        """Send commands, to be shown together.
-
-        Raises:
-            ViewerError: If the server has ended or no longer reads its input.
-        """
+        """Send commands, to be shown together."""
         commands = list(commands)
         records = [
             Record(DELETE, command.path, command.packed)
@@ -129,13 +104,7 @@ class Server:
                 command.keep_in(self.scene)
 
     def messages(self) -> list[dict[str, Any]]:
-        """Return what the page that steers has sent since the last call; never waits.
-
-        ``{"do": "left"}`` says that it was closed, or that another page took over.
-
-        Raises:
-            ViewerError: If the server has ended.
-        """
+        """Return the steering page's messages since the last call; never waits."""
         with self._lock:
             if self.process.stdout is None or self.process.stdout.closed:
                 raise ViewerError("the viewer is closed")
@@ -149,14 +118,7 @@ class Server:
         return found
 
     def wait_for_page(self, timeout: float) -> bool:
-        """Wait until a page shows all that was sent; return whether one does.
-
-        Args:
-            timeout: The longest time to wait [s].
-
-        Raises:
-            ViewerError: If the server has ended, or does not answer.
-        """
+        """Wait until a page shows all that was sent; return whether one does."""
         deadline = time.monotonic() + timeout
         self._asked += 1
         while True:
@@ -168,11 +130,7 @@ class Server:
             time.sleep(_POLL)
 
     def wait_until_closed(self) -> None:
-        """Wait until no page is open any more; a page that is reloaded counts as open.
-
-        Raises:
-            ViewerError: If the server has ended, or does not answer.
-        """
+        """Wait until no page is open; a page that is reloaded counts as open."""
         last_seen = time.monotonic()
         while time.monotonic() < last_seen + RELOAD_TIMEOUT:
             if self._ask()["pages"]:
@@ -213,9 +171,8 @@ class Server:
         except OSError as error:
             self._fail(f"has ended ({error.strerror})")
         finally:
-            self._unsent = bytes(
-                rest
-            )  # not empty after Ctrl-C: no record is cut in two
+            # Not empty after Ctrl-C: no record is cut in two.
+            self._unsent = bytes(rest)
 
     def _answer(self, deadline: float) -> dict[str, Any]:
         """Return the process's next answer; messages that come before it are kept."""
@@ -256,11 +213,7 @@ def _wait(descriptor: int, event: int, timeout: float) -> bool:
 
 
 def meshcat_page() -> Path:
-    """Return the folder of Meshcat's page, without importing Meshcat.
-
-    Raises:
-        ViewerError: If Meshcat or its page is not installed.
-    """
+    """Return the folder of Meshcat's page, without importing Meshcat."""
     spec = importlib.util.find_spec("meshcat")
     if spec is None or spec.origin is None:
         raise ViewerError(

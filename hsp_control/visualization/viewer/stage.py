@@ -1,23 +1,28 @@
-"""The stage: background, lights, and a floor with a grid."""
+"""The stage: background, lights, floor and camera."""
 
 from collections.abc import Iterator
 
 import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.config.view_settings import ViewSettings
+from hsp_control.robot import Robot
+from hsp_control.robot.matrix_view import matrix_view
 from hsp_control.visualization import palette
 from hsp_control.visualization.viewer import threejs
 from hsp_control.visualization.viewer.appearance import GRID, HAZE
 from hsp_control.visualization.viewer.commands import (
     Command,
     Json,
+    set_camera,
     set_object,
     set_property,
     set_transform,
 )
 from hsp_control.visualization.viewer.legend import LegendEntry, translucent
-from hsp_control.visualization.viewer.poses import pose_at
+from hsp_control.visualization.viewer.threejs import pose_at
 
 _LIGHT_FROM = np.array([0.5, -0.45, 1.6])
 _FINE = 1e-3
@@ -25,13 +30,7 @@ _SHADOW = translucent(palette.MUTED, 0.4)
 
 
 def draw_stage(points: Array, floor: float, view: ViewSettings) -> Iterator[Command]:
-    """Yield the background, the lights and the floor.
-
-    Args:
-        points: Points that enclose the scene [m], shape (K, 3).
-        floor: The floor's height [m].
-        view: The settings: background colour, light, grid.
-    """
+    """Yield the background, the lights and the floor; points (K, 3) [m]."""
     yield from draw_background(view)
     center = 0.5 * (points.min(axis=0) + points.max(axis=0))
     size = scene_size(points)
@@ -41,11 +40,7 @@ def draw_stage(points: Array, floor: float, view: ViewSettings) -> Iterator[Comm
 
 
 def draw_background(view: ViewSettings) -> Iterator[Command]:
-    """Yield the background alone.
-
-    Args:
-        view: The settings: its colour.
-    """
+    """Yield the background alone."""
     sky = view.background
     horizon = palette.blend(sky, palette.MUTED, HAZE)
     yield set_property("/Background", "top_color", _channels(sky))
@@ -67,15 +62,7 @@ def is_dark(color: str) -> bool:
 
 
 def in_sight(subject: Array, others: Array) -> Array:
-    """Return the points that the camera must show: the subject's, and others near it.
-
-    Other points are clipped to a distance of the subject's size from it, so that far or
-    large obstacles do not make the subject small.
-
-    Args:
-        subject: Points of the robot and its paths [m], shape (K, 3).
-        others: Points of obstacles [m], shape (L, 3).
-    """
+    """Return the subject's points, and others clipped to the subject's size."""
     size = scene_size(subject)
     low, high = subject.min(axis=0) - size, subject.max(axis=0) + size
     return np.vstack([subject, np.clip(others, low, high)])
@@ -160,3 +147,85 @@ def _round_step(length: float) -> float:
 
 def _channels(color: str) -> list[float]:
     return [int(color[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+
+
+FIELD_OF_VIEW = 32.0
+"""Vertical field of view [deg]: narrow, for little perspective distortion."""
+_THICKNESS = 0.11  # radius of the balls around the points, over the size of the scene
+_DEFAULT_DIRECTION = np.array([1.0, -1.35, 0.62])
+_COS_STEEP = np.cos(np.radians(30.0))
+_MAX_POINTS = 300
+
+
+def look_at(
+    robot: Robot,
+    points: Array,
+    eye: ArrayLike | None = None,
+    target: ArrayLike | None = None,
+    *,
+    fit: bool = False,
+) -> Command:
+    """Return the command that places the camera.
+
+    A planar arm is seen along its joint axes, any other robot from its front and above.
+    ``eye`` None: far enough to see all ``points``, (K, 3) [m]; ``fit``: only its
+    direction.
+    """
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    center = middle if target is None or fit else np.asarray(target, float)
+    direction = viewing_direction(robot, eye, center if target is None else target)
+    stride = max(1, len(points) // _MAX_POINTS)
+    view: dict[str, object] = {
+        "points": points[::stride].tolist(),
+        "radius": _THICKNESS * scene_size(points),
+    }
+    if eye is not None and not fit:
+        view["eye"] = np.asarray(eye, float).tolist()
+    else:
+        view["direction"] = direction.tolist()
+    steep = abs(direction[2]) > _COS_STEEP * np.linalg.norm(direction)
+    return set_camera(
+        **view,
+        target=center.tolist(),
+        up=[0.0, 1.0, 0.0] if steep else [0.0, 0.0, 1.0],
+        field_of_view=FIELD_OF_VIEW,
+    )
+
+
+def viewing_direction(
+    robot: Robot, eye: ArrayLike | None, target: ArrayLike | None
+) -> Array:
+    """Return the direction from the target to the eye, shape (3,), not normalised."""
+    if eye is not None:
+        return np.subtract(eye, np.zeros(3) if target is None else target)
+    normal = plane_normal(robot)
+    return _DEFAULT_DIRECTION if normal is None else normal
+
+
+def right_direction(
+    robot: Robot, eye: ArrayLike | None, target: ArrayLike | None
+) -> Array:
+    """Return the horizontal direction to the right in the picture, a unit vector."""
+    direction = viewing_direction(robot, eye, target)
+    right = np.array([-direction[1], direction[0], 0.0])
+    length = float(np.linalg.norm(right))
+    return right / length if length > 1e-6 else np.array([1.0, 0.0, 0.0])
+
+
+def plane_normal(robot: Robot) -> Array | None:
+    """Return the normal of a planar arm's plane, towards the eye; None if spatial."""
+    if any(joint.nv != 1 for joint in list(robot.model.joints)[1:]):
+        return None
+    data = robot.model.createData()
+    J = matrix_view(pin.computeJointJacobians(robot.model, data, robot.neutral()))
+    turns = np.linalg.norm(J[3:], axis=0) > 0.5
+    if not turns.any():
+        return None
+    normal = J[3:, turns][:, 0]
+    parallel = np.abs(np.abs(normal @ J[3:, turns]) - 1.0) < 1e-9
+    across = np.abs(normal @ J[:3, ~turns]) < 1e-9
+    if not (parallel.all() and across.all()):
+        return None
+    # Seen from above; if the plane is vertical, with x or y to the right.
+    towards = normal @ np.array([0.1, -1.0, 10.0])
+    return np.asarray(normal if towards > 0.0 else -normal)

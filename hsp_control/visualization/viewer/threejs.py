@@ -1,13 +1,42 @@
-"""Objects in three.js's JSON format: solids, lines and lights."""
+"""Objects, materials and poses of three.js, in Meshcat's format."""
 
 from collections.abc import Sequence
 from itertools import count
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.visualization.viewer.commands import Json, typed_array
+
+
+def pose_at(position: ArrayLike) -> Array:
+    """Return the pose with a position [m] and no rotation, shape (4, 4)."""
+    pose = np.eye(4)
+    pose[:3, 3] = position
+    return pose
+
+
+def pose_along(direction: Array) -> Array:
+    """Return the smallest rotation of z to a direction, as a pose of shape (4, 4)."""
+    z = np.array([0.0, 0.0, 1.0])
+    turn = pin.Quaternion.FromTwoVectors(z, direction / np.linalg.norm(direction))
+    pose = np.eye(4)
+    pose[:3, :3] = turn.toRotationMatrix()
+    return pose
+
+
+def quaternions_along(directions: Array) -> Array:
+    """Return the smallest rotations of z to directions, quaternions, shape (N, 4)."""
+    lengths = np.linalg.norm(directions, axis=1, keepdims=True)
+    x, y, z = (directions / np.where(lengths > 0.0, lengths, 1.0)).T
+    turns = np.column_stack([-y, x, np.zeros_like(x), 1.0 + z])
+    sizes = np.linalg.norm(turns, axis=1, keepdims=True)
+    straight_down = np.array([1.0, 0.0, 0.0, 0.0])
+    return np.where(sizes > 1e-9, turns / np.maximum(sizes, 1e-9), straight_down)
+
 
 _serial = count(1)
 
@@ -65,11 +94,7 @@ def arrow(length: float, radius: float) -> Json:
 
 
 def lathe(profile: Array) -> Json:
-    """Return the solid of revolution about z of a profile.
-
-    Args:
-        profile: Rows of (radius, z) [m], in ascending order along the profile.
-    """
+    """Return the solid of revolution about z of a profile."""
     points = [{"x": float(max(r, 0.0)), "y": float(z)} for r, z in profile]
     return _geometry("LatheGeometry", points=points, segments=48)
 
@@ -82,14 +107,7 @@ def plane(size: float) -> Json:
 def mesh(
     geometry: Json, surface: Json, pose: Array | None = None, *, shadow: bool = True
 ) -> Json:
-    """Return an object of a geometry and a material.
-
-    Args:
-        geometry: The geometry.
-        surface: The material, see `materials`.
-        pose: Its pose in its node, shape (4, 4); None: the identity.
-        shadow: Whether it casts and receives shadows.
-    """
+    """Return an object of a geometry and a material."""
     total = np.eye(4) if pose is None else pose
     if geometry["type"] in {"CylinderGeometry", "LatheGeometry"}:
         total = total @ _Y_TO_Z
@@ -123,12 +141,7 @@ def group(things: Sequence[Json]) -> Json:
 
 
 def buffer_geometry(attributes: dict[str, Array]) -> Json:
-    """Return a geometry of explicit vertices.
-
-    Args:
-        attributes: ``position``, and optionally ``normal`` and ``color``; one row per
-            vertex.
-    """
+    """Return a geometry of explicit vertices."""
     packed = {
         name: {
             "itemSize": rows.shape[1],
@@ -142,12 +155,7 @@ def buffer_geometry(attributes: dict[str, Array]) -> Json:
 
 
 def segments(points: Array, colors: Array) -> Json:
-    """Return line segments of one pixel width.
-
-    Args:
-        points: Pairs of end points [m], shape (2n, 3).
-        colors: Their colours in RGBA from 0 to 1, shape (2n, 4).
-    """
+    """Return line segments of one pixel width; points (2n, 3) [m], colors (2n, 4)."""
     geometry = buffer_geometry({"position": points, "color": colors})
     surface = {
         "uuid": unique_name(),
@@ -162,12 +170,7 @@ def segments(points: Array, colors: Array) -> Json:
 
 
 def shadow_catcher(size: float, opacity: float) -> Json:
-    """Return a square in the x-y plane that shows only the shadows on it.
-
-    Args:
-        size: Its edge [m].
-        opacity: The shadows' opacity.
-    """
+    """Return a square in the x-y plane that shows only the shadows on it."""
     surface = {
         "uuid": unique_name(),
         "type": "ShadowMaterial",
@@ -206,3 +209,46 @@ def _geometry(kind: str, **fields: Any) -> Json:
 def unique_name() -> str:
     """Return a name that is unique in this process, which three.js requires."""
     return f"hsp-{next(_serial)}"
+
+
+def material(
+    color: str | Sequence[float], *, opacity: float = 1.0, glow: float = 0.0
+) -> Json:
+    """Return a material that is lit by the scene's lights."""
+    number = color_number(color)
+    lit = color_number([(1.0 - glow) * (number >> k & 255) / 255 for k in (16, 8, 0)])
+    surface: Json = {
+        "uuid": unique_name(),
+        "type": "MeshStandardMaterial",
+        "color": lit,
+        "roughness": 0.55,
+        "metalness": 0.0,
+        "emissive": number,
+        "emissiveIntensity": glow,
+    }
+    if opacity < 1.0:
+        surface |= {"transparent": True, "opacity": opacity, "depthWrite": False}
+    return surface
+
+
+def always_visible(surface: Json) -> Json:
+    """Return a material without depth test: it is visible even inside a link."""
+    return surface | {"transparent": True, "depthTest": False, "depthWrite": False}
+
+
+def unlit_material(color: str) -> Json:
+    """Return a material that has the same colour, ``#RRGGBB``, in any light."""
+    return {
+        "uuid": unique_name(),
+        "type": "MeshBasicMaterial",
+        "color": color_number(color),
+        "side": 0,
+    }
+
+
+def color_number(color: str | Sequence[float]) -> int:
+    """Return ``#RRGGBB``, or red, green and blue from 0 to 1, as three.js's number."""
+    if isinstance(color, str):
+        return int(color[1:], 16)
+    red, green, blue = (round(255 * min(max(c, 0.0), 1.0)) for c in color[:3])
+    return red << 16 | green << 8 | blue

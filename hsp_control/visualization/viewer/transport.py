@@ -19,18 +19,10 @@ class Transport(Protocol):
         """The commands that build the scene."""
 
     def send(self, commands: Iterable[Command]) -> None:
-        """Send commands, to be shown together.
-
-        Raises:
-            ViewerError: If the server has ended.
-        """
+        """Send commands, to be shown together."""
 
     def wait_for_page(self, timeout: float) -> bool:
-        """Wait until a page shows all that was sent; return whether one does.
-
-        Args:
-            timeout: The longest time to wait [s].
-        """
+        """Wait until a page shows all that was sent; return whether one does."""
 
     def wait_until_closed(self) -> None:
         """Wait until no page is open any more."""

@@ -17,7 +17,6 @@ from hsp_control.robot import Robot, RobotState
 from hsp_control.simulation import Rollout
 from hsp_control.visualization.viewer import browser
 from hsp_control.visualization.viewer.bands import bands_of
-from hsp_control.visualization.viewer.camera import look_at, right_direction
 from hsp_control.visualization.viewer.clip import remove_clip, set_clip
 from hsp_control.visualization.viewer.commands import (
     Command,
@@ -30,8 +29,8 @@ from hsp_control.visualization.viewer.commands import (
 )
 from hsp_control.visualization.viewer.comparison import ComparedRun, Comparison
 from hsp_control.visualization.viewer.motion import motion_of
-from hsp_control.visualization.viewer.obstacle_drawing import ObstacleDrawing
-from hsp_control.visualization.viewer.offline.inline import InlineView
+from hsp_control.visualization.viewer.obstacle_layer import ObstacleDrawing
+from hsp_control.visualization.viewer.offline.page import InlineView
 from hsp_control.visualization.viewer.robot_drawing import RobotDrawing
 from hsp_control.visualization.viewer.run_drawing import RunDrawing, all_layers, clear
 from hsp_control.visualization.viewer.run_plots import plots_of
@@ -40,11 +39,14 @@ from hsp_control.visualization.viewer.stage import (
     draw_stage,
     in_sight,
     is_dark,
+    look_at,
+    right_direction,
     scene_size,
     stage_legend,
 )
-from hsp_control.visualization.viewer.stage_content import StageContent
 from hsp_control.visualization.viewer.transport import Transport
+
+StageContent = RunDrawing | Comparison | ObstacleDrawing
 
 _log = logging.getLogger(__name__)
 
@@ -236,18 +238,11 @@ class Viewer:
         self._plot(runs)
 
     def open_browser(self) -> bool:
-        """Open the page in the user's browser; return whether there is one.
-
-        Logs a warning if there is none.
-        """
+        """Open the page in the user's browser; return whether there is one."""
         return self.url is not None and browser.open_browser(self.url)
 
     def wait_until_closed(self) -> None:
-        """Wait until no page is open any more.
-
-        Raises:
-            ViewerError: If the server has ended.
-        """
+        """Wait until no page is open any more."""
         self.transport.wait_until_closed()
 
     def wait_for_browser(self, timeout: float) -> bool:
@@ -272,11 +267,7 @@ class Viewer:
         self.close()
 
     def _repr_html_(self) -> str:
-        """Return the HTML for a notebook: what is shown now, which needs no server.
-
-        The live page is shown in a frame, with the reason, where a robot's meshes
-        cannot be read.
-        """
+        """Return the HTML for a notebook; with unreadable meshes, the live page."""
         try:
             return InlineView(self.transport.scene, url=self.url)._repr_html_()
         except ExportError as error:
@@ -298,17 +289,7 @@ class Viewer:
     def replace_run(
         self, rollout: Rollout, size: float, controller: Controller, status: str
     ) -> None:
-        """Replace a partly drawn run by the complete one; the page keeps its time.
-
-        Args:
-            rollout: The run.
-            size: The scene's size, as `set_stage` returned it [m].
-            controller: The run's controller.
-            status: The status line beside the scene.
-
-        Raises:
-            ViewerError: If the server has ended.
-        """
+        """Replace a partly drawn run by the complete one; the page keeps its time."""
         run = self._run(rollout, controller)
         playing = self._playing(None, None)
         clip = set_clip(run.clip(), play=True, keep=True, **playing)
@@ -320,14 +301,7 @@ class Viewer:
         self._plot([ComparedRun("", self.robot, rollout, controller)])
 
     def show_plots(self, plots: Command) -> None:
-        """Show plots beside the scene, until another scene is drawn.
-
-        Args:
-            plots: See `run_plots`.
-
-        Raises:
-            ViewerError: If the server has ended.
-        """
+        """Show plots beside the scene, until another scene is drawn."""
         self._plotted = True
         self.transport.send([plots])
 
@@ -378,14 +352,7 @@ class Viewer:
         moving: Array | None = None,
         fit: bool = False,
     ) -> list[Command]:
-        """Return the commands that clear the stage, fit it, and draw a scene.
-
-        Args:
-            scene: The scene.
-            title: The title; None: the robot's name.
-            moving: Points of the robot [m], shape (K, 3); None: the scene's own.
-            fit: Show all points, even if the view sets the camera's position.
-        """
+        """Return the commands that clear the stage, fit it, and draw a scene."""
         view = self.view
         subject = self._subject(scene.points() if moving is None else moving)
         points = in_sight(subject, scene.obstacle_points())

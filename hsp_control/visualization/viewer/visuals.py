@@ -30,28 +30,20 @@ _SIZES = {
 
 
 class Visual(NamedTuple):
-    """One visual element of a link.
+    """One visual element of a link."""
 
-    Attributes:
-        joint: The index of its link's parent joint; 0: it does not move.
-        link: Its link's name.
-        pose: Its pose in the joint's frame, shape (4, 4).
-        kind: ``box``, ``cylinder``, ``sphere``, ``capsule``, ``ellipsoid`` or ``mesh``.
-        size: Its lengths [m] in the URDF's order, or an ellipsoid's semi-axes; of a
-            mesh: its scale.
-        color: Red, green, blue and opacity, from 0 to 1.
-        file: Of a mesh: its file, or None if it is not found or not readable.
-        mesh: Of a mesh without a file: vertices [m], shape (k, 3), and triangles
-            of their indices, shape (n, 3).
-    """
-
-    joint: int
+    joint: int  # the index of its link's parent joint; 0: it does not move
     link: str
-    pose: Array
+    pose: Array  # its pose in the joint's frame, (4, 4)
+    # ``box``, ``cylinder``, ``sphere``, ``capsule``, ``ellipsoid`` or ``mesh``.
     kind: str
+    # Its lengths [m] in the URDF's order, or an ellipsoid's semi-axes; of a mesh: its
+    # scale.
     size: tuple[float, ...]
-    color: tuple[float, ...]
-    file: Path | None
+    color: tuple[float, ...]  # red, green, blue and opacity, from 0 to 1
+    file: Path | None  # of a mesh: its file, or None if it is not found or not readable
+    # Of a mesh without a file: vertices [m], (k, 3), and triangles of their indices,
+    # (n, 3).
     mesh: tuple[Array, Indices] | None = None
 
     @property
@@ -122,9 +114,7 @@ def _visual(
     )
 
 
-def _materials(
-    tree: Element,
-) -> Iterator[tuple[str, tuple[float, ...]]]:
+def _materials(tree: Element) -> Iterator[tuple[str, tuple[float, ...]]]:
     """Yield (name, colour) of all named materials in the file."""
     for material in tree.iter("material"):
         color = material.find("color")

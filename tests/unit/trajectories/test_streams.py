@@ -22,10 +22,10 @@ from hsp_control.trajectories import (
     StreamPose,
     TrajectorySample,
 )
-from hsp_control.trajectories.polynomial import QUINTIC
-from hsp_control.trajectories.streams import record
-from hsp_control.trajectories.streams.bounds import _DERIVATIVES
-from hsp_control.trajectories.streams.recording import read_recording
+from hsp_control.trajectories.piecewise_polynomial import QUINTIC
+from hsp_control.trajectories.streams import inbox
+from hsp_control.trajectories.streams.mailbox import read_recording
+from hsp_control.trajectories.streams.segments import _DERIVATIVES
 from hsp_control.trajectories.streams.waypoints import SenderClock, derivatives
 
 H = 5e-4
@@ -418,7 +418,7 @@ def test_earlier_times_are_remembered() -> None:
 
 
 def test_a_record_that_is_full_says_how_much_it_lost(monkeypatch: Any) -> None:
-    monkeypatch.setattr(record, "MOST", 7)  # a value and its time each
+    monkeypatch.setattr(inbox, "MOST", 7)  # a value and its time each
     stream = Stream([0.0]).anchored(None)
     feed = at_times(*((0.1, lambda: stream.send([0.1])) for _ in range(5)))
     sampled(stream, 0.2, feed)

@@ -57,7 +57,6 @@ from hsp_control.trajectories import (
 from hsp_control.visualization import palette
 from hsp_control.visualization.plots import (
     logged_geometry,
-    obstacles,
     paths,
     views,
 )
@@ -322,7 +321,7 @@ def test_obstacles_are_their_outlines(logs: dict[str, Rollout]) -> None:
     arm = Arm()
     task = FramePosition(arm.tcp, arm.circle([1.0, 0.0, 1.0]), gains=GAINS)
     log = arm.run(task, scene=scene)
-    found = {body.name: body for body in obstacles.logged_obstacles(log)}
+    found = {body.name: body for body in logged_geometry.logged_obstacles(log)}
     assert [name for name, body in found.items() if body.oversized] == [
         "table",
         "floor",
@@ -361,7 +360,7 @@ def test_obstacles_are_their_outlines(logs: dict[str, Rollout]) -> None:
 
 def test_a_mesh_is_a_dashed_ball_around_it(logs: dict[str, Rollout]) -> None:
     about = {"shape": "Mesh", "parameters": {"file": "a.stl"}, "radius": 0.3}
-    (body,) = obstacles.logged_obstacles(
+    (body,) = logged_geometry.logged_obstacles(
         changed(logs["obstacle"], obstacles={"disk": about})
     )
     assert (body.radius, body.exact) == (0.3, False)

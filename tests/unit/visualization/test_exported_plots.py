@@ -14,12 +14,14 @@ from hsp_control.common.exceptions import ExportError
 from hsp_control.simulation.log_series import held_period
 from hsp_control.visualization.viewer import ComparedRun, export_html
 from hsp_control.visualization.viewer.comparison import run_parts
-from hsp_control.visualization.viewer.packed.held_effort import expected_floor
 from hsp_control.visualization.viewer.packed.packing import ArrayTable
-from hsp_control.visualization.viewer.packed.panels import Edge, Panel, panels_of
 from hsp_control.visualization.viewer.packed.plot_packing import (
+    Edge,
+    Panel,
     PlottedRun,
+    expected_floor,
     pack_panels,
+    panels_of,
 )
 
 PLANAR = "paper/4_moving_obstacle"

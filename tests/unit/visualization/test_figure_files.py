@@ -18,7 +18,7 @@ from hsp_control import (
 from hsp_control.common.exceptions import PlotError
 from hsp_control.visualization import palette
 from hsp_control.visualization.plots import (
-    box_axes,
+    paths,
     views,
 )
 
@@ -80,10 +80,10 @@ def test_a_box_has_two_numbers_on_every_edge() -> None:
     for _ in range(20):
         lower = rng.uniform(-1.0, 1.0, 3)
         upper = lower + rng.uniform(0.05, 1.0, 3)
-        axes = drawn(box_axes.draw_box, views.oblique(), lower, upper)
+        axes = drawn(paths.draw_box, views.oblique(), lower, upper)
         numbers = [text for text in axes.texts if "[" not in text.get_text()]
         assert len(numbers) >= 6
-        assert box_axes.corners(lower, upper).shape == (8, 3)
+        assert paths.corners(lower, upper).shape == (8, 3)
 
 
 # --- files, and what drawing leaves behind -------------------------------------------

@@ -5,8 +5,8 @@ import pytest
 
 from hsp_control import load_experiment
 from hsp_control.visualization.viewer.motion import motion_of
+from hsp_control.visualization.viewer.obstacle_layer import SolidLayer, solids_of
 from hsp_control.visualization.viewer.run_drawing import LAYERS, all_layers
-from hsp_control.visualization.viewer.solid_layer import SolidLayer, solids_of
 
 pytest.importorskip("mujoco")
 BOX = {"type": "Box", "size": [0.2, 0.3, 0.1]}

@@ -38,7 +38,6 @@ from hsp_control.visualization.viewer import (
     Viewer,
     live,
 )
-from hsp_control.visualization.viewer.capsules import Capsules
 from hsp_control.visualization.viewer.commands import CAPTION, CLIP, unpack
 from hsp_control.visualization.viewer.controller_analysis import (
     from_the_start,
@@ -46,9 +45,9 @@ from hsp_control.visualization.viewer.controller_analysis import (
     terms_of_type,
 )
 from hsp_control.visualization.viewer.ellipsoid import SECONDS, principal_axes
-from hsp_control.visualization.viewer.influence import zone
+from hsp_control.visualization.viewer.measured_links import Capsules, zone
 from hsp_control.visualization.viewer.motion import drawn_times, motion_of
-from hsp_control.visualization.viewer.obstacle_drawing import obstacle_legend
+from hsp_control.visualization.viewer.obstacle_layer import obstacle_legend
 from hsp_control.visualization.viewer.run_drawing import LAYERS
 
 PLANAR, SPATIAL = "paper/4_moving_obstacle", "panda_obstacle"

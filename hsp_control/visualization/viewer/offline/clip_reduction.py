@@ -18,24 +18,17 @@ from hsp_control.visualization.viewer.packed.keyframes import (
 )
 from hsp_control.visualization.viewer.packed.packing import CLOCK_STEP, ArrayTable
 
-POSITION_BOUND = 2e-4
-"""Maximum position error of a node [m]."""
-ANGLE_BOUND = np.radians(0.1)
-"""Maximum rotation error of a node [rad]."""
+POSITION_BOUND = 2e-4  # maximum position error of a node [m]
+ANGLE_BOUND = np.radians(0.1)  # maximum rotation error of a node [rad]
 
 
 class _Property(NamedTuple):
-    """How a property is interpolated, and its error bound.
+    """How a property is interpolated, and its error bound."""
 
-    Attributes:
-        step: The resolution of its values.
-        interpolate: The player's interpolation between two keyframes: ``player.js``.
-        error: Above 1 where the error exceeds its bound.
-    """
-
-    step: float
+    step: float  # the resolution of its values
+    # The player's interpolation between two keyframes: ``player.js``.
     interpolate: Callable[[Array, Array, Array], Array]
-    error: RelativeError
+    error: RelativeError  # above 1 where the error exceeds its bound
 
 
 _PROPERTIES = {
@@ -51,12 +44,7 @@ _PROPERTIES = {
 
 
 def reduce_clip(command: Json, arrays: ArrayTable) -> Json:
-    """Return a clip's command with as few keyframes as the bounds allow.
-
-    Args:
-        command: See `hsp_control.visualization.viewer.clip`.
-        arrays: The table that stores the numbers.
-    """
+    """Return a clip's command with as few keyframes as the bounds allow."""
     clocks: list[Json] = []
     tracks = []
     for track in command["tracks"]:

@@ -16,16 +16,11 @@ INSTALL = "pip install 'hsp_control[export]'"
 
 
 class Piece(NamedTuple):
-    """A part of a mesh with one colour.
+    """A part of a mesh with one colour."""
 
-    Attributes:
-        vertices: Shape (n, 3), in the file's unit of length.
-        triangles: Indices of vertices, shape (k, 3).
-        color: Red, green, blue and opacity, from 0 to 1; None: the URDF's colour.
-    """
-
-    vertices: Array
-    triangles: Indices
+    vertices: Array  # (n, 3), in the file's unit of length
+    triangles: Indices  # indices of vertices, (k, 3)
+    # Red, green, blue and opacity, from 0 to 1; None: the URDF's colour.
     color: tuple[float, ...] | None
 
 
@@ -33,13 +28,6 @@ def read_mesh(thing: Json, owner: str) -> list[Piece]:
     """Return a mesh file's pieces, one per colour; a texture becomes its mean colour.
 
     A Collada file's unit and up axis are ignored, as in Meshcat's page and Pinocchio.
-
-    Args:
-        thing: Meshcat's ``_meshfile_geometry`` or ``_meshfile_object``.
-        owner: The node that it belongs to, for messages.
-
-    Raises:
-        ExportError: If the libraries are not installed, or the mesh cannot be read.
     """
     try:
         import collada  # noqa: F401

@@ -7,7 +7,6 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.visualization.viewer.commands import Json
-from hsp_control.visualization.viewer.materials import material
 from hsp_control.visualization.viewer.offline.clip_reduction import reduce_clip
 from hsp_control.visualization.viewer.offline.meshes import Piece, read_mesh
 from hsp_control.visualization.viewer.offline.triangle_meshes import (
@@ -16,24 +15,15 @@ from hsp_control.visualization.viewer.offline.triangle_meshes import (
     weld,
 )
 from hsp_control.visualization.viewer.packed.packing import ArrayTable, step_of
-from hsp_control.visualization.viewer.threejs import matrix, unique_name
+from hsp_control.visualization.viewer.threejs import material, matrix, unique_name
 
 VERTEX_STEP = 2e-5
 """Resolution of vertices [m], or 2⁻¹⁶ of a mesh's size if that is larger."""
-_TRAIL_STEP = 5e-5
-"""Resolution of a trail's points [m]."""
+_TRAIL_STEP = 5e-5  # resolution of a trail's points [m]
 
 
 def reduce_scene(commands: Iterable[Json], arrays: ArrayTable) -> list[Json]:
-    """Return commands that show the same scene in fewer bytes.
-
-    Args:
-        commands: A recorded scene, oldest first, as plain data.
-        arrays: The table that stores the numbers.
-
-    Raises:
-        ExportError: If a mesh cannot be read, or the library for it is not installed.
-    """
+    """Return commands that show the same scene in fewer bytes."""
     return [_reduced(command, arrays) for command in commands]
 
 
@@ -65,12 +55,7 @@ def _packed(value: Any, arrays: ArrayTable) -> Any:
 
 
 class _MeshFileReplacer:
-    """Replaces the mesh files of one object by triangles.
-
-    Attributes:
-        geometries: The object's geometries.
-        materials: The object's materials.
-    """
+    """Replaces the mesh files of one object by triangles."""
 
     def __init__(self, thing: Json, owner: str, arrays: ArrayTable) -> None:
         self._owner, self._arrays = owner, arrays
@@ -87,12 +72,7 @@ class _MeshFileReplacer:
         self.materials = list(thing.get("materials", []))
 
     def replaced(self, node: Json, scale: float) -> Json:
-        """Return a node of the object without mesh files.
-
-        Args:
-            node: The node.
-            scale: Metres in the world per unit of its parent's length.
-        """
+        """Return a node of the object without mesh files."""
         if "matrix" in node:
             axes = np.reshape(node["matrix"], (4, 4))[:3, :3]
             scale *= float(np.linalg.norm(axes, axis=1).max())

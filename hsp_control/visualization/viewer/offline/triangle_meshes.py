@@ -13,13 +13,7 @@ CREASE = np.radians(38.0)
 def weld(
     vertices: Array, triangles: Indices, tolerance: float
 ) -> tuple[Array, Indices]:
-    """Merge vertices at the same position; drop triangles that become degenerate.
-
-    Args:
-        vertices: Shape (n, 3).
-        triangles: Shape (k, 3).
-        tolerance: Edge of the grid cells within which vertices are merged.
-    """
+    """Merge vertices at the same position; drop triangles that become degenerate."""
     cells = np.rint((vertices - vertices.min(axis=0)) / tolerance).astype(np.int64)
     _, first, cell = np.unique(cells, axis=0, return_index=True, return_inverse=True)
     triangles = cell.reshape(-1)[triangles]
@@ -28,11 +22,7 @@ def weld(
 
 
 def split_creases(vertices: Array, triangles: Indices) -> tuple[Array, Indices]:
-    """Duplicate the vertices of creases, so that each side has its own.
-
-    Normals that the page computes from the triangles are then smooth across all
-    remaining shared edges. Arguments and results are as in `weld`.
-    """
+    """Duplicate the vertices of creases: normals are smooth across other edges."""
     corners = np.arange(triangles.size).reshape(-1, 3)
     normals = np.cross(
         vertices[triangles[:, 1]] - vertices[triangles[:, 0]],
@@ -62,11 +52,7 @@ def split_creases(vertices: Array, triangles: Indices) -> tuple[Array, Indices]:
 
 
 def sort_along_curve(vertices: Array, triangles: Indices) -> tuple[Array, Indices]:
-    """Sort triangles along a space-filling curve; number vertices by first use.
-
-    Neighbouring triangles are then close in the array, which packs well. The
-    orientation of the triangles is unchanged.
-    """
+    """Sort triangles along a space-filling curve: neighbours pack well."""
     triangles = triangles[np.argsort(_morton_codes(vertices[triangles].mean(axis=1)))]
     used, first = np.unique(triangles, return_index=True)
     order = np.argsort(first)

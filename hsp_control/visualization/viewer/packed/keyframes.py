@@ -19,16 +19,8 @@ def keyframe_rows(
 ) -> Indices:
     """Return the rows of the keyframes, by the algorithm of Douglas and Peucker (1973).
 
-    A segment whose worst sample exceeds the bound is split at that sample. All segments
-    are split at once, until none exceeds the bound.
-
-    Args:
-        times: Times of the samples [s], ascending, shape (n,).
-        samples: The samples, shape (n, k).
-        rounded: The samples rounded as in keyframes, shape (n, k).
-        interpolate: Returns the played value between two keyframes at a fraction:
-            shapes (n, k), (n, k), (n, 1).
-        error: Above 1 where the bound is exceeded.
+    All segments whose worst sample exceeds the bound are split there, at once.
+    ``times`` (n,), ``samples`` and ``rounded`` (n, k).
     """
     last = len(times) - 1
     rows = np.arange(len(times))

@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.visualization.viewer.commands import Json, typed_array
 
-CLOCK_STEP = 1e-6
-"""Resolution of times [s]."""
+CLOCK_STEP = 1e-6  # resolution of times [s]
 _KINDS = {
     np.dtype("f4"): "Float32Array",
     np.dtype("f8"): "Float64Array",
@@ -26,11 +25,7 @@ _MAX_STEPS = 2**31
 
 
 class ArrayTable:
-    """The arrays of a page; equal arrays are stored once.
-
-    Attributes:
-        entries: The packed arrays, in the order of their numbers.
-    """
+    """The arrays of a page; equal arrays are stored once."""
 
     def __init__(self) -> None:
         """Start without arrays."""
@@ -38,14 +33,7 @@ class ArrayTable:
         self._numbers: dict[bytes, int] = {}
 
     def numbers(self, values: ArrayLike, step: float, dtype: Any = np.float32) -> Json:
-        """Store numbers to within half a step; return a reference to the array.
-
-        Args:
-            values: Shape (n,) or (n, k), finite.
-            step: Resolution, positive; coarser for a column that would need more than
-                31 bits.
-            dtype: The type in the page: ``float32`` or ``float64``.
-        """
+        """Store numbers to within half a step; return a reference to the array."""
         rows = np.asarray(values, float)
         rows = rows[:, None] if rows.ndim == 1 else rows
         offset = rows.min(axis=0) if len(rows) else np.zeros(rows.shape[1])

@@ -1,4 +1,4 @@
-"""A circle at constant speed, in any Rⁿ with n ≥ 2."""
+"""Curves in closed form: a circle, a Lissajous figure, a line without end."""
 
 from dataclasses import KW_ONLY
 from functools import cached_property
@@ -64,11 +64,7 @@ class Circle(Compiled, Trajectory, type="circle"):
 
     @cached_property
     def _plane(self) -> Array:
-        """u1 and u2, shape (2, n).
-
-        Raises:
-            TrajectoryError: If they are not orthonormal or do not fit the dimension.
-        """
+        """u1 and u2, shape (2, n)."""
         n = self.dimension
         if self.axes is not None:
             return checks.orthonormal(self.axes, "axes", (2, n))
@@ -86,11 +82,7 @@ class Circle(Compiled, Trajectory, type="circle"):
 
 
 def _axes_from_normal(normal: Array, toward: ArrayLike | None) -> Array:
-    """Return u1 and u2 = normal × u1, shape (2, 3); ``normal`` has length 1.
-
-    Raises:
-        TrajectoryError: If ``toward`` is parallel to ``normal``.
-    """
+    """Return u1 and u2 = normal × u1, shape (2, 3); ``normal`` has length 1."""
     if toward is None:
         first = np.eye(3)[np.argmin(np.abs(normal))]
     else:
@@ -124,3 +116,90 @@ def _circle(
         position[i] = center[i] + radial
         velocity[i] = rate * tangential
         acceleration[i] = -rate * rate * radial
+
+
+class Lissajous(Compiled, Trajectory, type="lissajous"):
+    """x_i(t) = c_i + a_i sin(ω_i t + φ_i), for all t."""
+
+    points: ClassVar[tuple[str, ...]] = ("center",)
+
+    amplitudes: Vector
+    """a, shape (n,) [m, or the task's unit]."""
+    rates: Vector
+    """ω, shape (n,) [rad/s]."""
+    phases: Vector | None = None
+    """φ at t = 0, shape (n,) [rad]; zero by default."""
+    center: Vector | None = None
+    """c, shape (n,) [m, or the task's unit]; where the robot starts by default."""
+
+    def __post_init__(self) -> None:
+        """Check that all have one shape."""
+        shape = np.shape(self.amplitudes)
+        checks.array(self.rates, "rates", shape)
+        for name in ("phases", "center"):
+            value = getattr(self, name)
+            if value is not None:
+                checks.array(value, name, shape)
+
+    @property
+    def dimension(self) -> int:
+        """The number n of coordinates."""
+        return np.size(self.amplitudes)
+
+    def _kernel(self) -> Kernel:
+        phases = np.zeros(self.dimension) if self.phases is None else self.phases
+        parameters = [self.center, self.amplitudes, self.rates, phases]
+        return _lissajous, (np.array(parameters, dtype=float),)
+
+
+@kernel
+def _lissajous(
+    parameters: Array, position: Array, velocity: Array, acceleration: Array, t: float
+) -> None:
+    for i in range(position.size):
+        center, amplitude = parameters[0, i], parameters[1, i]
+        rate, phase = parameters[2, i], parameters[3, i]
+        swing = amplitude * sin(rate * t + phase)
+        position[i] = center + swing
+        velocity[i] = rate * amplitude * cos(rate * t + phase)
+        acceleration[i] = -rate * rate * swing
+
+
+class UniformLine(Compiled, Trajectory, type="uniform_line"):
+    """x(t) = x0 + t v, for all t. For a line that starts and stops use `Line`."""
+
+    points: ClassVar[tuple[str, ...]] = ("start",)
+
+    velocity: Vector
+    """v, shape (n,) [m/s, or the task's unit per s]."""
+    start: Vector | None = None
+    """x0, the point at t = 0, shape (n,) [m, or the task's unit]; where the robot
+    starts by default."""
+
+    def __post_init__(self) -> None:
+        """Check that both have one shape."""
+        if self.start is not None:
+            checks.array(self.velocity, "velocity", np.shape(self.start))
+
+    @property
+    def dimension(self) -> int:
+        """The number n of coordinates."""
+        return np.size(self.velocity)
+
+    def _kernel(self) -> Kernel:
+        return _line, (np.asarray(self.start), np.asarray(self.velocity))
+
+
+@kernel
+def _line(
+    start: Array,
+    constant_velocity: Array,
+    position: Array,
+    velocity: Array,
+    acceleration: Array,
+    t: float,
+) -> None:
+    for i in range(position.size):
+        position[i] = start[i] + t * constant_velocity[i]
+        velocity[i] = constant_velocity[i]
+        acceleration[i] = 0.0

@@ -1,0 +1,341 @@
+"""Costs of joint positions: centring, a posture, equal angles, a barrier at limits."""
+
+from dataclasses import KW_ONLY, replace
+from math import cos, pi, sin
+from typing import Annotated, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import Field
+
+from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.exceptions import FieldError
+from hsp_control.common.kernels import kernel
+from hsp_control.common.native import bind
+from hsp_control.declaration import within
+from hsp_control.declaration.quantities import Fraction, Names, Weights
+from hsp_control.geometry.start import Start
+from hsp_control.null_space.fields.barrier import barrier_at
+from hsp_control.null_space.fields.cost import CompiledCost, Derivatives
+from hsp_control.robot import Robot, RobotState
+from hsp_control.robot.configuration_space import joint_displacements
+from hsp_control.robot.postures import Posture, configuration
+from hsp_control.trajectories import Trajectory, TrajectorySample
+
+
+class JointCentering(CompiledCost, type="joint_centering"):
+    """f = ½ Σ w_i ((q_i - m_i)/r_i)², m_i the middle and r_i half of the range.
+
+    Joints without limits, continuous joints and a floating root do not count. After
+    Liégeois (1977), equation (11), scaled such that (q_i - m_i)/r_i is ±1 at a limit.
+    Half a range of less than 1 rad or 1 m counts as that: else a finger that opens by
+    4 cm would be drawn back at 2500 1/s, faster than any control period can follow.
+    """
+
+    _: KW_ONLY
+    weights: Weights = 1.0
+    """w_i of the joints [1/s], one number or nv."""
+
+    def placed(self, start: Start) -> Self:
+        """Return the cost, checked."""
+        robot = start.state.robot
+        with within("weights"):
+            per_dof(self.weights, robot.nv)
+        if not limited_joints(robot).size:
+            raise FieldError(
+                f"no joint of {robot.name} has limits, so no range has a middle; use a "
+                "target posture instead"
+            )
+        return self
+
+    def _compile(self, state: RobotState, gradient: Array, rate: Array) -> Derivatives:
+        robot = state.robot
+        limited, (lower, upper) = limited_joints(robot), robot.position_limits()
+        dofs = limited[:, 0]
+        low, high = lower[dofs], upper[dofs]
+        half = np.maximum(0.5 * (high - low), 1.0)
+        stiffness = per_dof(self.weights, robot.nv)[dofs] / half**2
+        return bind(
+            _centering,
+            state.q,
+            state.v,
+            limited,
+            0.5 * (low + high),
+            stiffness,
+            gradient,
+            rate,
+        )
+
+
+def limited_joints(robot: Robot) -> Indices:
+    """Return the indices into v and q of the k joints with limits, shape (k, 2)."""
+    lower, upper = robot.position_limits()
+    limited = np.isfinite(lower) & np.isfinite(upper) & (upper > lower)
+    return robot.single_dof_joints[limited[robot.single_dof_joints[:, 0]], :2].copy()
+
+
+@kernel
+def _centering(
+    q: Array,
+    v: Array,
+    limited: Indices,
+    middle: Array,
+    stiffness: Array,
+    gradient: Array,
+    rate: Array,
+) -> float:
+    """Write ∇f = k_i (q_i - m_i) and (∇f)' = k_i v_i, and return f; k_i = w_i/r_i²."""
+    for i in range(v.shape[0]):
+        gradient[i] = rate[i] = 0.0
+    f = 0.0
+    for k in range(limited.shape[0]):
+        i, at = limited[k, 0], limited[k, 1]
+        away = q[at] - middle[k]
+        gradient[i] = stiffness[k] * away
+        rate[i] = stiffness[k] * v[i]
+        f += 0.5 * stiffness[k] * away * away
+    return f
+
+
+def per_dof(weights: ArrayLike, nv: int) -> Array:
+    """Return weights of the joints as an array of shape (nv,)."""
+    array = np.array(weights, dtype=float)
+    if array.ndim == 0:
+        return np.full(nv, float(array))
+    if array.shape != (nv,):
+        raise FieldError(f"weights have shape {array.shape}; needs one number or {nv}")
+    return array
+
+
+class TargetPosture(CompiledCost, type="target_posture"):
+    """f = Σ w_i ½d_i², d = q ⊖ target(t); Σ w_i (1 - cos d_i) for continuous joints.
+
+    The two forms differ by terms of fourth order. The second is smooth at all angles,
+    whereas ½d² has a kink at an angle of π from the target. Joints with several degrees
+    of freedom, such as a floating root, do not count: use a task for them.
+    """
+
+    target: Posture = "start"
+    """The posture: ``start``, ``home``, nv joint positions or a configuration of nq
+    numbers [rad or m]."""
+    _: KW_ONLY
+    weights: Weights = 1.0
+    """w_i of the joints [1/s], one number or nv."""
+    displacement: Trajectory | None = None
+    """Motion of the target: nv numbers that are added to it [rad or m]; none by
+    default. A stream leads it only in a change of the running controller."""
+
+    def placed(self, start: Start) -> Self:
+        """Return the cost with its posture as a configuration, checked."""
+        robot = start.state.robot
+        with within("weights"):
+            weights = per_dof(self.weights, robot.nv)
+            if not weights[robot.single_dof_joints[:, 0]].any():
+                raise FieldError("every weight is 0")
+        displacement = self.displacement
+        if displacement is not None:
+            with within("displacement"):
+                displacement = displacement.anchored(np.zeros(robot.nv))
+                if displacement.dimension != robot.nv:
+                    raise FieldError(
+                        f"it has dimension {displacement.dimension}; the robot has "
+                        f"{robot.nv} degrees of freedom"
+                    )
+        with within("target"):
+            target = configuration(self.target, start.state)
+        return replace(self, target=target, displacement=displacement)
+
+    def _compile(self, state: RobotState, gradient: Array, rate: Array) -> Derivatives:
+        robot = state.robot
+        if isinstance(self.target, str) or np.shape(self.target) != (robot.nq,):
+            raise self._not_placed("posture")
+        moved = TrajectorySample.allocate(robot.nv)
+        derivatives = bind(
+            _posture,
+            state.q,
+            state.v,
+            np.asarray(self.target, dtype=float),
+            moved.position,
+            moved.velocity,
+            robot.single_dof_joints,
+            per_dof(self.weights, robot.nv),
+            gradient,
+            rate,
+        )
+        if self.displacement is None:
+            return derivatives
+        follow = self.displacement.follow(moved)
+
+        def followed() -> float:
+            follow(state.t)
+            return float(derivatives())
+
+        return followed
+
+
+@kernel
+def _posture(
+    q: Array,
+    v: Array,
+    target: Array,
+    moved: Array,
+    moved_rate: Array,
+    single_dof_joints: Indices,
+    weights: Array,
+    gradient: Array,
+    rate: Array,
+) -> float:
+    """Write ∇f = w d (continuous joints: w sin d) and its rate, and return f."""
+    for i in range(v.shape[0]):
+        gradient[i] = rate[i] = 0.0
+    joint_displacements(q, target, single_dof_joints, gradient)
+    f = 0.0
+    for k in range(single_dof_joints.shape[0]):
+        i = single_dof_joints[k, 0]
+        d, d_dot = gradient[i] - moved[i], v[i] - moved_rate[i]
+        if single_dof_joints[k, 2] == 1:
+            f += 0.5 * weights[i] * d * d
+            gradient[i] = weights[i] * d
+            rate[i] = weights[i] * d_dot
+        else:
+            f += weights[i] * (1.0 - cos(d))
+            gradient[i] = weights[i] * sin(d)
+            rate[i] = weights[i] * cos(d) * d_dot
+    return f
+
+
+class EqualJointAngles(CompiledCost, type="equal_joint_angles"):
+    """f = Σ (q_{k+1} - q_k)² [1/s] over consecutive joints of a list.
+
+    The paper's third simulation has the weight 5 and the joints 2 and 3 of the planar
+    arm, whose positions are the paper's relative angles θ̃2 and θ̃3. Differences are
+    wrapped to [-π, π), so that full turns of continuous joints do not count.
+    """
+
+    joints: Annotated[Names, Field(min_length=2)]
+    """Names of two or more joints with one degree of freedom each, in order [-]."""
+
+    def placed(self, start: Start) -> Self:
+        """Return the cost, checked."""
+        for k, joint in enumerate(self.joints):
+            with within("joints", k):
+                where = start.state.robot.velocity_index(joint)
+                size = where.stop - where.start
+                if size != 1:
+                    raise FieldError(
+                        f"joint {joint!r} has {size} degrees of freedom; needs 1"
+                    )
+        return self
+
+    def _compile(self, state: RobotState, gradient: Array, rate: Array) -> Derivatives:
+        robot = state.robot
+        chain = [robot.velocity_index(joint).start for joint in self.joints]
+        return bind(
+            _equal_angles,
+            state.q,
+            state.v,
+            robot.neutral(),
+            robot.single_dof_joints,
+            np.array(chain, dtype=np.int64),
+            np.zeros(robot.nv),
+            gradient,
+            rate,
+        )
+
+
+@kernel
+def _equal_angles(
+    q: Array,
+    v: Array,
+    neutral: Array,
+    single_dof_joints: Indices,
+    chain: Indices,
+    angles: Array,
+    gradient: Array,
+    rate: Array,
+) -> float:
+    """Write ∇f and (∇f)' with d_k = q_{k+1} - q_k in [-π, π), and return f."""
+    joint_displacements(q, neutral, single_dof_joints, angles)
+    for i in range(v.shape[0]):
+        gradient[i] = rate[i] = 0.0
+    f = 0.0
+    for k in range(chain.shape[0] - 1):
+        i, j = chain[k], chain[k + 1]
+        d = (angles[j] - angles[i] + pi) % (2.0 * pi) - pi
+        slope, slope_dot = 2.0 * d, 2.0 * (v[j] - v[i])
+        gradient[i] -= slope
+        gradient[j] += slope
+        rate[i] -= slope_dot
+        rate[j] += slope_dot
+        f += d * d
+    return f
+
+
+class LimitBarrier(CompiledCost, type="limit_barrier"):
+    """f = Σ w_i (b((q_i - lower_i)/u_i) + b((upper_i - q_i)/u_i)).
+
+    u_i is ``zone`` times half the range, and b the function `barrier_at`: a joint adds
+    to f only within the distance u_i of a limit. Joints without limits, continuous
+    joints and a floating root do not count.
+    """
+
+    zone: Fraction = 0.3
+    """Width of the zone before a limit, as a fraction of half the range, at most 1
+    [-]."""
+    _: KW_ONLY
+    weights: Weights = 1.0
+    """w_i of the joints [1/s], one number or nv."""
+
+    def placed(self, start: Start) -> Self:
+        """Return the cost, checked; see `NullSpaceField.placed`."""
+        robot = start.state.robot
+        with within("weights"):
+            per_dof(self.weights, robot.nv)
+        if not limited_joints(robot).size:
+            raise FieldError(f"no joint of {robot.name} has limits")
+        return self
+
+    def _compile(self, state: RobotState, gradient: Array, rate: Array) -> Derivatives:
+        robot = state.robot
+        limited, (low, high) = limited_joints(robot), robot.position_limits()
+        dofs = limited[:, 0]
+        lower, upper = low[dofs], high[dofs]
+        return bind(
+            _limit_barrier,
+            state.q,
+            state.v,
+            limited,
+            lower,
+            upper,
+            0.5 * self.zone * (upper - lower),  # u_i
+            per_dof(self.weights, robot.nv)[dofs],
+            gradient,
+            rate,
+        )
+
+
+@kernel
+def _limit_barrier(
+    q: Array,
+    v: Array,
+    limited: Indices,
+    lower: Array,
+    upper: Array,
+    unit: Array,
+    weights: Array,
+    gradient: Array,
+    rate: Array,
+) -> float:
+    """Write ∇f and (∇f)' = ∇²f v, and return f."""
+    for i in range(v.shape[0]):
+        gradient[i] = rate[i] = 0.0
+    f = 0.0
+    for k in range(limited.shape[0]):
+        i, at = limited[k, 0], limited[k, 1]
+        b_lower, slope_lower, curvature_lower = barrier_at((q[at] - lower[k]) / unit[k])
+        b_upper, slope_upper, curvature_upper = barrier_at((upper[k] - q[at]) / unit[k])
+        f += weights[k] * (b_lower + b_upper)
+        gradient[i] = weights[k] * (slope_lower - slope_upper) / unit[k]
+        curvature = (curvature_lower + curvature_upper) / (unit[k] * unit[k])
+        rate[i] = weights[k] * curvature * v[i]
+    return f
