@@ -22,9 +22,7 @@ from hsp_control.null_space.metrics import (
     MassMatrixMetric,
     Metric,
 )
-from hsp_control.trajectories import (
-    HoldOrientation,
-)
+from hsp_control.trajectories import HoldOrientation
 
 Array = NDArray[np.float64]
 GAINS = Gains(natural_frequency=20.0)

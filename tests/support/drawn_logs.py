@@ -30,19 +30,10 @@ from hsp_control import (
 )
 from hsp_control.common.resources import bundled_configs
 from hsp_control.geometry import Scene
-from hsp_control.geometry.shapes import (
-    Sphere,
-)
+from hsp_control.geometry.shapes import Sphere
 from hsp_control.null_space.metrics import MassMatrixMetric
-from hsp_control.trajectories import (
-    Circle as Round,
-)
-from hsp_control.trajectories import (
-    ComposedPose,
-    HoldOrientation,
-    Lissajous,
-    Spin,
-)
+from hsp_control.trajectories import Circle as Round
+from hsp_control.trajectories import ComposedPose, HoldOrientation, Lissajous, Spin
 
 GAINS = Gains(100.0, 20.0)
 PAPER = {"uncontrolled": 1, "rest": 2, "equal": 3, "obstacle": 4}

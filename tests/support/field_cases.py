@@ -137,8 +137,7 @@ MEMBERS: dict[str, Member] = {
         robots=LIMITED,
     ),
     "target_posture": Member(
-        lambda n: posture(n),
-        lambda n: [(1.0, posture_oracle(n), True)],
+        lambda n: posture(n), lambda n: [(1.0, posture_oracle(n), True)]
     ),
     "target_posture, weights": Member(
         lambda n: posture(n, weights=spread(load(n).nv, 0, 3)),
@@ -230,10 +229,7 @@ MEMBERS: dict[str, Member] = {
     ),
     "transmission, force": Member(
         lambda n: Transmission(
-            frames_of(n)[2],
-            direction=direction(n),
-            kind="force",
-            axes=position_axes(n),
+            frames_of(n)[2], direction=direction(n), kind="force", axes=position_axes(n)
         ),
         lambda n: [
             (

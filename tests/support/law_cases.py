@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from hsp_control import (
-    Robot,
-)
+from hsp_control import Robot
 from hsp_control.law import CONSTANT, IDENTITY
 from hsp_control.law.pseudo_inverse import weighted_pseudo_inverse
 

@@ -16,12 +16,7 @@ from hsp_control import (
     Robot,
     TargetPosture,
 )
-from hsp_control.live import (
-    InProcessRobot,
-    LiveSettings,
-    Measurement,
-    SimulatedRobot,
-)
+from hsp_control.live import InProcessRobot, LiveSettings, Measurement, SimulatedRobot
 from hsp_control.robot.integrators import SemiImplicitEuler
 from hsp_control.simulation.plants import IntegratedPlant, RigidBodyPlant
 

@@ -6,9 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from hsp_control import (
-    Robot,
-)
+from hsp_control import Robot
 
 Array = NDArray[np.float64]
 

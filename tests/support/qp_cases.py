@@ -13,11 +13,7 @@ import numpy as np
 import quadprog
 from numpy.typing import NDArray
 
-from hsp_control.control.actuation.dual_active_set import (
-    Problem,
-    Workspace,
-    minimise,
-)
+from hsp_control.control.actuation.dual_active_set import Problem, Workspace, minimise
 
 Array = NDArray[np.float64]
 Generator = np.random.Generator

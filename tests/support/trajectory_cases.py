@@ -112,10 +112,7 @@ POINT_MEMBERS: dict[str, tuple[Trajectory, list[float]]] = {
         [0.5, 2],
     ),
     "callable": (CallableTrajectory(swinging, 3), []),
-    "callable with velocity": (
-        CallableTrajectory(swinging, 3, swinging_velocity),
-        [],
-    ),
+    "callable with velocity": (CallableTrajectory(swinging, 3, swinging_velocity), []),
     "callable with both": (
         CallableTrajectory(swinging, 3, swinging_velocity, swinging_acceleration),
         [],

@@ -292,13 +292,7 @@ def test_kernels_take_them() -> None:
             ("position",),
             "limits of panda_joint1 leave no room: -1 to 1 with a margin of 1",
         ),
-        (
-            panda,
-            {"position_margin": 5.0},
-            LimitError,
-            ("position",),
-            "leave no room",
-        ),
+        (panda, {"position_margin": 5.0}, LimitError, ("position",), "leave no room"),
         (
             fingers,
             {"static_effort": 0.5},

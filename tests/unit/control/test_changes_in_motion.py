@@ -367,11 +367,7 @@ FINAL: dict[str, tuple[Callable[[], Controller], Any, Callable[[], Controller]]]
         lambda: still(null_space_gain=9.0),
     ),
     "add": (still, lambda change: change.add(TURNED), lambda: still(TURNED)),
-    "remove": (
-        lambda: still(TURNED),
-        lambda change: change.remove("turned"),
-        still,
-    ),
+    "remove": (lambda: still(TURNED), lambda change: change.remove("turned"), still),
 }
 
 
@@ -517,10 +513,7 @@ def test_the_log_has_the_terms_of_both_and_of_tasks_that_come() -> None:
     options: dict[str, Any] = {"control_period": 0.001, "log_period": 0.01}
     log = simulate(law, panda().home(), duration=1.15, on_row=change, **options)
     assert log.meta["tasks"]["elbow"]["rows"] == 1
-    for name, first in (
-        ("field.target_posture.g", 3),
-        ("task.elbow.error", 5),
-    ):
+    for name, first in (("field.target_posture.g", 3), ("task.elbow.error", 5)):
         seen = np.isfinite(log[name]).all(axis=1)
         assert not seen[:first].any()
         assert seen[first + 1 :].all()

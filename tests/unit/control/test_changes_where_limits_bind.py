@@ -15,11 +15,7 @@ from places import THOROUGH
 import hsp_control as hsp
 from hsp_control.control.actuation import actuation
 from hsp_control.control.actuation.status import Status
-from hsp_control.control.compensation import (
-    Command,
-    Compensation,
-    FrictionFeedForward,
-)
+from hsp_control.control.compensation import Command, Compensation, FrictionFeedForward
 from hsp_control.plans.switched import Switched
 from hsp_control.trajectories import HoldOrientation, Schedule
 from hsp_control.trajectories.switch import Switch

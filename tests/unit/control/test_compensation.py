@@ -30,10 +30,7 @@ from hsp_control import (
     load_experiment,
     simulate,
 )
-from hsp_control.common.exceptions import (
-    GainError,
-    SimulationError,
-)
+from hsp_control.common.exceptions import GainError, SimulationError
 from hsp_control.control.actuation.status import Status
 from hsp_control.control.compensation import (
     Command,

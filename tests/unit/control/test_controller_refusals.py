@@ -54,11 +54,7 @@ from hsp_control.null_space.fields import FieldSample, FunctionField
 from hsp_control.null_space.metrics import ConstantMetric, Metric, MetricSample
 from hsp_control.tasks import TaskSample
 from hsp_control.tasks.task import Feedback
-from hsp_control.trajectories import (
-    CallableTrajectory,
-    Trajectory,
-    TrajectorySample,
-)
+from hsp_control.trajectories import CallableTrajectory, Trajectory, TrajectorySample
 
 Array = NDArray[np.float64]
 

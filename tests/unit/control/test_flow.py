@@ -28,9 +28,7 @@ from hsp_control import (
     TargetPosture,
     simulate,
 )
-from hsp_control.common.exceptions import (
-    ControllerError,
-)
+from hsp_control.common.exceptions import ControllerError
 from hsp_control.law import CONSTANT
 from hsp_control.null_space.fields import FunctionField
 from hsp_control.null_space.metrics import Metric, MetricSample
