@@ -42,44 +42,19 @@ from field_oracles import (
 )
 from numpy.typing import NDArray
 
-from hsp_control import (
-    JointCentering,
-    NullSpaceField,
-    Obstacle,
-    Rest,
-    Robot,
-    RobotState,
-    TargetPosture,
-)
+import hsp_control as hsp
 from hsp_control.geometry import Scene
 from hsp_control.geometry.start import Start
-from hsp_control.null_space.fields import (
-    EqualJointAngles,
-    FieldSample,
-    FieldSum,
-    InverseCondition,
-    LimitBarrier,
-    Manipulability,
-    Ramp,
-    StateWeight,
-    Transmission,
-    Uncontrolled,
-)
-from hsp_control.null_space.metrics import (
-    ConstantMetric,
-    IdentityMetric,
-    MassMatrixMetric,
-    Metric,
-    MetricSample,
-)
 
 Array = NDArray[np.float64]
 
 
-Field = TypeVar("Field", bound=NullSpaceField)
+Field = TypeVar("Field", bound=hsp.NullSpaceField)
 
 
-def placed(field: Field, state: RobotState, scene: Iterable[Obstacle] = ()) -> Field:
+def placed(
+    field: Field, state: hsp.RobotState, scene: Iterable[hsp.Obstacle] = ()
+) -> Field:
     """Return a field, placed where the robot starts."""
     return field.placed(Start(state, Scene(scene)))
 
@@ -97,12 +72,12 @@ class Member:
             differenced gradient 1e-9, the promise of `Cost`.
     """
 
-    make: Callable[[str], NullSpaceField]
+    make: Callable[[str], hsp.NullSpaceField]
     parts: Callable[[str], list[tuple[Any, Any, bool]]]
     rate_accuracy: float = 5e-12
     robots: tuple[str, ...] = tuple(ROBOTS)
 
-    def build(self, name: str) -> NullSpaceField:
+    def build(self, name: str) -> hsp.NullSpaceField:
         """Return the field, placed on a robot at rest at home."""
         robot = load(name)
         return placed(
@@ -110,29 +85,31 @@ class Member:
         )
 
 
-def posture(name: str, **options: Any) -> TargetPosture:
-    return TargetPosture(target(name), **options)
+def posture(name: str, **options: Any) -> hsp.TargetPosture:
+    return hsp.TargetPosture(target(name), **options)
 
 
-def weighted(name: str) -> NullSpaceField:
+def weighted(name: str) -> hsp.NullSpaceField:
     frame = frames_of(name)[2]
-    of_state = StateWeight(lambda s: 1.5 + np.sin(s.t + s.position(frame)[0]))
-    return Ramp(initial=0.5, final=2.0, start=0.3, duration=1.0) * (
+    of_state = hsp.fields.StateWeight(
+        lambda s: 1.5 + np.sin(s.t + s.position(frame)[0])
+    )
+    return hsp.fields.Ramp(initial=0.5, final=2.0, start=0.3, duration=1.0) * (
         3.0 * posture(name) + point_distance(name)
     ) + of_state * swirl_field(name, rate=True)
 
 
 LIMITED = ("panda", "kinova", "floating ur5", "rolling ur5")
 MEMBERS: dict[str, Member] = {
-    "rest": Member(lambda n: Rest(), lambda n: []),
-    "uncontrolled": Member(lambda n: Uncontrolled(), lambda n: []),
+    "rest": Member(lambda n: hsp.Rest(), lambda n: []),
+    "uncontrolled": Member(lambda n: hsp.fields.Uncontrolled(), lambda n: []),
     "joint_centering": Member(
-        lambda n: JointCentering(),
+        lambda n: hsp.JointCentering(),
         lambda n: [(1.0, centering_oracle(n), True)],
         robots=LIMITED,
     ),
     "joint_centering, weights": Member(
-        lambda n: JointCentering(weights=spread(load(n).nv, 0.0, 3.0)),
+        lambda n: hsp.JointCentering(weights=spread(load(n).nv, 0.0, 3.0)),
         lambda n: [(1.0, centering_oracle(n, spread(load(n).nv, 0.0, 3.0)), True)],
         robots=LIMITED,
     ),
@@ -148,24 +125,26 @@ MEMBERS: dict[str, Member] = {
         lambda n: [(1.0, posture_oracle(n, sways=True), True)],
     ),
     "equal_joint_angles": Member(
-        lambda n: FieldSum([EqualJointAngles(JOINTS[ROBOTS[n][0]], weight=5.0)]),
+        lambda n: hsp.fields.FieldSum(
+            [hsp.fields.EqualJointAngles(JOINTS[ROBOTS[n][0]], weight=5.0)]
+        ),
         lambda n: [(1.0, equal_oracle(n, 5.0), True)],
     ),
     "point_distance": Member(
-        lambda n: FieldSum([point_distance(n)]),
+        lambda n: hsp.fields.FieldSum([point_distance(n)]),
         lambda n: [(1.0, distance_oracle(n, 0.4), True)],
     ),
     "limit_barrier": Member(
-        lambda n: LimitBarrier(zone=0.9),
+        lambda n: hsp.fields.LimitBarrier(zone=0.9),
         lambda n: [(1.0, barrier_oracle(n, 0.9), True)],
         robots=LIMITED,
     ),
     "manipulability": Member(
-        lambda n: Manipulability(frames_of(n)[2], axes=position_axes(n)),
+        lambda n: hsp.Manipulability(frames_of(n)[2], axes=position_axes(n)),
         lambda n: [(1.0, spectrum_oracle(n, root_of_determinant), True)],
     ),
     "manipulability, determinant, metric": Member(
-        lambda n: Manipulability(
+        lambda n: hsp.Manipulability(
             frames_of(n)[2],
             axes=position_axes(n),
             form="determinant",
@@ -180,7 +159,9 @@ MEMBERS: dict[str, Member] = {
         ],
     ),
     "manipulability, log, pose": Member(
-        lambda n: Manipulability(frames_of(n)[2], form="log", rows="pose", length=0.5),
+        lambda n: hsp.Manipulability(
+            frames_of(n)[2], form="log", rows="pose", length=0.5
+        ),
         lambda n: [
             (
                 1.0,
@@ -193,12 +174,12 @@ MEMBERS: dict[str, Member] = {
         robots=LIMITED,
     ),
     "manipulability, orientation": Member(
-        lambda n: Manipulability(frames_of(n)[2], rows="orientation"),
+        lambda n: hsp.Manipulability(frames_of(n)[2], rows="orientation"),
         lambda n: [(1.0, spectrum_oracle(n, root_of_determinant, [3, 4, 5]), True)],
         robots=LIMITED,
     ),
     "inverse_condition": Member(
-        lambda n: InverseCondition(frames_of(n)[2], axes=position_axes(n)),
+        lambda n: hsp.fields.InverseCondition(frames_of(n)[2], axes=position_axes(n)),
         lambda n: [
             (
                 1.0,
@@ -211,7 +192,7 @@ MEMBERS: dict[str, Member] = {
         ],
     ),
     "transmission, velocity": Member(
-        lambda n: Transmission(
+        lambda n: hsp.fields.Transmission(
             frames_of(n)[2], direction=3.0 * direction(n), axes=position_axes(n)
         ),
         lambda n: [
@@ -228,7 +209,7 @@ MEMBERS: dict[str, Member] = {
         ],
     ),
     "transmission, force": Member(
-        lambda n: Transmission(
+        lambda n: hsp.fields.Transmission(
             frames_of(n)[2], direction=direction(n), kind="force", axes=position_axes(n)
         ),
         lambda n: [
@@ -291,7 +272,7 @@ MEMBERS: dict[str, Member] = {
         lambda n: (
             0.5 * (3.0 * posture(n) + 2 * point_distance(n))
             + 0.7 * swirl_field(n, rate=False)
-            + Rest()
+            + hsp.Rest()
         ),
         lambda n: [
             (1.5, posture_oracle(n), True),
@@ -316,22 +297,26 @@ every_field = pytest.mark.parametrize(
 )
 
 
-def metrics(robot: Robot) -> dict[str, tuple[Metric, Callable[[Array], Array]]]:
+def metrics(
+    robot: hsp.Robot,
+) -> dict[str, tuple[hsp.metrics.Metric, Callable[[Array], Array]]]:
     """Return the three metrics, each with W(q) by plain Pinocchio."""
     rng = np.random.default_rng(5)
     A = np.eye(robot.nv) + 0.3 * rng.normal(size=(robot.nv, robot.nv))
     return {
-        "identity": (IdentityMetric(), lambda q: np.eye(robot.nv)),
-        "constant": (ConstantMetric(A.T @ A), lambda q: A.T @ A),
-        "mass matrix": (MassMatrixMetric(), Plain(robot).mass_matrix),
+        "identity": (hsp.metrics.IdentityMetric(), lambda q: np.eye(robot.nv)),
+        "constant": (hsp.metrics.ConstantMetric(A.T @ A), lambda q: A.T @ A),
+        "mass matrix": (hsp.metrics.MassMatrixMetric(), Plain(robot).mass_matrix),
     }
 
 
-def evaluate(field: NullSpaceField, metric: Metric, state: RobotState) -> FieldSample:
+def evaluate(
+    field: hsp.NullSpaceField, metric: hsp.metrics.Metric, state: hsp.RobotState
+) -> hsp.fields.FieldSample:
     """Return g and g' at a state, in memory of their own."""
     nv = state.robot.nv
-    sample = metric.evaluate(state, MetricSample.allocate(nv))
-    out = FieldSample(np.full(nv, np.nan), np.full(nv, np.nan))
+    sample = metric.evaluate(state, hsp.law.MetricSample.allocate(nv))
+    out = hsp.fields.FieldSample(np.full(nv, np.nan), np.full(nv, np.nan))
     assert field.evaluate(state, sample, metric.form, out) is out
     return out
 

@@ -14,18 +14,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from hsp_control import (
-    CenterOfMass,
-    Circle,
-    Controller,
-    FrameOrientation,
-    FramePosition,
-    Gains,
-    Robot,
-    RobotState,
-    TargetPosture,
-    simulate,
-)
+import hsp_control as hsp
 from hsp_control.common.exceptions import ContactError, ControllerError
 from hsp_control.constraints.contacts import (
     CommandedForce,
@@ -43,38 +32,43 @@ from hsp_control.trajectories import CallableTrajectory, Hold, Schedule, Stream
 pytest.importorskip("example_robot_data")
 Array = NDArray[np.float64]
 seeds = st.integers(0, 2**32 - 1)
-GAINS = Gains(natural_frequency=8.0)
+GAINS = hsp.Gains(natural_frequency=8.0)
 HAND, TIP = "gripper_right_base_link", "panda_tcp"
 SOLES = ("left_sole_link", "right_sole_link")
 
 
 @cache
-def talos() -> Robot:
-    return Robot.load(
+def talos() -> hsp.Robot:
+    return hsp.Robot.load(
         "talos", locked={"gripper_left_joint": 0, "gripper_right_joint": 0}
     )
 
 
 @cache
-def panda() -> Robot:
-    return Robot.load("panda")
+def panda() -> hsp.Robot:
+    return hsp.Robot.load("panda")
 
 
 def wall(force: CommandedForce | None, **options: Any) -> PointContact:
     return PointContact(HAND, normal=[-1.0, 0.0, 0.0], force=force, **options)
 
 
-def leaning(*contacts: Contact, friction: float = 0.7, **options: Any) -> Controller:
+def leaning(
+    *contacts: Contact, friction: float = 0.7, **options: Any
+) -> hsp.Controller:
     """Return Talos on two soles with further contacts."""
     soles = [
         SurfaceContact(frame, length=0.16, width=0.1, friction=friction)
         for frame in SOLES
     ]
-    tasks = [CenterOfMass(gains=GAINS), FrameOrientation("torso_2_link", gains=GAINS)]
-    return Controller(
+    tasks = [
+        hsp.CenterOfMass(gains=GAINS),
+        hsp.FrameOrientation("torso_2_link", gains=GAINS),
+    ]
+    return hsp.Controller(
         talos(),
         tasks,
-        TargetPosture("home"),
+        hsp.TargetPosture("home"),
         null_space_gain=6.0,
         contacts=[*soles, *contacts],
         start=talos().home(),
@@ -82,7 +76,7 @@ def leaning(*contacts: Contact, friction: float = 0.7, **options: Any) -> Contro
     )
 
 
-def random_state(robot: Robot, seed: int) -> RobotState:
+def random_state(robot: hsp.Robot, seed: int) -> hsp.RobotState:
     rng = np.random.default_rng(seed)
     q = robot.integrate(robot.home(), 0.02 * rng.standard_normal(robot.nv))
     return robot.state(0.0, q, 0.01 * rng.standard_normal(robot.nv))
@@ -186,12 +180,12 @@ def test_a_force_that_nothing_can_balance_gives_way_before_the_law() -> None:
 # --- motions -------------------------------------------------------------------------
 
 
-def pressing(contact: Contact, **options: Any) -> Controller:
+def pressing(contact: Contact, **options: Any) -> hsp.Controller:
     """Return a Panda that turns its hand as it pleases, and presses."""
-    return Controller(
+    return hsp.Controller(
         panda(),
-        [FrameOrientation(TIP, gains=GAINS, name="turn")],
-        TargetPosture(panda().home()),
+        [hsp.FrameOrientation(TIP, gains=GAINS, name="turn")],
+        hsp.TargetPosture(panda().home()),
         null_space_gain=5.0,
         contacts=[contact],
         **({"limits": None} | options),
@@ -209,7 +203,7 @@ def test_a_fixed_base_presses_with_what_is_commanded() -> None:
     controller = pressing(contact)
     J = controller.robot.state(0.0, panda().home(), np.zeros(7)).frame(TIP).jacobian
     v0 = 0.3 * np.linalg.svd(J)[2][-1]  # self-motion
-    log = simulate(
+    log = hsp.simulate(
         controller,
         panda().home(),
         v0,
@@ -231,7 +225,7 @@ def test_a_fixed_base_presses_with_what_is_commanded() -> None:
 class SlidingPlant(ContinuousPlant):
     """A point on a plane: one rigid row, and kinetic friction that it does not tell."""
 
-    def __init__(self, robot: Robot, contact: SlidingContact) -> None:
+    def __init__(self, robot: hsp.Robot, contact: SlidingContact) -> None:
         super().__init__(robot)
         self._contact = contact
         self.pressed = 0.0
@@ -262,21 +256,21 @@ def test_a_sliding_point_keeps_force_and_path(normal: list[float]) -> None:
     )
     state = panda().state(0.0, panda().home(), np.zeros(7))
     here = state.position(TIP)[:2].copy()
-    path = Circle(0.05, 2.0, here - [0.05, 0.0])
+    path = hsp.Circle(0.05, 2.0, here - [0.05, 0.0])
     tasks = [
-        FramePosition(TIP, path, axes="xy", gains=GAINS, name="path"),
-        FrameOrientation(TIP, gains=GAINS, name="upright"),
+        hsp.FramePosition(TIP, path, axes="xy", gains=GAINS, name="path"),
+        hsp.FrameOrientation(TIP, gains=GAINS, name="upright"),
     ]
-    controller = Controller(
+    controller = hsp.Controller(
         panda(),
         tasks,
-        TargetPosture(panda().home() + 0.1),
+        hsp.TargetPosture(panda().home() + 0.1),
         null_space_gain=5.0,
         contacts=[contact],
         limits=None,
     )
     plant = SlidingPlant(panda(), contact)
-    log = simulate(
+    log = hsp.simulate(
         controller,
         panda().home(),
         controller.flow(0.0, panda().home()),
@@ -314,9 +308,9 @@ def test_a_wrench_of_a_surface() -> None:
     """Six numbers: the forces at the corners have this sum and these moments."""
     wrench = np.array([2.0, -1.0, 30.0, 0.4, -0.5, 0.1])
     contact = SurfaceContact(TIP, length=0.1, width=0.08, force=CommandedForce(wrench))
-    controller = Controller(
+    controller = hsp.Controller(
         panda(),
-        [FramePosition(TIP, axes="x", gains=GAINS)],
+        [hsp.FramePosition(TIP, axes="x", gains=GAINS)],
         contacts=[contact],
         limits=None,
     )
@@ -339,7 +333,7 @@ def press(**options: Any) -> PointContact:
 REFUSED: dict[str, tuple[Any, str]] = {
     "none": (lambda: CommandedForce(), "give either the value of the force or its"),
     "two": (
-        lambda: CommandedForce(1.0, trajectory=Circle(1.0, 1.0, [0.0, 0.0])),
+        lambda: CommandedForce(1.0, trajectory=hsp.Circle(1.0, 1.0, [0.0, 0.0])),
         "give either the value of the force or its trajectory",
     ),
     "streamed": (

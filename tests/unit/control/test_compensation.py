@@ -12,24 +12,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 from task_cases import placed
 
-from hsp_control import (
-    CenterOfMass,
-    Controller,
-    FrameOrientation,
-    FramePose,
-    FramePosition,
-    Gains,
-    Hold,
-    JointPosture,
-    Limits,
-    Pointing,
-    Robot,
-    RobotState,
-    Rollout,
-    Task,
-    load_experiment,
-    simulate,
-)
+import hsp_control as hsp
 from hsp_control.common.exceptions import GainError, SimulationError
 from hsp_control.control.actuation.status import Status
 from hsp_control.control.compensation import (
@@ -45,12 +28,6 @@ from hsp_control.control.compensation import (
 from hsp_control.null_space.fields import TargetPosture
 from hsp_control.robot.friction import JointFriction
 from hsp_control.robot.integrators import Rk4
-from hsp_control.simulation.plants import (
-    ImperfectPlant,
-    IntegratedPlant,
-    RigidBodyPlant,
-    StickingPlant,
-)
 from hsp_control.simulation.plants.drives import EffortDelay
 from hsp_control.simulation.plants.model_changes import Inertias, Payload, changed
 from hsp_control.simulation.plants.sensors import SensorDelay, VelocityNoise
@@ -62,13 +39,13 @@ EYE = np.eye(7)
 
 
 def run(
-    made: Controller, compensation: Compensation | None = None, **options: Any
-) -> Rollout:
+    made: hsp.Controller, compensation: Compensation | None = None, **options: Any
+) -> hsp.Rollout:
     settings: dict[str, Any] = {
         "duration": 0.3, "control_period": H, "log_period": H, "integrator": Rk4(H),
         "compensation": compensation, **options,
     }  # fmt: skip
-    return simulate(made, Q0, **settings)
+    return hsp.simulate(made, Q0, **settings)
 
 
 # ----------------------------------------------------------------------- the chain
@@ -76,12 +53,12 @@ def run(
 
 def test_without_compensators_it_is_the_controller_to_the_last_bit() -> None:
     """Beside a loop written by hand, as a user would, on a noisy plant."""
-    made = controller(limits=Limits(effort_rate=1000.0))
-    engine = IntegratedPlant(RigidBodyPlant(PANDA), Rk4(H))
-    plant = ImperfectPlant(engine, [VelocityNoise(0.02)], [], seed=3)
+    made = controller(limits=hsp.Limits(effort_rate=1000.0))
+    engine = hsp.plants.IntegratedPlant(hsp.plants.RigidBodyPlant(PANDA), Rk4(H))
+    plant = hsp.plants.ImperfectPlant(engine, [VelocityNoise(0.02)], [], seed=3)
     ours = run(made, Compensation(), plant=plant, duration=0.1)
 
-    state = RobotState(PANDA)
+    state = hsp.RobotState(PANDA)
     q, v = Q0, np.zeros(7)
     plant.reset(0.0, q, v)
     made.restart()
@@ -125,7 +102,7 @@ def test_the_robot_s_own_friction_is_fed_forward() -> None:
     assert np.abs(made.log_channels()["friction.feed_forward"].value).max() > 1e-4
 
 
-def friction_of(robot: Robot) -> tuple[Array, Array]:
+def friction_of(robot: hsp.Robot) -> tuple[Array, Array]:
     """Return the Coulomb and viscous friction in the URDF, shape (nv,) each."""
     return np.abs(robot.model.upperDryFrictionLimit), np.abs(robot.model.damping)
 
@@ -158,11 +135,11 @@ def test_the_observer_is_a_low_pass_on_what_pushes(name: str, rate: float) -> No
 
     The mean of Cᵀv - G over a period is good to h²/12 of its second derivative: 1e-4.
     """
-    robot, rng = Robot.load(name), np.random.default_rng(1)
+    robot, rng = hsp.Robot.load(name), np.random.default_rng(1)
     nv = robot.nv
     d, tau = rng.uniform(-5.0, 5.0, nv), rng.uniform(-5.0, 5.0, nv)
     observer = MomentumObserver(rate).begin(robot)
-    plant = IntegratedPlant(RigidBodyPlant(robot), Rk4(H))
+    plant = hsp.plants.IntegratedPlant(hsp.plants.RigidBodyPlant(robot), Rk4(H))
     q, v = robot.home(), rng.uniform(-0.5, 0.5, nv)
     plant.reset(0.0, q, v)
     for k in range(100):
@@ -181,7 +158,7 @@ def test_the_observer_lets_go_of_what_is_not_there() -> None:
 def test_what_is_cancelled_is_clipped() -> None:
     """Beyond it the arm gives way as if there were no observer."""
     heavy = changed(PANDA, [Inertias(1.5)])
-    plant = RigidBodyPlant(heavy)
+    plant = hsp.plants.RigidBodyPlant(heavy)
     clipped, free = (
         run(
             controller(),
@@ -193,7 +170,7 @@ def test_what_is_cancelled_is_clipped() -> None:
     assert np.abs(free["observer.disturbance"][-1]).max() > 5.0
     errors = [np.linalg.norm(log["task.hand.error"][-1]) for log in (clipped, free)]
     assert errors[0] > 10.0 * errors[1]
-    state = RobotState(PANDA)
+    state = hsp.RobotState(PANDA)
     own = MomentumObserver(50.0, [1.0] * 7)
     command = Command(controller(), Compensation(momentum_observer=own))
     for k in range(5):
@@ -211,11 +188,11 @@ def test_limits_are_kept_by_the_whole_effort() -> None:
     """The observer asks for more than the limits leave; where they do not bind: all."""
     heavy = changed(PANDA, [Inertias(1.4)])
     most = np.array([87.0, 45.0, 87.0, 87.0, 12.0, 12.0, 12.0])
-    made = controller(limits=Limits(effort=most, velocity=None, position=None))
+    made = controller(limits=hsp.Limits(effort=most, velocity=None, position=None))
     log = run(
         made,
         Compensation(momentum_observer=MomentumObserver(50.0)),
-        plant=RigidBodyPlant(heavy),
+        plant=hsp.plants.RigidBodyPlant(heavy),
     )
     assert (np.abs(log.tau) <= most + 1e-9).all()
     assert np.abs(log.tau[:, 1]).max() > 45.0 - 1e-6  # and it is reached
@@ -223,8 +200,8 @@ def test_limits_are_kept_by_the_whole_effort() -> None:
 
 
 def test_the_observer_leaves_the_effort_rate_to_the_limits() -> None:
-    made = controller(limits=Limits(effort_rate=100.0))
-    plant = RigidBodyPlant(changed(PANDA, [Inertias(1.4)]))
+    made = controller(limits=hsp.Limits(effort_rate=100.0))
+    plant = hsp.plants.RigidBodyPlant(changed(PANDA, [Inertias(1.4)]))
     log = run(made, Compensation(momentum_observer=MomentumObserver(50.0)), plant=plant)
     assert np.abs(np.diff(log.tau, axis=0)).max() <= 100.0 * H + 1e-9
 
@@ -239,7 +216,7 @@ def test_known_friction_costs_nothing_and_the_observer_leaves_it_alone() -> None
     friction here is some 0.5 N·m.
     """
     made = controller(away=0.0)
-    oil = StickingPlant(PANDA, JointFriction.of(PANDA, viscous=2.0), H / 2.0)
+    oil = hsp.plants.StickingPlant(PANDA, JointFriction.of(PANDA, viscous=2.0), H / 2.0)
     known = FrictionFeedForward(viscous=2.0)
     flow = {"v0": made.flow(0.0, Q0)}  # no transient
     bare, alone = run(made, **flow), run(made, plant=oil, **flow)
@@ -270,18 +247,20 @@ def test_the_desired_velocity_is_the_law_s_flow(levels: int) -> None:
 
     robot, rng = PANDA, np.random.default_rng(2)
     own: dict[str, Any] = {
-        "gains": Gains(natural_frequency=5.0),
+        "gains": hsp.Gains(natural_frequency=5.0),
         "largest_error": "none",
     }
-    turned = FrameOrientation("panda_tcp", HoldOrientation(np.eye(3)), **own)
-    again = FramePosition("panda_tcp", circle().trajectory, name="more", **own)
+    turned = hsp.FrameOrientation("panda_tcp", HoldOrientation(np.eye(3)), **own)
+    again = hsp.FramePosition("panda_tcp", circle().trajectory, name="more", **own)
     second, third = replace(turned, priority=2), replace(again, priority=3)
-    tasks: list[Task] = {
+    tasks: list[hsp.Task] = {
         1: [circle(), turned],
         2: [circle(), second],
         3: [circle(), second, third],  # nine rows on seven freedoms
     }[levels]
-    made = Controller(robot, tasks, TargetPosture(np.zeros(7) + Q0 * 0.9), limits=None)
+    made = hsp.Controller(
+        robot, tasks, TargetPosture(np.zeros(7) + Q0 * 0.9), limits=None
+    )
     q = robot.integrate(Q0, rng.uniform(-0.3, 0.3, 7))
     flow = made.flow(0.4, q)
     for _ in range(5):
@@ -296,24 +275,24 @@ def test_the_desired_velocity_is_the_law_s_flow(levels: int) -> None:
 # ------------------------------------------------------------------ integral action
 
 
-def all_tasks() -> list[Task]:
-    robot, gains = PANDA, Gains(natural_frequency=3.0)
+def all_tasks() -> list[hsp.Task]:
+    robot, gains = PANDA, hsp.Gains(natural_frequency=3.0)
     here = robot.state(0.0, Q0, np.zeros(7)).frame("panda_tcp")
     turn = HoldOrientation(here.rotation)
     pose = HoldPose(here.position, here.rotation)
     return [
         circle(),
-        FrameOrientation("panda_tcp", turn, gains=gains),
-        FramePose("panda_tcp", pose, gains=gains),
-        Pointing("panda_tcp", axis=[0.0, 0.0, 1.0], trajectory=turn, gains=gains),
-        JointPosture(Q0, gains=gains),
-        CenterOfMass(Hold([0.1, 0.0, 0.4]), gains=gains),
+        hsp.FrameOrientation("panda_tcp", turn, gains=gains),
+        hsp.FramePose("panda_tcp", pose, gains=gains),
+        hsp.Pointing("panda_tcp", axis=[0.0, 0.0, 1.0], trajectory=turn, gains=gains),
+        hsp.JointPosture(Q0, gains=gains),
+        hsp.CenterOfMass(hsp.Hold([0.1, 0.0, 0.4]), gains=gains),
         RelativePose("panda_tcp", pose, reference="panda_link0", gains=gains),
     ]
 
 
 @pytest.mark.parametrize("task", all_tasks(), ids=lambda task: type(task).__name__)
-def test_an_offset_enters_each_error_equation_exactly(task: Task) -> None:
+def test_an_offset_enters_each_error_equation_exactly(task: hsp.Task) -> None:
     """e'' + Kv e' + Kp e + offset = 0, e'' by central differences of e'."""
     robot, rng = PANDA, np.random.default_rng(5)
     task = placed(task, robot)
@@ -346,7 +325,7 @@ def test_with_an_integral_the_error_is_that_of_the_third_order() -> None:
     made = controller()
     q = robot.integrate(Q0, np.array([0.0, 0.05, 0.0, 0.05, 0.0, 0.0, 0.0]))
     ki = {"hand": [400.0, 800.0, 1200.0]}
-    log = simulate(
+    log = hsp.simulate(
         made, q, duration=0.5, control_period=H / 2, log_period=0.01,
         integrator=Rk4(H / 2),
         compensation=Compensation(integral_action=IntegralAction(ki=ki)),
@@ -362,11 +341,11 @@ def test_with_an_integral_the_error_is_that_of_the_third_order() -> None:
 
 
 def test_a_lasting_error_dies_and_the_null_space_keeps_its_own() -> None:
-    plant = RigidBodyPlant(changed(PANDA, [Inertias(1.2)]))
+    plant = hsp.plants.RigidBodyPlant(changed(PANDA, [Inertias(1.2)]))
     point = circle().trajectory.sample(0.0).position
-    gains = Gains(natural_frequency=20.0)
-    hold = FramePosition("panda_tcp", Hold(point), gains=gains, name="hand")
-    made = Controller(PANDA, [hold], limits=None)
+    gains = hsp.Gains(natural_frequency=20.0)
+    hold = hsp.FramePosition("panda_tcp", hsp.Hold(point), gains=gains, name="hand")
+    made = hsp.Controller(PANDA, [hold], limits=None)
     options = {"plant": plant, "duration": 1.5}
     alone = run(made, **options)
     mended = run(made, Compensation(integral_action=IntegralAction(10.0)), **options)
@@ -389,9 +368,9 @@ def test_a_payload_s_error_dies_as_the_linear_equation_says(
     All joints are led, so that no self-motion is left; the rest is of second order.
     """
     loaded = changed(PANDA, [Payload("panda_tcp", mass)])
-    task = JointPosture(Q0, gains=Gains(natural_frequency=20.0), name="hand")
+    task = hsp.JointPosture(Q0, gains=hsp.Gains(natural_frequency=20.0), name="hand")
 
-    def dynamics(robot: Robot, q: Array) -> tuple[Array, Array]:
+    def dynamics(robot: hsp.Robot, q: Array) -> tuple[Array, Array]:
         state = robot.state(0.0, q, np.zeros(7))
         upper = np.triu(state.mass_matrix)
         return upper + np.triu(upper, 1).T, state.nonlinear_effects.copy()
@@ -408,9 +387,9 @@ def test_a_payload_s_error_dies_as_the_linear_equation_says(
         [-400.0 * B - D, -40.0 * B, -400.0 * rate * B, weight(Q0)[:, None]]
     )
     log = run(
-        Controller(PANDA, [task], limits=None),
+        hsp.Controller(PANDA, [task], limits=None),
         Compensation(integral_action=IntegralAction(rate)),
-        plant=RigidBodyPlant(loaded), duration=2.0, log_period=0.02,
+        plant=hsp.plants.RigidBodyPlant(loaded), duration=2.0, log_period=0.02,
     )  # fmt: skip
     expected = np.array([expm(A * t)[:7, 21] for t in log.t])
     error, size = log["task.hand.error"], np.abs(expected).max()
@@ -422,12 +401,15 @@ def test_a_payload_s_error_dies_as_the_linear_equation_says(
 @pytest.mark.slow
 def test_too_much_integral_action_is_lost_with_a_payload() -> None:
     """2 kg at the hand leave 0.3 of the feedback: as little as Ki/(Kv Kp) = 12/40."""
-    loaded = RigidBodyPlant(changed(PANDA, [Payload("panda_tcp", 2.0)]))
+    loaded = hsp.plants.RigidBodyPlant(changed(PANDA, [Payload("panda_tcp", 2.0)]))
     point = circle(away=0.0).trajectory.sample(0.0).position
-    hold = FramePosition(
-        "panda_tcp", Hold(point), gains=Gains(natural_frequency=20.0), name="hand"
+    hold = hsp.FramePosition(
+        "panda_tcp",
+        hsp.Hold(point),
+        gains=hsp.Gains(natural_frequency=20.0),
+        name="hand",
     )
-    made = Controller(PANDA, [hold], 2.0 * TargetPosture(Q0), limits=None)
+    made = hsp.Controller(PANDA, [hold], 2.0 * TargetPosture(Q0), limits=None)
     largest = {}
     for rate in (5.0, 12.0):
         compensation = Compensation(integral_action=IntegralAction(rate))
@@ -483,7 +465,7 @@ def test_an_integral_only_unwinds_while_the_law_is_not_delivered() -> None:
 def test_an_arm_that_is_too_weak_does_not_wind_up() -> None:
     """While its limits bind, errors are not gathered."""
     weak = np.array([87.0, 20.0, 87.0, 87.0, 12.0, 12.0, 12.0])  # gravity takes 30
-    made = controller(limits=Limits(effort=weak, velocity=None, position=None))
+    made = controller(limits=hsp.Limits(effort=weak, velocity=None, position=None))
     log = run(made, Compensation(integral_action=IntegralAction(20.0)), duration=0.015)
     assert (log["status"] >= Status.LIMITED).all()
     assert np.abs(log["task.hand.error"][-1]).max() > 1e-4
@@ -521,8 +503,8 @@ def test_the_predictor_knows_where_the_robot_will_be(
     efforts: int, sensors: int
 ) -> None:
     """What the law is shown is the state in which its effort acts, to Rk4's error."""
-    plant = ImperfectPlant(
-        IntegratedPlant(RigidBodyPlant(PANDA), Rk4(H)),
+    plant = hsp.plants.ImperfectPlant(
+        hsp.plants.IntegratedPlant(hsp.plants.RigidBodyPlant(PANDA), Rk4(H)),
         [SensorDelay(sensors)] if sensors else [],
         [EffortDelay(efforts)] if efforts else [],
     )
@@ -542,7 +524,7 @@ def test_the_law_is_of_the_time_at_which_its_effort_acts(
     efforts: int, sensors: int
 ) -> None:
     """Sent at t: the effort of the moving task at t + the drives' delay, no other."""
-    made, state = controller(), RobotState(PANDA)
+    made, state = controller(), hsp.RobotState(PANDA)
     compensation = Compensation(predictor=Predictor(efforts, sensors))
     log = run(made, compensation, duration=0.05)
 
@@ -565,14 +547,14 @@ def test_the_ramp_leads_from_gravity_to_the_law(frequency: float) -> None:
     options: dict[str, Any] = {
         "duration": 0.4, "control_period": H, "log_period": H, "integrator": Rk4(H)
     }  # fmt: skip
-    jumping = simulate(made, q, **options)
-    smooth = simulate(made, q, compensation=ramp, **options)
+    jumping = hsp.simulate(made, q, **options)
+    smooth = hsp.simulate(made, q, compensation=ramp, **options)
     gravity = PANDA.inverse_dynamics(q, np.zeros(7), np.zeros(7))
     np.testing.assert_allclose(smooth.tau[0], gravity, atol=1e-12)
     assert np.abs(jumping.tau[0] - gravity).max() > 5.0
     steps = np.abs(np.diff(smooth.tau, axis=0)).max()
     assert steps < 0.02 * np.abs(jumping.tau[0] - gravity).max()
-    state = RobotState(PANDA)
+    state = hsp.RobotState(PANDA)
     for k in (250, 400):  # the ramp is over: the law, exactly
         here = state.update(smooth.t[k], smooth.q[k], smooth.v[k])
         np.testing.assert_array_equal(made.compute(here).tau, smooth.tau[k])
@@ -627,7 +609,7 @@ def test_random_bodies_and_friction_come_to_a_tenth_of_a_millimetre() -> None:
             "integrator": {"type": "rk4", "step": H},
         },
     }
-    log = load_experiment(config).run()
+    log = hsp.load_experiment(config).run()
     late = log.t > 1.5
     error = np.linalg.norm(log["task.hand.error"][late], axis=1)
     assert np.sqrt(np.mean(error**2)) < 0.11e-3

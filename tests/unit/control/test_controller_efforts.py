@@ -19,15 +19,11 @@ from controller_cases import (
     track,
 )
 
+import hsp_control as hsp
 from hsp_control import Controller, FramePosition, Limits, Rest, TargetPosture
 from hsp_control.common.exceptions import ControllerError
 from hsp_control.control.actuation import Status
 from hsp_control.null_space.fields import Uncontrolled
-from hsp_control.null_space.metrics import (
-    IdentityMetric,
-    MassMatrixMetric,
-    MetricSample,
-)
 
 # --- what it returns -----------------------------------------------------------------
 
@@ -96,7 +92,7 @@ def test_defaults_are_rest_the_identity_and_ten() -> None:
         panda(),
         [track()],
         Rest(),
-        metric=IdentityMetric(),
+        metric=hsp.metrics.IdentityMetric(),
         null_space_gain=10.0,
         limits=None,
     )
@@ -134,7 +130,7 @@ def test_uncontrolled_leaves_self_motion_alone(kind: str) -> None:
     for t, q, v in states(5):
         state = panda().state(t, q, v)
         out = controller.compute(state)
-        sample, W = out.task, metric.evaluate(state, MetricSample.allocate(7)).W
+        sample, W = out.task, metric.evaluate(state, hsp.law.MetricSample.allocate(7)).W
         J_sharp = oracles.pseudo_inverse(sample.jacobian, W)
         expected = J_sharp @ (sample.acceleration - sample.jacobian_dot @ v)
         scale = np.abs(expected).max()
@@ -158,7 +154,7 @@ def test_diagnosis(kind: str) -> None:
         state = panda().state(t, q, v)
         out = contents(controller.compute(state))
         diagnosis = controller.diagnose()
-        W = metric.evaluate(state, MetricSample.allocate(7)).W
+        W = metric.evaluate(state, hsp.law.MetricSample.allocate(7)).W
         J, e_N = out["task.jacobian"], out["null_space_error"]
         whitened = J @ np.linalg.inv(np.linalg.cholesky(W)).T
         expected = np.linalg.svd(whitened)[1]
@@ -273,7 +269,7 @@ def test_states_take_turns() -> None:
     """Two robots of one kind, one controller: each state gets its own effort."""
     field = TargetPosture(panda().home())
     controller = Controller(
-        panda(), [track()], field, metric=MassMatrixMetric(), limits=None
+        panda(), [track()], field, metric=hsp.metrics.MassMatrixMetric(), limits=None
     )
     first, second = (panda().state(*where) for where in states(2, seed=3))
     a, b = contents(controller.compute(first)), contents(controller.compute(second))
@@ -312,7 +308,7 @@ def test_singular_posture_gives_a_bounded_effort(kind: str) -> None:
     sample = outputs[0]
     wanted = sample["task.acceleration"] - sample["task.jacobian_dot"] @ v
     state = panda().state(0.0, np.zeros(7), v)
-    metric = METRICS[kind](7).evaluate(state, MetricSample.allocate(7))
+    metric = METRICS[kind](7).evaluate(state, hsp.law.MetricSample.allocate(7))
     uncontrolled = Controller(
         panda(),
         tasks,

@@ -20,21 +20,7 @@ from controller_cases import (
 )
 from numpy.typing import NDArray
 
-from hsp_control import (
-    Controller,
-    FramePosition,
-    FunctionCost,
-    HspControlError,
-    JointPosture,
-    Limits,
-    NullSpaceField,
-    ObstacleClearance,
-    Rest,
-    RobotState,
-    TargetPosture,
-    Task,
-    simulate,
-)
+import hsp_control as hsp
 from hsp_control.common.exceptions import (
     ContactError,
     ControllerError,
@@ -83,14 +69,14 @@ W1 = np.array([100.0, 1, 1, 1, 1, 1, 1])
             "^tasks: two tasks are called 'panda_tcp'; give them distinct names$",
         ),
         (
-            lambda: [FramePosition("panda_hnad", name="hand")],
+            lambda: [hsp.FramePosition("panda_hnad", name="hand")],
             {},
             FrameNotFoundError,
             r"^tasks.hand.frame: no frame 'panda_hnad'; did you mean 'panda_hand'\?",
         ),
         (
             lambda: [track()],
-            {"field": lambda: Rest() + TargetPosture([0.0, 1.0])},
+            {"field": lambda: hsp.Rest() + hsp.TargetPosture([0.0, 1.0])},
             ShapeError,
             r"^null_space.fields.1.target: a posture has shape \(2,\); needs 7 num",
         ),
@@ -117,7 +103,11 @@ W1 = np.array([100.0, 1, 1, 1, 1, 1, 1])
         *(
             (lambda: [track()], {what: wrong}, ControllerError, message)
             for what, wrong, message in (
-                ("field", [Rest()], r"^field is \[Rest\(\)\], which is not a NullSp"),
+                (
+                    "field",
+                    [hsp.Rest()],
+                    r"^field is \[Rest\(\)\], which is not a NullSp",
+                ),
                 ("metric", "identity", "^metric is 'identity', which is not a Metric"),
                 ("limits", {"effort": 1}, "^limits is .*, which is not a Limits"),
                 ("contacts", ["sole"], "^contacts contains 'sole', which is not a Con"),
@@ -125,13 +115,13 @@ W1 = np.array([100.0, 1, 1, 1, 1, 1, 1])
         ),
         (
             lambda: [track()],
-            {"limits": lambda: Limits(effort=[1.0, 2.0])},
+            {"limits": lambda: hsp.Limits(effort=[1.0, 2.0])},
             LimitError,
             "^limits.effort: has 2 numbers; needs one number or 7$",
         ),
         (
             lambda: [track()],
-            {"field": lambda: ObstacleClearance(["ball"])},
+            {"field": lambda: hsp.ObstacleClearance(["ball"])},
             SceneError,
             r"^null_space.fields.0.obstacles.0: no obstacle 'ball' \(the scene has",
         ),
@@ -206,7 +196,7 @@ W1 = np.array([100.0, 1, 1, 1, 1, 1, 1])
     ],
 )
 def test_refuses(
-    tasks: Callable[[], list[Task]],
+    tasks: Callable[[], list[hsp.Task]],
     options: dict[str, Any],
     error: type[Exception],
     message: str,
@@ -216,27 +206,27 @@ def test_refuses(
         for name, option in options.items()
     }
     with pytest.raises(error, match=message) as caught:
-        Controller(panda(), tasks(), **made)
-    assert isinstance(caught.value, HspControlError)
+        hsp.Controller(panda(), tasks(), **made)
+    assert isinstance(caught.value, hsp.HspControlError)
     not_there = error is FrameNotFoundError
     assert isinstance(caught.value, LookupError if not_there else ValueError)
 
 
 def test_a_gain_is_judged_in_its_metric() -> None:
     """The gain that is refused in one metric passes in another, and conversely."""
-    Controller(panda(), [track()], null_space_gain=indefinite_gain())
+    hsp.Controller(panda(), [track()], null_space_gain=indefinite_gain())
     # W K_N symmetric positive definite, K_N + K_Nᵀ indefinite.
     K_hat = np.eye(7)
     K_hat[0, 1] = K_hat[1, 0] = 0.9
     K_N = np.linalg.solve(np.diag(W1), K_hat)
     assert np.linalg.eigvalsh(K_N + K_N.T)[0] < 0.0
-    Controller(panda(), [track()], null_space_gain=K_N, metric=ConstantMetric(W1))
+    hsp.Controller(panda(), [track()], null_space_gain=K_N, metric=ConstantMetric(W1))
     with pytest.raises(GainError):
-        Controller(panda(), [track()], null_space_gain=K_N)
+        hsp.Controller(panda(), [track()], null_space_gain=K_N)
 
 
 def test_as_many_rows_as_freedoms_are_allowed() -> None:
-    (posture,) = Controller(panda(), [JointPosture(gains=GAINS)]).tasks
+    (posture,) = hsp.Controller(panda(), [hsp.JointPosture(gains=GAINS)]).tasks
     assert posture.rows == 7
 
 
@@ -256,13 +246,13 @@ def test_as_many_rows_as_freedoms_are_allowed() -> None:
     ],
 )
 def test_what_it_is_made_of_cannot_be_assigned(name: str, instead: str) -> None:
-    controller = Controller(panda(), [track()])
+    controller = hsp.Controller(panda(), [track()])
     with pytest.raises(ImmutableError, match=f"^Controller.{name} cannot.*{instead}"):
         setattr(controller, name, getattr(controller, name))
 
 
 def test_the_gain_in_force_is_a_copy() -> None:
-    controller = Controller(panda(), [track()], null_space_gain=3.0)
+    controller = hsp.Controller(panda(), [track()], null_space_gain=3.0)
     controller.null_space_gain[:] = 7.0
     np.testing.assert_array_equal(controller.null_space_gain, 3.0 * np.eye(7))
 
@@ -287,14 +277,14 @@ class Broken(Trajectory):
         return out
 
 
-class BrokenField(NullSpaceField):
+class BrokenField(hsp.NullSpaceField):
     """A user's field written straight into the sample, unchecked."""
 
     where: str
     broken: float
 
     def evaluate(
-        self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
+        self, state: hsp.RobotState, metric: MetricSample, form: int, out: FieldSample
     ) -> FieldSample:
         for array in out:
             array[:] = 0.0
@@ -302,7 +292,7 @@ class BrokenField(NullSpaceField):
             getattr(out, self.where)[2] = self.broken
         return out
 
-    def value(self, state: RobotState) -> float:
+    def value(self, state: hsp.RobotState) -> float:
         return 0.0
 
 
@@ -311,12 +301,12 @@ class BrokenMetric(Metric):
 
     form: ClassVar[int] = VARYING
 
-    def evaluate(self, state: RobotState, out: MetricSample) -> MetricSample:
+    def evaluate(self, state: hsp.RobotState, out: MetricSample) -> MetricSample:
         out.W_dot[0, 0] = np.nan if state.t > 0.5 else 0.0
         return out
 
 
-class BrokenTask(FramePosition):
+class BrokenTask(hsp.FramePosition):
     """A user's task whose arrays go wrong after half a second."""
 
     _: KW_ONLY
@@ -325,7 +315,7 @@ class BrokenTask(FramePosition):
 
     def evaluate(
         self,
-        state: RobotState,
+        state: hsp.RobotState,
         out: TaskSample | None = None,
         feedback: Feedback | None = None,
     ) -> TaskSample:
@@ -346,10 +336,10 @@ def late(wrong: Any, right: Any) -> Callable[..., Any]:
     return lambda x: wrong if getattr(x, "t", x) > 0.5 else right
 
 
-def position(function: Callable[[float], Any]) -> FramePosition:
+def position(function: Callable[[float], Any]) -> hsp.FramePosition:
     still = late(np.zeros(3), np.zeros(3))
     trajectory = CallableTrajectory(function, 3, velocity=still, acceleration=still)
-    return FramePosition(TCP, trajectory, gains=GAINS)
+    return hsp.FramePosition(TCP, trajectory, gains=GAINS)
 
 
 Parts = dict[str, Any]
@@ -359,7 +349,9 @@ FAILURES: dict[str, tuple[Callable[[], Parts], type[Exception], str]] = {
         f"{value} in a trajectory's {where}": (
             lambda value=value, where=where: {
                 "tasks": [
-                    FramePosition(TCP, Broken(value, where), gains=GAINS, name="mine")
+                    hsp.FramePosition(
+                        TCP, Broken(value, where), gains=GAINS, name="mine"
+                    )
                 ]
             },
             NonFiniteError,
@@ -420,13 +412,13 @@ FAILURES: dict[str, tuple[Callable[[], Parts], type[Exception], str]] = {
         "needs 7 finite numbers",
     ),
     "NaN from a cost": (
-        lambda: {"field": FunctionCost(late(np.nan, 1.0), name="mine")},
+        lambda: {"field": hsp.FunctionCost(late(np.nan, 1.0), name="mine")},
         FieldError,
         r"cost 'mine' returned nan at t = 0\.7",
     ),
     "NaN from a cost's gradient": (
         lambda: {
-            "field": FunctionCost(
+            "field": hsp.FunctionCost(
                 late(1.0, 1.0),
                 gradient_function=late(NAN, np.zeros(7)),
                 rate_function=late(np.zeros(7), np.zeros(7)),
@@ -450,25 +442,25 @@ FAILURES: dict[str, tuple[Callable[[], Parts], type[Exception], str]] = {
 def test_nan_of_a_user_is_an_error_and_never_an_effort(what: str) -> None:
     make, error, message = FAILURES[what]
     parts = {"tasks": [track()], "field": None, "metric": None} | make()
-    controller = Controller(panda(), **parts)
+    controller = hsp.Controller(panda(), **parts)
     _, q, v = states(1)[0]
     before = contents(controller.compute(panda().state(0.25, q, v)))
     with pytest.raises(error, match=message) as caught:
         controller.compute(panda().state(0.75, q, v))
     assert type(caught.value) is error
-    assert isinstance(caught.value, HspControlError)
+    assert isinstance(caught.value, hsp.HspControlError)
     # The failure leaves nothing behind: the controller goes on as if new.
     assert_same(contents(controller.compute(panda().state(0.25, q, v))), before)
 
 
 def test_user_mistake_in_a_simulation_names_the_time() -> None:
     """The loop stops with the cause and what had been computed."""
-    task = FramePosition(TCP, Broken(np.nan, "position"), gains=GAINS, name="mine")
-    controller = Controller(panda(), [task])
+    task = hsp.FramePosition(TCP, Broken(np.nan, "position"), gains=GAINS, name="mine")
+    controller = hsp.Controller(panda(), [task])
     with pytest.raises(
-        HspControlError, match=r"the simulation stopped: task 'mine' is not finite"
+        hsp.HspControlError, match=r"the simulation stopped: task 'mine' is not finite"
     ) as caught:
-        simulate(controller, panda().home(), duration=1.0, log_period=0.1)
+        hsp.simulate(controller, panda().home(), duration=1.0, log_period=0.1)
     rollout = caught.value.rollout  # type: ignore[attr-defined]
     assert np.isfinite(rollout.tau).all()
     assert rollout.t[-1] == pytest.approx(0.5)

@@ -8,14 +8,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+import hsp_control as hsp
 from hsp_control import Controller, Gains, JointPosture, Robot, simulate
-from hsp_control.control.compensation import (
-    Compensation,
-    IntegralAction,
-    MomentumObserver,
-    Predictor,
-    VelocityFilter,
-)
 from hsp_control.control.compensation.elastic_joint import ElasticJoint
 from hsp_control.control.compensation.linear_loop import LinearLoop
 from hsp_control.simulation.plants import EffortDelay, ImperfectPlant, SampledPlant
@@ -77,10 +71,10 @@ def test_the_transition_is_the_solution_of_the_equations() -> None:
     ("delays", "compensation"),
     [
         ((0, 0), {}),
-        ((1, 2), {"integral_action": IntegralAction(5.0)}),
-        ((1, 0), {"predictor": Predictor(1, 0)}),
-        ((0, 1), {"velocity_filter": VelocityFilter(40.0, 2)}),
-        ((0, 2), {"momentum_observer": MomentumObserver(2.0)}),
+        ((1, 2), {"integral_action": hsp.compensation.IntegralAction(5.0)}),
+        ((1, 0), {"predictor": hsp.compensation.Predictor(1, 0)}),
+        ((0, 1), {"velocity_filter": hsp.compensation.VelocityFilter(40.0, 2)}),
+        ((0, 2), {"momentum_observer": hsp.compensation.MomentumObserver(2.0)}),
     ],
 )
 def test_a_simulated_joint_obeys_the_loop_s_polynomial(
@@ -95,7 +89,10 @@ def test_a_simulated_joint_obeys_the_loop_s_polynomial(
     robot = Robot.load(str(file))
     h, joint = 0.01, elastic(measured, 400.0)
     task = JointPosture(np.zeros(1), gains=Gains(natural_frequency=8.0))
-    made, parts = Controller(robot, [task], limits=None), Compensation(**compensation)
+    made, parts = (
+        Controller(robot, [task], limits=None),
+        hsp.compensation.Compensation(**compensation),
+    )
     plant = ImperfectPlant(
         Sprung(robot, joint), [SensorDelay(delays[1])], [EffortDelay(delays[0])]
     )

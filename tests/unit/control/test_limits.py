@@ -10,22 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from hsp_control import (
-    Circle,
-    Controller,
-    FramePosition,
-    Gains,
-    Hold,
-    JointCentering,
-    JointPosture,
-    Limits,
-    Obstacle,
-    ObstacleClearance,
-    Robot,
-    Rollout,
-    Sphere,
-    simulate,
-)
+import hsp_control as hsp
 from hsp_control.constraints.limits import ObstacleDistance, RobotLimits
 from hsp_control.constraints.limits.acceleration_bounds import acceleration_bounds
 from hsp_control.control.actuation import Status
@@ -41,26 +26,26 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 @cache
-def panda() -> Robot:
-    return Robot.load("panda")
+def panda() -> hsp.Robot:
+    return hsp.Robot.load("panda")
 
 
-def hand(frequency: float = 10.0, **circle: Any) -> FramePosition:
+def hand(frequency: float = 10.0, **circle: Any) -> hsp.FramePosition:
     options = {"angular_rate": 2.0, "normal": [0.0, 0.0, 1.0], **circle}
-    path = Circle(0.15, center=[0.45, 0.0, 0.45], **options)
-    gains = Gains(natural_frequency=frequency)
-    return FramePosition("panda_tcp", path, gains=gains, name="hand")
+    path = hsp.Circle(0.15, center=[0.45, 0.0, 0.45], **options)
+    gains = hsp.Gains(natural_frequency=frequency)
+    return hsp.FramePosition("panda_tcp", path, gains=gains, name="hand")
 
 
 # --- the bounds ----------------------------------------------------------------------
 
 
-def of(robot: Robot, **options: Any) -> RobotLimits:
+def of(robot: hsp.Robot, **options: Any) -> RobotLimits:
     """Return limits as numbers of a robot."""
-    return Limits(**options).placed(at_home(robot))
+    return hsp.Limits(**options).placed(at_home(robot))
 
 
-def at_home(robot: Robot, *scene: Obstacle) -> Start:
+def at_home(robot: hsp.Robot, *scene: hsp.Obstacle) -> Start:
     return Start(robot.state(0.0, robot.home(), np.zeros(robot.nv)), Scene(scene))
 
 
@@ -203,10 +188,10 @@ def test_without_an_active_limit_the_qp_gives_the_law(seed: int) -> None:
     """Wide limits: the step is the law's, to the last bit, over random states."""
     robot, rng = panda(), np.random.default_rng(seed)
     q, v = robot.random_configuration(rng), 0.3 * rng.standard_normal(7)
-    field = JointCentering()
-    free = Controller(robot, [hand()], field, limits=None)
-    wide = Limits(effort=1e6, velocity=None, position=None)
-    limited = Controller(robot, [hand()], field, limits=wide)
+    field = hsp.JointCentering()
+    free = hsp.Controller(robot, [hand()], field, limits=None)
+    wide = hsp.Limits(effort=1e6, velocity=None, position=None)
+    limited = hsp.Controller(robot, [hand()], field, limits=wide)
     state = robot.state(0.3, q, v)
     out, same = free.compute(state), limited.compute(state)
     assert same.status == Status.EXACT
@@ -216,9 +201,11 @@ def test_without_an_active_limit_the_qp_gives_the_law(seed: int) -> None:
 def test_a_controller_keeps_the_robot_s_own_limits_unless_told_otherwise() -> None:
     """Also an effort that is asked for beside a singularity."""
     robot = panda()
-    far = FramePosition("panda_tcp", Hold([3.0, 0.0, 0.5]), largest_error="none")
-    own = Controller(robot, [far])
-    free = Controller(robot, [far], limits=None)
+    far = hsp.FramePosition(
+        "panda_tcp", hsp.Hold([3.0, 0.0, 0.5]), largest_error="none"
+    )
+    own = hsp.Controller(robot, [far])
+    free = hsp.Controller(robot, [far], limits=None)
     most = robot.model.effortLimit
     assert own.limits is not None
     assert free.limits is None
@@ -232,19 +219,19 @@ def test_null_space_gives_way_first_then_the_lower_task() -> None:
     """One effort limit that binds: what is left exact shows the order."""
     robot = panda()
     q, v = robot.home(), np.zeros(7)
-    posture = JointPosture(
+    posture = hsp.JointPosture(
         robot.integrate(q, np.full(7, 0.5)),
-        gains=Gains(natural_frequency=10.0),
+        gains=hsp.Gains(natural_frequency=10.0),
         joints=["panda_joint1", "panda_joint2"],
         name="posture",
         priority=2,
     )
     state = robot.state(0.3, q, v)
     # Without an error: then what is below the hand costs least.
-    kept = Hold(state.position("panda_tcp").copy())
+    kept = hsp.Hold(state.position("panda_tcp").copy())
     tasks = [replace(hand(), trajectory=kept), posture]
-    field = 20.0 * JointCentering()
-    free = Controller(robot, tasks, field, limits=None)
+    field = 20.0 * hsp.JointCentering()
+    free = hsp.Controller(robot, tasks, field, limits=None)
     wanted = free.compute(state)
     tau, a = wanted.tau.copy(), wanted.acceleration.copy()
     joint = int(np.abs(tau - state.nonlinear_effects).argmax())
@@ -252,8 +239,8 @@ def test_null_space_gives_way_first_then_the_lower_task() -> None:
         effort = np.full(7, 1e3)
         still = state.nonlinear_effects[joint]
         effort[joint] = abs(still + shrink * (tau[joint] - still))
-        limits = Limits(effort=effort, velocity=None, position=None)
-        controller = Controller(robot, tasks, field, limits=limits)
+        limits = hsp.Limits(effort=effort, velocity=None, position=None)
+        controller = hsp.Controller(robot, tasks, field, limits=limits)
         out = controller.compute(state)
         assert out.status == Status.LIMITED
         assert abs(out.tau[joint]) <= effort[joint]
@@ -269,8 +256,8 @@ def test_null_space_gives_way_first_then_the_lower_task() -> None:
 # --- along motions -------------------------------------------------------------------
 
 
-def run(controller: Controller, q0: Array, duration: float = 1.5) -> Rollout:
-    return simulate(
+def run(controller: hsp.Controller, q0: Array, duration: float = 1.5) -> hsp.Rollout:
+    return hsp.simulate(
         controller,
         q0,
         duration=duration,
@@ -280,7 +267,7 @@ def run(controller: Controller, q0: Array, duration: float = 1.5) -> Rollout:
     )
 
 
-def violations(rollout: Rollout, limits: RobotLimits) -> dict[str, float]:
+def violations(rollout: hsp.Rollout, limits: RobotLimits) -> dict[str, float]:
     """Return the worst excess over each limit, in the log alone."""
     q, v, tau = rollout["q"], rollout["v"], rollout["tau"]
     rates = np.abs(np.diff(tau, axis=0)) / 1e-3
@@ -292,24 +279,24 @@ def violations(rollout: Rollout, limits: RobotLimits) -> dict[str, float]:
     }
 
 
-def limit_rich(seed: int) -> tuple[Controller, RobotLimits, Array]:
+def limit_rich(seed: int) -> tuple[hsp.Controller, RobotLimits, Array]:
     """Return a random controller whose limits become active, its limits and a start."""
     robot, rng = panda(), np.random.default_rng(seed)
     lower, upper = robot.position_limits()
     q0 = 0.5 * (lower + upper) + 0.35 * (upper - lower) * rng.uniform(-1.0, 1.0, 7)
     own = of(robot)
-    limits = Limits(
+    limits = hsp.Limits(
         effort=own.effort * rng.uniform(0.7, 1.0),
         effort_rate=1000.0,
         velocity=own.velocity * rng.uniform(0.2, 0.5),
     )
     start = robot.state(0.0, q0, np.zeros(7)).position("panda_tcp")
     center = start + rng.normal(0.0, 0.4, 3)
-    path = Circle(0.2, rng.uniform(1, 6), center, normal=rng.normal(size=3))
-    task = FramePosition(
-        "panda_tcp", path, gains=Gains(natural_frequency=rng.uniform(5, 12))
+    path = hsp.Circle(0.2, rng.uniform(1, 6), center, normal=rng.normal(size=3))
+    task = hsp.FramePosition(
+        "panda_tcp", path, gains=hsp.Gains(natural_frequency=rng.uniform(5, 12))
     )
-    controller = Controller(robot, [task], JointCentering(), limits=limits)
+    controller = hsp.Controller(robot, [task], hsp.JointCentering(), limits=limits)
     assert controller.limits is not None
     return controller, controller.limits, q0
 
@@ -332,7 +319,7 @@ def test_no_limit_is_violated(seed: int) -> None:
 def test_speed_limits_are_kept_at_any_period(seed: int, period: float) -> None:
     """Seeds that exceed them by 0.6 and 2.7 % with a constant margin."""
     controller, limits, q0 = limit_rich(seed)
-    rollout = simulate(
+    rollout = hsp.simulate(
         controller,
         q0,
         duration=0.8,
@@ -357,10 +344,12 @@ def test_a_load_that_the_model_lacks_drives_no_joint_beyond_its_limit(
     beyond, q0 = robot.home(), robot.home()
     beyond[1], q0[1] = upper[1] + 0.2, upper[1] - 0.5
     beyond[3] = q0[3] = -0.5
-    task = JointPosture(beyond, gains=Gains(natural_frequency=6.0), name="beyond")
+    task = hsp.JointPosture(
+        beyond, gains=hsp.Gains(natural_frequency=6.0), name="beyond"
+    )
     load = Push("panda_tcp", (0.0, 0.0, -30.0), duration=10.0)
-    rollout = simulate(
-        Controller(robot, [task]),
+    rollout = hsp.simulate(
+        hsp.Controller(robot, [task]),
         q0,
         duration=2.5,
         control_period=period,
@@ -409,9 +398,11 @@ def test_a_joint_limit_is_approached_and_not_crossed() -> None:
     _, upper = robot.position_limits()
     beyond = robot.home()
     beyond[3] = upper[3] + 0.5
-    task = JointPosture(beyond, gains=Gains(natural_frequency=6.0), name="beyond")
-    limits = Limits()
-    rollout = run(Controller(robot, [task], limits=limits), robot.home(), 2.5)
+    task = hsp.JointPosture(
+        beyond, gains=hsp.Gains(natural_frequency=6.0), name="beyond"
+    )
+    limits = hsp.Limits()
+    rollout = run(hsp.Controller(robot, [task], limits=limits), robot.home(), 2.5)
     joint = rollout["q"][:, 3]
     assert joint.max() <= upper[3]
     assert joint[-1] > upper[3] - 0.01  # as near as the margin lets it
@@ -425,8 +416,8 @@ def test_contradiction_is_relaxed_and_told() -> None:
     q, v = robot.home(), np.zeros(7)
     _, upper = robot.position_limits()
     q[3], v[3] = upper[3] - 0.02, 2.0
-    limits = Limits(effort=1.0)
-    out = Controller(robot, [hand()], limits=limits).compute(robot.state(0.0, q, v))
+    limits = hsp.Limits(effort=1.0)
+    out = hsp.Controller(robot, [hand()], limits=limits).compute(robot.state(0.0, q, v))
     assert np.isfinite(out.tau).all()
     assert (np.abs(out.tau) <= 1.0).all()
     assert out.status > Status.LIMITED
@@ -435,8 +426,8 @@ def test_contradiction_is_relaxed_and_told() -> None:
 
 def test_effort_rate_needs_to_know_what_went_out() -> None:
     robot = panda()
-    limits = Limits(effort_rate=1000.0)
-    controller = Controller(robot, [hand()], limits=limits)
+    limits = hsp.Limits(effort_rate=1000.0)
+    controller = hsp.Controller(robot, [hand()], limits=limits)
     state = robot.state(0.0, robot.home(), np.zeros(7))
     before = state.nonlinear_effects.copy()
     controller.applied(before, 1e-3)
@@ -450,33 +441,38 @@ def test_hold_with_limits_is_still_the_paper() -> None:
     """A still target within all limits: not one step is limited."""
     robot = panda()
     here = robot.state(0.0, robot.home(), np.zeros(7)).position("panda_tcp").copy()
-    task = FramePosition("panda_tcp", Hold(here), gains=Gains(natural_frequency=10.0))
-    rollout = run(Controller(robot, [task], limits=Limits()), robot.home(), 0.2)
+    task = hsp.FramePosition(
+        "panda_tcp", hsp.Hold(here), gains=hsp.Gains(natural_frequency=10.0)
+    )
+    rollout = run(hsp.Controller(robot, [task], limits=hsp.Limits()), robot.home(), 0.2)
     assert not rollout["status"].any()
 
 
 # --- distances -----------------------------------------------------------------------
 
 
-def swinging() -> Obstacle:
+def swinging() -> hsp.Obstacle:
     """Return a ball that comes into the arm's elbow and goes again."""
     robot = panda()
     elbow = robot.state(0.0, robot.home(), np.zeros(7)).position("panda_link4")
     center = elbow + np.array([0.0, 0.35, 0.0])
     path = Lissajous([0.0, 0.28, 0.0], [1.0, 2.0, 1.0], [0.0, 3.14, 0.0], center)
-    return Obstacle("ball", Sphere(0.08), path)
+    return hsp.Obstacle("ball", hsp.Sphere(0.08), path)
 
 
-def elbow(limits: Limits | None) -> Controller:
+def elbow(limits: hsp.Limits | None) -> hsp.Controller:
     robot = panda()
     here = robot.state(0.0, robot.home(), np.zeros(7)).position("panda_tcp").copy()
-    task = FramePosition(
-        "panda_tcp", Hold(here), gains=Gains(natural_frequency=10.0), name="hand"
+    task = hsp.FramePosition(
+        "panda_tcp",
+        hsp.Hold(here),
+        gains=hsp.Gains(natural_frequency=10.0),
+        name="hand",
     )
-    return Controller(
+    return hsp.Controller(
         robot,
         [task],
-        JointCentering(),
+        hsp.JointCentering(),
         null_space_gain=6.0,
         limits=limits,
         scene=[swinging()],
@@ -487,11 +483,11 @@ def elbow(limits: Limits | None) -> Controller:
 def test_things_stay_apart() -> None:
     """A ball swings into the elbow: without the limit it hits, with it it does not."""
     robot = panda()
-    clearance = ObstacleClearance([swinging()]).placed(at_home(robot))
+    clearance = hsp.ObstacleClearance([swinging()]).placed(at_home(robot))
     proximity = clearance.proximity(at_home(robot).state)
     least: dict[bool, float] = {}
     for limited in (False, True):
-        limits = Limits(distances=[ObstacleDistance(0.02)])
+        limits = hsp.Limits(distances=[ObstacleDistance(0.02)])
         rollout = run(elbow(limits if limited else None), robot.home(), 1.6)
         least[limited] = min(
             float(proximity.measure(robot.state(t, q, v)).min())

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import hsp_control as hsp
 from hsp_control import (
     Controller,
     FramePosition,
@@ -20,11 +21,6 @@ from hsp_control import (
     simulate,
 )
 from hsp_control.cli.main import main
-from hsp_control.common.exceptions import (
-    HspControlError,
-    SimulationError,
-    UnstableRateError,
-)
 from hsp_control.control.compensation import (
     Command,
     Compensation,
@@ -273,7 +269,7 @@ def test_the_robot_grows_just_above_and_dies_just_below(
             )
             speed = np.linalg.norm(log.v, axis=1)
             growth = speed[-100:].max() / speed[:100].max()
-        except SimulationError:
+        except hsp.errors.SimulationError:
             growth = np.inf
         assert growth < 0.5 if side < 0.0 else growth > 2.0
         found = rate_findings(made, Q0, H, effort_delay=delay)
@@ -317,7 +313,7 @@ def test_an_unstable_rate_is_reported_with_stable_values(
     assert finding.path == path
     assert finding.radius > 1.0
     assert re.search(message, finding.message), finding.message
-    with pytest.raises(UnstableRateError, match="unstable at this rate"):
+    with pytest.raises(hsp.errors.UnstableRateError, match="unstable at this rate"):
         check_rate(made(), Q0, H)
 
 
@@ -509,7 +505,7 @@ def test_all_compensators_from_yaml_and_each_turned_off(tmp_path: Path) -> None:
 def test_mistakes_are_told_where_they_stand(
     sections: dict[str, Any], message: str
 ) -> None:
-    with pytest.raises(HspControlError, match=message):
+    with pytest.raises(hsp.HspControlError, match=message):
         load_experiment(config(**sections))
 
 
@@ -566,7 +562,7 @@ def test_a_simulation_refuses_what_a_run_refuses(
     if delay:
         engine = IntegratedPlant(RigidBodyPlant(PANDA), Rk4(H))
         how["plant"] = ImperfectPlant(engine, [SensorDelay(0)], [EffortDelay(delay)])
-    with pytest.raises(UnstableRateError, match=message):
+    with pytest.raises(hsp.errors.UnstableRateError, match=message):
         simulate(holding(**gains), Q0, control_period=H, **how)
     if not delay:  # nothing is held
         simulate(holding(**gains), Q0, **how)

@@ -11,24 +11,9 @@ from hypothesis import strategies as st
 from law_numbers import Numbers, numbers, resolve
 from numpy.typing import NDArray
 
-from hsp_control import (
-    Controller,
-    FramePosition,
-    Gains,
-    Hold,
-    JointCentering,
-    JointPosture,
-    Robot,
-    simulate,
-)
+import hsp_control as hsp
 from hsp_control.common.exceptions import ControllerError
 from hsp_control.law import CONSTANT, IDENTITY, VARYING
-from hsp_control.null_space.metrics import (
-    ConstantMetric,
-    IdentityMetric,
-    MassMatrixMetric,
-    Metric,
-)
 from hsp_control.robot.integrators import Dop853
 from hsp_control.trajectories import Circle
 
@@ -159,39 +144,43 @@ def test_priorities_meet_the_stack_where_they_take_over(seed: int) -> None:
 
 # --- along motions -------------------------------------------------------------------
 
-GAINS = Gains(natural_frequency=8.0)
+GAINS = hsp.Gains(natural_frequency=8.0)
 SIDES = ("left", "right")
 
 
 @cache
-def panda() -> Robot:
-    return Robot.load("panda")
+def panda() -> hsp.Robot:
+    return hsp.Robot.load("panda")
 
 
-def metric_of(kind: str) -> Metric:
+def metric_of(kind: str) -> hsp.metrics.Metric:
     if kind == "mass_matrix":
-        return MassMatrixMetric()
-    return IdentityMetric() if kind == "identity" else ConstantMetric(np.arange(1, 8))
+        return hsp.metrics.MassMatrixMetric()
+    return (
+        hsp.metrics.IdentityMetric()
+        if kind == "identity"
+        else hsp.metrics.ConstantMetric(np.arange(1, 8))
+    )
 
 
-def conflicting(kind: str) -> Controller:
+def conflicting(kind: str) -> hsp.Controller:
     """Return a hand on a circle, above one that wants it elsewhere, and a wrist.
 
     The second level's x row is the first's, at every state: rank 5 of 6, for good.
     """
     robot = panda()
     circle = Circle(0.1, 1.5, [0.45, 0.0, 0.4], normal=[0.0, 0.0, 1.0])
-    hand = FramePosition("panda_tcp", circle, gains=GAINS, name="hand")
-    rival = FramePosition(
-        "panda_tcp", Hold([0.6]), gains=GAINS, axes="x", name="rival", priority=2
+    hand = hsp.FramePosition("panda_tcp", circle, gains=GAINS, name="hand")
+    rival = hsp.FramePosition(
+        "panda_tcp", hsp.Hold([0.6]), gains=GAINS, axes="x", name="rival", priority=2
     )
-    wrist = JointPosture(
+    wrist = hsp.JointPosture(
         robot.home(), gains=GAINS, joints=["panda_joint7"], name="wrist", priority=2
     )
-    return Controller(
+    return hsp.Controller(
         robot,
         [replace(task, largest_error="none") for task in (wrist, hand, rival)],
-        2.0 * JointCentering(),
+        2.0 * hsp.JointCentering(),
         null_space_gain=4.0,
         metric=metric_of(kind),
         limits=None,
@@ -205,7 +194,7 @@ def test_propositions_hold_per_level(kind: str) -> None:
     robot = controller.robot
     q, v0 = robot.home(), 0.3 * np.cos(np.arange(7.0))
     precise = Dop853(rtol=1e-11, atol=1e-11)
-    rollout = simulate(
+    rollout = hsp.simulate(
         controller, q, v0, duration=1.0, log_period=0.02, integrator=precise
     )
     assert rollout["damped"].all()  # the conflict is there throughout
@@ -236,14 +225,14 @@ def test_levels_are_the_tasks_of_one_priority() -> None:
     assert [controller.priority_of(n) for n in ("hand", "wrist", "rival")] == [1, 2, 2]
     hand, wrist, rival = controller.tasks
     spread = [replace(rival, priority=70), replace(hand, priority=3), wrist]
-    levels = Controller(panda(), spread, limits=None).levels
+    levels = hsp.Controller(panda(), spread, limits=None).levels
     assert [task.name for (task,) in levels] == ["wrist", "hand", "rival"]
 
 
 def test_nested_lists_are_refused() -> None:
     hand, *others = conflicting("identity").tasks
     with pytest.raises(ControllerError, match="lists; write the level as priority="):
-        Controller(panda(), [hand, others], limits=None)  # type: ignore[list-item]
+        hsp.Controller(panda(), [hand, others], limits=None)  # type: ignore[list-item]
 
 
 def test_propositions_hold_for_two_arms() -> None:
@@ -254,7 +243,7 @@ def test_propositions_hold_for_two_arms() -> None:
         "l_gripper_l_finger_joint": 0.01,
         "r_gripper_l_finger_joint": 0.01,
     }
-    robot = Robot.load("baxter", locked=locked)
+    robot = hsp.Robot.load("baxter", locked=locked)
     bend = np.array([-0.5, -0.4, -0.8, 1.4, 0.4, 0.8, 0.0])
     mirror = np.array([-1.0, 1.0, -1.0, 1.0, -1.0, 1.0, 1.0])
     q = robot.integrate(robot.neutral(), np.r_[bend, mirror * bend])
@@ -264,16 +253,18 @@ def test_propositions_hold_for_two_arms() -> None:
     round_and_round = Circle(0.08, 1.5, left, normal=x_axis)
     second: dict[str, Any] = {"gains": GAINS, "priority": 2}
     tasks = [
-        FramePosition("left_gripper", round_and_round, gains=GAINS),
-        FramePosition("right_gripper", Hold(right + 0.05), **second),
-        FramePosition("left_gripper", Hold([0.3]), axes="x", name="rival", **second),
+        hsp.FramePosition("left_gripper", round_and_round, gains=GAINS),
+        hsp.FramePosition("right_gripper", hsp.Hold(right + 0.05), **second),
+        hsp.FramePosition(
+            "left_gripper", hsp.Hold([0.3]), axes="x", name="rival", **second
+        ),
     ]
     tasks = [replace(task, largest_error="none") for task in tasks]
-    controller = Controller(
-        robot, tasks, JointCentering(), null_space_gain=4.0, limits=None
+    controller = hsp.Controller(
+        robot, tasks, hsp.JointCentering(), null_space_gain=4.0, limits=None
     )
     v0 = 0.2 * np.cos(np.arange(robot.nv))
-    rollout = simulate(
+    rollout = hsp.simulate(
         controller,
         q,
         v0,
