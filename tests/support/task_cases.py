@@ -113,7 +113,7 @@ class Motion:
         return np.tensordot(weights, values, 1) / self.step**order
 
 
-class Tumble(hsp.changes.OrientationTrajectory):
+class Tumble(hsp.trajectories.OrientationTrajectory):
     """R(τ) = exp(f a) exp(g b) R0 with f, g parabolas: w and w' are not parallel."""
 
     start: Matrix
@@ -246,7 +246,7 @@ class Orientation(Family):
 
     def reference(
         self, motion: Motion, error: float, rng: np.random.Generator
-    ) -> hsp.changes.OrientationTrajectory:
+    ) -> hsp.trajectories.OrientationTrajectory:
         R = self.placement(motion, 0.0).rotation
         return Tumble(R @ pin.exp3(-error * unit(rng, 3)))
 
@@ -407,7 +407,7 @@ class Direction(Family):
         assert np.linalg.norm(e) == pytest.approx(np.tan(0.5 * angle), rel=1e-12)
 
 
-class Spinning(hsp.changes.OrientationTrajectory):
+class Spinning(hsp.trajectories.OrientationTrajectory):
     """Turns about its own third axis at 1.7 rad/s: the direction stands still."""
 
     start: Matrix

@@ -60,7 +60,7 @@ BLENDED_SPIN = hsp.trajectories.BlendOrientation(
 )
 
 # Members, and the times at which they join their holds or one piece the next.
-POINT_MEMBERS: dict[str, tuple[hsp.changes.Trajectory, list[float]]] = {
+POINT_MEMBERS: dict[str, tuple[hsp.trajectories.Trajectory, list[float]]] = {
     "hold": (hsp.Hold([1, 2, 3, 4]), []),
     "line": (hsp.Line([3, -1], 1.5, start=[0, 1], start_time=0.5), [0.5, 2.0]),
     "uniform line": (hsp.trajectories.UniformLine([0.3, 0.2, -1], [1, 0, 2]), []),
@@ -115,13 +115,13 @@ POINT_MEMBERS: dict[str, tuple[hsp.changes.Trajectory, list[float]]] = {
     ),
 }
 POINT_MEMBERS["crossfade"] = (
-    hsp.changes.Crossfade(
+    hsp.trajectories.Crossfade(
         CIRCLE, hsp.Line([3, -1], 4.0, start=[0, 1]), start_time=0.5, duration=1.0
     ),
     [0.5, 1.5],
 )
 ORIENTATION_MEMBERS: dict[
-    str, tuple[hsp.changes.OrientationTrajectory, list[float]]
+    str, tuple[hsp.trajectories.OrientationTrajectory, list[float]]
 ] = {
     "hold orientation": (hsp.trajectories.HoldOrientation(R1), []),
     "spin": (SPIN, []),
@@ -142,7 +142,7 @@ ORIENTATION_MEMBERS: dict[
         [0.5, 1.5, 2.0],
     ),
 }
-POSE_MEMBERS: dict[str, tuple[hsp.changes.PoseTrajectory, list[float]]] = {
+POSE_MEMBERS: dict[str, tuple[hsp.trajectories.PoseTrajectory, list[float]]] = {
     "composed pose": (hsp.trajectories.ComposedPose(LISSAJOUS, SPIN), []),
     "hold pose": (hsp.trajectories.HoldPose(POINTS[0], R1), []),
     "screw": (screw(pose(5), pose(6), 1.5, 0.5), [0.5, 2.0]),

@@ -19,7 +19,6 @@ import hsp_control as hsp
 from hsp_control.common.exceptions import (
     ContactError,
     FrameNotFoundError,
-    ScheduleError,
 )
 from hsp_control.constraints.contacts.unactuated import UnactuatedRows
 from hsp_control.control.actuation import Status
@@ -31,7 +30,7 @@ from hsp_control.geometry.start import Start
 from hsp_control.robot.integrators import Dop853, Rk4
 from hsp_control.simulation.plants import ContactPlant, RigidContact
 from hsp_control.tasks import TaskSample
-from hsp_control.trajectories import Blend, HoldOrientation, HoldPose, Schedule
+from hsp_control.trajectories import Blend, HoldOrientation
 
 pytest.importorskip("example_robot_data")
 Array = NDArray[np.float64]
@@ -90,7 +89,7 @@ CONTACTS: dict[str, tuple[Callable[[], hsp.Robot], hsp.contacts.Contact]] = {
             point=[0.1, 0.02, -0.03],
             offset=[-0.02, 0.0, 0.01],
             normal=[0.1, 0.2, 1.0],
-            force=hsp.changes.CommandedForce(5.0),
+            force=hsp.contacts.CommandedForce(5.0),
         ),
     ),
 }
@@ -394,104 +393,6 @@ def test_forces_are_redistributed_before_the_law_is_touched() -> None:
     assert out.status in (Status.EXACT, Status.REDISTRIBUTED)
     moved = out.task.jacobian[12:] @ out.acceleration
     np.testing.assert_allclose(moved, out.task.acceleration[12:], atol=1e-9)
-
-
-# --- schedules -----------------------------------------------------------------------
-
-
-def test_a_contact_is_released_without_a_jump() -> None:
-    """The sole's force fades, its rows become a task's: efforts are continuous in t."""
-    robot = talos()
-    state = robot.state(0.0, robot.home(), np.zeros(robot.nv))
-    foot = state.frame(SOLES[0])
-    over = state.centroidal.position * [1, 0, 1] + [0, state.position(SOLES[1])[1], 0]
-    tasks: list[hsp.Task] = [
-        hsp.CenterOfMass(hsp.Hold(over), gains=GAINS, priority=1),
-        hsp.FramePose(
-            SOLES[0],
-            HoldPose(foot.position, foot.rotation),
-            gains=GAINS,
-            name="swing",
-            priority=1,
-            schedule=Schedule([(1.0, None)], ramp=0.0),
-        ),
-    ]
-    contacts = [
-        sole(SOLES[1]),
-        sole(SOLES[0], schedule=Schedule([(-np.inf, 1.0)], ramp=0.4)),
-    ]
-    controller = hsp.Controller(robot, tasks, contacts=contacts, limits=None)
-    # Over the right sole already: the left one bears little.
-    q = robot.home()
-    for _ in range(50):  # a Newton walk of the centre of mass, feet still
-        state.update(0.0, q, np.zeros(robot.nv))
-        rows = np.vstack(
-            [state.centroidal.jacobian, *(state.frame(f).jacobian for f in SOLES)]
-        )
-        step = np.r_[over - state.centroidal.position, np.zeros(12)]
-        q = robot.integrate(q, np.linalg.pinv(rows) @ step)
-
-    def effort(t: float) -> Array:
-        return controller.compute(robot.state(t, q, np.zeros(robot.nv))).tau.copy()
-
-    times = np.linspace(0.5, 1.1, 121)
-    efforts = np.array([effort(t) for t in times])
-    jumps = np.abs(np.diff(efforts, axis=0)).max(axis=1)
-    across = np.abs(effort(1.0 - 1e-9) - effort(1.0)).max()
-    assert across < 1e-2 * np.abs(efforts).max()
-    assert jumps.max() < 0.2 * np.abs(efforts).max()
-    out = controller.compute(robot.state(1.05, q, np.zeros(robot.nv)))
-    assert out.forces.size == 12  # one sole is left
-
-
-@pytest.mark.slow
-def test_tasks_come_and_go_without_a_jump() -> None:
-    """On a Panda: a task is added, its gains change, it is removed; always exact."""
-    robot = hsp.Robot.load("panda")
-    q, v = robot.home(), 0.1 * np.ones(7)
-    here = robot.state(0.0, q, v).position("panda_tcp").copy()
-    hand = hsp.FramePosition(
-        "panda_tcp", hsp.Hold(here + 0.05), gains=GAINS, name="hand"
-    )
-    wrist = hsp.JointPosture(
-        robot.integrate(q, 0.3 * np.ones(7)), gains=GAINS, joints=["panda_joint7"]
-    )
-    controller = hsp.Controller(robot, [hand], limits=None)
-    controller.compute(robot.state(0.0, q, v))
-    controller.at(1.0).ramp(0.5).add(wrist)
-    assert controller.priority_of("posture") == 1
-    controller.at(2.0).ramp(0.5).gains("hand", hsp.Gains(natural_frequency=4.0))
-    controller.at(3.0).ramp(0.5).remove("posture")
-    last = None
-    for t in np.arange(0.9, 3.8, 0.005):
-        out = controller.compute(robot.state(t, q, v))
-        rows = controller.task_rows["hand"]
-        reached = out.task.jacobian[rows] @ out.acceleration
-        reached += out.task.jacobian_dot[rows] @ v
-        np.testing.assert_allclose(reached, out.task.acceleration[rows], atol=1e-9)
-        if last is not None:
-            assert np.abs(out.tau - last).max() < 1.0, t
-        last = out.tau.copy()
-    assert "posture" not in controller.task_rows
-    assert controller.feedback("hand").Kp[0, 0] == pytest.approx(16.0)
-
-
-def test_schedule() -> None:
-    schedule = Schedule([(-np.inf, 1.0), (2.0, 4.0)], ramp=0.5)
-    assert [schedule.weight(t) for t in (-9.0, 0.4, 1.0, 1.5, 2.0, 3.0, 4.0)] == [
-        *(1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
-    ]
-    assert schedule.weight(0.75) == pytest.approx(0.5)
-    assert schedule.active(2.0)
-    assert not schedule.active(4.0)
-    for intervals, ramp, message in (
-        ([(1.0, 1.0)], 0.0, "is empty"),
-        ([(0.0, 2.0), (1.0, 3.0)], 0.0, "overlaps the previous one"),
-        ([(0.0, 0.5)], 0.3, "shorter than its ramps"),
-        ([(0.0, 1.0)], -1.0, "at least 0"),
-    ):
-        with pytest.raises(ScheduleError, match=message):
-            Schedule(intervals, ramp=ramp)
 
 
 # --- what is refused -----------------------------------------------------------------

@@ -19,7 +19,7 @@ from task_cases import placed
 import hsp_control as hsp
 from hsp_control.control.changes import AddTask, ChangeGains, RemoveTask
 from hsp_control.null_space.differences import rate_along_flow
-from hsp_control.null_space.fields import FieldSample, Uncontrolled
+from hsp_control.null_space.fields import FieldSample
 from hsp_control.null_space.fields.field import terms_of
 from hsp_control.robot.integrators import Dop853
 from hsp_control.simulation.recorder import Recorder
@@ -102,7 +102,7 @@ def share(t: float, start: float = START, ramp: float = RAMP) -> float:
 def g_at(
     field: hsp.NullSpaceField, metric: hsp.metrics.Metric, state: hsp.RobotState
 ) -> FieldSample:
-    sample, at = FieldSample.allocate(7), hsp.law.MetricSample.allocate(7)
+    sample, at = FieldSample.allocate(7), hsp.metrics.MetricSample.allocate(7)
     return field.evaluate(state, metric.evaluate(state, at), metric.form, sample)
 
 
@@ -143,9 +143,6 @@ def test_one_field_of_several_is_exchanged_and_keeps_its_weight() -> None:
 
 
 CHANGES: dict[str, Callable[[hsp.Controller], Any]] = {
-    "field": lambda law: (
-        law.at(START).ramp(RAMP).field(hsp.Manipulability("panda_tcp"))
-    ),
     "several fields": lambda law: (
         law.at(START).ramp(RAMP).field(posture(), hsp.Manipulability("panda_tcp"))
     ),
@@ -154,7 +151,6 @@ CHANGES: dict[str, Callable[[hsp.Controller], Any]] = {
     "exchange": lambda law: (
         law.at(START).ramp(RAMP).exchange("joint_centering", swaying())
     ),
-    "gains": lambda law: law.at(START).ramp(RAMP).gains("hand", COUPLED),
     "all": lambda law: (
         law.at(START).ramp(RAMP).field(posture(), hsp.Rest()).gains("hand", COUPLED)
     ),
@@ -195,20 +191,6 @@ def test_proposition_2_holds_while_its_gain_changes(metric: hsp.metrics.Metric) 
     expected = log["null_space_norm"][0] * np.exp(-np.array(passed))
     np.testing.assert_allclose(log["null_space_norm"], expected, rtol=1e-6)
     np.testing.assert_array_equal(law.null_space_gain, 15.0 * np.eye(7))
-
-
-def test_in_the_end_the_field_is_the_new_one() -> None:
-    """Then the controller forgets the old one."""
-    law, new = controller(), posture()
-    law.at(START).ramp(RAMP).field(new)
-    q, v = panda().home(), np.zeros(7)
-    law.compute(START + RAMP, q, v)
-    assert law.field != placed(new, panda())
-    law.compute(START + RAMP + KEPT + 1e-9, q, v)
-    assert terms_of(law.field) == (placed(new, panda()),)
-    law.at(2.0).ramp(RAMP).weight(new.name, 0.5)
-    law.compute(2.0 + RAMP + 1.1 * KEPT, q, v)
-    assert terms_of(law.field) == (replace(placed(new, panda()), weight=0.5),)
 
 
 # --- the error equation --------------------------------------------------------------
@@ -373,39 +355,6 @@ def test_efforts_go_over_as_the_ramp_does(what: str, ramp: float) -> None:
     np.testing.assert_array_equal(efforts(law, times[times > 0.6])[0], new)
 
 
-def test_the_effort_does_not_jump_and_ends_as_the_new_field_s() -> None:
-    law = controller()
-    law.at(START).ramp(RAMP).field(posture())
-    times = np.arange(0.0, 0.8, 1e-4)
-    # One state, moving time: what is left is the circle's own motion and the ramp's.
-    changing = efforts(law, times)
-    old, final = (efforts(controller(f), times) for f in (None, posture()))
-    rtol = {"rtol": 1e-12, "atol": 1e-12}
-    np.testing.assert_allclose(changing[times < START], old[times < START], **rtol)
-    over = times >= START + RAMP
-    np.testing.assert_allclose(changing[over], final[over], **rtol)
-    most = np.abs(final - old).max()
-    # The quintic's slope is at most 15/8 over the ramp; g' adds its second derivative.
-    steepest = most * (15 / 8 / RAMP + 10 / np.sqrt(3) / RAMP**2 / K_N) * 1e-4
-    circles = np.abs(np.diff(old, axis=0)).max() + np.abs(np.diff(final, axis=0)).max()
-    assert np.abs(np.diff(changing, axis=0)).max() < 2.0 * steepest + circles
-
-
-def test_a_change_of_mind_begins_where_the_field_is() -> None:
-    law = controller()
-    law.at(0.1).ramp(0.4).field(posture())
-    taus = []
-    for t in np.arange(0.0, 1.2, 1e-3):
-        if abs(t - 0.3) < 1e-9:  # half-way: back to rest
-            law.at(0.3).ramp(0.4).field()
-        taus.append(law.compute(t, panda().home(), np.zeros(7)).tau)
-    # 1e-3 s of a change over 0.4 s: a jump would be the whole of it.
-    steps = np.abs(np.diff(taus, axis=0)).max(axis=1)
-    assert steps.max() < 0.05 * np.abs(np.ptp(taus, axis=0)).max()
-    law.compute(0.7 + 1.1 * KEPT, panda().home(), np.zeros(7))
-    assert law.field == hsp.Rest()
-
-
 # --- what is on the time line --------------------------------------------------------
 
 
@@ -428,53 +377,6 @@ def test_calls_can_be_chained_and_are_values() -> None:
     assert law.weight_of("turned", 2.25) == pytest.approx(0.5)
     with pytest.raises(hsp.errors.ControllerError, match="no task 'hand'"):
         law.weight_of("hand", 0.0)
-
-
-@pytest.mark.parametrize(
-    ("make", "kind", "message"),
-    [
-        (
-            lambda c: c.at(0).field(Uncontrolled()),
-            hsp.errors.ControllerError,
-            "uncontrolled null space cannot be blended with a controlled one",
-        ),
-        (
-            lambda c: c.at(0).ramp(-1).field(hsp.Rest()),
-            hsp.errors.ControllerError,
-            "^ChangeField: ramp: -1 is negative; must be at least 0$",
-        ),
-        (
-            lambda c: c.at(np.inf).field(hsp.Rest()),
-            hsp.errors.ControllerError,
-            "^ChangeField: at: .inf is not a finite number$",
-        ),
-        (
-            lambda c: c.at(0).field(hsp.Rest(), hsp.TargetPosture([0.0, 1.0])),
-            hsp.errors.ShapeError,
-            "^fields.1.target: ",
-        ),
-        (
-            lambda c: c.at(0).gains("hand", hsp.Gains([1, 2], 1)),
-            hsp.errors.GainError,
-            r"^gains: kp has shape \(2,\); needs a number, 3 numbers or",
-        ),
-        (
-            lambda c: c.at(0).null_space_gain([1.0, 2.0]),
-            hsp.errors.GainError,
-            r"^gain: null_space_gain has shape \(2,\)",
-        ),
-    ],
-)
-def test_what_cannot_change_is_refused(
-    make: Any, kind: type[hsp.HspControlError], message: str
-) -> None:
-    law = controller()
-    before = efforts(law, np.zeros(1))
-    with pytest.raises(kind, match=message):
-        make(law)
-    assert law.changes == ()
-    assert law.field == placed(hsp.JointCentering(), panda())
-    np.testing.assert_array_equal(efforts(law, np.zeros(1)), before)
 
 
 def test_the_log_has_the_terms_of_both_and_of_tasks_that_come() -> None:

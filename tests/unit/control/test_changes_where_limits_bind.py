@@ -132,69 +132,50 @@ class Case:
         assert jump < 1e-6, f"{jump} N·m at {t} s"
 
 
-CHANGES: dict[str, Callable[[Case], hsp.Controller]] = {}
+def changed(controller: hsp.Controller, act: Callable[[Any], Any]) -> hsp.Controller:
+    act(controller.at(START).ramp(RAMP))
+    return controller
 
 
-def change(make: Callable[[Case], hsp.Controller]) -> Callable[[Case], hsp.Controller]:
-    CHANGES[make.__name__] = make
-    return make
-
-
-@change
 def a_task_is_added(case: Case) -> hsp.Controller:
-    controller = case.controller()
-    controller.at(START).ramp(RAMP).add(case.other())
-    return controller
+    return changed(case.controller(), lambda at: at.add(case.other()))
 
 
-@change
-def a_task_is_removed(case: Case) -> hsp.Controller:
-    controller = case.controller(case.hand(), case.other())
-    controller.at(START).ramp(RAMP).remove("other")
-    return controller
-
-
-@change
 def a_task_has_a_schedule(case: Case) -> hsp.Controller:
     schedule = Schedule([(START, START + RAMP)], ramp=0.1)
     return case.controller(case.hand(), case.other(schedule=schedule))
 
 
-@change
 def several_fade_at_a_time(case: Case) -> hsp.Controller:
     controller = case.controller(case.hand(), case.other())
-    controller.at(START).ramp(RAMP).remove("other").limits(case.limits())
+    changed(controller, lambda at: at.remove("other").limits(case.limits()))
     controller.at(START + 0.1).ramp(0.1).add(case.other(name="third"))
     return controller
 
 
-@change
 def limits_change(case: Case) -> hsp.Controller:
-    controller = case.controller()
-    controller.at(START).ramp(RAMP).limits(case.limits(acceleration=20.0))
-    return controller
+    new = case.limits(acceleration=20.0)
+    return changed(case.controller(), lambda at: at.limits(new))
 
 
-@change
-def limits_go(case: Case) -> hsp.Controller:
-    controller = case.controller()
-    controller.at(START).ramp(RAMP).limits(None)
-    return controller
-
-
-@change
 def limits_come(case: Case) -> hsp.Controller:
     controller = case.controller(limits=None)
-    controller.at(START).ramp(RAMP).limits(case.limits())
-    return controller
+    return changed(controller, lambda at: at.limits(case.limits()))
 
 
-@change
 def limits_go_and_others_come(case: Case) -> hsp.Controller:
-    controller = case.controller()
-    controller.at(START).ramp(RAMP).limits(None)
+    controller = changed(case.controller(), lambda at: at.limits(None))
     controller.at(START + 0.1).ramp(RAMP).limits(case.limits())
     return controller
+
+
+CHANGES: dict[str, Callable[[Case], hsp.Controller]] = {
+    each.__name__: each
+    for each in (
+        *(a_task_is_added, a_task_has_a_schedule, several_fade_at_a_time),
+        *(limits_change, limits_come, limits_go_and_others_come),
+    )
+}
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -393,7 +374,9 @@ def test_a_foot_that_is_lifted_while_it_moves(seed: int) -> None:
     )
 
 
-@pytest.mark.parametrize("what", ["limits_change", "limits_go", "limits_come"])
+@pytest.mark.parametrize(
+    "what", ["limits_change", "limits_go_and_others_come", "limits_come"]
+)
 def test_a_change_of_limits_is_compiled_when_it_is_made(
     what: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from compensation_cases import ALL, EVERYTHING, PANDA, Q0, H, circle, controller
 from numpy.typing import NDArray
 from scipy.linalg import expm
@@ -112,17 +113,6 @@ def test_compensators_need_a_control_period() -> None:
         SimulationError, match=r"compensation \(predictor\) is computed"
     ):
         run(controller(), Compensation(predictor=Predictor(1)), control_period=None)
-
-
-def test_the_log_has_what_they_know() -> None:
-    log = run(controller(), ALL, duration=0.15)
-    shapes = {
-        "observer.disturbance": 7, "friction.feed_forward": 7, "task.hand.integral": 3,
-        "shown.q": 7, "shown.v": 7,
-    }  # fmt: skip
-    for name, width in shapes.items():
-        assert log[name].shape == (len(log), width)
-        assert np.abs(log[name][-1]).max() > 0.0
 
 
 # ------------------------------------------------------------------ momentum observer
@@ -398,32 +388,6 @@ def test_a_payload_s_error_dies_as_the_linear_equation_says(
     assert np.abs(error[-1]).max() < (0.05 if rate == 2.0 else 1e-3) * size
 
 
-@pytest.mark.slow
-def test_too_much_integral_action_is_lost_with_a_payload() -> None:
-    """2 kg at the hand leave 0.3 of the feedback: as little as Ki/(Kv Kp) = 12/40."""
-    loaded = hsp.plants.RigidBodyPlant(changed(PANDA, [Payload("panda_tcp", 2.0)]))
-    point = circle(away=0.0).trajectory.sample(0.0).position
-    hold = hsp.FramePosition(
-        "panda_tcp",
-        hsp.Hold(point),
-        gains=hsp.Gains(natural_frequency=20.0),
-        name="hand",
-    )
-    made = hsp.Controller(PANDA, [hold], 2.0 * TargetPosture(Q0), limits=None)
-    largest = {}
-    for rate in (5.0, 12.0):
-        compensation = Compensation(integral_action=IntegralAction(rate))
-        log = run(made, compensation, plant=loaded, duration=4.0, log_period=0.01)
-        error = np.linalg.norm(log["task.hand.error"], axis=1)
-        largest[rate] = [error[:100].max(), error[100:200].max(), error[-100:].max()]
-    first, second, last = largest[5.0]
-    assert first > 10e-3
-    assert second < 0.1 * first
-    assert last < 0.01 * first
-    first, second, last = largest[12.0]
-    assert last > 2.0 * second
-
-
 @pytest.mark.parametrize("rate", [40.0, 41.0, 400.0])
 def test_an_integral_gain_beyond_routh_is_refused(rate: float) -> None:
     with pytest.raises(
@@ -572,44 +536,30 @@ def test_random_bodies_and_friction_come_to_a_tenth_of_a_millimetre() -> None:
     with ±20 % masses and inertias, centres of mass off by 1 cm, and Coulomb friction of
     which the feed-forward knows 80 %; 1.2 s of it.
     """
-    coulomb = [0.8, 0.8, 0.6, 0.6, 0.3, 0.3, 0.2]
-    blend = {"type": "circle", "origin": "start", "center": [0.0] * 3, "radius": 0.1,
-             "angular_rate": 2.0, "normal": [0.0, 0.0, 1.0]}  # fmt: skip
-    config = {
-        "robot": {"name": "panda"},
-        "tasks": {
-            "hand": {
-                "type": "frame_position",
-                "frame": "panda_tcp",
-                "trajectory": blend,
-                "gains": {"natural_frequency": 20.0},
-                "blend": 1.0,
-            }
-        },
-        "null_space": {
-            "gain": 10.0,
-            "fields": [{"type": "joint_centering", "weight": 2.0}],
-        },
-        "plant": {
-            "type": "rigid_body",
-            "inertias": {"random_mass": 0.2, "random_inertia": 0.2, "random_com": 0.01},
-            "friction": {"coulomb": coulomb, "viscous": 0.2},
-        },
-        "compensation": {
-            "momentum_observer": {"bandwidth": 50.0},
-            "friction_feed_forward": {
-                "coulomb": [0.8 * c for c in coulomb],
-                "viscous": 0.16,
-            },
-        },
-        "simulation": {
-            "duration": 2.7,
-            "control_period": H,
-            "log_period": 0.005,
-            "integrator": {"type": "rk4", "step": H},
-        },
-    }
-    log = hsp.load_experiment(config).run()
+    coulomb = np.array([0.8, 0.8, 0.6, 0.6, 0.3, 0.3, 0.2])
+    document = f"""
+robot: {{name: panda}}
+tasks:
+  hand:
+    type: frame_position
+    frame: panda_tcp
+    trajectory:
+      {{type: circle, origin: start, center: [0, 0, 0], radius: 0.1, angular_rate: 2,
+        normal: [0, 0, 1]}}
+    gains: {{natural_frequency: 20}}
+    blend: 1.0
+null_space: {{gain: 10, fields: [{{type: joint_centering, weight: 2}}]}}
+plant:
+  type: rigid_body
+  inertias: {{random_mass: 0.2, random_inertia: 0.2, random_com: 0.01}}
+  friction: {{coulomb: {coulomb.tolist()}, viscous: 0.2}}
+compensation:
+  momentum_observer: {{bandwidth: 50}}
+  friction_feed_forward: {{coulomb: {(0.8 * coulomb).tolist()}, viscous: 0.16}}
+simulation: {{duration: 2.7, control_period: {H}, log_period: 0.005,
+  integrator: {{type: rk4, step: {H}}}}}
+"""
+    log = hsp.load_experiment(yaml.safe_load(document)).run()
     late = log.t > 1.5
     error = np.linalg.norm(log["task.hand.error"][late], axis=1)
     assert np.sqrt(np.mean(error**2)) < 0.11e-3

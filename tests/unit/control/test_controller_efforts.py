@@ -130,7 +130,10 @@ def test_uncontrolled_leaves_self_motion_alone(kind: str) -> None:
     for t, q, v in states(5):
         state = panda().state(t, q, v)
         out = controller.compute(state)
-        sample, W = out.task, metric.evaluate(state, hsp.law.MetricSample.allocate(7)).W
+        sample, W = (
+            out.task,
+            metric.evaluate(state, hsp.metrics.MetricSample.allocate(7)).W,
+        )
         J_sharp = oracles.pseudo_inverse(sample.jacobian, W)
         expected = J_sharp @ (sample.acceleration - sample.jacobian_dot @ v)
         scale = np.abs(expected).max()
@@ -154,7 +157,7 @@ def test_diagnosis(kind: str) -> None:
         state = panda().state(t, q, v)
         out = contents(controller.compute(state))
         diagnosis = controller.diagnose()
-        W = metric.evaluate(state, hsp.law.MetricSample.allocate(7)).W
+        W = metric.evaluate(state, hsp.metrics.MetricSample.allocate(7)).W
         J, e_N = out["task.jacobian"], out["null_space_error"]
         whitened = J @ np.linalg.inv(np.linalg.cholesky(W)).T
         expected = np.linalg.svd(whitened)[1]
@@ -308,7 +311,7 @@ def test_singular_posture_gives_a_bounded_effort(kind: str) -> None:
     sample = outputs[0]
     wanted = sample["task.acceleration"] - sample["task.jacobian_dot"] @ v
     state = panda().state(0.0, np.zeros(7), v)
-    metric = METRICS[kind](7).evaluate(state, hsp.law.MetricSample.allocate(7))
+    metric = METRICS[kind](7).evaluate(state, hsp.metrics.MetricSample.allocate(7))
     uncontrolled = Controller(
         panda(),
         tasks,

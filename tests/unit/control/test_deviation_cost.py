@@ -229,15 +229,6 @@ def test_static_rows_are_the_second_derivative() -> None:
     np.testing.assert_allclose(A @ a - b, barrier[near], rtol=0, atol=1e-4)
 
 
-def test_what_bears_a_contact_is_left_out() -> None:
-    robot = panda()
-    limit = StaticEffort(np.full(7, 1.0), 1.0)
-    state = robot.state(0.0, robot.home(), np.zeros(7))
-    A, _ = limit.rows(state, 10.0, NOWHERE)
-    fewer, _ = limit.rows(state, 10.0, np.array([1, 3]))
-    assert len(A) == len(fewer) + 2
-
-
 @pytest.mark.slow
 def test_an_arm_goes_where_it_can_be_held() -> None:
     """A target that its shoulder cannot hold: it comes to rest before it."""

@@ -250,11 +250,8 @@ CALLS = (
     [
         lambda law, s: law.compute(s.t, s.q, s.v),
         lambda law, s: law.flow(s.t, s.q),
-        lambda law, s: law.stack(s),
-        lambda law, s: law.restart(),
         lambda law, s: law.at(1.0).null_space_gain(3.0),
     ],
-    ids=["compute", "flow", "stack", "restart", "change"],
 )
 def test_a_field_that_calls_its_own_controller_is_told(call: Any) -> None:
     armed = False

@@ -19,7 +19,6 @@ from controller_cases import (
 from numpy.typing import NDArray
 
 import hsp_control as hsp
-from hsp_control.common.exceptions import ControllerError
 from hsp_control.law import CONSTANT
 from hsp_control.null_space.fields import FunctionField
 from hsp_control.null_space.metrics import Metric, MetricSample
@@ -148,10 +147,3 @@ def test_constant_form_is_asked_for_no_rate() -> None:
     np.testing.assert_allclose(
         controller.compute(state).tau, plain.compute(state).tau, rtol=1e-13, atol=1e-12
     )
-
-
-def test_refuses_the_state_of_another_robot_object() -> None:
-    other = hsp.Robot.load("panda")
-    state = other.state(0.0, other.home(), np.zeros(7))
-    with pytest.raises(ControllerError, match="the state is of another robot object"):
-        hsp.Controller(panda(), [track()]).compute(state)

@@ -391,25 +391,6 @@ def test_the_error_of_the_acceleration_is_what_is_observed() -> None:
     np.testing.assert_allclose(held.error, [8.0, 8.0], rtol=1e-9)
 
 
-@pytest.mark.slow
-def test_a_joint_limit_is_approached_and_not_crossed() -> None:
-    """A posture beyond the limit: the joint comes to rest before it, and stays."""
-    robot = panda()
-    _, upper = robot.position_limits()
-    beyond = robot.home()
-    beyond[3] = upper[3] + 0.5
-    task = hsp.JointPosture(
-        beyond, gains=hsp.Gains(natural_frequency=6.0), name="beyond"
-    )
-    limits = hsp.Limits()
-    rollout = run(hsp.Controller(robot, [task], limits=limits), robot.home(), 2.5)
-    joint = rollout["q"][:, 3]
-    assert joint.max() <= upper[3]
-    assert joint[-1] > upper[3] - 0.01  # as near as the margin lets it
-    assert np.abs(rollout["v"][-200:, 3]).max() < 1e-3
-    assert np.abs(np.diff(rollout["tau"][-200:, 3])).max() < 1e-2
-
-
 def test_contradiction_is_relaxed_and_told() -> None:
     """A joint that its motor cannot stop before the limit: least violation."""
     robot = panda()

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
+from carriage import carriage, check_that_it_is_the_loop
 
 import hsp_control as hsp
 from hsp_control import (
@@ -113,13 +115,6 @@ def test_an_integral_is_stable_up_to_routh_where_the_rate_is_high() -> None:
         assert (loop.radius() < 1.0) is stable
 
 
-CARRIAGE = """<robot name="carriage"><link name="rail"/><link name="carriage">
-<inertial><mass value="2"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>
-</inertial></link><joint name="slide" type="prismatic"><parent link="rail"/>
-<child link="carriage"/><axis xyz="1 0 0"/>
-<limit lower="-10" upper="10" effort="1000" velocity="100"/></joint></robot>"""
-
-
 @pytest.mark.parametrize("heavy", [1.0, 3.0])
 @pytest.mark.parametrize(
     ("delays", "compensation"),
@@ -147,14 +142,8 @@ CARRIAGE = """<robot name="carriage"><link name="rail"/><link name="carriage">
 def test_the_linear_loop_is_the_chain_link_by_link(
     delays: tuple[int, int], compensation: dict[str, Any], heavy: float, tmp_path: Path
 ) -> None:
-    """A carriage on a rail *is* the linear mode, also one heavier than its model.
-
-    By Cayley and Hamilton its positions obey the recurrence of the transition's
-    characteristic polynomial, once what was there before the run has passed.
-    """
-    file = tmp_path / "carriage.urdf"
-    file.write_text(CARRIAGE)
-    robot = Robot.load(str(file))
+    """A carriage on a rail *is* the linear mode, also one heavier than its model."""
+    robot = carriage(tmp_path)
     h, frequency = 0.01, 12.0
     task = JointPosture(np.zeros(1), gains=Gains(natural_frequency=frequency))
     made, parts = Controller(robot, [task], limits=None), Compensation(**compensation)
@@ -171,15 +160,8 @@ def test_the_linear_loop_is_the_chain_link_by_link(
     Ki = ZERO if action is None else action.gains(made.tasks)["posture"]
     Kp, Kv, *_ = made.feedback("posture")
     loop = LinearLoop(Kp, Kv, Ki, h, *delays, parts, 1.0 / heavy)
-    coefficients = np.poly(loop.transition())
-    n, begun = len(coefficients), 8
-    residuals = [coefficients[::-1] @ x[k : k + n] for k in range(begun, len(x) - n)]
-    # Rounding of coefficients of up to 10, on positions of 1 m.
-    assert np.abs(residuals).max() < 1e-12
     other = LinearLoop(1.1 * Kp, Kv, Ki, h, *delays, parts, 1.0 / heavy)
-    wrong = np.poly(other.transition())
-    missed = [wrong[::-1] @ x[k : k + n] for k in range(begun, len(x) - n)]
-    assert np.abs(missed).max() > 1e3 * np.abs(residuals).max()
+    check_that_it_is_the_loop(x, loop, other)
 
 
 @pytest.mark.slow
@@ -277,10 +259,10 @@ def test_the_robot_grows_just_above_and_dies_just_below(
 
 
 @pytest.mark.parametrize(
-    ("made", "path", "message"),
+    ("how", "path", "message"),
     [
         (
-            lambda: holding(gain=2500.0),
+            {"gain": 2500.0},
             ("null_space", "gain"),
             r"unstable at this rate: K_N times the period is 2.5 \(motion grows by a "
             r"factor of up to 1.501 per period\); use K_N of at most 200 1/s or a "
@@ -288,33 +270,28 @@ def test_the_robot_grows_just_above_and_dies_just_below(
             r"most 1990 1/s or a control_period of at most 0.000799 s$",
         ),
         (
-            lambda: holding(frequency=1500.0),
+            {"frequency": 1500.0},
             ("tasks", "hand", "gains"),
-            r"unstable at this rate: ω0 of task 'hand' times the period is 1.5 \(.*\); "
-            r"use ω0 of task 'hand' of at most 200 1/s or a control_period of at most "
-            r"0.000133 s; the loop is stable with ω0 of task 'hand' of at most "
-            r"(999|1000) 1/s or a control_period of at most 0.000666 s$",
+            r"ω0 of task 'hand' times the period is 1.5 .* of at most (999|1000) 1/s "
+            r"or a control_period of at most 0.000666 s$",
         ),
         (
-            lambda: holding(gain=1100.0, stiffness=1100.0),
+            {"gain": 1100.0, "stiffness": 1100.0},
             ("null_space", "gain"),
-            r"K_N times the period is 1.1, with a field of stiffness 1100 1/s \(.*\); "
-            r"use K_N of at most 200 1/s or a control_period of at most 0.000181 s; "
-            r"the loop is stable with K_N of at most (899|900) 1/s or fields of at "
-            r"most 0.818 times these weights or a control_period of at most "
-            r"0.000909 s$",
+            r"K_N times the period is 1.1, with a field of stiffness 1100 1/s .* of at "
+            r"most (899|900) 1/s or fields of at most 0.818 times these weights or a ",
         ),
     ],
 )
 def test_an_unstable_rate_is_reported_with_stable_values(
-    made: Any, path: tuple[str, ...], message: str
+    how: dict[str, float], path: tuple[str, ...], message: str
 ) -> None:
-    (finding,) = [f for f in rate_findings(made(), Q0, H) if f.unstable]
+    (finding,) = [f for f in rate_findings(holding(**how), Q0, H) if f.unstable]
     assert finding.path == path
     assert finding.radius > 1.0
     assert re.search(message, finding.message), finding.message
     with pytest.raises(hsp.errors.UnstableRateError, match="unstable at this rate"):
-        check_rate(made(), Q0, H)
+        check_rate(holding(**how), Q0, H)
 
 
 @pytest.mark.parametrize(
@@ -429,8 +406,6 @@ ALL: dict[str, Any] = {
 
 def test_all_compensators_from_yaml_and_each_turned_off(tmp_path: Path) -> None:
     file = tmp_path / "all.yaml"
-    import yaml
-
     file.write_text(yaml.safe_dump(config(compensation=ALL)))
     made = load_experiment(file)
     assert made.compensation.names == tuple(ALL)
@@ -447,25 +422,12 @@ def test_all_compensators_from_yaml_and_each_turned_off(tmp_path: Path) -> None:
     assert np.asarray(friction.viscous).tolist() == [0.003] * 7
 
 
+LATE = {"type": "rigid_body", "sensors": {"delay": 1}}
+
+
 @pytest.mark.parametrize(
     ("sections", "message"),
     [
-        (
-            {"compensation": {"momentum_obsever": {}}},
-            "unknown key 'momentum_obsever'; did you mean 'momentum_observer'",
-        ),
-        (
-            {"compensation": {"momentum_observer": {"clip": [1, 2]}}},
-            "compensation.momentum_observer.clip: has 2 numbers; needs one number or 7",
-        ),
-        (
-            {"compensation": {"integral_action": {"rate": 1, "tasks": ["hnad"]}}},
-            r"compensation.integral_action.tasks: .* 'hnad'; did you mean 'hand'\?",
-        ),
-        (
-            {"compensation": {"predictor": {"effort_delay": 0}}},
-            "compensation.predictor: a pred",
-        ),
         (
             {"compensation": {"start_up_ramp": {}}, "simulation": {"duration": 1}},
             "compensation acts once per control period: set simulation.control_period",
@@ -474,26 +436,8 @@ def test_all_compensators_from_yaml_and_each_turned_off(tmp_path: Path) -> None:
             {"null_space": {"gain": 2500}},
             "null_space.gain: unstable at this rate: K_N times the period is 2.5",
         ),
-        (
-            {
-                "plant": {"type": "rigid_body", "drives": {"delay": 1}},
-                "tasks": {
-                    "hand": {
-                        "type": "frame_position",
-                        "frame": "panda_tcp",
-                        "trajectory": {"type": "hold"},
-                        "gains": {"natural_frequency": 500},
-                    }
-                },
-            },
-            "tasks.hand.gains: unstable at this rate: .* 0.5, 1 period of delay .*"
-            "ω0 of task 'hand' of at most 100 1/s .* of at most 426 1/s",
-        ),
-        (
-            {
-                "plant": {"type": "rigid_body", "sensors": {"delay": 1}},
-                "null_space": {"gain": 1100},  # without a delay up to 2000
-            },
+        (  # without a delay up to 2000
+            {"plant": LATE, "null_space": {"gain": 1100}},
             "null_space.gain: unstable at this rate: .* 1 period of delay",
         ),
         (
@@ -519,8 +463,6 @@ def test_the_command_line_says_what_is_close(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "close.yaml"
-    import yaml
-
     file.write_text(yaml.safe_dump(config(null_space={"gain": 500})))
     for command in (["check", str(file)], ["run", str(file), "--out", str(tmp_path)]):
         assert main(command) == 0
@@ -538,19 +480,12 @@ def test_the_command_line_says_what_is_close(
         (
             {"gain": 5000.0},
             0,
-            r"^null_space\.gain: unstable at this rate: .*; use K_N of at most 200 1/s "
-            r"or a control_period of at most 4e-05 s; the loop is stable with K_N of "
-            r"at most (1990|2000) 1/s",
-        ),
-        (
-            {"frequency": 1500.0},
-            0,
-            r"^tasks\.hand\.gains: .* use ω0 of task 'hand' of at most 200 1/s or ",
+            r"^null_space\.gain: unstable at this rate: .* most 200 ",
         ),
         (
             {"frequency": 500.0},
             1,
-            r"^tasks\.hand\.gains: .*, 1 period of delay .* use .* at most 100 1/s or ",
+            r"^tasks\.hand\.gains: .*, 1 period of delay .* 100 ",
         ),
     ],
 )

@@ -12,7 +12,6 @@ from law_numbers import Numbers, numbers, resolve
 from numpy.typing import NDArray
 
 import hsp_control as hsp
-from hsp_control.common.exceptions import ControllerError
 from hsp_control.law import CONSTANT, IDENTITY, VARYING
 from hsp_control.robot.integrators import Dop853
 from hsp_control.trajectories import Circle
@@ -227,12 +226,6 @@ def test_levels_are_the_tasks_of_one_priority() -> None:
     spread = [replace(rival, priority=70), replace(hand, priority=3), wrist]
     levels = hsp.Controller(panda(), spread, limits=None).levels
     assert [task.name for (task,) in levels] == ["wrist", "hand", "rival"]
-
-
-def test_nested_lists_are_refused() -> None:
-    hand, *others = conflicting("identity").tasks
-    with pytest.raises(ControllerError, match="lists; write the level as priority="):
-        hsp.Controller(panda(), [hand, others], limits=None)  # type: ignore[list-item]
 
 
 def test_propositions_hold_for_two_arms() -> None:
