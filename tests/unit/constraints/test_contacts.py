@@ -13,13 +13,12 @@ import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose
 from numpy.typing import NDArray
+from runs import check_errors, check_null_space, continuous, held
 
 import hsp_control as hsp
-from hsp_control.common.exceptions import (
-    ContactError,
-    FrameNotFoundError,
-)
+from hsp_control.common.exceptions import ContactError, FrameNotFoundError
 from hsp_control.constraints.contacts.unactuated import UnactuatedRows
 from hsp_control.control.actuation import Status
 from hsp_control.control.actuation.support import Support
@@ -27,7 +26,6 @@ from hsp_control.control.evolution import PRESENT
 from hsp_control.control.planned_contact import PlannedContact
 from hsp_control.geometry.scene import Scene
 from hsp_control.geometry.start import Start
-from hsp_control.robot.integrators import Dop853, Rk4
 from hsp_control.simulation.plants import ContactPlant, RigidContact
 from hsp_control.tasks import TaskSample
 from hsp_control.trajectories import Blend, HoldOrientation
@@ -127,14 +125,14 @@ def test_rows_are_the_velocity_of_what_touches(kind: str, seed: int) -> None:
         assert isinstance(contact, hsp.contacts.BallContact)
         arm = -contact.radius * contact.axes[:, 2]
         moving = slope(lambda s: place(s).translation) + np.cross(turning, arm)
-    np.testing.assert_allclose(sample.jacobian @ v, moving, rtol=0, atol=1e-9)
-    np.testing.assert_allclose(sample.acceleration, -40.0 * moving, atol=1e-7)
+    assert_allclose(sample.jacobian @ v, moving, rtol=0, atol=1e-9)
+    assert_allclose(sample.acceleration, -40.0 * moving, atol=1e-7)
 
     def rows(s: float) -> Array:
         there = robot.state(0.0, robot.integrate(q, s * v), v)
         return sample_of(contact, there).jacobian.copy()
 
-    np.testing.assert_allclose(sample.jacobian_dot, slope(rows), rtol=0, atol=1e-8)
+    assert_allclose(sample.jacobian_dot, slope(rows), rtol=0, atol=1e-8)
 
 
 @given(seeds)
@@ -182,7 +180,7 @@ def test_unactuated_rows_ask_for_no_effort(seed: int) -> None:
     )
     P = np.eye(robot.nv) - np.linalg.pinv(J) @ J
     turned = np.linalg.pinv(J) @ J_dot @ P
-    np.testing.assert_allclose(turned + turned.T, slope(projector), atol=1e-6)
+    assert_allclose(turned + turned.T, slope(projector), atol=1e-6)
 
 
 # --- the law on a constrained plant --------------------------------------------------
@@ -242,7 +240,7 @@ def test_effort_and_forces_are_one_solution(seed: int) -> None:
         for contact in controller.contacts:
             sample = sample_of(contact, state)
             moved = sample.jacobian @ out.acceleration + sample.jacobian_dot @ state.v
-            np.testing.assert_allclose(moved, sample.acceleration, rtol=0, atol=1e-7)
+            assert_allclose(moved, sample.acceleration, rtol=0, atol=1e-7)
     forces = out.forces.reshape(-1, 3)
     assert (forces[:, 2] >= 0.0).all()
     tangential = np.linalg.norm(forces[:, :2], axis=1)
@@ -283,15 +281,8 @@ def test_the_log_says_how_much_friction_is_used() -> None:
         contacts=contacts,
         limits=None,
     )
-    log = hsp.simulate(
-        controller,
-        robot.home(),
-        duration=0.002,
-        log_period=0.001,
-        control_period=0.001,
-        integrator=Rk4(0.001),
-        plant=ContactPlant(robot, [RigidContact(frame) for frame in SOLES]),
-    )
+    plant = ContactPlant(robot, [RigidContact(frame) for frame in SOLES])
+    log = held(controller, robot.home(), duration=0.002, plant=plant)
     for k in range(len(log)):
         out = controller.compute(robot.state(log.t[k], log.q[k], log.v[k]))
         for frame, mu, forces in zip(
@@ -311,22 +302,11 @@ def test_propositions_hold_for_a_humanoid() -> None:
     q0 = robot.integrate(
         robot.home(), np.r_[np.zeros(6), 0.02 * np.cos(np.arange(robot.nv - 6))]
     )
-    rollout = hsp.simulate(
-        controller,
-        q0,
-        controller.flow(0.0, q0),  # a start that the contacts allow
-        duration=0.3,
-        log_period=0.02,
-        integrator=Dop853(rtol=1e-9, atol=1e-9),
-        plant=plant,
-    )
+    v0 = controller.flow(0.0, q0)  # a start that the contacts allow
+    how: dict[str, Any] = {"duration": 0.3, "log_period": 0.02, "plant": plant}
+    rollout = continuous(controller, q0, v0, tolerance=1e-9, **how)
     assert not rollout["damped"].any()
-    t, w = rollout.t, 8.0
-    for name in ("center_of_mass", "trunk", "hand"):
-        e = rollout[f"task.{name}.error"]
-        rate = rollout[f"task.{name}.error_rate"]
-        expected = np.exp(-w * t)[:, None] * (e[0] + (rate[0] + w * e[0]) * t[:, None])
-        np.testing.assert_allclose(e, expected, rtol=0, atol=1e-6)
+    check_errors(rollout, 8.0, "center_of_mass", "trunk", "hand", atol=1e-6)
     assert rollout["singular_values"].shape[1] == 9
 
 
@@ -340,18 +320,10 @@ def test_null_space_decays_on_the_constrained_plant() -> None:
     rng = np.random.default_rng(3)
     v0 = 0.3 * rng.standard_normal(robot.nv)
     v0 -= np.linalg.pinv(J) @ (J @ v0)  # self-motion: no task and no contact moves
-    rollout = hsp.simulate(
-        controller,
-        robot.home(),
-        v0,
-        duration=0.3,
-        log_period=0.02,
-        integrator=Dop853(rtol=1e-10, atol=1e-10),
-        plant=ContactPlant(robot, [RigidContact(f) for f in SOLES], damping=40.0),
-    )
-    norm = rollout["null_space_norm"]
-    assert norm[0] > 0.5
-    np.testing.assert_allclose(norm, norm[0] * np.exp(-6.0 * rollout.t), rtol=1e-6)
+    plant = ContactPlant(robot, [RigidContact(f) for f in SOLES], damping=40.0)
+    how: dict[str, Any] = {"duration": 0.3, "log_period": 0.02, "plant": plant}
+    rollout = continuous(controller, robot.home(), v0, **how)
+    check_null_space(rollout, 6.0, least=0.5, rtol=1e-6)
     assert np.abs(rollout["task.hand.error"]).max() < 1e-7
 
 
@@ -366,33 +338,15 @@ def test_in_the_air_only_what_is_possible_is_asked() -> None:
     out = controller.compute(state)
     assert not out.tau[:6].any()
     wanted = state.inverse_dynamics(out.acceleration)
-    np.testing.assert_allclose(wanted[:6], 0.0, atol=1e-8 * np.abs(wanted).max())
+    assert_allclose(wanted[:6], 0.0, atol=1e-8 * np.abs(wanted).max())
     mass = state.centroidal
     fall = mass.jacobian @ out.acceleration + mass.jacobian_dot @ state.v
-    np.testing.assert_allclose(fall, [0.0, 0.0, -9.81], atol=1e-8)
-    np.testing.assert_allclose(
+    assert_allclose(fall, [0.0, 0.0, -9.81], atol=1e-8)
+    assert_allclose(
         out.task.jacobian[controller.task_rows["posture"]] @ out.acceleration,
         out.task.acceleration[controller.task_rows["posture"]],
         atol=1e-8,
     )
-
-
-def test_forces_are_redistributed_before_the_law_is_touched() -> None:
-    """A low friction that the least forces miss, and others do not."""
-    robot = talos()
-    state = robot.state(0.0, robot.home(), np.zeros(robot.nv))
-    com = state.centroidal.position + np.array([0.0, 0.065, 0.0])
-    task = hsp.CenterOfMass(hsp.Hold(com), gains=hsp.Gains(natural_frequency=3.0))
-    controller = hsp.Controller(
-        robot,
-        [task],
-        contacts=[sole(frame, friction=0.12) for frame in SOLES],
-        limits=None,
-    )
-    out = controller.compute(state)
-    assert out.status in (Status.EXACT, Status.REDISTRIBUTED)
-    moved = out.task.jacobian[12:] @ out.acceleration
-    np.testing.assert_allclose(moved, out.task.acceleration[12:], atol=1e-9)
 
 
 # --- what is refused -----------------------------------------------------------------

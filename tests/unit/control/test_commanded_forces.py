@@ -13,6 +13,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from runs import check_null_space, continuous
 
 import hsp_control as hsp
 from hsp_control.common.exceptions import ContactError, ControllerError
@@ -25,7 +26,6 @@ from hsp_control.constraints.contacts import (
 )
 from hsp_control.control.actuation import Status
 from hsp_control.control.actuation.contact_forces import minimum_norm_forces
-from hsp_control.robot.integrators import Dop853
 from hsp_control.simulation.plants import ContactPlant, ContinuousPlant, RigidContact
 from hsp_control.trajectories import CallableTrajectory, Hold, Schedule, Stream
 
@@ -203,22 +203,14 @@ def test_a_fixed_base_presses_with_what_is_commanded() -> None:
     controller = pressing(contact)
     J = controller.robot.state(0.0, panda().home(), np.zeros(7)).frame(TIP).jacobian
     v0 = 0.3 * np.linalg.svd(J)[2][-1]  # self-motion
-    log = hsp.simulate(
-        controller,
-        panda().home(),
-        v0,
-        duration=0.4,
-        log_period=0.05,
-        integrator=Dop853(rtol=1e-10, atol=1e-10),
-        plant=ContactPlant(panda(), [RigidContact(TIP, "point")], damping=40.0),
-    )
+    plant = ContactPlant(panda(), [RigidContact(TIP, "point")], damping=40.0)
+    how: dict[str, Any] = {"duration": 0.4, "log_period": 0.05, "plant": plant}
+    log = continuous(controller, panda().home(), v0, **how)
     expected = np.array([command(t) for t in log.t])
     for column in (f"plant.contact.{TIP}.force", f"contact.{TIP}.force",
                    f"contact.{TIP}.commanded"):  # fmt: skip
         np.testing.assert_allclose(log[column], expected, atol=1e-9)
-    norm = log["null_space_norm"]
-    assert norm[0] > 0.1
-    np.testing.assert_allclose(norm, norm[0] * np.exp(-5.0 * log.t), rtol=1e-7)
+    check_null_space(log, 5.0, least=0.1, rtol=1e-7)
     assert np.abs(log["task.turn.error"]).max() < 1e-9
 
 
@@ -270,15 +262,9 @@ def test_a_sliding_point_keeps_force_and_path(normal: list[float]) -> None:
         limits=None,
     )
     plant = SlidingPlant(panda(), contact)
-    log = hsp.simulate(
-        controller,
-        panda().home(),
-        controller.flow(0.0, panda().home()),
-        duration=0.5,
-        log_period=0.05,
-        integrator=Dop853(rtol=1e-10, atol=1e-10),
-        plant=plant,
-    )
+    q0 = panda().home()
+    v0 = controller.flow(0.0, q0)
+    log = continuous(controller, q0, v0, duration=0.5, log_period=0.05, plant=plant)
     assert np.abs(log["task.path.error"]).max() < 1e-8
     norm = log["null_space_norm"]
     assert norm.max() < 1e-7

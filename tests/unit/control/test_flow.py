@@ -17,12 +17,12 @@ from controller_cases import (
     track,
 )
 from numpy.typing import NDArray
+from runs import continuous
 
 import hsp_control as hsp
 from hsp_control.law import CONSTANT
 from hsp_control.null_space.fields import FunctionField
 from hsp_control.null_space.metrics import Metric, MetricSample
-from hsp_control.robot.integrators import Dop853
 
 Array = NDArray[np.float64]
 
@@ -72,14 +72,8 @@ def test_robot_becomes_the_flow(kind: str) -> None:
         null_space_gain=20.0,
         singularity_threshold=EXACT,
     )
-    rollout = hsp.simulate(
-        controller,
-        panda().home(),
-        0.2 * np.ones(7),
-        duration=2.0,
-        log_period=0.25,
-        integrator=Dop853(rtol=1e-10, atol=1e-10),
-    )
+    v0 = 0.2 * np.ones(7)
+    rollout = continuous(controller, panda().home(), v0, duration=2.0, log_period=0.25)
     gaps = [
         np.abs(v - controller.flow(t, q)).max()
         for t, q, v in zip(rollout.t, rollout.q, rollout.v, strict=True)
@@ -102,14 +96,8 @@ def test_a_start_on_the_flow_has_no_transient() -> None:
     )
     task = hsp.FramePosition(TCP, path, gains=GAINS)
     controller = hsp.Controller(panda(), [task], field, singularity_threshold=EXACT)
-    rollout = hsp.simulate(
-        controller,
-        home,
-        controller.flow(0.0, home),
-        duration=1.0,
-        log_period=0.1,
-        integrator=Dop853(rtol=1e-10, atol=1e-10),
-    )
+    v0 = controller.flow(0.0, home)
+    rollout = continuous(controller, home, v0, duration=1.0, log_period=0.1)
     for t, q, v in zip(rollout.t, rollout.q, rollout.v, strict=True):
         out = controller.compute(panda().state(t, q, v))
         np.testing.assert_allclose(out.task.error, 0.0, rtol=0, atol=1e-9)

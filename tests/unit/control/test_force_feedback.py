@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from runs import held
 
-from hsp_control import Controller, FrameOrientation, Gains, Limits, Robot, simulate
+from hsp_control import Controller, FrameOrientation, Gains, Limits, Robot
 from hsp_control.common.exceptions import CompensationError
 from hsp_control.constraints.contacts import CommandedForce, PointContact
 from hsp_control.control.compensation import (
@@ -15,7 +16,6 @@ from hsp_control.control.compensation import (
     ForceFeedback,
     MomentumObserver,
 )
-from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.plants import ContactPlant, Push, RigidContact
 from hsp_control.trajectories import Schedule
@@ -47,16 +47,9 @@ def run(
     """Hold a hand against a rigid plane while something else pushes it down."""
     push = Push(TIP, force=(0.0, 0.0, unknown), start=0.0, duration=10.0)
     plant = ContactPlant(panda(), [RigidContact(TIP, "point")], pushes=[push])
-    return simulate(
-        controller,
-        panda().home(),
-        duration=options.get("duration", 0.4),
-        control_period=H,
-        log_period=0.01,
-        integrator=Rk4(H),
-        plant=plant,
-        compensation=compensation,
-    )
+    duration = options.get("duration", 0.4)
+    how = {"duration": duration, "log_period": 0.01, "plant": plant}
+    return held(controller, panda().home(), compensation=compensation, **how)
 
 
 def test_the_error_decays_at_its_rate() -> None:
@@ -110,15 +103,8 @@ def test_an_estimate_needs_no_sensor() -> None:
     log = run(pressing(), both, 0.0)
     assert log["contact.press.estimated"][-1] == pytest.approx(20.0, abs=0.1)
     assert np.abs(log["observer.disturbance"][-1]).max() < 0.1
-    air = simulate(
-        pressing(),
-        panda().home(),
-        duration=0.1,
-        control_period=H,
-        log_period=0.01,
-        integrator=Rk4(H),
-        compensation=both,
-    )
+    how: dict[str, Any] = {"duration": 0.1, "log_period": 0.01}
+    air = held(pressing(), panda().home(), compensation=both, **how)
     assert air["contact.press.estimated"][-1] == pytest.approx(0.0, abs=0.5)
 
 

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from runs import held
 
 import hsp_control as hsp
 from hsp_control.constraints.limits import ObstacleDistance, RobotLimits
@@ -17,7 +18,6 @@ from hsp_control.control.actuation import Status
 from hsp_control.control.actuation.held_effort import HeldEffort
 from hsp_control.geometry import Scene
 from hsp_control.geometry.start import Start
-from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants import Push, RigidBodyPlant
 from hsp_control.trajectories import Lissajous
 
@@ -256,17 +256,6 @@ def test_null_space_gives_way_first_then_the_lower_task() -> None:
 # --- along motions -------------------------------------------------------------------
 
 
-def run(controller: hsp.Controller, q0: Array, duration: float = 1.5) -> hsp.Rollout:
-    return hsp.simulate(
-        controller,
-        q0,
-        duration=duration,
-        control_period=1e-3,
-        log_period=1e-3,
-        integrator=Rk4(1e-3),
-    )
-
-
 def violations(rollout: hsp.Rollout, limits: RobotLimits) -> dict[str, float]:
     """Return the worst excess over each limit, in the log alone."""
     q, v, tau = rollout["q"], rollout["v"], rollout["tau"]
@@ -306,7 +295,7 @@ def limit_rich(seed: int) -> tuple[hsp.Controller, RobotLimits, Array]:
 def test_no_limit_is_violated(seed: int) -> None:
     """Limit-rich rollouts; benchmarks/limit_rollouts.py runs a thousand of them."""
     controller, limits, q0 = limit_rich(seed)
-    rollout = run(controller, q0, 0.8)
+    rollout = held(controller, q0, duration=0.8)
     assert rollout.meta["status"] == "completed"
     assert (rollout["status"] == Status.LIMITED).any()  # limits did bind
     worst = violations(rollout, limits)
@@ -319,14 +308,7 @@ def test_no_limit_is_violated(seed: int) -> None:
 def test_speed_limits_are_kept_at_any_period(seed: int, period: float) -> None:
     """Seeds that exceed them by 0.6 and 2.7 % with a constant margin."""
     controller, limits, q0 = limit_rich(seed)
-    rollout = hsp.simulate(
-        controller,
-        q0,
-        duration=0.8,
-        control_period=period,
-        log_period=period,
-        integrator=Rk4(1e-3),
-    )
+    rollout = held(controller, q0, period, duration=0.8)
     used = np.abs(rollout["v"]) / limits.velocity
     assert used.max() <= 1.0
     assert used.max() > 0.9
@@ -348,15 +330,9 @@ def test_a_load_that_the_model_lacks_drives_no_joint_beyond_its_limit(
         beyond, gains=hsp.Gains(natural_frequency=6.0), name="beyond"
     )
     load = Push("panda_tcp", (0.0, 0.0, -30.0), duration=10.0)
-    rollout = hsp.simulate(
-        hsp.Controller(robot, [task]),
-        q0,
-        duration=2.5,
-        control_period=period,
-        log_period=period,
-        integrator=Rk4(1e-3),
-        plant=RigidBodyPlant(robot, [load]),
-    )
+    plant = RigidBodyPlant(robot, [load])
+    law = hsp.Controller(robot, [task])
+    rollout = held(law, q0, period, duration=2.5, plant=plant)
     joint = rollout["q"][:, 1]
     assert joint.max() < upper[1]
     assert joint[-1] == pytest.approx(upper[1] - 0.005, abs=1e-5)
@@ -391,20 +367,6 @@ def test_the_error_of_the_acceleration_is_what_is_observed() -> None:
     np.testing.assert_allclose(held.error, [8.0, 8.0], rtol=1e-9)
 
 
-def test_contradiction_is_relaxed_and_told() -> None:
-    """A joint that its motor cannot stop before the limit: least violation."""
-    robot = panda()
-    q, v = robot.home(), np.zeros(7)
-    _, upper = robot.position_limits()
-    q[3], v[3] = upper[3] - 0.02, 2.0
-    limits = hsp.Limits(effort=1.0)
-    out = hsp.Controller(robot, [hand()], limits=limits).compute(robot.state(0.0, q, v))
-    assert np.isfinite(out.tau).all()
-    assert (np.abs(out.tau) <= 1.0).all()
-    assert out.status > Status.LIMITED
-    assert 0.0 < out.relaxation < np.inf
-
-
 def test_effort_rate_needs_to_know_what_went_out() -> None:
     robot = panda()
     limits = hsp.Limits(effort_rate=1000.0)
@@ -416,17 +378,6 @@ def test_effort_rate_needs_to_know_what_went_out() -> None:
     assert np.abs(out.tau - before).max() <= 1.0 + 1e-9
     controller.restart()
     assert np.abs(controller.compute(state).tau - before).max() > 1.0
-
-
-def test_hold_with_limits_is_still_the_paper() -> None:
-    """A still target within all limits: not one step is limited."""
-    robot = panda()
-    here = robot.state(0.0, robot.home(), np.zeros(7)).position("panda_tcp").copy()
-    task = hsp.FramePosition(
-        "panda_tcp", hsp.Hold(here), gains=hsp.Gains(natural_frequency=10.0)
-    )
-    rollout = run(hsp.Controller(robot, [task], limits=hsp.Limits()), robot.home(), 0.2)
-    assert not rollout["status"].any()
 
 
 # --- distances -----------------------------------------------------------------------
@@ -469,7 +420,8 @@ def test_things_stay_apart() -> None:
     least: dict[bool, float] = {}
     for limited in (False, True):
         limits = hsp.Limits(distances=[ObstacleDistance(0.02)])
-        rollout = run(elbow(limits if limited else None), robot.home(), 1.6)
+        law = elbow(limits if limited else None)
+        rollout = held(law, robot.home(), duration=1.6)
         least[limited] = min(
             float(proximity.measure(robot.state(t, q, v)).min())
             for t, q, v in zip(rollout.t, rollout["q"], rollout["v"], strict=True)

@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from robot_cases import load
 
 import hsp_control as hsp
-from hsp_control import Controller, FramePosition, Robot, TargetPosture, simulate
+from hsp_control import Controller, FramePosition, Robot, TargetPosture
 from hsp_control.common.exceptions import GainError
 from hsp_control.control.composition import checked_gain
-from hsp_control.robot.integrators import Dop853
 
 Array = NDArray[np.float64]
 
@@ -155,16 +154,3 @@ def test_a_matrix_over_the_mass_matrix_is_refused(gain: Any) -> None:
         controller.at(1.0).null_space_gain(gain)
     np.testing.assert_array_equal(controller.null_space_gain, 4.0 * np.eye(7))
     controller.at(1.0).null_space_gain(6.0)
-
-
-def test_v_falls_while_matrix_gains_follow_each_other() -> None:
-    robot, rng = load("panda"), np.random.default_rng(43)
-    q0, v0 = robot.home(), rng.normal(size=7)
-    W = np.diag(np.linspace(1.0, 5.0, 7))
-    first, second = (np.linalg.solve(W, damping(7, rng)) for _ in range(2))
-    controller = holding(first, hsp.metrics.ConstantMetric(W))
-    controller.at(0.05).ramp(0.1).null_space_gain(second)
-    run = simulate(controller, q0, v0, duration=0.2, integrator=Dop853(rtol=1e-10))
-    norms = run["null_space_norm"]
-    assert (np.diff(norms) < 0.0).all()
-    assert norms[-1] < 0.5 * norms[0]

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import yaml
 from carriage import carriage, check_that_it_is_the_loop
+from runs import held
 
 import hsp_control as hsp
 from hsp_control import (
@@ -240,15 +241,7 @@ def test_the_robot_grows_just_above_and_dies_just_below(
         engine = IntegratedPlant(RigidBodyPlant(PANDA), Rk4(H))
         plant = ImperfectPlant(engine, [], [EffortDelay(delay)])
         try:
-            log = simulate(
-                made,
-                Q0,
-                duration=0.3,
-                control_period=H,
-                log_period=H,
-                plant=plant,
-                check_rate=False,
-            )
+            log = held(made, Q0, duration=0.3, plant=plant, check_rate=False)
             speed = np.linalg.norm(log.v, axis=1)
             growth = speed[-100:].max() / speed[:100].max()
         except hsp.errors.SimulationError:
@@ -295,38 +288,27 @@ def test_an_unstable_rate_is_reported_with_stable_values(
 
 
 @pytest.mark.parametrize(
-    ("compensation", "delay", "advice"),
+    ("make", "wrong", "delay", "advice"),
     [
         (
-            {"momentum_observer": MomentumObserver(3000.0)},
-            1,
-            r"momentum_observer\.bandwidth of at most ([\d.]+) 1/s",
+            lambda x: Compensation(momentum_observer=MomentumObserver(x)),
+            *(3000.0, 1, r"momentum_observer\.bandwidth of at most ([\d.]+) 1/s"),
         ),
         (
-            {"velocity_filter": VelocityFilter(5.0, 2)},
-            0,
-            r"velocity_filter\.cutoff of at least ([\d.]+) Hz",
+            lambda x: Compensation(velocity_filter=VelocityFilter(x, 2)),
+            *(5.0, 0, r"velocity_filter\.cutoff of at least ([\d.]+) Hz"),
         ),
     ],
 )
 def test_the_advice_on_a_compensator_works(
-    compensation: dict[str, Any], delay: int, advice: str
+    make: Any, wrong: float, delay: int, advice: str
 ) -> None:
     made = holding(frequency=40.0, gain=20.0)
-    options = {"effort_delay": delay}
-    found = rate_findings(made, Q0, H, Compensation(**compensation), **options)
-    numbers = [
-        float(match[1])
-        for finding in found
-        if finding.unstable and (match := re.search(advice, finding.message))
-    ]
-    assert numbers
-    (name,) = compensation
-    if name == "momentum_observer":
-        mended = Compensation(momentum_observer=MomentumObserver(min(numbers)))
-    else:
-        mended = Compensation(velocity_filter=VelocityFilter(max(numbers), 2))
-    check_rate(made, Q0, H, mended, **options)
+    found = rate_findings(made, Q0, H, make(wrong), effort_delay=delay)
+    told = [re.search(advice, each.message) for each in found if each.unstable]
+    numbers = [float(match[1]) for match in told if match]
+    best = min(numbers) if "most" in advice else max(numbers)
+    check_rate(made, Q0, H, make(best), effort_delay=delay)
 
 
 def test_what_misses_the_rule_is_said_and_not_refused() -> None:

@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from law_numbers import Numbers, numbers, resolve
 from numpy.typing import NDArray
+from runs import check_errors, check_null_space, continuous
 
 import hsp_control as hsp
 from hsp_control.law import CONSTANT, IDENTITY, VARYING
-from hsp_control.robot.integrators import Dop853
 from hsp_control.trajectories import Circle
 
 Array = NDArray[np.float64]
@@ -192,27 +192,13 @@ def test_propositions_hold_per_level(kind: str) -> None:
     controller = conflicting(kind)
     robot = controller.robot
     q, v0 = robot.home(), 0.3 * np.cos(np.arange(7.0))
-    precise = Dop853(rtol=1e-11, atol=1e-11)
-    rollout = hsp.simulate(
-        controller, q, v0, duration=1.0, log_period=0.02, integrator=precise
+    rollout = continuous(
+        controller, q, v0, tolerance=1e-11, duration=1.0, log_period=0.02
     )
     assert rollout["damped"].all()  # the conflict is there throughout
-
-    t, w = rollout.t, 8.0
-
-    def decayed(e: Array, rate: Array) -> Array:
-        """Return the critically damped solution of e'' + 2w e' + w² e = 0."""
-        return np.exp(-w * t)[:, None] * (e + (rate + w * e) * t[:, None])
-
-    for name in ("hand", "wrist"):
-        error, rate = rollout[f"task.{name}.error"], rollout[f"task.{name}.error_rate"]
-        expected = decayed(error[0], rate[0])
-        np.testing.assert_allclose(error, expected, rtol=0, atol=1e-8)
+    check_errors(rollout, 8.0, "hand", "wrist", atol=1e-8)
     assert np.abs(rollout["task.rival.error"][-1]) > 0.03
-
-    norm = rollout["null_space_norm"]
-    assert norm[0] > 0.05
-    np.testing.assert_allclose(norm, norm[0] * np.exp(-4.0 * t), rtol=1e-6, atol=0)
+    check_null_space(rollout, 4.0, least=0.05, rtol=1e-6)
 
 
 def test_levels_are_the_tasks_of_one_priority() -> None:
@@ -257,19 +243,7 @@ def test_propositions_hold_for_two_arms() -> None:
         robot, tasks, hsp.JointCentering(), null_space_gain=4.0, limits=None
     )
     v0 = 0.2 * np.cos(np.arange(robot.nv))
-    rollout = hsp.simulate(
-        controller,
-        q,
-        v0,
-        duration=0.6,
-        log_period=0.05,
-        integrator=Dop853(rtol=1e-10, atol=1e-10),
-    )
+    rollout = continuous(controller, q, v0, duration=0.6, log_period=0.05)
     assert rollout["damped"].all()
-    t, w = rollout.t, 8.0
-    for name in ("left_gripper", "right_gripper"):
-        e, rate = rollout[f"task.{name}.error"], rollout[f"task.{name}.error_rate"]
-        expected = np.exp(-w * t)[:, None] * (e[0] + (rate[0] + w * e[0]) * t[:, None])
-        np.testing.assert_allclose(e, expected, rtol=0, atol=1e-7)
-    norm = rollout["null_space_norm"]
-    np.testing.assert_allclose(norm, norm[0] * np.exp(-4.0 * t), rtol=1e-5, atol=0)
+    check_errors(rollout, 8.0, "left_gripper", "right_gripper", atol=1e-7)
+    check_null_space(rollout, 4.0, least=0.0, rtol=1e-5)

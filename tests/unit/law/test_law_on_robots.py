@@ -13,6 +13,7 @@ import oracles
 import pytest
 from law_cases import load, pseudo_inverse
 from law_numbers import positive
+from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 from oracles import slope
 from task_cases import placed
@@ -185,12 +186,8 @@ def test_controller_applies_the_short_form(name: str, kind: str) -> None:
     expected = oracles.law(x.J, x.J_dot, x.a_x, c.v, x.g, x.g_dot, K_N, x.W, x.W_dot)
     # Rounding, grown by J's condition; seen: 2e-14 of a, 1e-13 of e_N.
     size = np.abs(expected.acceleration).max()
-    np.testing.assert_allclose(
-        out.acceleration, expected.acceleration, rtol=0, atol=1e-12 * size
-    )
-    np.testing.assert_allclose(
-        out.null_space_error, expected.null_space_error, rtol=0, atol=1e-12
-    )
+    assert_allclose(out.acceleration, expected.acceleration, rtol=0, atol=1e-12 * size)
+    assert_allclose(out.null_space_error, expected.null_space_error, rtol=0, atol=1e-12)
     # J a + J'v = a_x: to rounding, whatever the metric's condition.
     residual = x.J @ out.acceleration + x.J_dot @ c.v - x.a_x
     assert np.abs(residual).max() <= 1e-12 * max(size, 1.0)
@@ -213,12 +210,8 @@ def test_identity_metric_is_equation_13_as_printed(name: str) -> None:
     ours = controller(c, metric, K_N)
     out = ours.compute(state)
     # The differences' rounding, 1e-12 of (J⁺)'; the turning term itself is of order 1.
-    np.testing.assert_allclose(
-        out.null_space_error, expected.null_space_error, rtol=0, atol=1e-12
-    )
-    np.testing.assert_allclose(
-        out.acceleration, expected.acceleration, rtol=0, atol=1e-9
-    )
+    assert_allclose(out.null_space_error, expected.null_space_error, rtol=0, atol=1e-12)
+    assert_allclose(out.acceleration, expected.acceleration, rtol=0, atol=1e-9)
     without = oracles.paper_law(
         x.J, x.J_dot, 0 * J_plus_dot, x.a_x, c.v, x.g, x.g_dot, K_N
     )
@@ -251,10 +244,8 @@ def test_coordinates_metric_is_equation_13_in_those_coordinates(name: str) -> No
     )
     out = controller(c, metric, 7.0).compute(state)
     # 1e-11 of (J⁺)' by differences; A⁻¹ doubles it.
-    np.testing.assert_allclose(
-        out.acceleration, A_inverse @ theta.acceleration, rtol=0, atol=1e-9
-    )
-    np.testing.assert_allclose(
+    assert_allclose(out.acceleration, A_inverse @ theta.acceleration, rtol=0, atol=1e-9)
+    assert_allclose(
         out.null_space_error, A_inverse @ theta.null_space_error, rtol=0, atol=1e-12
     )
     # A cost's field is raised with the metric: -∇_θ f in the other coordinates.
@@ -263,9 +254,7 @@ def test_coordinates_metric_is_equation_13_in_those_coordinates(name: str) -> No
     sample = metric.evaluate(state, hsp.metrics.MetricSample.allocate(nv))
     state = robot.state(0.3, robot.integrate(c.q, 0.3 * c.v), c.v)
     g = cost.evaluate(state, sample, metric.form, FieldSample.allocate(nv)).g
-    np.testing.assert_allclose(
-        A @ g, -A_inverse.T @ cost.gradient(state), rtol=0, atol=1e-13
-    )
+    assert_allclose(A @ g, -A_inverse.T @ cost.gradient(state), rtol=0, atol=1e-13)
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -289,7 +278,7 @@ def test_identity_behind_the_short_form(name: str, kind: str) -> None:
     right = P @ np.linalg.solve(t.W, bend @ x)
     # Rounding of the differences, 1e-11, and of W⁻¹: cond(M) is up to 5e6 (Tiago).
     scale = max(1.0, np.abs(left).max()) * (1e-9 + 1e-14 * np.linalg.cond(t.W))
-    np.testing.assert_allclose(left, right, rtol=0, atol=scale)
+    assert_allclose(left, right, rtol=0, atol=scale)
     assert np.abs(left).max() > 0.01  # there is something to see
 
 
@@ -306,15 +295,15 @@ def test_projector_and_error_in_the_metric(name: str, kind: str) -> None:
     J_sharp, _ = pseudo_inverse(x.J, x.W, threshold=1e-4)
     P = np.eye(c.robot.nv) - J_sharp @ x.J
     atol = 1e-11 * np.linalg.norm(x.W, 2)
-    np.testing.assert_allclose(x.W @ P, P.T @ x.W, rtol=0, atol=atol)
-    np.testing.assert_allclose(P @ P, P, rtol=0, atol=1e-10)
-    np.testing.assert_allclose(P @ np.linalg.solve(x.W, x.J.T), 0.0, rtol=0, atol=1e-8)
+    assert_allclose(x.W @ P, P.T @ x.W, rtol=0, atol=atol)
+    assert_allclose(P @ P, P, rtol=0, atol=1e-10)
+    assert_allclose(P @ np.linalg.solve(x.W, x.J.T), 0.0, rtol=0, atol=1e-8)
     e_N, asked = out.null_space_error, x.g - c.v
-    np.testing.assert_allclose(e_N, P @ asked, rtol=0, atol=1e-11)
-    np.testing.assert_allclose(x.J @ e_N, 0.0, rtol=0, atol=1e-11)
+    assert_allclose(e_N, P @ asked, rtol=0, atol=1e-11)
+    assert_allclose(x.J @ e_N, 0.0, rtol=0, atol=1e-11)
     rest = asked - e_N
     whole = asked @ x.W @ asked
-    np.testing.assert_allclose(e_N @ x.W @ e_N + rest @ x.W @ rest, whole, rtol=1e-10)
+    assert_allclose(e_N @ x.W @ e_N + rest @ x.W @ rest, whole, rtol=1e-10)
 
 
 @pytest.mark.slow
@@ -349,7 +338,7 @@ def test_lyapunov_function_decays_as_proved(name: str, kind: str, gain: str) -> 
     expected = -e_N @ W @ K_N @ e_N
     assert abs(expected) > 0.1  # there is something to see
     # Rounding of the differences: 1e-15 of V over 1e-4 s; seen: 1e-12 of V'.
-    np.testing.assert_allclose(slope(V, step), expected, rtol=1e-10)
+    assert_allclose(slope(V, step), expected, rtol=1e-10)
 
 
 @pytest.mark.parametrize("kind", METRICS)
@@ -369,7 +358,7 @@ def test_law_of_a_rank_deficient_task(kind: str) -> None:
     assert not flat.damped
     for name in ("tau", "acceleration", "null_space_error"):
         # A zero row is a zero to the last bit: only rounding differs.
-        np.testing.assert_allclose(
+        assert_allclose(
             getattr(spatial, name), getattr(flat, name), rtol=1e-12, atol=1e-12
         )
 
@@ -382,6 +371,6 @@ def test_a_task_that_takes_every_freedom_leaves_no_null_space() -> None:
     full = c._replace(tasks=[task])
     for kind in METRICS:
         out = controller(full, METRICS[kind](7), 7.0).compute(state)
-        np.testing.assert_allclose(out.null_space_error, 0.0, rtol=0, atol=1e-13)
+        assert_allclose(out.null_space_error, 0.0, rtol=0, atol=1e-13)
         expected = task.evaluate(state).acceleration
-        np.testing.assert_allclose(out.acceleration, expected, rtol=0, atol=1e-11)
+        assert_allclose(out.acceleration, expected, rtol=0, atol=1e-11)
