@@ -6,12 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import hsp_control as hsp
+from hsp_control.common.arrays import Array
 from hsp_control.trajectories import HoldOrientation
 
-Array = NDArray[np.float64]
 GAINS = hsp.Gains(natural_frequency=20.0)
 TCP = "panda_tcp"
 CENTER = np.array([0.35, 0.1, 0.5])

@@ -40,14 +40,11 @@ from field_oracles import (
     swirl_oracle,
     target,
 )
-from numpy.typing import NDArray
 
 import hsp_control as hsp
+from hsp_control.common.arrays import Array
 from hsp_control.geometry import Scene
 from hsp_control.geometry.start import Start
-
-Array = NDArray[np.float64]
-
 
 Field = TypeVar("Field", bound=hsp.NullSpaceField)
 

@@ -4,14 +4,13 @@ from collections.abc import Callable
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 import hsp_control as hsp
+from hsp_control.common.arrays import Array
 from hsp_control.live import InProcessRobot, LiveSettings, Measurement, SimulatedRobot
 from hsp_control.robot.integrators import SemiImplicitEuler
 from hsp_control.simulation.plants import IntegratedPlant, RigidBodyPlant
 
-Array = NDArray[np.float64]
 PERIOD = 0.001
 
 

@@ -4,12 +4,9 @@ from typing import Any
 
 import numpy as np
 from numpy.testing import assert_allclose
-from numpy.typing import NDArray
 
 import hsp_control as hsp
 from hsp_control.robot.integrators import Dop853, Rk4
-
-Array = NDArray[np.float64]
 
 
 def held(law: hsp.Controller, q0: Any, period: float = 1e-3, **how: Any) -> hsp.Rollout:

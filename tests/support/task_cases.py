@@ -13,7 +13,6 @@ from typing import Any, TypeVar
 import numpy as np
 import pinocchio as pin
 import pytest
-from numpy.typing import NDArray
 
 import hsp_control as hsp
 from hsp_control import (
@@ -28,12 +27,12 @@ from hsp_control import (
     Robot,
     Task,
 )
+from hsp_control.common.arrays import Array
 from hsp_control.declaration.quantities import Matrix
 from hsp_control.geometry import Scene
 from hsp_control.geometry.start import Start
 from hsp_control.tasks import RelativePose
 
-Array = NDArray[np.float64]
 Kind = TypeVar("Kind", bound=Task | NullSpaceField)
 
 TIME = 0.7  # [s], when all is looked at

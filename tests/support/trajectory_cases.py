@@ -5,11 +5,9 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 import hsp_control as hsp
-
-Array = NDArray[np.float64]
+from hsp_control.common.arrays import Array
 
 
 def pose(seed: int) -> pin.SE3:

@@ -14,10 +14,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from numpy.typing import NDArray
 from runs import check_errors, check_null_space, continuous, held
 
 import hsp_control as hsp
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ContactError, FrameNotFoundError
 from hsp_control.constraints.contacts.unactuated import UnactuatedRows
 from hsp_control.control.actuation import Status
@@ -31,7 +31,6 @@ from hsp_control.tasks import TaskSample
 from hsp_control.trajectories import Blend, HoldOrientation
 
 pytest.importorskip("example_robot_data")
-Array = NDArray[np.float64]
 seeds = st.integers(0, 2**32 - 1)
 GAINS = hsp.Gains(natural_frequency=8.0)
 SOLES = ("left_sole_link", "right_sole_link")

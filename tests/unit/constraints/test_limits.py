@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from controller_cases import panda
 
 from hsp_control import Hold, Limits, Obstacle, Robot, RobotState, Sphere
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import (
     FieldError,
     HspControlError,
@@ -35,13 +36,6 @@ from hsp_control.geometry.scene import Scene
 from hsp_control.geometry.shapes import Box
 from hsp_control.geometry.start import Start
 from hsp_control.trajectories import Lissajous
-
-Array = NDArray[np.float64]
-
-
-@cache
-def panda() -> Robot:
-    return Robot.load("panda")
 
 
 @cache

@@ -10,13 +10,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from places import THOROUGH
 
 import hsp_control as hsp
+from hsp_control.common.arrays import Array
 from hsp_control.control.changes import Change
-
-Array = NDArray[np.float64]
 
 ROBOTS = ["planar3r", "iiwa14", "panda"]
 SPAN = 3.0

@@ -5,19 +5,19 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
+from controller_cases import panda
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from runs import check_null_space
 from scipy.integrate import quad, solve_ivp
 from task_cases import placed
 
 import hsp_control as hsp
+from hsp_control.common.arrays import Array
 from hsp_control.control.changes import AddTask, ChangeGains, RemoveTask
 from hsp_control.null_space.differences import rate_along_flow
 from hsp_control.null_space.fields import FieldSample
@@ -27,7 +27,6 @@ from hsp_control.simulation.recorder import Recorder
 from hsp_control.trajectories import HoldOrientation, Lissajous, Spin
 from hsp_control.trajectories.timing import smooth_step
 
-Array = NDArray[np.float64]
 K_N = 4.0
 START, RAMP = 0.2, 0.3
 KEPT = 1.0
@@ -38,11 +37,6 @@ COUPLED = hsp.Gains(
     [[60.0, 8.0, 0.0], [-5.0, 40.0, 3.0], [0.0, 2.0, 30.0]],
     [[12.0, 1.0, 0.0], [0.0, 15.0, 2.0], [1.0, 0.0, 9.0]],
 )
-
-
-@cache
-def panda() -> hsp.Robot:
-    return hsp.Robot.load("panda")
 
 
 def posture() -> hsp.TargetPosture:

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from places import THOROUGH
 
 import hsp_control as hsp
+from hsp_control.common.arrays import Array
 from hsp_control.control.actuation import actuation
 from hsp_control.control.actuation.status import Status
 from hsp_control.control.compensation import Command, Compensation, FrictionFeedForward
@@ -20,8 +20,6 @@ from hsp_control.plans.switched import Switched
 from hsp_control.trajectories import HoldOrientation, Schedule
 from hsp_control.trajectories.switch import Switch
 from hsp_control.trajectories.timing import smooth_step
-
-Array = NDArray[np.float64]
 
 ROBOTS = ["planar3r", "panda", "iiwa14", "ur5", "xarm7"]
 START, RAMP = 0.2, 0.3

@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from controller_cases import panda
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from runs import check_null_space, continuous
 
 import hsp_control as hsp
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ContactError, ControllerError
 from hsp_control.constraints.contacts import (
     CommandedForce,
@@ -30,7 +31,6 @@ from hsp_control.simulation.plants import ContactPlant, ContinuousPlant, RigidCo
 from hsp_control.trajectories import CallableTrajectory, Hold, Schedule, Stream
 
 pytest.importorskip("example_robot_data")
-Array = NDArray[np.float64]
 seeds = st.integers(0, 2**32 - 1)
 GAINS = hsp.Gains(natural_frequency=8.0)
 HAND, TIP = "gripper_right_base_link", "panda_tcp"
@@ -42,11 +42,6 @@ def talos() -> hsp.Robot:
     return hsp.Robot.load(
         "talos", locked={"gripper_left_joint": 0, "gripper_right_joint": 0}
     )
-
-
-@cache
-def panda() -> hsp.Robot:
-    return hsp.Robot.load("panda")
 
 
 def wall(force: CommandedForce | None, **options: Any) -> PointContact:

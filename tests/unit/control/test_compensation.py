@@ -10,11 +10,11 @@ import pytest
 import yaml
 from compensation_cases import ALL, EVERYTHING, PANDA, Q0, H, circle, controller
 from numpy.testing import assert_allclose, assert_array_equal
-from numpy.typing import NDArray
 from scipy.linalg import expm
 from task_cases import placed
 
 import hsp_control as hsp
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import GainError, SimulationError
 from hsp_control.control.actuation.status import Status
 from hsp_control.control.compensation import (
@@ -36,7 +36,6 @@ from hsp_control.simulation.plants.sensors import SensorDelay, VelocityNoise
 from hsp_control.tasks import RelativePose
 from hsp_control.trajectories import HoldOrientation, HoldPose
 
-Array = NDArray[np.float64]
 EYE = np.eye(7)
 
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 from compensation_cases import ALL, EVERYTHING, PANDA, Q0, H, circle, controller
-from numpy.typing import NDArray
 
 from hsp_control import Robot
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError
 from hsp_control.control.compensation import (
     Command,
@@ -23,8 +23,6 @@ from hsp_control.control.compensation import (
     StartUpRamp,
     VelocityFilter,
 )
-
-Array = NDArray[np.float64]
 
 
 def test_one_compensation_serves_many_commands_at_once() -> None:

@@ -17,9 +17,9 @@ from controller_cases import (
     states,
     track,
 )
-from numpy.typing import NDArray
 
 import hsp_control as hsp
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import (
     ContactError,
     ControllerError,
@@ -41,7 +41,6 @@ from hsp_control.tasks import Task, TaskSample
 from hsp_control.tasks.task import Feedback
 from hsp_control.trajectories import CallableTrajectory, Trajectory, TrajectorySample
 
-Array = NDArray[np.float64]
 Parts = dict[str, Any]
 
 

@@ -1,18 +1,18 @@
 """What deviations from the law cost, and postures that motors can hold."""
 
 from dataclasses import replace
-from functools import cache
 from typing import Any
 
 import limit_oracle
 import numpy as np
 import pytest
+from controller_cases import panda
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from runs import held
 
 import hsp_control as hsp
+from hsp_control.common.arrays import Array
 from hsp_control.common.kernels import PLAIN
 from hsp_control.constraints.limits import StaticEffort
 from hsp_control.control.actuation import Status
@@ -23,16 +23,10 @@ from hsp_control.control.actuation.deviation_cost import (
 )
 from hsp_control.law import Resolution
 
-Array = NDArray[np.float64]
 seeds = st.integers(0, 2**32 - 1)
 NOWHERE = np.zeros(0, dtype=np.int64)
 FAR = [0.8, 0.6, 0.9]
 compiled = pytest.mark.skipif(PLAIN, reason="many steps")
-
-
-@cache
-def panda() -> hsp.Robot:
-    return hsp.Robot.load("panda")
 
 
 def hand(**circle: Any) -> hsp.FramePosition:

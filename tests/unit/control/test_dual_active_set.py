@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from places import ROOT
 from qp_cases import (
     KINDS,
@@ -26,6 +25,7 @@ from qp_cases import (
     residual,
 )
 
+from hsp_control.common.arrays import Array
 from hsp_control.control.actuation import dual_active_set
 from hsp_control.control.actuation.dual_active_set import (
     EXHAUSTED,
@@ -34,7 +34,6 @@ from hsp_control.control.actuation.dual_active_set import (
     Workspace,
 )
 
-Array = NDArray[np.float64]
 seeds = st.integers(0, 2**32 - 1)
 QUICK = 3 if dual_active_set.minimise.__class__.__name__ == "function" else 150
 """QPs of a kind; uncompiled, the kernel takes a hundred times as long."""

@@ -6,17 +6,16 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 from carriage import MASS, carriage, check_that_it_is_the_loop
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 import hsp_control as hsp
 from hsp_control import Controller, Gains, JointPosture, Robot, simulate
+from hsp_control.common.arrays import Array
 from hsp_control.control.compensation.elastic_joint import ElasticJoint
 from hsp_control.control.compensation.linear_loop import LinearLoop
 from hsp_control.simulation.plants import EffortDelay, ImperfectPlant, SampledPlant
 from hsp_control.simulation.plants.sensors import SensorDelay
 
-Array = NDArray[np.float64]
 H, OMEGA = 0.001, 20.0
 
 

@@ -16,15 +16,13 @@ from controller_cases import (
     states,
     track,
 )
-from numpy.typing import NDArray
 from runs import continuous
 
 import hsp_control as hsp
+from hsp_control.common.arrays import Array
 from hsp_control.law import CONSTANT
 from hsp_control.null_space.fields import FunctionField
 from hsp_control.null_space.metrics import Metric, MetricSample
-
-Array = NDArray[np.float64]
 
 
 def swaying_posture(state: hsp.RobotState) -> Array:

@@ -1,13 +1,13 @@
 """Force feedback: the felt force goes to the command at the rate K_i, within bounds."""
 
-from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
+from controller_cases import panda
 from runs import held
 
-from hsp_control import Controller, FrameOrientation, Gains, Limits, Robot
+from hsp_control import Controller, FrameOrientation, Gains, Limits
 from hsp_control.common.exceptions import CompensationError
 from hsp_control.constraints.contacts import CommandedForce, PointContact
 from hsp_control.control.compensation import (
@@ -22,11 +22,6 @@ from hsp_control.trajectories import Schedule
 
 TIP, H = "panda_tcp", 1e-3
 OBSERVER = MomentumObserver(100.0, cancel=False)
-
-
-@cache
-def panda() -> Robot:
-    return Robot.load("panda")
 
 
 def pressing(

@@ -1,17 +1,17 @@
 """Limits: the step is the law's where none binds, and keeps them where one does."""
 
 from dataclasses import replace
-from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
+from controller_cases import panda
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from runs import held
 
 import hsp_control as hsp
+from hsp_control.common.arrays import Array
 from hsp_control.constraints.limits import ObstacleDistance, RobotLimits
 from hsp_control.constraints.limits.acceleration_bounds import acceleration_bounds
 from hsp_control.control.actuation import Status
@@ -21,13 +21,7 @@ from hsp_control.geometry.start import Start
 from hsp_control.simulation.plants import Push, RigidBodyPlant
 from hsp_control.trajectories import Lissajous
 
-Array = NDArray[np.float64]
 seeds = st.integers(0, 2**32 - 1)
-
-
-@cache
-def panda() -> hsp.Robot:
-    return hsp.Robot.load("panda")
 
 
 def hand(frequency: float = 10.0, **circle: Any) -> hsp.FramePosition:

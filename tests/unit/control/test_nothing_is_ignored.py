@@ -6,12 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import hsp_control as hsp
+from hsp_control.common.arrays import Array
 from hsp_control.declaration import Part
-
-Array = NDArray[np.float64]
 
 BALL = hsp.Obstacle("ball", hsp.Sphere(0.1), hsp.Hold([0.6, 0.4, 0.6]))
 

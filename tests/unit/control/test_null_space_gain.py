@@ -11,15 +11,13 @@ import pinocchio as pin
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from robot_cases import load
 
 import hsp_control as hsp
 from hsp_control import Controller, FramePosition, Robot, TargetPosture
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import GainError
 from hsp_control.control.composition import checked_gain
-
-Array = NDArray[np.float64]
 
 COUNT = 2500
 """Gains for each of four robots."""

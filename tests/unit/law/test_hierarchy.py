@@ -1,22 +1,21 @@
 """Strict priorities: against an oracle of projectors, and along whole motions."""
 
 from dataclasses import replace
-from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
+from controller_cases import panda
 from hypothesis import given
 from hypothesis import strategies as st
 from law_numbers import Numbers, numbers, resolve
-from numpy.typing import NDArray
 from runs import check_errors, check_null_space, continuous
 
 import hsp_control as hsp
+from hsp_control.common.arrays import Array
 from hsp_control.law import CONSTANT, IDENTITY, VARYING
 from hsp_control.trajectories import Circle
 
-Array = NDArray[np.float64]
 FORMS = {"identity": IDENTITY, "constant": CONSTANT, "varying": VARYING}
 forms = pytest.mark.parametrize("form", FORMS.values(), ids=FORMS)
 seeds = st.integers(0, 2**32 - 1)
@@ -145,11 +144,6 @@ def test_priorities_meet_the_stack_where_they_take_over(seed: int) -> None:
 
 GAINS = hsp.Gains(natural_frequency=8.0)
 SIDES = ("left", "right")
-
-
-@cache
-def panda() -> hsp.Robot:
-    return hsp.Robot.load("panda")
 
 
 def metric_of(kind: str) -> hsp.metrics.Metric:

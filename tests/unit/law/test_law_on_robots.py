@@ -14,17 +14,14 @@ import pytest
 from law_cases import load, pseudo_inverse
 from law_numbers import positive
 from numpy.testing import assert_allclose
-from numpy.typing import NDArray
 from oracles import slope
 from task_cases import placed
 
 import hsp_control as hsp
+from hsp_control.common.arrays import Array
 from hsp_control.law import VARYING
 from hsp_control.null_space.fields import FieldSample, FunctionField
 from hsp_control.trajectories import HoldOrientation
-
-Array = NDArray[np.float64]
-
 
 GAINS = hsp.Gains(16.0, 8.0)
 
