@@ -254,18 +254,6 @@ TURNED = hsp.FrameOrientation(
 )
 
 
-def test_a_change_of_gains_that_ends_before_an_older_one(panda: Trial) -> None:
-    def act(k: int) -> None:
-        if k == 1:
-            panda.controller.at(0.2).ramp(1.0).gains("hand", gains(20.0))
-        if k == 600:
-            panda.controller.at(0.6).ramp(0.3).gains("hand", gains(5.0))
-
-    assert panda.largest_step(act, 1.3) < 0.2
-    Kp = panda.controller.feedback("hand").Kp
-    np.testing.assert_allclose(Kp, 25.0 * np.eye(3), atol=1e-12)
-
-
 def test_the_removal_of_a_scheduled_task_does_not_switch_it_on() -> None:
     schedule = hsp.trajectories.Schedule([(2.0, 5.0)], ramp=0.3)
     both, one = Trial(), Trial()
