@@ -270,7 +270,7 @@ levels: the field without W' | recursion
 +Y[i] += 0.0 * W_dot[i, j] * (x[j] - 0.5 * e_N[j])
 # control
 @ control/actuation/actuation.py | unit/control/test_limits.py
-effort limit ignored | controller_keeps
+effort limit ignored | contradiction
   self._tau_upper[:] = self._kept.limits.effort => self._tau_upper[:] = np.inf
 @ control/actuation/actuation.py | unit/control/test_limited_step.py
 limits on efforts have no rows | optimum

@@ -134,19 +134,6 @@ def test_the_law_is_the_same_with_and_without_a_force(seed: int) -> None:
     assert np.abs(outputs[0.0].tau - outputs[10.0].tau).max() > 0.01
 
 
-def test_the_feet_balance_what_the_hand_presses() -> None:
-    """The horizontal forces of the soles take the wall's, within a millinewton."""
-    state = talos().state(0.0, talos().home(), np.zeros(talos().nv))
-    totals = []
-    for pressed in (0.0, 20.0):
-        controller = leaning(wall(CommandedForce([0.0, 0.0, pressed])))
-        out = controller.compute(state)
-        world = controller.active_stack.support.in_world(out.forces)
-        totals.append(world[:-1].sum(axis=0))
-        assert world[-1] @ [-1.0, 0.0, 0.0] == pytest.approx(pressed, abs=2e-3)
-    np.testing.assert_allclose(totals[1] - totals[0], [20.0, 0.0, 0.0], atol=5e-3)
-
-
 def test_other_forces_are_found_within_the_programme() -> None:
     """Where least forces leave the cones, the soles' change, and the command stays."""
     state = talos().state(0.0, talos().home(), np.zeros(talos().nv))

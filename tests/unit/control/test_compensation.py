@@ -139,12 +139,6 @@ def test_the_observer_is_a_low_pass_on_what_pushes(name: str, rate: float) -> No
         q, v = plant.advance(k * H, (k + 1) * H, tau + d)
 
 
-def test_the_observer_lets_go_of_what_is_not_there() -> None:
-    log = run(controller(), Compensation(momentum_observer=MomentumObserver(50.0)))
-    # Of efforts of 40 N·m, on the exact model: what the period's mean leaves out.
-    assert np.abs(log["observer.disturbance"]).max() < 2e-3
-
-
 def test_what_is_cancelled_is_clipped() -> None:
     """Beyond it the arm gives way as if there were no observer."""
     heavy = changed(PANDA, [Inertias(1.5)])

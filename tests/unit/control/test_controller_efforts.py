@@ -3,7 +3,6 @@
 from copy import deepcopy
 
 import numpy as np
-import oracles
 import pinocchio as pin
 import pytest
 from controller_cases import (
@@ -69,20 +68,6 @@ def test_tasks_are_stacked_in_order() -> None:
     assert_allclose(residual, out.task.acceleration, rtol=0, atol=1e-12 * scale)
 
 
-def test_order_of_tasks_does_not_matter() -> None:
-    """One level: the same law whichever comes first."""
-    field = TargetPosture(panda().home())
-    first = Controller(panda(), [track(), hold_orientation()], field, limits=None)
-    second = Controller(panda(), [hold_orientation(), track()], field, limits=None)
-    for t, q, v in states(5):
-        state = panda().state(t, q, v)
-        a, b = first.compute(state), second.compute(state)
-        # Six rows near singularities: condition numbers up to 1e3.
-        scale = 1e-11 * np.abs(a.acceleration).max()
-        assert_allclose(a.acceleration, b.acceleration, rtol=0, atol=scale)
-        assert_allclose(a.null_space_error, b.null_space_error, rtol=0, atol=1e-11)
-
-
 def test_defaults_are_rest_the_identity_and_ten() -> None:
     plain = Controller(panda(), [track()], limits=None)
     said = Controller(
@@ -96,35 +81,6 @@ def test_defaults_are_rest_the_identity_and_ten() -> None:
     state = panda().state(*states(1)[0])
     assert_same(contents(plain.compute(state)), contents(said.compute(state)))
     assert_array_equal(plain.null_space_gain, 10.0 * np.eye(7))
-
-
-@metrics
-def test_uncontrolled_leaves_self_motion_alone(kind: str) -> None:
-    """φ_N = 0, the paper's first simulation: a = J#(a_x - J'v) and no more."""
-    metric = METRICS[kind](7)
-    controller = Controller(
-        panda(),
-        [track()],
-        Uncontrolled(),
-        metric=metric,
-        singularity_threshold=EXACT,
-        limits=None,
-    )
-    for t, q, v in states(5):
-        state = panda().state(t, q, v)
-        out = controller.compute(state)
-        sample, W = (
-            out.task,
-            metric.evaluate(state, hsp.metrics.MetricSample.allocate(7)).W,
-        )
-        J_sharp = oracles.pseudo_inverse(sample.jacobian, W)
-        expected = J_sharp @ (sample.acceleration - sample.jacobian_dot @ v)
-        scale = np.abs(expected).max()
-        assert_allclose(out.acceleration, expected, rtol=0, atol=1e-11 * scale)
-        # e_N is reported all the same, for g = 0: the self-motion that nobody holds.
-        e_N = -(v - J_sharp @ sample.jacobian @ v)
-        assert_allclose(out.null_space_error, e_N, rtol=0, atol=1e-11)
-        assert np.abs(e_N).max() > 0.1
 
 
 @metrics
@@ -245,20 +201,6 @@ def test_same_state_same_effort(kind: str) -> None:
     # Another controller of the same tasks and field does not disturb, nor a new state.
     assert_same(contents(fresh.compute(panda().state(*somewhere))), expected)
     assert_same(contents(controller.compute(state)), expected)
-
-
-def test_states_take_turns() -> None:
-    """Two robots of one kind, one controller: each state gets its own effort."""
-    field = TargetPosture(panda().home())
-    controller = Controller(
-        panda(), [track()], field, metric=hsp.metrics.MassMatrixMetric(), limits=None
-    )
-    first, second = (panda().state(*where) for where in states(2, seed=3))
-    a, b = contents(controller.compute(first)), contents(controller.compute(second))
-    for _ in range(3):
-        assert_same(contents(controller.compute(first)), a)
-        assert_same(contents(controller.compute(second)), b)
-    assert np.abs(a["tau"] - b["tau"]).max() > 1.0
 
 
 # --- near singularities --------------------------------------------------------------

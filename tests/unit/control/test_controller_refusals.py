@@ -387,15 +387,3 @@ def test_nan_of_a_user_is_an_error_and_never_an_effort(
     assert type(caught.value) is error
     # The failure leaves nothing behind: the controller goes on as if new.
     assert_same(contents(controller.compute(panda().state(0.25, q, v))), before)
-
-
-def test_user_mistake_in_a_simulation_names_the_time() -> None:
-    """The loop stops with the cause and what had been computed."""
-    controller = hsp.Controller(panda(), [position(Broken(np.nan, "position"), "mine")])
-    with pytest.raises(
-        hsp.HspControlError, match=r"the simulation stopped: task 'mine' is not finite"
-    ) as caught:
-        hsp.simulate(controller, panda().home(), duration=1.0, log_period=0.1)
-    rollout = caught.value.rollout  # type: ignore[attr-defined]
-    assert np.isfinite(rollout.tau).all()
-    assert rollout.t[-1] == pytest.approx(0.5)

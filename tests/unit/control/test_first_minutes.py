@@ -122,23 +122,6 @@ FIRST_EFFORT = (
 )
 
 
-@pytest.mark.parametrize("period", [None, 0.001])
-def test_a_simulation_warns_of_its_first_effort(period: float | None) -> None:
-    circle = hsp.Circle(radius=0.1, angular_rate=2.0)
-    how: dict[str, Any] = {"duration": 0.01, "control_period": period}
-
-    def law(blend: float | None) -> hsp.Controller:
-        hand = hsp.FramePose("panda_tcp", circle, blend=blend)
-        return hsp.Controller(panda(), [hand], hsp.JointCentering())
-
-    with pytest.warns(StartWarning, match="^" + FIRST_EFFORT) as said:
-        hsp.simulate(law(None), panda().home(), **how)
-    assert len(said) == 1
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        hsp.simulate(law(1.0), panda().home(), **how)
-
-
 def test_a_loop_of_ones_own_is_told_once_when_it_sends() -> None:
     """What is only computed moves nothing; a restart is another start."""
     circle = hsp.Circle(radius=0.1, angular_rate=2.0)
@@ -186,32 +169,6 @@ def test_the_commands_warn_of_the_first_effort(
 
 
 # --- efforts that are slower than gravity -------------------------------------------
-
-SLOW = (
-    r"the effort of joint 'panda_joint2' may change by 10 N·m/s, but gravity by "
-    r"70\.6 N·m/s at its speed limit of 2\.17 rad/s: the robot may fall, and pass its "
-    r"limits; give more limits\.effort_rate, or less limits\.velocity$"
-)
-
-
-def test_a_simulation_warns_of_efforts_slower_than_gravity() -> None:
-    home = panda().home()
-    how: dict[str, Any] = {"duration": 0.01, "control_period": 0.001}
-
-    def law(limits: hsp.Limits | None) -> hsp.Controller:
-        return hsp.Controller(
-            panda(), [hsp.FramePose("panda_tcp")], limits=limits, start=home
-        )
-
-    with pytest.warns(StartWarning, match="^" + SLOW):
-        hsp.simulate(law(hsp.Limits(effort_rate=10.0)), home, **how)
-    for enough in (None, hsp.Limits(), hsp.Limits(effort_rate=10.0, velocity=0.05)):
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            hsp.simulate(law(enough), home, **how)
-    with warnings.catch_warnings():  # without a period efforts have no rate
-        warnings.simplefilter("error")
-        hsp.simulate(law(hsp.Limits(effort_rate=10.0)), home, duration=0.01)
 
 
 @given(seed=st.integers(0, 2**32 - 1))

@@ -84,24 +84,6 @@ def test_robot_becomes_the_flow(kind: str) -> None:
     assert np.abs(rollout.v[-1]).max() > 0.1
 
 
-def test_a_start_on_the_flow_has_no_transient() -> None:
-    """v0 = flow(0, q0) from a point of the path: e and e_N are zero from the start."""
-    field = FunctionField(swaying_posture)
-    home = panda().home()
-    start = panda().state(0.0, home, np.zeros(7)).position(TCP).copy()
-    path = hsp.Circle(
-        0.1, 2.0, start - np.array([0.1, 0.0, 0.0]), axes=[[1, 0, 0], [0, 0, 1]]
-    )
-    task = hsp.FramePosition(TCP, path, gains=GAINS)
-    controller = hsp.Controller(panda(), [task], field, singularity_threshold=EXACT)
-    v0 = controller.flow(0.0, home)
-    rollout = continuous(controller, home, v0, duration=1.0, log_period=0.1)
-    for t, q, v in zip(rollout.t, rollout.q, rollout.v, strict=True):
-        out = controller.compute(panda().state(t, q, v))
-        np.testing.assert_allclose(out.task.error, 0.0, rtol=0, atol=1e-9)
-        np.testing.assert_allclose(out.null_space_error, 0.0, rtol=0, atol=1e-8)
-
-
 def test_hold_still() -> None:
     """A robot at rest at its posture and its point stays there: a = 0, tau = N."""
     home = panda().home()

@@ -1,6 +1,5 @@
 """Limits: the step is the law's where none binds, and keeps them where one does."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -209,44 +208,6 @@ def test_a_controller_keeps_the_robot_s_own_limits_unless_told_otherwise() -> No
     assert (np.abs(free.compute(*there).tau) > most).any()
 
 
-def test_null_space_gives_way_first_then_the_lower_task() -> None:
-    """One effort limit that binds: what is left exact shows the order."""
-    robot = panda()
-    q, v = robot.home(), np.zeros(7)
-    posture = hsp.JointPosture(
-        robot.integrate(q, np.full(7, 0.5)),
-        gains=hsp.Gains(natural_frequency=10.0),
-        joints=["panda_joint1", "panda_joint2"],
-        name="posture",
-        priority=2,
-    )
-    state = robot.state(0.3, q, v)
-    # Without an error: then what is below the hand costs least.
-    kept = hsp.Hold(state.position("panda_tcp").copy())
-    tasks = [replace(hand(), trajectory=kept), posture]
-    field = 20.0 * hsp.JointCentering()
-    free = hsp.Controller(robot, tasks, field, limits=None)
-    wanted = free.compute(state)
-    tau, a = wanted.tau.copy(), wanted.acceleration.copy()
-    joint = int(np.abs(tau - state.nonlinear_effects).argmax())
-    for shrink, exact in ((0.999, 2), (0.9, 1)):
-        effort = np.full(7, 1e3)
-        still = state.nonlinear_effects[joint]
-        effort[joint] = abs(still + shrink * (tau[joint] - still))
-        limits = hsp.Limits(effort=effort, velocity=None, position=None)
-        controller = hsp.Controller(robot, tasks, field, limits=limits)
-        out = controller.compute(state)
-        assert out.status == Status.LIMITED
-        assert abs(out.tau[joint]) <= effort[joint]
-        given_up = out.task.jacobian @ (out.acceleration - a)
-        # What the costs' ratios, 1e-4 a level, leave of strict order.
-        scale = np.abs(out.acceleration - a).max()
-        if exact >= 1:
-            assert np.abs(given_up[:3]).max() < 2e-3 * scale
-        consistent = state.mass_matrix @ out.acceleration + state.nonlinear_effects
-        np.testing.assert_allclose(out.tau, consistent, rtol=0, atol=1e-8)
-
-
 # --- along motions -------------------------------------------------------------------
 
 
@@ -359,6 +320,20 @@ def test_the_error_of_the_acceleration_is_what_is_observed() -> None:
     np.testing.assert_array_equal(held.drift, drift)
     np.testing.assert_array_equal(held.steady, steady)
     np.testing.assert_allclose(held.error, [8.0, 8.0], rtol=1e-9)
+
+
+def test_contradiction_is_relaxed_and_told() -> None:
+    """A joint that its motor cannot stop before the limit: least violation."""
+    robot = panda()
+    q, v = robot.home(), np.zeros(7)
+    _, upper = robot.position_limits()
+    q[3], v[3] = upper[3] - 0.02, 2.0
+    limits = hsp.Limits(effort=1.0)
+    out = hsp.Controller(robot, [hand()], limits=limits).compute(robot.state(0.0, q, v))
+    assert np.isfinite(out.tau).all()
+    assert (np.abs(out.tau) <= 1.0).all()
+    assert out.status > Status.LIMITED
+    assert 0.0 < out.relaxation < np.inf
 
 
 def test_effort_rate_needs_to_know_what_went_out() -> None:

@@ -25,7 +25,6 @@ from hsp_control import (
 )
 from hsp_control.cli.main import main
 from hsp_control.control.compensation import (
-    Command,
     Compensation,
     IntegralAction,
     MomentumObserver,
@@ -374,34 +373,6 @@ def config(**sections: Any) -> dict[str, Any]:
         "simulation": {"duration": 0.02, "control_period": H},
         **sections,
     }
-
-
-ALL: dict[str, Any] = {
-    "velocity_filter": {"cutoff": 100, "order": 2},
-    "predictor": {"effort_delay": 1},
-    "momentum_observer": {"bandwidth": 20, "clip": [10] * 7},
-    "friction_feed_forward": {"coulomb": 0.1, "viscous": [0.1] * 7},
-    "integral_action": {"ki": {"hand": [[9, 0, 0], [0, 9, 0], [0, 0, 9]]}, "limit": 5},
-    "start_up_ramp": {"duration": 0.01, "natural_frequency": 2},
-}
-
-
-def test_all_compensators_from_yaml_and_each_turned_off(tmp_path: Path) -> None:
-    file = tmp_path / "all.yaml"
-    file.write_text(yaml.safe_dump(config(compensation=ALL)))
-    made = load_experiment(file)
-    assert made.compensation.names == tuple(ALL)
-    assert isinstance(Command(made.controller, made.compensation), Command)
-    log = made.run()
-    assert log["observer.disturbance"].shape == (len(log), 7)
-    for name in ALL:
-        rest = load_experiment(file, f"compensation.{name}=null").compensation.names
-        assert rest == tuple(other for other in ALL if other != name)
-    urdf = load_experiment(file, "compensation.friction_feed_forward=urdf").compensation
-    assert urdf.friction_feed_forward == "urdf"
-    friction = urdf.friction(made.robot)
-    assert friction is not None
-    assert np.asarray(friction.viscous).tolist() == [0.003] * 7
 
 
 LATE = {"type": "rigid_body", "sensors": {"delay": 1}}

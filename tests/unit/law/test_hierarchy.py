@@ -1,7 +1,6 @@
 """Strict priorities: against an oracle of projectors, and along whole motions."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -143,7 +142,6 @@ def test_priorities_meet_the_stack_where_they_take_over(seed: int) -> None:
 # --- along motions -------------------------------------------------------------------
 
 GAINS = hsp.Gains(natural_frequency=8.0)
-SIDES = ("left", "right")
 
 
 def metric_of(kind: str) -> hsp.metrics.Metric:
@@ -206,38 +204,3 @@ def test_levels_are_the_tasks_of_one_priority() -> None:
     spread = [replace(rival, priority=70), replace(hand, priority=3), wrist]
     levels = hsp.Controller(panda(), spread, limits=None).levels
     assert [task.name for (task,) in levels] == ["wrist", "hand", "rival"]
-
-
-def test_propositions_hold_for_two_arms() -> None:
-    """Baxter's hands at two levels, the second asking for more than is left of it."""
-    pytest.importorskip("example_robot_data")
-    locked = {
-        "head_pan": 0.0,
-        "l_gripper_l_finger_joint": 0.01,
-        "r_gripper_l_finger_joint": 0.01,
-    }
-    robot = hsp.Robot.load("baxter", locked=locked)
-    bend = np.array([-0.5, -0.4, -0.8, 1.4, 0.4, 0.8, 0.0])
-    mirror = np.array([-1.0, 1.0, -1.0, 1.0, -1.0, 1.0, 1.0])
-    q = robot.integrate(robot.neutral(), np.r_[bend, mirror * bend])
-    state = robot.state(0.0, q, np.zeros(robot.nv))
-    left, right = (state.position(f"{side}_gripper").copy() for side in SIDES)
-    x_axis = np.array([1.0, 0.0, 0.0])
-    round_and_round = Circle(0.08, 1.5, left, normal=x_axis)
-    second: dict[str, Any] = {"gains": GAINS, "priority": 2}
-    tasks = [
-        hsp.FramePosition("left_gripper", round_and_round, gains=GAINS),
-        hsp.FramePosition("right_gripper", hsp.Hold(right + 0.05), **second),
-        hsp.FramePosition(
-            "left_gripper", hsp.Hold([0.3]), axes="x", name="rival", **second
-        ),
-    ]
-    tasks = [replace(task, largest_error="none") for task in tasks]
-    controller = hsp.Controller(
-        robot, tasks, hsp.JointCentering(), null_space_gain=4.0, limits=None
-    )
-    v0 = 0.2 * np.cos(np.arange(robot.nv))
-    rollout = continuous(controller, q, v0, duration=0.6, log_period=0.05)
-    assert rollout["damped"].all()
-    check_errors(rollout, 8.0, "left_gripper", "right_gripper", atol=1e-7)
-    check_null_space(rollout, 4.0, least=0.0, rtol=1e-5)
