@@ -11,7 +11,9 @@ every edit still fits the code.
 
 import argparse
 import os
+import resource
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -26,6 +28,8 @@ ROOT = Path(__file__).resolve().parents[1]
 COPIED = ("hsp_control", "tests", "robots", "configs", "docs", "pyproject.toml")
 TESTS_FAILED = 1
 """The exit status of pytest when tests ran and one failed."""
+LONGEST, MEMORY = 900.0, 16 << 30
+"""What the tests of one mutant may take: time [s], and memory that they ask for [B]."""
 
 
 class Verdict(NamedTuple):
@@ -33,7 +37,7 @@ class Verdict(NamedTuple):
 
     Attributes:
         word: ``caught``, ``SURVIVED`` or ``BROKEN`` (no test ran).
-        detail: The first test that failed, or the end of what pytest printed.
+        detail: The first test that failed, or the end of what was printed.
     """
 
     word: str
@@ -105,23 +109,33 @@ def mutated(mutant: Mutant, text: str) -> str:
 
 
 def run(copy: Path, tests: str) -> Verdict:
-    """Run tests in a copy of the checkout until one fails."""
-    ran = subprocess.run(
+    """Run tests in a copy of the checkout until one fails, or all are too long."""
+    started = subprocess.Popen(
         [
             *(sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:randomly"),
             *("-p", "no:cacheprovider", "--tb=no", *tests.split()),
         ],
         cwd=copy,
         env=os.environ | {"PYTHONPATH": str(copy)},
-        capture_output=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
         text=True,
+        start_new_session=True,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY)),
     )
-    lines = ran.stdout.strip().splitlines()
-    if ran.returncode == TESTS_FAILED:
+    try:
+        lines = started.communicate(timeout=LONGEST)[0].strip().splitlines()
+    except subprocess.TimeoutExpired:
+        os.killpg(started.pid, signal.SIGKILL)  # and what it has started
+        started.communicate()
+        return Verdict("caught", "did not end")
+    if started.returncode < 0:
+        return Verdict("caught", f"died of signal {-started.returncode}")
+    if started.returncode == TESTS_FAILED:
         failed = [line for line in lines if line.startswith(("FAILED", "ERROR"))]
         return Verdict("caught", failed[0].split(" - ")[0] if failed else "")
-    word = "SURVIVED" if ran.returncode == 0 else "BROKEN"
-    return Verdict(word, lines[-1] if lines else ran.stderr[-200:])
+    word = "SURVIVED" if started.returncode == 0 else "BROKEN"
+    return Verdict(word, lines[-1] if lines else "")
 
 
 if __name__ == "__main__":

@@ -9,10 +9,7 @@ from campaigns.asking import ask
 from campaigns.worker import Worker
 from hsp_control.common.resources import bundled_configs
 
-KINDS = {
-    "yaml": "campaigns.yaml_case:case",
-    "urdf": "campaigns.urdf_case:case",
-}
+KINDS = {"yaml": "campaigns.yaml_case:case", "urdf": "campaigns.urdf_case:case"}
 TIMEOUT = 60.0
 """A case that is not over after this is a hang [s]; loaded machines are slow."""
 

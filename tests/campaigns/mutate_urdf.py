@@ -12,17 +12,8 @@ NUMBERS = [
     "", " ", "x", "1,5", "0x10", "1_000", "1 2", "1 2 3 4", "0 0 0", "1e-12", "١",
 ]  # fmt: skip
 NAMES = [
-    "",
-    " ",
-    "world",
-    "universe",
-    "root_joint",
-    "x" * 5000,
-    "a b",
-    "é",
-    "..",
-    "/",
-    "\u202e",
+    *("", " ", "world", "universe", "root_joint", "x" * 5000),
+    *("a b", "é", "..", "/", "\u202e"),
 ]
 FILES = [
     "", "nowhere.stl", "/etc/passwd", "../../../../etc/passwd", "package://", "package://../x",
@@ -32,14 +23,8 @@ FILES = [
     "pipe.stl",
 ]  # fmt: skip
 KINDS = [
-    "revolute",
-    "continuous",
-    "prismatic",
-    "fixed",
-    "floating",
-    "planar",
-    "spherical",
-    "",
+    *("revolute", "continuous", "prismatic", "fixed"),
+    *("floating", "planar", "spherical", ""),
 ]
 
 LAUGHS = (

@@ -7,18 +7,14 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from numpy.typing import NDArray
 from oracles import slope
 
 from hsp_control import Cost, Robot
+from hsp_control.common.arrays import Array
 from hsp_control.common.resources import bundled_robots
 from hsp_control.geometry import LinkShape
 from hsp_control.null_space.fields.barrier import barrier
-from hsp_control.trajectories import (
-    Lissajous,
-)
-
-Array = NDArray[np.float64]
+from hsp_control.trajectories import Lissajous
 
 
 @cache

@@ -4,15 +4,13 @@ from functools import cache
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from hsp_control import Controller, FramePosition, Gains, Obstacle, Robot, TargetPosture
+from hsp_control.common.arrays import Array
 from hsp_control.geometry.shapes import Sphere
 from hsp_control.null_space.fields import PointDistance
 from hsp_control.robot.integrators import Dop853
 from hsp_control.trajectories import Circle, Lissajous
-
-Array = NDArray[np.float64]
 
 EXACT = Dop853(rtol=1e-12, atol=1e-12)
 ROBOTS: dict[str, tuple[str, str | None]] = {

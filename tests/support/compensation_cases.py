@@ -4,16 +4,8 @@ from typing import Any
 
 import numpy as np
 
+import hsp_control as hsp
 from hsp_control import Circle, Controller, FramePosition, Gains, Robot
-from hsp_control.control.compensation import (
-    Compensation,
-    FrictionFeedForward,
-    IntegralAction,
-    MomentumObserver,
-    Predictor,
-    StartUpRamp,
-    VelocityFilter,
-)
 from hsp_control.null_space.fields import TargetPosture
 
 H = 1e-3
@@ -44,11 +36,11 @@ def controller(robot: Robot = PANDA, away: float = 0.05, **options: Any) -> Cont
 
 
 EVERYTHING: dict[str, Any] = {
-    "velocity_filter": VelocityFilter(100.0),
-    "predictor": Predictor(1),
-    "momentum_observer": MomentumObserver(50.0, clip=20.0),
-    "friction_feed_forward": FrictionFeedForward(0.1, 0.1),
-    "integral_action": IntegralAction(5.0),
-    "start_up_ramp": StartUpRamp(0.1),
+    "velocity_filter": hsp.compensation.VelocityFilter(100.0),
+    "predictor": hsp.compensation.Predictor(1),
+    "momentum_observer": hsp.compensation.MomentumObserver(50.0, clip=20.0),
+    "friction_feed_forward": hsp.compensation.FrictionFeedForward(0.1, 0.1),
+    "integral_action": hsp.compensation.IntegralAction(5.0),
+    "start_up_ramp": hsp.compensation.StartUpRamp(0.1),
 }
-ALL = Compensation(**EVERYTHING)
+ALL = hsp.compensation.Compensation(**EVERYTHING)

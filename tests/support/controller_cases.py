@@ -6,59 +6,43 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from hsp_control import (
-    Circle,
-    ControlOutput,
-    FrameOrientation,
-    FramePosition,
-    Gains,
-    Robot,
-)
-from hsp_control.null_space.metrics import (
-    CoordinatesMetric,
-    IdentityMetric,
-    MassMatrixMetric,
-    Metric,
-)
-from hsp_control.trajectories import (
-    HoldOrientation,
-)
+import hsp_control as hsp
+from hsp_control.common.arrays import Array
+from hsp_control.trajectories import HoldOrientation
 
-Array = NDArray[np.float64]
-GAINS = Gains(natural_frequency=20.0)
+GAINS = hsp.Gains(natural_frequency=20.0)
 TCP = "panda_tcp"
 CENTER = np.array([0.35, 0.1, 0.5])
 # Below every singular value of the random states: the law is exact there.
 EXACT = 1e-4
 
-METRICS: dict[str, Callable[[int], Metric]] = {
-    "identity": lambda nv: IdentityMetric(),
-    "coordinates": lambda nv: CoordinatesMetric(np.tril(np.ones((nv, nv)))),
-    "mass_matrix": lambda nv: MassMatrixMetric(),
+METRICS: dict[str, Callable[[int], hsp.metrics.Metric]] = {
+    "identity": lambda nv: hsp.metrics.IdentityMetric(),
+    "coordinates": lambda nv: hsp.metrics.CoordinatesMetric(np.tril(np.ones((nv, nv)))),
+    "mass_matrix": lambda nv: hsp.metrics.MassMatrixMetric(),
 }
 metrics = pytest.mark.parametrize("kind", METRICS)
 
 
 @cache
-def panda() -> Robot:
-    return Robot.load("panda")
+def panda() -> hsp.Robot:
+    return hsp.Robot.load("panda")
 
 
-def circle() -> Circle:
-    return Circle(0.1, 2.0, CENTER, normal=[0.0, 1.0, 1.0])
+def circle() -> hsp.Circle:
+    return hsp.Circle(0.1, 2.0, CENTER, normal=[0.0, 1.0, 1.0])
 
 
-def track(**options: Any) -> FramePosition:
+def track(**options: Any) -> hsp.FramePosition:
     """Return a task that is far from its path and uses the whole error."""
     options = {"largest_error": "none", **options}
-    return FramePosition(TCP, circle(), gains=GAINS, **options)
+    return hsp.FramePosition(TCP, circle(), gains=GAINS, **options)
 
 
-def hold_orientation() -> FrameOrientation:
+def hold_orientation() -> hsp.FrameOrientation:
     upright = HoldOrientation(np.eye(3))
-    return FrameOrientation(TCP, upright, gains=GAINS, largest_error="none")
+    return hsp.FrameOrientation(TCP, upright, gains=GAINS, largest_error="none")
 
 
 def states(count: int, seed: int = 0) -> list[tuple[float, Array, Array]]:
@@ -73,7 +57,7 @@ def states(count: int, seed: int = 0) -> list[tuple[float, Array, Array]]:
     ]
 
 
-def contents(out: ControlOutput) -> dict[str, Any]:
+def contents(out: hsp.ControlOutput) -> dict[str, Any]:
     """Return all that an output contains, by name."""
     return {
         "tau": out.tau,

@@ -10,49 +10,24 @@ import pinocchio as pin
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+import hsp_control as hsp
 import hsp_control.visualization.plots as plots
-from hsp_control import (
-    Controller,
-    FrameOrientation,
-    FramePose,
-    FramePosition,
-    Gains,
-    Hold,
-    JointPosture,
-    Obstacle,
-    Pointing,
-    Robot,
-    Rollout,
-    TargetPosture,
-    Task,
-    load_experiment,
-    simulate,
-)
 from hsp_control.common.resources import bundled_configs
 from hsp_control.geometry import Scene
-from hsp_control.geometry.shapes import (
-    Sphere,
-)
+from hsp_control.geometry.shapes import Sphere
 from hsp_control.null_space.metrics import MassMatrixMetric
-from hsp_control.trajectories import (
-    Circle as Round,
-)
-from hsp_control.trajectories import (
-    ComposedPose,
-    HoldOrientation,
-    Lissajous,
-    Spin,
-)
+from hsp_control.trajectories import Circle as Round
+from hsp_control.trajectories import ComposedPose, HoldOrientation, Lissajous, Spin
 
-GAINS = Gains(100.0, 20.0)
+GAINS = hsp.Gains(100.0, 20.0)
 PAPER = {"uncontrolled": 1, "rest": 2, "equal": 3, "obstacle": 4}
 DURATION = {3: 10.0}  # [s]; the others run for 1 s
 
 
 @cache
-def planar(number: int) -> Rollout:
+def planar(number: int) -> hsp.Rollout:
     (name,) = (name for name in bundled_configs() if f"paper/{number}_" in name)
-    return load_experiment(
+    return hsp.load_experiment(
         name, f"simulation.duration={DURATION.get(number, 1.0)}"
     ).run()
 
@@ -61,7 +36,7 @@ def planar(number: int) -> Rollout:
 class Arm:
     """A Panda at home, and what it can be asked to do."""
 
-    robot: Robot = field(default_factory=lambda: Robot.load("panda"))
+    robot: hsp.Robot = field(default_factory=lambda: hsp.Robot.load("panda"))
     tcp: str = "panda_tcp"
 
     def __post_init__(self) -> None:
@@ -72,36 +47,40 @@ class Arm:
     def circle(self, normal: list[float]) -> Round:
         return Round(0.1, 2.0, self.position, normal=normal)
 
-    def run(self, *tasks: Task, scene: Scene | None = None, **settings: Any) -> Rollout:
-        posture = TargetPosture(self.q0 + 0.1)
-        controller = Controller(
+    def run(
+        self, *tasks: hsp.Task, scene: Scene | None = None, **settings: Any
+    ) -> hsp.Rollout:
+        posture = hsp.TargetPosture(self.q0 + 0.1)
+        controller = hsp.Controller(
             self.robot, tasks, posture, **({"limits": None} | settings)
         )
-        return simulate(controller, self.q0, duration=0.5, scene=scene)
+        return hsp.simulate(controller, self.q0, duration=0.5, scene=scene)
 
 
 @cache
-def spatial() -> dict[str, Rollout]:
+def spatial() -> dict[str, hsp.Rollout]:
     arm = Arm()
     tcp = arm.tcp
-    tilted = FramePosition(tcp, arm.circle([1.0, 0.0, 1.0]), gains=GAINS)
+    tilted = hsp.FramePosition(tcp, arm.circle([1.0, 0.0, 1.0]), gains=GAINS)
     center = Lissajous([0.0, 0.1, 0.1], [0, 2, 3], [0, 0, 0], [0.3, -0.3, 0.5])
     spin = Spin([0.0, 0.0, 1.0], 0.3, rotation=arm.rotation)
-    pose = FramePose(tcp, ComposedPose(arm.circle([1.0, 0.0, 0.0]), spin), gains=GAINS)
-    aside = Spin([0, 0, 1], 1.0, rotation=arm.rotation @ pin.utils.rotate("x", 0.4))
-    xz = FramePosition(
-        tcp, Hold(arm.position[[0, 2]]), gains=GAINS, axes="xz", name="xz"
+    pose = hsp.FramePose(
+        tcp, ComposedPose(arm.circle([1.0, 0.0, 0.0]), spin), gains=GAINS
     )
-    pointing = Pointing(tcp, axis=[0, 0, 1], trajectory=aside, gains=GAINS)
+    aside = Spin([0, 0, 1], 1.0, rotation=arm.rotation @ pin.utils.rotate("x", 0.4))
+    xz = hsp.FramePosition(
+        tcp, hsp.Hold(arm.position[[0, 2]]), gains=GAINS, axes="xz", name="xz"
+    )
+    pointing = hsp.Pointing(tcp, axis=[0, 0, 1], trajectory=aside, gains=GAINS)
     joints = ["panda_joint1", "panda_joint2"]
-    posture = JointPosture(arm.q0 + 0.1, gains=GAINS, joints=joints)
-    turned = FrameOrientation(
+    posture = hsp.JointPosture(arm.q0 + 0.1, gains=GAINS, joints=joints)
+    turned = hsp.FrameOrientation(
         "panda_link5", HoldOrientation(np.eye(3)), gains=GAINS, name="turn"
     )
     return {
         "space": arm.run(
             tilted,
-            scene=Scene([Obstacle("ball", Sphere(0.07), center)]),
+            scene=Scene([hsp.Obstacle("ball", Sphere(0.07), center)]),
             null_space_gain=np.linspace(5.0, 15.0, 7),
         ),
         "pose": arm.run(pose, metric=MassMatrixMetric()),
@@ -111,11 +90,11 @@ def spatial() -> dict[str, Rollout]:
 
 
 def changed(
-    log: Rollout, rows: slice = slice(None), columns: Any = None, **meta: Any
-) -> Rollout:
+    log: hsp.Rollout, rows: slice = slice(None), columns: Any = None, **meta: Any
+) -> hsp.Rollout:
     """Return a copy of a log of some rows, with some columns and meta replaced."""
     kept = {name: column[rows].copy() for name, column in log.columns.items()}
-    return Rollout(kept | (columns or {}), log.meta | meta)
+    return hsp.Rollout(kept | (columns or {}), log.meta | meta)
 
 
 def drawn(draw: Callable[..., None], *arguments: Any, **options: Any) -> Axes:
@@ -135,7 +114,7 @@ def legend_texts(axes: Axes) -> list[str]:
     return [] if legend is None else [text.get_text() for text in legend.get_texts()]
 
 
-def both(log: Rollout) -> list[Figure]:
+def both(log: hsp.Rollout) -> list[Figure]:
     return [plots.paper_figure(log), plots.diagnostics_figure(log)]
 
 

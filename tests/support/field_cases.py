@@ -40,46 +40,18 @@ from field_oracles import (
     swirl_oracle,
     target,
 )
-from numpy.typing import NDArray
 
-from hsp_control import (
-    JointCentering,
-    NullSpaceField,
-    Obstacle,
-    Rest,
-    Robot,
-    RobotState,
-    TargetPosture,
-)
+import hsp_control as hsp
+from hsp_control.common.arrays import Array
 from hsp_control.geometry import Scene
 from hsp_control.geometry.start import Start
-from hsp_control.null_space.fields import (
-    EqualJointAngles,
-    FieldSample,
-    FieldSum,
-    InverseCondition,
-    LimitBarrier,
-    Manipulability,
-    Ramp,
-    StateWeight,
-    Transmission,
-    Uncontrolled,
-)
-from hsp_control.null_space.metrics import (
-    ConstantMetric,
-    IdentityMetric,
-    MassMatrixMetric,
-    Metric,
-    MetricSample,
-)
 
-Array = NDArray[np.float64]
+Field = TypeVar("Field", bound=hsp.NullSpaceField)
 
 
-Field = TypeVar("Field", bound=NullSpaceField)
-
-
-def placed(field: Field, state: RobotState, scene: Iterable[Obstacle] = ()) -> Field:
+def placed(
+    field: Field, state: hsp.RobotState, scene: Iterable[hsp.Obstacle] = ()
+) -> Field:
     """Return a field, placed where the robot starts."""
     return field.placed(Start(state, Scene(scene)))
 
@@ -97,12 +69,12 @@ class Member:
             differenced gradient 1e-9, the promise of `Cost`.
     """
 
-    make: Callable[[str], NullSpaceField]
+    make: Callable[[str], hsp.NullSpaceField]
     parts: Callable[[str], list[tuple[Any, Any, bool]]]
     rate_accuracy: float = 5e-12
     robots: tuple[str, ...] = tuple(ROBOTS)
 
-    def build(self, name: str) -> NullSpaceField:
+    def build(self, name: str) -> hsp.NullSpaceField:
         """Return the field, placed on a robot at rest at home."""
         robot = load(name)
         return placed(
@@ -110,192 +82,160 @@ class Member:
         )
 
 
-def posture(name: str, **options: Any) -> TargetPosture:
-    return TargetPosture(target(name), **options)
+def posture(name: str, **options: Any) -> hsp.TargetPosture:
+    return hsp.TargetPosture(target(name), **options)
 
 
-def weighted(name: str) -> NullSpaceField:
+def weighted(name: str) -> hsp.NullSpaceField:
     frame = frames_of(name)[2]
-    of_state = StateWeight(lambda s: 1.5 + np.sin(s.t + s.position(frame)[0]))
-    return Ramp(initial=0.5, final=2.0, start=0.3, duration=1.0) * (
+    of_state = hsp.fields.StateWeight(
+        lambda s: 1.5 + np.sin(s.t + s.position(frame)[0])
+    )
+    return hsp.fields.Ramp(initial=0.5, final=2.0, start=0.3, duration=1.0) * (
         3.0 * posture(name) + point_distance(name)
     ) + of_state * swirl_field(name, rate=True)
 
 
 LIMITED = ("panda", "kinova", "floating ur5", "rolling ur5")
+
+
+def of_cost(
+    make: Callable[[str], hsp.NullSpaceField],
+    oracle: Callable[[str], Any],
+    robots: tuple[str, ...] = tuple(ROBOTS),
+    accuracy: float = 5e-12,
+    *,
+    cost: bool = True,
+) -> Member:
+    """Return a field of one term with the weight 1; a cost, or g itself."""
+    return Member(make, lambda n: [(1.0, oracle(n), cost)], accuracy, robots)
+
+
+def of_spectrum(
+    make: Callable[..., hsp.NullSpaceField],
+    function: Callable[[str, Array], float],
+    **options: Any,
+) -> Member:
+    """Return a field of a function of J W⁻¹ Jᵀ of the last frame's position."""
+
+    def field(n: str) -> hsp.NullSpaceField:
+        own = {k: each(n) if callable(each) else each for k, each in options.items()}
+        return make(frames_of(n)[2], axes=position_axes(n), **own)
+
+    def oracle(n: str) -> Any:
+        metric = options["metric"](n) if "metric" in options else None
+        return spectrum_oracle(n, lambda G: function(n, G), metric=metric)
+
+    return of_cost(field, oracle)
+
+
+def weights_of(n: str) -> Array:
+    return spread(load(n).nv, 0.0, 3.0)
+
+
 MEMBERS: dict[str, Member] = {
-    "rest": Member(lambda n: Rest(), lambda n: []),
-    "uncontrolled": Member(lambda n: Uncontrolled(), lambda n: []),
-    "joint_centering": Member(
-        lambda n: JointCentering(),
-        lambda n: [(1.0, centering_oracle(n), True)],
-        robots=LIMITED,
+    "rest": Member(lambda n: hsp.Rest(), lambda n: []),
+    "uncontrolled": Member(lambda n: hsp.fields.Uncontrolled(), lambda n: []),
+    "joint_centering": of_cost(
+        lambda n: hsp.JointCentering(), centering_oracle, LIMITED
     ),
-    "joint_centering, weights": Member(
-        lambda n: JointCentering(weights=spread(load(n).nv, 0.0, 3.0)),
-        lambda n: [(1.0, centering_oracle(n, spread(load(n).nv, 0.0, 3.0)), True)],
-        robots=LIMITED,
+    "joint_centering, weights": of_cost(
+        lambda n: hsp.JointCentering(weights=weights_of(n)),
+        lambda n: centering_oracle(n, weights_of(n)),
+        LIMITED,
     ),
-    "target_posture": Member(
-        lambda n: posture(n),
-        lambda n: [(1.0, posture_oracle(n), True)],
+    "target_posture": of_cost(posture, posture_oracle),
+    "target_posture, weights": of_cost(
+        lambda n: posture(n, weights=weights_of(n)),
+        lambda n: posture_oracle(n, weights_of(n)),
     ),
-    "target_posture, weights": Member(
-        lambda n: posture(n, weights=spread(load(n).nv, 0, 3)),
-        lambda n: [(1.0, posture_oracle(n, spread(load(n).nv, 0, 3)), True)],
-    ),
-    "target_posture, moving": Member(
+    "target_posture, moving": of_cost(
         lambda n: posture(n, displacement=swaying(n)),
-        lambda n: [(1.0, posture_oracle(n, sways=True), True)],
+        lambda n: posture_oracle(n, sways=True),
     ),
-    "equal_joint_angles": Member(
-        lambda n: FieldSum([EqualJointAngles(JOINTS[ROBOTS[n][0]], weight=5.0)]),
-        lambda n: [(1.0, equal_oracle(n, 5.0), True)],
-    ),
-    "point_distance": Member(
-        lambda n: FieldSum([point_distance(n)]),
-        lambda n: [(1.0, distance_oracle(n, 0.4), True)],
-    ),
-    "limit_barrier": Member(
-        lambda n: LimitBarrier(zone=0.9),
-        lambda n: [(1.0, barrier_oracle(n, 0.9), True)],
-        robots=LIMITED,
-    ),
-    "manipulability": Member(
-        lambda n: Manipulability(frames_of(n)[2], axes=position_axes(n)),
-        lambda n: [(1.0, spectrum_oracle(n, root_of_determinant), True)],
-    ),
-    "manipulability, determinant, metric": Member(
-        lambda n: Manipulability(
-            frames_of(n)[2],
-            axes=position_axes(n),
-            form="determinant",
-            metric=coupling(n),
+    "equal_joint_angles": of_cost(
+        lambda n: hsp.fields.FieldSum(
+            [hsp.fields.EqualJointAngles(JOINTS[ROBOTS[n][0]], weight=5.0)]
         ),
-        lambda n: [
-            (
-                1.0,
-                spectrum_oracle(n, lambda G: -np.linalg.det(G), metric=coupling(n)),
-                True,
-            )
-        ],
+        lambda n: equal_oracle(n, 5.0),
     ),
-    "manipulability, log, pose": Member(
-        lambda n: Manipulability(frames_of(n)[2], form="log", rows="pose", length=0.5),
-        lambda n: [
-            (
-                1.0,
-                spectrum_oracle(
-                    n, lambda G: -0.5 * np.linalg.slogdet(G)[1], list(range(6)), 0.5
-                ),
-                True,
-            )
-        ],
-        robots=LIMITED,
+    "point_distance": of_cost(
+        lambda n: hsp.fields.FieldSum([point_distance(n)]),
+        lambda n: distance_oracle(n, 0.4),
     ),
-    "manipulability, orientation": Member(
-        lambda n: Manipulability(frames_of(n)[2], rows="orientation"),
-        lambda n: [(1.0, spectrum_oracle(n, root_of_determinant, [3, 4, 5]), True)],
-        robots=LIMITED,
+    "limit_barrier": of_cost(
+        lambda n: hsp.fields.LimitBarrier(zone=0.9),
+        lambda n: barrier_oracle(n, 0.9),
+        LIMITED,
     ),
-    "inverse_condition": Member(
-        lambda n: InverseCondition(frames_of(n)[2], axes=position_axes(n)),
-        lambda n: [
-            (
-                1.0,
-                spectrum_oracle(
-                    n,
-                    lambda G: -(len(G) ** 2) / np.trace(G) / np.trace(np.linalg.inv(G)),
-                ),
-                True,
-            )
-        ],
+    "manipulability": of_spectrum(
+        hsp.Manipulability, lambda n, G: root_of_determinant(G)
     ),
-    "transmission, velocity": Member(
-        lambda n: Transmission(
-            frames_of(n)[2], direction=3.0 * direction(n), axes=position_axes(n)
+    "manipulability, determinant, metric": of_spectrum(
+        hsp.Manipulability,
+        lambda n, G: -np.linalg.det(G),
+        form="determinant",
+        metric=coupling,
+    ),
+    "manipulability, log, pose": of_cost(
+        lambda n: hsp.Manipulability(
+            frames_of(n)[2], form="log", rows="pose", length=0.5
         ),
-        lambda n: [
-            (
-                1.0,
-                spectrum_oracle(
-                    n,
-                    lambda G: (
-                        -((direction(n) @ np.linalg.inv(G) @ direction(n)) ** -0.5)
-                    ),
-                ),
-                True,
-            )
-        ],
-    ),
-    "transmission, force": Member(
-        lambda n: Transmission(
-            frames_of(n)[2],
-            direction=direction(n),
-            kind="force",
-            axes=position_axes(n),
+        lambda n: spectrum_oracle(
+            n, lambda G: -0.5 * np.linalg.slogdet(G)[1], list(range(6)), 0.5
         ),
-        lambda n: [
-            (
-                1.0,
-                spectrum_oracle(
-                    n, lambda G: -((direction(n) @ G @ direction(n)) ** -0.5)
-                ),
-                True,
-            )
-        ],
+        LIMITED,
     ),
-    "function_cost": Member(
-        reach_cost, lambda n: [(1.0, reach_oracle(n), True)], rate_accuracy=1e-9
+    "manipulability, orientation": of_cost(
+        lambda n: hsp.Manipulability(frames_of(n)[2], rows="orientation"),
+        lambda n: spectrum_oracle(n, root_of_determinant, [3, 4, 5]),
+        LIMITED,
     ),
-    "function_cost, gradient": Member(
-        lambda n: reach_cost(n, gradient=True),
-        lambda n: [(1.0, reach_oracle(n), True)],
-        rate_accuracy=2e-11,
+    "inverse_condition": of_spectrum(
+        hsp.fields.InverseCondition,
+        lambda n, G: -(len(G) ** 2) / np.trace(G) / np.trace(np.linalg.inv(G)),
     ),
-    "function_cost, gradient and rate": Member(
-        lambda n: reach_cost(n, gradient=True, rate=True),
-        lambda n: [(1.0, reach_oracle(n), True)],
+    "transmission, velocity": of_spectrum(
+        hsp.fields.Transmission,
+        lambda n, G: -((direction(n) @ np.linalg.inv(G) @ direction(n)) ** -0.5),
+        direction=lambda n: 3.0 * direction(n),
     ),
-    "own cost, value only": Member(
-        lambda n: ValueOnly(frames_of(n)[2]),
-        lambda n: [(1.0, reach_oracle(n), True)],
-        rate_accuracy=1e-9,
+    "transmission, force": of_spectrum(
+        hsp.fields.Transmission,
+        lambda n, G: -((direction(n) @ G @ direction(n)) ** -0.5),
+        direction=direction,
+        kind="force",
     ),
-    "own cost, gradient": Member(
-        lambda n: WithGradient(frames_of(n)[2]),
-        lambda n: [(1.0, reach_oracle(n), True)],
-        rate_accuracy=2e-11,
+    "function_cost": of_cost(reach_cost, reach_oracle, accuracy=1e-9),
+    "function_cost, gradient": of_cost(
+        lambda n: reach_cost(n, gradient=True), reach_oracle, accuracy=2e-11
     ),
-    "function_field": Member(
-        lambda n: swirl_field(n, rate=False),
-        lambda n: [(1.0, swirl_oracle(n), False)],
-        rate_accuracy=2e-11,
+    "function_cost, gradient and rate": of_cost(
+        lambda n: reach_cost(n, gradient=True, rate=True), reach_oracle
     ),
-    "function_field, rate": Member(
-        lambda n: swirl_field(n, rate=True), lambda n: [(1.0, swirl_oracle(n), False)]
+    "own cost, value only": of_cost(
+        lambda n: ValueOnly(frames_of(n)[2]), reach_oracle, accuracy=1e-9
     ),
-    "own vector field": Member(
-        lambda n: Swirl(frames_of(n)[2]),
-        lambda n: [(1.0, swirl_oracle(n), False)],
-        rate_accuracy=2e-11,
+    "own cost, gradient": of_cost(
+        lambda n: WithGradient(frames_of(n)[2]), reach_oracle, accuracy=2e-11
     ),
-    "own vector field, rate": Member(
-        lambda n: SwirlWithRate(frames_of(n)[2]),
-        lambda n: [(1.0, swirl_oracle(n), False)],
+    "function_field": of_cost(
+        lambda n: swirl_field(n, rate=False), swirl_oracle, accuracy=2e-11, cost=False
     ),
-    "sum": Member(
-        lambda n: posture(n) + point_distance(n),
-        lambda n: [
-            (1.0, posture_oracle(n), True),
-            (1.0, distance_oracle(n, 0.4), True),
-        ],
+    "function_field, rate": of_cost(
+        lambda n: swirl_field(n, rate=True), swirl_oracle, cost=False
+    ),
+    "own vector field": of_cost(
+        lambda n: Swirl(frames_of(n)[2]), swirl_oracle, accuracy=2e-11, cost=False
+    ),
+    "own vector field, rate": of_cost(
+        lambda n: SwirlWithRate(frames_of(n)[2]), swirl_oracle, cost=False
     ),
     "sum of a sum and a vector field": Member(
         lambda n: (
             0.5 * (3.0 * posture(n) + 2 * point_distance(n))
             + 0.7 * swirl_field(n, rate=False)
-            + Rest()
+            + hsp.Rest()
         ),
         lambda n: [
             (1.5, posture_oracle(n), True),
@@ -320,22 +260,26 @@ every_field = pytest.mark.parametrize(
 )
 
 
-def metrics(robot: Robot) -> dict[str, tuple[Metric, Callable[[Array], Array]]]:
+def metrics(
+    robot: hsp.Robot,
+) -> dict[str, tuple[hsp.metrics.Metric, Callable[[Array], Array]]]:
     """Return the three metrics, each with W(q) by plain Pinocchio."""
     rng = np.random.default_rng(5)
     A = np.eye(robot.nv) + 0.3 * rng.normal(size=(robot.nv, robot.nv))
     return {
-        "identity": (IdentityMetric(), lambda q: np.eye(robot.nv)),
-        "constant": (ConstantMetric(A.T @ A), lambda q: A.T @ A),
-        "mass matrix": (MassMatrixMetric(), Plain(robot).mass_matrix),
+        "identity": (hsp.metrics.IdentityMetric(), lambda q: np.eye(robot.nv)),
+        "constant": (hsp.metrics.ConstantMetric(A.T @ A), lambda q: A.T @ A),
+        "mass matrix": (hsp.metrics.MassMatrixMetric(), Plain(robot).mass_matrix),
     }
 
 
-def evaluate(field: NullSpaceField, metric: Metric, state: RobotState) -> FieldSample:
+def evaluate(
+    field: hsp.NullSpaceField, metric: hsp.metrics.Metric, state: hsp.RobotState
+) -> hsp.fields.FieldSample:
     """Return g and g' at a state, in memory of their own."""
     nv = state.robot.nv
-    sample = metric.evaluate(state, MetricSample.allocate(nv))
-    out = FieldSample(np.full(nv, np.nan), np.full(nv, np.nan))
+    sample = metric.evaluate(state, hsp.metrics.MetricSample.allocate(nv))
+    out = hsp.fields.FieldSample(np.full(nv, np.nan), np.full(nv, np.nan))
     assert field.evaluate(state, sample, metric.form, out) is out
     return out
 

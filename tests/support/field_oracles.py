@@ -12,14 +12,12 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from numpy.typing import NDArray
 
 from hsp_control import Cost, FunctionCost, Obstacle, Robot, RobotState
+from hsp_control.common.arrays import Array
 from hsp_control.geometry.shapes import Sphere
 from hsp_control.null_space.fields import FunctionField, PointDistance, VectorField
 from hsp_control.trajectories import Lissajous
-
-Array = NDArray[np.float64]
 
 TIME = 0.8  # [s]
 ROBOTS: dict[str, tuple[str, str | None]] = {

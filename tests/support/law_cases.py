@@ -4,15 +4,11 @@ from functools import cache
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from hsp_control import (
-    Robot,
-)
+from hsp_control import Robot
+from hsp_control.common.arrays import Array
 from hsp_control.law import CONSTANT, IDENTITY
 from hsp_control.law.pseudo_inverse import weighted_pseudo_inverse
-
-Array = NDArray[np.float64]
 
 
 def pseudo_inverse(J: Array, W: Array | None, threshold: float) -> tuple[Array, bool]:

@@ -4,11 +4,9 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hsp_control.common.arrays import Array
 from hsp_control.law import IDENTITY, VARYING, Outcome, Problem, Resolution
-
-Array = NDArray[np.float64]
 
 
 def orthogonal(seed: int, n: int, m: int) -> Array:

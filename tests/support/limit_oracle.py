@@ -10,11 +10,10 @@ import daqp
 import numpy as np
 from numpy.typing import NDArray
 
+from hsp_control.common.arrays import Array
 from hsp_control.control.actuation.deviation_cost import _OF_ERROR
 from hsp_control.control.actuation.support import Support
 from hsp_control.law import Resolution
-
-Array = NDArray[np.float64]
 
 _EQUALITY, _INEQUALITY = 5, 0
 _FORCE_COST = 1e-6

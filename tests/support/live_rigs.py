@@ -4,34 +4,19 @@ from collections.abc import Callable
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from hsp_control import (
-    Circle,
-    Controller,
-    FramePosition,
-    Gains,
-    Limits,
-    NullSpaceField,
-    Robot,
-    TargetPosture,
-)
-from hsp_control.live import (
-    InProcessRobot,
-    LiveSettings,
-    Measurement,
-    SimulatedRobot,
-)
+import hsp_control as hsp
+from hsp_control.common.arrays import Array
+from hsp_control.live import InProcessRobot, LiveSettings, Measurement, SimulatedRobot
 from hsp_control.robot.integrators import SemiImplicitEuler
 from hsp_control.simulation.plants import IntegratedPlant, RigidBodyPlant
 
-Array = NDArray[np.float64]
 PERIOD = 0.001
 
 
 @cache
-def panda() -> Robot:
-    return Robot.load("panda")
+def panda() -> hsp.Robot:
+    return hsp.Robot.load("panda")
 
 
 def start() -> Array:
@@ -39,18 +24,18 @@ def start() -> Array:
 
 
 def law(
-    field: NullSpaceField | None = None,
-    gains: Gains = Gains(natural_frequency=10.0),  # noqa: B008 (a value)
-    limits: Limits | None = None,
-) -> Controller:
+    field: hsp.NullSpaceField | None = None,
+    gains: hsp.Gains = hsp.Gains(natural_frequency=10.0),  # noqa: B008 (a value)
+    limits: hsp.Limits | None = None,
+) -> hsp.Controller:
     """Return a controller that draws a circle and swings the elbow."""
     tip = panda().state(0.0, start(), np.zeros(7)).position("panda_tcp")
-    path = Circle(0.1, 3.0, tip + np.array([0.0, 0.0, 0.1]), normal=[1.0, 0.0, 0.0])
-    task = FramePosition("panda_tcp", path, gains=gains, name="tip")
+    path = hsp.Circle(0.1, 3.0, tip + np.array([0.0, 0.0, 0.1]), normal=[1.0, 0.0, 0.0])
+    task = hsp.FramePosition("panda_tcp", path, gains=gains, name="tip")
     q = start()
     q[0] += 0.5
-    field = TargetPosture(q) if field is None else field
-    return Controller(panda(), [task], field, null_space_gain=10.0, limits=limits)
+    field = hsp.TargetPosture(q) if field is None else field
+    return hsp.Controller(panda(), [task], field, null_space_gain=10.0, limits=limits)
 
 
 def watched(settings: LiveSettings | None = None) -> SimulatedRobot:

@@ -4,14 +4,9 @@ import struct
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from hsp_control import (
-    Robot,
-)
-
-Array = NDArray[np.float64]
-
+from hsp_control import Robot
+from hsp_control.common.arrays import Array
 
 ONE_LINK = """<robot name="odd">
   <link name="base">{base}</link>

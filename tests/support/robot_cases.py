@@ -10,11 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from hsp_control import Robot, RobotState
-
-Array = NDArray[np.float64]
+from hsp_control.common.arrays import Array
 
 BUNDLED = ("planar3r", "panda", "iiwa14")
 ROBOTS: dict[str, tuple[str, dict[str, Any]]] = {

@@ -7,13 +7,7 @@ from typing import Annotated, Literal
 
 import pytest
 import yaml
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    RootModel,
-    model_validator,
-)
+from pydantic import BaseModel, ConfigDict, Field, RootModel, model_validator
 
 from hsp_control.common.exceptions import ConfigError
 from hsp_control.config.document import Document

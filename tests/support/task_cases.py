@@ -13,8 +13,8 @@ from typing import Any, TypeVar
 import numpy as np
 import pinocchio as pin
 import pytest
-from numpy.typing import NDArray
 
+import hsp_control as hsp
 from hsp_control import (
     CenterOfMass,
     FrameOrientation,
@@ -27,19 +27,12 @@ from hsp_control import (
     Robot,
     Task,
 )
+from hsp_control.common.arrays import Array
 from hsp_control.declaration.quantities import Matrix
 from hsp_control.geometry import Scene
 from hsp_control.geometry.start import Start
 from hsp_control.tasks import RelativePose
-from hsp_control.trajectories import (
-    ComposedPose,
-    HoldOrientation,
-    Lissajous,
-    OrientationSample,
-    OrientationTrajectory,
-)
 
-Array = NDArray[np.float64]
 Kind = TypeVar("Kind", bound=Task | NullSpaceField)
 
 TIME = 0.7  # [s], when all is looked at
@@ -119,7 +112,7 @@ class Motion:
         return np.tensordot(weights, values, 1) / self.step**order
 
 
-class Tumble(OrientationTrajectory):
+class Tumble(hsp.trajectories.OrientationTrajectory):
     """R(τ) = exp(f a) exp(g b) R0 with f, g parabolas: w and w' are not parallel."""
 
     start: Matrix
@@ -129,9 +122,9 @@ class Tumble(OrientationTrajectory):
     b = np.array([-0.2, 0.8, 0.4])
 
     def sample(
-        self, t: float, out: OrientationSample | None = None
-    ) -> OrientationSample:
-        out = OrientationSample.allocate() if out is None else out
+        self, t: float, out: hsp.trajectories.OrientationSample | None = None
+    ) -> hsp.trajectories.OrientationSample:
+        out = hsp.trajectories.OrientationSample.allocate() if out is None else out
         s = t - self.time
         f, f_dot, f_ddot = s + 0.8 * s * s, 1.0 + 1.6 * s, 1.6
         g, g_dot, g_ddot = 0.7 * s - 0.5 * s * s, 0.7 - s, -1.0
@@ -159,13 +152,13 @@ def frame_along(direction: Array) -> Array:
     return columns
 
 
-def wobble(position: Array) -> Lissajous:
+def wobble(position: Array) -> hsp.trajectories.Lissajous:
     """Return a motion that passes through a point at `TIME`."""
     n = len(position)
     amplitudes, rates = 0.2 + 0.1 * np.arange(n), 1.3 + 0.4 * np.arange(n)
     phases = 0.3 * np.arange(n) + 0.2
     away = amplitudes * np.sin(rates * TIME + phases)
-    return Lissajous(amplitudes, rates, phases, position - away)
+    return hsp.trajectories.Lissajous(amplitudes, rates, phases, position - away)
 
 
 # --- the members ---------------------------------------------------------------------
@@ -252,7 +245,7 @@ class Orientation(Family):
 
     def reference(
         self, motion: Motion, error: float, rng: np.random.Generator
-    ) -> OrientationTrajectory:
+    ) -> hsp.trajectories.OrientationTrajectory:
         R = self.placement(motion, 0.0).rotation
         return Tumble(R @ pin.exp3(-error * unit(rng, 3)))
 
@@ -284,7 +277,9 @@ class Pose(Orientation):
         x = self.placement(motion, 0.0).translation
         turned = self.reference(motion, error, rng)
         moved = wobble(x + error * unit(rng, 3))
-        return FramePose(self.frame, ComposedPose(moved, turned), gains=gains)
+        return FramePose(
+            self.frame, hsp.trajectories.ComposedPose(moved, turned), gains=gains
+        )
 
     def coordinates(self, task: Any, motion: Motion) -> Callable[[float], Array]:
         turned = super().coordinates(task, motion)
@@ -379,7 +374,7 @@ class Direction(Family):
         turn = pin.exp3(np.array([0.0, 0.0, rng.uniform(-np.pi, np.pi)]))
         R_d = frame_along(m) @ turn @ frame_along(n).T
         reference = {
-            "still": HoldOrientation(R_d),
+            "still": hsp.trajectories.HoldOrientation(R_d),
             "tumbling": Tumble(R_d),
             "spinning": Spinning(R_d),
         }[self.motion_of_reference]
@@ -411,15 +406,15 @@ class Direction(Family):
         assert np.linalg.norm(e) == pytest.approx(np.tan(0.5 * angle), rel=1e-12)
 
 
-class Spinning(OrientationTrajectory):
+class Spinning(hsp.trajectories.OrientationTrajectory):
     """Turns about its own third axis at 1.7 rad/s: the direction stands still."""
 
     start: Matrix
 
     def sample(
-        self, t: float, out: OrientationSample | None = None
-    ) -> OrientationSample:
-        out = OrientationSample.allocate() if out is None else out
+        self, t: float, out: hsp.trajectories.OrientationSample | None = None
+    ) -> hsp.trajectories.OrientationSample:
+        out = hsp.trajectories.OrientationSample.allocate() if out is None else out
         spin = pin.exp3(np.array([0.0, 0.0, 1.7 * (t - TIME)]))
         out.rotation[:] = self.start @ spin
         out.angular_velocity[:] = 1.7 * self.start[:, 2]

@@ -5,37 +5,9 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
-from hsp_control.trajectories import (
-    Blend,
-    BlendOrientation,
-    CallableOrientation,
-    CallableTrajectory,
-    Circle,
-    ComposedPose,
-    Crossfade,
-    CrossfadeOrientation,
-    Hold,
-    HoldOrientation,
-    HoldPose,
-    Line,
-    Lissajous,
-    MinimumJerk,
-    OrientationPath,
-    OrientationTrajectory,
-    PiecewisePolynomial,
-    PoseSample,
-    PoseTrajectory,
-    ScrewInterpolation,
-    Spin,
-    Spline,
-    Stops,
-    Trajectory,
-    UniformLine,
-)
-
-Array = NDArray[np.float64]
+import hsp_control as hsp
+from hsp_control.common.arrays import Array
 
 
 def pose(seed: int) -> pin.SE3:
@@ -45,9 +17,9 @@ def pose(seed: int) -> pin.SE3:
 
 def screw(
     start: pin.SE3, end: pin.SE3, duration: float, start_time: float = 0.0
-) -> ScrewInterpolation:
+) -> hsp.trajectories.ScrewInterpolation:
     """Return the screw motion between two poses."""
-    return ScrewInterpolation(
+    return hsp.trajectories.ScrewInterpolation(
         end.translation,
         end.rotation,
         duration,
@@ -78,80 +50,99 @@ IDENTITY = np.eye(3)
 R1, R2, R3 = (pose(seed).rotation for seed in (1, 2, 3))
 POINTS = np.random.default_rng(4).normal(size=(4, 3))
 TIMES = [0.2, 0.9, 1.4, 2.2]
-LISSAJOUS = Lissajous([0.5, -1, 2], [1, 2, 3], [0, 1, 2], [1, 2, 3])
-CIRCLE = Circle(1, 3, [1, 1])
-SPIN = Spin([1, -2, 0.5], 2.5, rotation=R1)
-BLENDED_SPIN = BlendOrientation(
+LISSAJOUS = hsp.trajectories.Lissajous([0.5, -1, 2], [1, 2, 3], [0, 1, 2], [1, 2, 3])
+CIRCLE = hsp.Circle(1, 3, [1, 1])
+SPIN = hsp.trajectories.Spin([1, -2, 0.5], 2.5, rotation=R1)
+BLENDED_SPIN = hsp.trajectories.BlendOrientation(
     SPIN, 1.5, rotation=R2, start_angular_velocity=[0.1, -0.4, 0.2], start_time=0.5
 )
 
 # Members, and the times at which they join their holds or one piece the next.
-POINT_MEMBERS: dict[str, tuple[Trajectory, list[float]]] = {
-    "hold": (Hold([1, 2, 3, 4]), []),
-    "line": (Line([3, -1], 1.5, start=[0, 1], start_time=0.5), [0.5, 2.0]),
-    "uniform line": (UniformLine([0.3, 0.2, -1], [1, 0, 2]), []),
+POINT_MEMBERS: dict[str, tuple[hsp.trajectories.Trajectory, list[float]]] = {
+    "hold": (hsp.Hold([1, 2, 3, 4]), []),
+    "line": (hsp.Line([3, -1], 1.5, start=[0, 1], start_time=0.5), [0.5, 2.0]),
+    "uniform line": (hsp.trajectories.UniformLine([0.3, 0.2, -1], [1, 0, 2]), []),
     "circle": (CIRCLE, []),
     "circle across a normal": (
-        Circle(0.4, 2, [0, 1, 2], phase=0.3, normal=[1, 2, 2]),
+        hsp.Circle(0.4, 2, [0, 1, 2], phase=0.3, normal=[1, 2, 2]),
         [],
     ),
     "circle from a start": (
-        Circle(0.4, -2, [0, 1, 2], normal=[0, 0, 3], toward=[0, 2, 1]),
+        hsp.Circle(0.4, -2, [0, 1, 2], normal=[0, 0, 3], toward=[0, 2, 1]),
         [],
     ),
-    "circle in axes": (Circle(2, 1, np.zeros(4), axes=np.eye(4)[[3, 1]]), []),
+    "circle in axes": (hsp.Circle(2, 1, np.zeros(4), axes=np.eye(4)[[3, 1]]), []),
     "lissajous": (LISSAJOUS, []),
-    "minimum jerk": (MinimumJerk(POINTS, TIMES), TIMES),
-    "stops": (Stops(POINTS, TIMES), TIMES),
-    "minimum jerk of two": (MinimumJerk(POINTS[:2], TIMES[:2]), TIMES[:2]),
-    "spline 3": (Spline(POINTS, TIMES, 3), TIMES),
-    "spline 5": (Spline(POINTS, TIMES), TIMES),
-    "spline 7": (Spline(POINTS, TIMES, 7), TIMES),
+    "minimum jerk": (hsp.trajectories.MinimumJerk(POINTS, TIMES), TIMES),
+    "stops": (hsp.trajectories.Stops(POINTS, TIMES), TIMES),
+    "minimum jerk of two": (
+        hsp.trajectories.MinimumJerk(POINTS[:2], TIMES[:2]),
+        TIMES[:2],
+    ),
+    "spline 3": (hsp.trajectories.Spline(POINTS, TIMES, 3), TIMES),
+    "spline 5": (hsp.trajectories.Spline(POINTS, TIMES), TIMES),
+    "spline 7": (hsp.trajectories.Spline(POINTS, TIMES, 7), TIMES),
     "polynomial": (
-        PiecewisePolynomial([0.5, 2], [[[1.0], [2.0], [-3.0], [0.5]]]),
+        hsp.trajectories.PiecewisePolynomial([0.5, 2], [[[1.0], [2.0], [-3.0], [0.5]]]),
         [0.5, 2],
     ),
-    "callable": (CallableTrajectory(swinging, 3), []),
+    "callable": (hsp.trajectories.CallableTrajectory(swinging, 3), []),
     "callable with velocity": (
-        CallableTrajectory(swinging, 3, swinging_velocity),
+        hsp.trajectories.CallableTrajectory(swinging, 3, swinging_velocity),
         [],
     ),
     "callable with both": (
-        CallableTrajectory(swinging, 3, swinging_velocity, swinging_acceleration),
+        hsp.trajectories.CallableTrajectory(
+            swinging, 3, swinging_velocity, swinging_acceleration
+        ),
         [],
     ),
     "callable with acceleration": (
-        CallableTrajectory(swinging, 3, acceleration=swinging_acceleration),
+        hsp.trajectories.CallableTrajectory(
+            swinging, 3, acceleration=swinging_acceleration
+        ),
         [],
     ),
-    "blend": (Blend(CIRCLE, 1.0, start=[0, 3], start_time=0.5), [0.5, 1.5]),
+    "blend": (
+        hsp.trajectories.Blend(CIRCLE, 1.0, start=[0, 3], start_time=0.5),
+        [0.5, 1.5],
+    ),
     "blend in motion": (
-        Blend(CIRCLE, 1.5, start=[0, 3], start_velocity=[1, -2]),
+        hsp.trajectories.Blend(CIRCLE, 1.5, start=[0, 3], start_velocity=[1, -2]),
         [0.0, 1.5],
     ),
 }
 POINT_MEMBERS["crossfade"] = (
-    Crossfade(CIRCLE, Line([3, -1], 4.0, start=[0, 1]), start_time=0.5, duration=1.0),
+    hsp.trajectories.Crossfade(
+        CIRCLE, hsp.Line([3, -1], 4.0, start=[0, 1]), start_time=0.5, duration=1.0
+    ),
     [0.5, 1.5],
 )
-ORIENTATION_MEMBERS: dict[str, tuple[OrientationTrajectory, list[float]]] = {
-    "hold orientation": (HoldOrientation(R1), []),
+ORIENTATION_MEMBERS: dict[
+    str, tuple[hsp.trajectories.OrientationTrajectory, list[float]]
+] = {
+    "hold orientation": (hsp.trajectories.HoldOrientation(R1), []),
     "spin": (SPIN, []),
-    "orientation path": (OrientationPath([R1, R2, R3], TIMES[:3]), TIMES[:3]),
-    "callable orientation": (CallableOrientation(nodding), []),
+    "orientation path": (
+        hsp.trajectories.OrientationPath([R1, R2, R3], TIMES[:3]),
+        TIMES[:3],
+    ),
+    "callable orientation": (hsp.trajectories.CallableOrientation(nodding), []),
     "blend orientation": (
-        BlendOrientation(SPIN, 1.5, rotation=R2, start_time=0.5),
+        hsp.trajectories.BlendOrientation(SPIN, 1.5, rotation=R2, start_time=0.5),
         [0.5, 2.0],
     ),
     "blend orientation in motion": (BLENDED_SPIN, [0.5, 2.0]),
     "crossfade orientation": (
-        CrossfadeOrientation(SPIN, BLENDED_SPIN, start_time=0.5, duration=1.0),
+        hsp.trajectories.CrossfadeOrientation(
+            SPIN, BLENDED_SPIN, start_time=0.5, duration=1.0
+        ),
         [0.5, 1.5, 2.0],
     ),
 }
-POSE_MEMBERS: dict[str, tuple[PoseTrajectory, list[float]]] = {
-    "composed pose": (ComposedPose(LISSAJOUS, SPIN), []),
-    "hold pose": (HoldPose(POINTS[0], R1), []),
+POSE_MEMBERS: dict[str, tuple[hsp.trajectories.PoseTrajectory, list[float]]] = {
+    "composed pose": (hsp.trajectories.ComposedPose(LISSAJOUS, SPIN), []),
+    "hold pose": (hsp.trajectories.HoldPose(POINTS[0], R1), []),
     "screw": (screw(pose(5), pose(6), 1.5, 0.5), [0.5, 2.0]),
     "screw without turn": (
         screw(pin.SE3(R1, POINTS[0]), pin.SE3(R1, POINTS[1]), 1.0),
@@ -167,6 +158,6 @@ MEMBERS: dict[str, tuple[Any, list[float]]] = {
 
 def flat(sample: Any) -> list[Array]:
     """Return the arrays of any sample, pose samples included."""
-    if isinstance(sample, PoseSample):
+    if isinstance(sample, hsp.trajectories.PoseSample):
         return [*sample.position, *sample.orientation]
     return list(sample)

@@ -107,6 +107,22 @@ def test_code_that_cannot_be_imported_catches_nothing(checkout: Path) -> None:
     assert mutants.run(checkout, "test_area.py").word == "BROKEN"
 
 
+@pytest.mark.process
+@pytest.mark.parametrize(
+    ("wrong", "detail"),
+    [
+        ("while True:\n        pass", "did not end"),
+        ("bytes(1 << 40)", "FAILED test_area.py::test_area"),
+    ],
+)
+def test_what_never_ends_or_eats_the_memory_is_caught(
+    checkout: Path, monkeypatch: pytest.MonkeyPatch, wrong: str, detail: str
+) -> None:
+    monkeypatch.setattr(mutants, "LONGEST", 5.0)
+    (checkout / "code_under_test.py").write_text(f"def area(a, b):\n    {wrong}\n")
+    assert mutants.run(checkout, "test_area.py") == ("caught", detail)
+
+
 def test_an_edit_that_does_not_fit_is_an_error(checkout: Path) -> None:
     with pytest.raises(ValueError, match=r"code that is not there: 0 places in code_"):
         list(mutants.tried(checkout, [ELSEWHERE]))

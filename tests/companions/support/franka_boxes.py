@@ -12,16 +12,15 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hsp_control import Robot
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HardwareError
 from hsp_control.companions.franka.layouts import PERIOD
 from hsp_control.companions.franka_box import Arm, Box, Server
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants import IntegratedPlant, RigidBody, SampledPlant
 
-Array = NDArray[np.float64]
 LONGEST = 120.0
 """Time after which a client is killed: libfranka can wait for ever [s]."""
 PATIENCE = 30.0

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from hsp_control.geometry.coal_distances import CoalDistances
 from oracles import slope
 from places import ROOT
 
@@ -37,6 +36,7 @@ from hsp_control import (
 from hsp_control.common import kernels, native
 from hsp_control.control.actuation import Status
 from hsp_control.geometry import Proximity, Scene, link_shapes
+from hsp_control.geometry.proximity import CoalDistances
 from hsp_control.geometry.shapes import Box, Capsule, Cylinder, HalfSpace, Shape, Sphere
 from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields import (

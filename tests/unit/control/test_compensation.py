@@ -7,33 +7,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from compensation_cases import ALL, EVERYTHING, PANDA, Q0, H, circle, controller
-from numpy.typing import NDArray
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.linalg import expm
 from task_cases import placed
 
-from hsp_control import (
-    CenterOfMass,
-    Controller,
-    FrameOrientation,
-    FramePose,
-    FramePosition,
-    Gains,
-    Hold,
-    JointPosture,
-    Limits,
-    Pointing,
-    Robot,
-    RobotState,
-    Rollout,
-    Task,
-    load_experiment,
-    simulate,
-)
-from hsp_control.common.exceptions import (
-    GainError,
-    SimulationError,
-)
+import hsp_control as hsp
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import GainError, SimulationError
 from hsp_control.control.actuation.status import Status
 from hsp_control.control.compensation import (
     Command,
@@ -48,30 +30,23 @@ from hsp_control.control.compensation import (
 from hsp_control.null_space.fields import TargetPosture
 from hsp_control.robot.friction import JointFriction
 from hsp_control.robot.integrators import Rk4
-from hsp_control.simulation.plants import (
-    ImperfectPlant,
-    IntegratedPlant,
-    RigidBodyPlant,
-    StickingPlant,
-)
 from hsp_control.simulation.plants.drives import EffortDelay
 from hsp_control.simulation.plants.model_changes import Inertias, Payload, changed
 from hsp_control.simulation.plants.sensors import SensorDelay, VelocityNoise
 from hsp_control.tasks import RelativePose
 from hsp_control.trajectories import HoldOrientation, HoldPose
 
-Array = NDArray[np.float64]
 EYE = np.eye(7)
 
 
 def run(
-    made: Controller, compensation: Compensation | None = None, **options: Any
-) -> Rollout:
+    made: hsp.Controller, compensation: Compensation | None = None, **options: Any
+) -> hsp.Rollout:
     settings: dict[str, Any] = {
         "duration": 0.3, "control_period": H, "log_period": H, "integrator": Rk4(H),
         "compensation": compensation, **options,
     }  # fmt: skip
-    return simulate(made, Q0, **settings)
+    return hsp.simulate(made, Q0, **settings)
 
 
 # ----------------------------------------------------------------------- the chain
@@ -79,12 +54,12 @@ def run(
 
 def test_without_compensators_it_is_the_controller_to_the_last_bit() -> None:
     """Beside a loop written by hand, as a user would, on a noisy plant."""
-    made = controller(limits=Limits(effort_rate=1000.0))
-    engine = IntegratedPlant(RigidBodyPlant(PANDA), Rk4(H))
-    plant = ImperfectPlant(engine, [VelocityNoise(0.02)], [], seed=3)
+    made = controller(limits=hsp.Limits(effort_rate=1000.0))
+    engine = hsp.plants.IntegratedPlant(hsp.plants.RigidBodyPlant(PANDA), Rk4(H))
+    plant = hsp.plants.ImperfectPlant(engine, [VelocityNoise(0.02)], [], seed=3)
     ours = run(made, Compensation(), plant=plant, duration=0.1)
 
-    state = RobotState(PANDA)
+    state = hsp.RobotState(PANDA)
     q, v = Q0, np.zeros(7)
     plant.reset(0.0, q, v)
     made.restart()
@@ -108,11 +83,11 @@ def test_a_run_repeats_itself_and_its_compensators_travel(name: str) -> None:
     again = run(made, compensation, duration=0.05)
     other = run(controller(), pickle.loads(pickle.dumps(compensation)), duration=0.05)
     for column, values in first.columns.items():
-        np.testing.assert_array_equal(values, again[column])
-        np.testing.assert_array_equal(values, other[column])
+        assert_array_equal(values, again[column])
+        assert_array_equal(values, other[column])
     bare = run(made, duration=0.05)
     # Nothing stays behind in the controller or its tasks.
-    np.testing.assert_array_equal(bare.tau, run(controller(), duration=0.05).tau)
+    assert_array_equal(bare.tau, run(controller(), duration=0.05).tau)
     assert set(bare.columns) <= set(first.columns)
 
 
@@ -123,12 +98,12 @@ def test_the_robot_s_own_friction_is_fed_forward() -> None:
     other = Command(controller(), Compensation(friction_feed_forward=known))
     for k in range(2):
         tau = made.effort(k * H, Q0, v, H)
-        np.testing.assert_array_equal(tau, other.effort(k * H, Q0, v, H))
+        assert_array_equal(tau, other.effort(k * H, Q0, v, H))
     assert made.log_channels().keys() == {"friction.feed_forward"}
     assert np.abs(made.log_channels()["friction.feed_forward"].value).max() > 1e-4
 
 
-def friction_of(robot: Robot) -> tuple[Array, Array]:
+def friction_of(robot: hsp.Robot) -> tuple[Array, Array]:
     """Return the Coulomb and viscous friction in the URDF, shape (nv,) each."""
     return np.abs(robot.model.upperDryFrictionLimit), np.abs(robot.model.damping)
 
@@ -138,17 +113,6 @@ def test_compensators_need_a_control_period() -> None:
         SimulationError, match=r"compensation \(predictor\) is computed"
     ):
         run(controller(), Compensation(predictor=Predictor(1)), control_period=None)
-
-
-def test_the_log_has_what_they_know() -> None:
-    log = run(controller(), ALL, duration=0.15)
-    shapes = {
-        "observer.disturbance": 7, "friction.feed_forward": 7, "task.hand.integral": 3,
-        "shown.q": 7, "shown.v": 7,
-    }  # fmt: skip
-    for name, width in shapes.items():
-        assert log[name].shape == (len(log), width)
-        assert np.abs(log[name][-1]).max() > 0.0
 
 
 # ------------------------------------------------------------------ momentum observer
@@ -161,30 +125,24 @@ def test_the_observer_is_a_low_pass_on_what_pushes(name: str, rate: float) -> No
 
     The mean of Cᵀv - G over a period is good to h²/12 of its second derivative: 1e-4.
     """
-    robot, rng = Robot.load(name), np.random.default_rng(1)
+    robot, rng = hsp.Robot.load(name), np.random.default_rng(1)
     nv = robot.nv
     d, tau = rng.uniform(-5.0, 5.0, nv), rng.uniform(-5.0, 5.0, nv)
     observer = MomentumObserver(rate).begin(robot)
-    plant = IntegratedPlant(RigidBodyPlant(robot), Rk4(H))
+    plant = hsp.plants.IntegratedPlant(hsp.plants.RigidBodyPlant(robot), Rk4(H))
     q, v = robot.home(), rng.uniform(-0.5, 0.5, nv)
     plant.reset(0.0, q, v)
     for k in range(100):
         r = observer.update(robot.state(0.0, q, v), tau, H)
         expected = d * (1.0 - np.exp(-rate * k * H))
-        np.testing.assert_allclose(r, expected, atol=2e-3)
+        assert_allclose(r, expected, atol=2e-3)
         q, v = plant.advance(k * H, (k + 1) * H, tau + d)
-
-
-def test_the_observer_lets_go_of_what_is_not_there() -> None:
-    log = run(controller(), Compensation(momentum_observer=MomentumObserver(50.0)))
-    # Of efforts of 40 N·m, on the exact model: what the period's mean leaves out.
-    assert np.abs(log["observer.disturbance"]).max() < 2e-3
 
 
 def test_what_is_cancelled_is_clipped() -> None:
     """Beyond it the arm gives way as if there were no observer."""
     heavy = changed(PANDA, [Inertias(1.5)])
-    plant = RigidBodyPlant(heavy)
+    plant = hsp.plants.RigidBodyPlant(heavy)
     clipped, free = (
         run(
             controller(),
@@ -196,7 +154,7 @@ def test_what_is_cancelled_is_clipped() -> None:
     assert np.abs(free["observer.disturbance"][-1]).max() > 5.0
     errors = [np.linalg.norm(log["task.hand.error"][-1]) for log in (clipped, free)]
     assert errors[0] > 10.0 * errors[1]
-    state = RobotState(PANDA)
+    state = hsp.RobotState(PANDA)
     own = MomentumObserver(50.0, [1.0] * 7)
     command = Command(controller(), Compensation(momentum_observer=own))
     for k in range(5):
@@ -207,18 +165,18 @@ def test_what_is_cancelled_is_clipped() -> None:
     assert (disturbance > 50.0).all()
     bare = command.controller.compute(state.update(5 * H, Q0, np.zeros(7))).tau
     modified = command.evaluate(5 * H, Q0, np.zeros(7)).tau
-    np.testing.assert_allclose(modified, bare - 1.0, atol=1e-12)
+    assert_allclose(modified, bare - 1.0, atol=1e-12)
 
 
 def test_limits_are_kept_by_the_whole_effort() -> None:
     """The observer asks for more than the limits leave; where they do not bind: all."""
     heavy = changed(PANDA, [Inertias(1.4)])
     most = np.array([87.0, 45.0, 87.0, 87.0, 12.0, 12.0, 12.0])
-    made = controller(limits=Limits(effort=most, velocity=None, position=None))
+    made = controller(limits=hsp.Limits(effort=most, velocity=None, position=None))
     log = run(
         made,
         Compensation(momentum_observer=MomentumObserver(50.0)),
-        plant=RigidBodyPlant(heavy),
+        plant=hsp.plants.RigidBodyPlant(heavy),
     )
     assert (np.abs(log.tau) <= most + 1e-9).all()
     assert np.abs(log.tau[:, 1]).max() > 45.0 - 1e-6  # and it is reached
@@ -226,8 +184,8 @@ def test_limits_are_kept_by_the_whole_effort() -> None:
 
 
 def test_the_observer_leaves_the_effort_rate_to_the_limits() -> None:
-    made = controller(limits=Limits(effort_rate=100.0))
-    plant = RigidBodyPlant(changed(PANDA, [Inertias(1.4)]))
+    made = controller(limits=hsp.Limits(effort_rate=100.0))
+    plant = hsp.plants.RigidBodyPlant(changed(PANDA, [Inertias(1.4)]))
     log = run(made, Compensation(momentum_observer=MomentumObserver(50.0)), plant=plant)
     assert np.abs(np.diff(log.tau, axis=0)).max() <= 100.0 * H + 1e-9
 
@@ -242,7 +200,7 @@ def test_known_friction_costs_nothing_and_the_observer_leaves_it_alone() -> None
     friction here is some 0.5 N·m.
     """
     made = controller(away=0.0)
-    oil = StickingPlant(PANDA, JointFriction.of(PANDA, viscous=2.0), H / 2.0)
+    oil = hsp.plants.StickingPlant(PANDA, JointFriction.of(PANDA, viscous=2.0), H / 2.0)
     known = FrictionFeedForward(viscous=2.0)
     flow = {"v0": made.flow(0.0, Q0)}  # no transient
     bare, alone = run(made, **flow), run(made, plant=oil, **flow)
@@ -257,7 +215,7 @@ def test_known_friction_costs_nothing_and_the_observer_leaves_it_alone() -> None
     ):
         log = run(made, compensation, plant=oil, **flow)
         friction = np.abs(2.0 * log.v[late]).max()
-        np.testing.assert_allclose(
+        assert_allclose(
             log["friction.feed_forward"][late], 2.0 * log.v[late], atol=0.2 * friction
         )
         errors = log["task.hand.error"][late] - bare["task.hand.error"][late]
@@ -273,50 +231,50 @@ def test_the_desired_velocity_is_the_law_s_flow(levels: int) -> None:
 
     robot, rng = PANDA, np.random.default_rng(2)
     own: dict[str, Any] = {
-        "gains": Gains(natural_frequency=5.0),
+        "gains": hsp.Gains(natural_frequency=5.0),
         "largest_error": "none",
     }
-    turned = FrameOrientation("panda_tcp", HoldOrientation(np.eye(3)), **own)
-    again = FramePosition("panda_tcp", circle().trajectory, name="more", **own)
+    turned = hsp.FrameOrientation("panda_tcp", HoldOrientation(np.eye(3)), **own)
+    again = hsp.FramePosition("panda_tcp", circle().trajectory, name="more", **own)
     second, third = replace(turned, priority=2), replace(again, priority=3)
-    tasks: list[Task] = {
+    tasks: list[hsp.Task] = {
         1: [circle(), turned],
         2: [circle(), second],
         3: [circle(), second, third],  # nine rows on seven freedoms
     }[levels]
-    made = Controller(robot, tasks, TargetPosture(np.zeros(7) + Q0 * 0.9), limits=None)
+    made = hsp.Controller(
+        robot, tasks, TargetPosture(np.zeros(7) + Q0 * 0.9), limits=None
+    )
     q = robot.integrate(Q0, rng.uniform(-0.3, 0.3, 7))
     flow = made.flow(0.4, q)
     for _ in range(5):
         state = robot.state(0.4, q, rng.uniform(-1.0, 1.0, 7))
         made.compute(state)
         # Round-off of a product of inverses, at velocities of 1 rad/s.
-        np.testing.assert_allclose(
-            desired_velocity(state, made.active_stack), flow, atol=1e-12
-        )
+        assert_allclose(desired_velocity(state, made.active_stack), flow, atol=1e-12)
 
 
 # ------------------------------------------------------------------ integral action
 
 
-def all_tasks() -> list[Task]:
-    robot, gains = PANDA, Gains(natural_frequency=3.0)
+def all_tasks() -> list[hsp.Task]:
+    robot, gains = PANDA, hsp.Gains(natural_frequency=3.0)
     here = robot.state(0.0, Q0, np.zeros(7)).frame("panda_tcp")
     turn = HoldOrientation(here.rotation)
     pose = HoldPose(here.position, here.rotation)
     return [
         circle(),
-        FrameOrientation("panda_tcp", turn, gains=gains),
-        FramePose("panda_tcp", pose, gains=gains),
-        Pointing("panda_tcp", axis=[0.0, 0.0, 1.0], trajectory=turn, gains=gains),
-        JointPosture(Q0, gains=gains),
-        CenterOfMass(Hold([0.1, 0.0, 0.4]), gains=gains),
+        hsp.FrameOrientation("panda_tcp", turn, gains=gains),
+        hsp.FramePose("panda_tcp", pose, gains=gains),
+        hsp.Pointing("panda_tcp", axis=[0.0, 0.0, 1.0], trajectory=turn, gains=gains),
+        hsp.JointPosture(Q0, gains=gains),
+        hsp.CenterOfMass(hsp.Hold([0.1, 0.0, 0.4]), gains=gains),
         RelativePose("panda_tcp", pose, reference="panda_link0", gains=gains),
     ]
 
 
 @pytest.mark.parametrize("task", all_tasks(), ids=lambda task: type(task).__name__)
-def test_an_offset_enters_each_error_equation_exactly(task: Task) -> None:
+def test_an_offset_enters_each_error_equation_exactly(task: hsp.Task) -> None:
     """e'' + Kv e' + Kp e + offset = 0, e'' by central differences of e'."""
     robot, rng = PANDA, np.random.default_rng(5)
     task = placed(task, robot)
@@ -337,7 +295,7 @@ def test_an_offset_enters_each_error_equation_exactly(task: Task) -> None:
     Kp, Kv, offset, *_ = feedback
     residual = (rates[0] - rates[1]) / (2 * h) + Kv @ e_dot + Kp @ e
     # Rounding 1e-16/h and the difference's own h², beside terms of 3 and more.
-    np.testing.assert_allclose(residual, -offset, atol=1e-7)
+    assert_allclose(residual, -offset, atol=1e-7)
 
 
 def test_with_an_integral_the_error_is_that_of_the_third_order() -> None:
@@ -349,7 +307,7 @@ def test_with_an_integral_the_error_is_that_of_the_third_order() -> None:
     made = controller()
     q = robot.integrate(Q0, np.array([0.0, 0.05, 0.0, 0.05, 0.0, 0.0, 0.0]))
     ki = {"hand": [400.0, 800.0, 1200.0]}
-    log = simulate(
+    log = hsp.simulate(
         made, q, duration=0.5, control_period=H / 2, log_period=0.01,
         integrator=Rk4(H / 2),
         compensation=Compensation(integral_action=IntegralAction(ki=ki)),
@@ -359,25 +317,7 @@ def test_with_an_integral_the_error_is_that_of_the_third_order() -> None:
         e, rate = log["task.hand.error"][0, row], log["task.hand.error_rate"][0, row]
         expected = [(expm(A * t) @ [0.0, e, rate])[1] for t in log.t]
         size = np.abs(expected).max()
-        np.testing.assert_allclose(
-            log["task.hand.error"][:, row], expected, atol=0.01 * size
-        )
-
-
-def test_a_lasting_error_dies_and_the_null_space_keeps_its_own() -> None:
-    plant = RigidBodyPlant(changed(PANDA, [Inertias(1.2)]))
-    point = circle().trajectory.sample(0.0).position
-    gains = Gains(natural_frequency=20.0)
-    hold = FramePosition("panda_tcp", Hold(point), gains=gains, name="hand")
-    made = Controller(PANDA, [hold], limits=None)
-    options = {"plant": plant, "duration": 1.5}
-    alone = run(made, **options)
-    mended = run(made, Compensation(integral_action=IntegralAction(10.0)), **options)
-    last = [np.linalg.norm(log["task.hand.error"][-1]) for log in (alone, mended)]
-    assert last[0] > 1e-3
-    assert last[1] < 0.05 * last[0]  # the arm still moves, and its weight with it
-    norms = [log["null_space_norm"][-1] for log in (alone, mended)]
-    assert norms[1] > 0.5 * norms[0] > 0.0
+        assert_allclose(log["task.hand.error"][:, row], expected, atol=0.01 * size)
 
 
 @pytest.mark.slow
@@ -392,9 +332,9 @@ def test_a_payload_s_error_dies_as_the_linear_equation_says(
     All joints are led, so that no self-motion is left; the rest is of second order.
     """
     loaded = changed(PANDA, [Payload("panda_tcp", mass)])
-    task = JointPosture(Q0, gains=Gains(natural_frequency=20.0), name="hand")
+    task = hsp.JointPosture(Q0, gains=hsp.Gains(natural_frequency=20.0), name="hand")
 
-    def dynamics(robot: Robot, q: Array) -> tuple[Array, Array]:
+    def dynamics(robot: hsp.Robot, q: Array) -> tuple[Array, Array]:
         state = robot.state(0.0, q, np.zeros(7))
         upper = np.triu(state.mass_matrix)
         return upper + np.triu(upper, 1).T, state.nonlinear_effects.copy()
@@ -411,38 +351,15 @@ def test_a_payload_s_error_dies_as_the_linear_equation_says(
         [-400.0 * B - D, -40.0 * B, -400.0 * rate * B, weight(Q0)[:, None]]
     )
     log = run(
-        Controller(PANDA, [task], limits=None),
+        hsp.Controller(PANDA, [task], limits=None),
         Compensation(integral_action=IntegralAction(rate)),
-        plant=RigidBodyPlant(loaded), duration=2.0, log_period=0.02,
+        plant=hsp.plants.RigidBodyPlant(loaded), duration=2.0, log_period=0.02,
     )  # fmt: skip
     expected = np.array([expm(A * t)[:7, 21] for t in log.t])
     error, size = log["task.hand.error"], np.abs(expected).max()
     assert size > 0.01 * mass  # [rad]
-    np.testing.assert_allclose(error, expected, rtol=0, atol=tolerance * size)
+    assert_allclose(error, expected, rtol=0, atol=tolerance * size)
     assert np.abs(error[-1]).max() < (0.05 if rate == 2.0 else 1e-3) * size
-
-
-@pytest.mark.slow
-def test_too_much_integral_action_is_lost_with_a_payload() -> None:
-    """2 kg at the hand leave 0.3 of the feedback: as little as Ki/(Kv Kp) = 12/40."""
-    loaded = RigidBodyPlant(changed(PANDA, [Payload("panda_tcp", 2.0)]))
-    point = circle(away=0.0).trajectory.sample(0.0).position
-    hold = FramePosition(
-        "panda_tcp", Hold(point), gains=Gains(natural_frequency=20.0), name="hand"
-    )
-    made = Controller(PANDA, [hold], 2.0 * TargetPosture(Q0), limits=None)
-    largest = {}
-    for rate in (5.0, 12.0):
-        compensation = Compensation(integral_action=IntegralAction(rate))
-        log = run(made, compensation, plant=loaded, duration=4.0, log_period=0.01)
-        error = np.linalg.norm(log["task.hand.error"], axis=1)
-        largest[rate] = [error[:100].max(), error[100:200].max(), error[-100:].max()]
-    first, second, last = largest[5.0]
-    assert first > 10e-3
-    assert second < 0.1 * first
-    assert last < 0.01 * first
-    first, second, last = largest[12.0]
-    assert last > 2.0 * second
 
 
 @pytest.mark.parametrize("rate", [40.0, 41.0, 400.0])
@@ -471,12 +388,12 @@ def test_an_integral_only_unwinds_while_the_law_is_not_delivered() -> None:
     offset = made.feedback("hand").offset
     e = np.array([1e-3, -1e-3, 0.0])
     action.advance({"hand": e}, 0.5, saturated=False)
-    np.testing.assert_allclose(action.integrals["hand"], 0.5 * e)
-    np.testing.assert_allclose(offset, 4000.0 * 0.5 * e)
+    assert_allclose(action.integrals["hand"], 0.5 * e)
+    assert_allclose(offset, 4000.0 * 0.5 * e)
     action.advance({"hand": e}, 0.5, saturated=True)  # would grow: stays
-    np.testing.assert_allclose(action.integrals["hand"], 0.5 * e)
+    assert_allclose(action.integrals["hand"], 0.5 * e)
     action.advance({"hand": -e}, 0.25, saturated=True)  # unwinds
-    np.testing.assert_allclose(action.integrals["hand"], 0.25 * e)
+    assert_allclose(action.integrals["hand"], 0.25 * e)
     action.advance({"hand": e}, 100.0, saturated=False)
     assert np.abs(offset).max() == pytest.approx(8.0)
     action.advance({"hand": None}, 1.0, saturated=False)
@@ -486,11 +403,11 @@ def test_an_integral_only_unwinds_while_the_law_is_not_delivered() -> None:
 def test_an_arm_that_is_too_weak_does_not_wind_up() -> None:
     """While its limits bind, errors are not gathered."""
     weak = np.array([87.0, 20.0, 87.0, 87.0, 12.0, 12.0, 12.0])  # gravity takes 30
-    made = controller(limits=Limits(effort=weak, velocity=None, position=None))
+    made = controller(limits=hsp.Limits(effort=weak, velocity=None, position=None))
     log = run(made, Compensation(integral_action=IntegralAction(20.0)), duration=0.015)
     assert (log["status"] >= Status.LIMITED).all()
     assert np.abs(log["task.hand.error"][-1]).max() > 1e-4
-    np.testing.assert_array_equal(log["task.hand.integral"], 0.0)
+    assert_array_equal(log["task.hand.integral"], 0.0)
 
 
 # -------------------------------------------------------------------- the small ones
@@ -502,7 +419,7 @@ def test_half_of_the_power_passes_at_the_cut_off(order: int) -> None:
     own = declared.begin()
     assert own.apply(np.full(3, 4.0), 0.0).tolist() == [4.0] * 3
     for _ in range(50):
-        np.testing.assert_allclose(own.apply(np.full(3, 4.0), H), 4.0, rtol=1e-12)
+        assert_allclose(own.apply(np.full(3, 4.0), H), 4.0, rtol=1e-12)
     for frequency, gain in ((20.0, 0.5**0.5), (2.0, 1.0), (200.0, 0.1**order)):
         t = np.arange(0.0, 2.0, H / 4.0)
         own = declared.begin()
@@ -524,8 +441,8 @@ def test_the_predictor_knows_where_the_robot_will_be(
     efforts: int, sensors: int
 ) -> None:
     """What the law is shown is the state in which its effort acts, to Rk4's error."""
-    plant = ImperfectPlant(
-        IntegratedPlant(RigidBodyPlant(PANDA), Rk4(H)),
+    plant = hsp.plants.ImperfectPlant(
+        hsp.plants.IntegratedPlant(hsp.plants.RigidBodyPlant(PANDA), Rk4(H)),
         [SensorDelay(sensors)] if sensors else [],
         [EffortDelay(efforts)] if efforts else [],
     )
@@ -535,9 +452,9 @@ def test_the_predictor_knows_where_the_robot_will_be(
     k = efforts
     started = efforts + sensors + 1
     shown, then = log["shown.q"][started : len(log) - k], log.q[started + k :]
-    np.testing.assert_allclose(shown, then, atol=1e-12)
+    assert_allclose(shown, then, atol=1e-12)
     shown, then = log["shown.v"][started : len(log) - k], log.v[started + k :]
-    np.testing.assert_allclose(shown, then, atol=1e-10)
+    assert_allclose(shown, then, atol=1e-10)
 
 
 @pytest.mark.parametrize(("efforts", "sensors"), [(1, 0), (2, 0), (0, 1), (1, 2)])
@@ -545,7 +462,7 @@ def test_the_law_is_of_the_time_at_which_its_effort_acts(
     efforts: int, sensors: int
 ) -> None:
     """Sent at t: the effort of the moving task at t + the drives' delay, no other."""
-    made, state = controller(), RobotState(PANDA)
+    made, state = controller(), hsp.RobotState(PANDA)
     compensation = Compensation(predictor=Predictor(efforts, sensors))
     log = run(made, compensation, duration=0.05)
 
@@ -555,7 +472,7 @@ def test_the_law_is_of_the_time_at_which_its_effort_acts(
         return made.compute(state.update(then, *shown)).tau.copy()
 
     for k in (0, 7, 40):
-        np.testing.assert_allclose(effort(k, efforts), log.tau[k], rtol=0, atol=1e-9)
+        assert_allclose(effort(k, efforts), log.tau[k], rtol=0, atol=1e-9)
         other = effort(k, efforts + 1) - log.tau[k]
         assert np.abs(other).max() > 1e-3  # a period more or less would be seen
 
@@ -568,17 +485,17 @@ def test_the_ramp_leads_from_gravity_to_the_law(frequency: float) -> None:
     options: dict[str, Any] = {
         "duration": 0.4, "control_period": H, "log_period": H, "integrator": Rk4(H)
     }  # fmt: skip
-    jumping = simulate(made, q, **options)
-    smooth = simulate(made, q, compensation=ramp, **options)
+    jumping = hsp.simulate(made, q, **options)
+    smooth = hsp.simulate(made, q, compensation=ramp, **options)
     gravity = PANDA.inverse_dynamics(q, np.zeros(7), np.zeros(7))
-    np.testing.assert_allclose(smooth.tau[0], gravity, atol=1e-12)
+    assert_allclose(smooth.tau[0], gravity, atol=1e-12)
     assert np.abs(jumping.tau[0] - gravity).max() > 5.0
     steps = np.abs(np.diff(smooth.tau, axis=0)).max()
     assert steps < 0.02 * np.abs(jumping.tau[0] - gravity).max()
-    state = RobotState(PANDA)
+    state = hsp.RobotState(PANDA)
     for k in (250, 400):  # the ramp is over: the law, exactly
         here = state.update(smooth.t[k], smooth.q[k], smooth.v[k])
-        np.testing.assert_array_equal(made.compute(here).tau, smooth.tau[k])
+        assert_array_equal(made.compute(here).tau, smooth.tau[k])
     # A spring to where it was found holds it there at first.
     assert np.abs(smooth.q[40] - q).max() < (0.02 if frequency else 0.03)
 
@@ -593,44 +510,30 @@ def test_random_bodies_and_friction_come_to_a_tenth_of_a_millimetre() -> None:
     with ±20 % masses and inertias, centres of mass off by 1 cm, and Coulomb friction of
     which the feed-forward knows 80 %; 1.2 s of it.
     """
-    coulomb = [0.8, 0.8, 0.6, 0.6, 0.3, 0.3, 0.2]
-    blend = {"type": "circle", "origin": "start", "center": [0.0] * 3, "radius": 0.1,
-             "angular_rate": 2.0, "normal": [0.0, 0.0, 1.0]}  # fmt: skip
-    config = {
-        "robot": {"name": "panda"},
-        "tasks": {
-            "hand": {
-                "type": "frame_position",
-                "frame": "panda_tcp",
-                "trajectory": blend,
-                "gains": {"natural_frequency": 20.0},
-                "blend": 1.0,
-            }
-        },
-        "null_space": {
-            "gain": 10.0,
-            "fields": [{"type": "joint_centering", "weight": 2.0}],
-        },
-        "plant": {
-            "type": "rigid_body",
-            "inertias": {"random_mass": 0.2, "random_inertia": 0.2, "random_com": 0.01},
-            "friction": {"coulomb": coulomb, "viscous": 0.2},
-        },
-        "compensation": {
-            "momentum_observer": {"bandwidth": 50.0},
-            "friction_feed_forward": {
-                "coulomb": [0.8 * c for c in coulomb],
-                "viscous": 0.16,
-            },
-        },
-        "simulation": {
-            "duration": 2.7,
-            "control_period": H,
-            "log_period": 0.005,
-            "integrator": {"type": "rk4", "step": H},
-        },
-    }
-    log = load_experiment(config).run()
+    coulomb = np.array([0.8, 0.8, 0.6, 0.6, 0.3, 0.3, 0.2])
+    document = f"""
+robot: {{name: panda}}
+tasks:
+  hand:
+    type: frame_position
+    frame: panda_tcp
+    trajectory:
+      {{type: circle, origin: start, center: [0, 0, 0], radius: 0.1, angular_rate: 2,
+        normal: [0, 0, 1]}}
+    gains: {{natural_frequency: 20}}
+    blend: 1.0
+null_space: {{gain: 10, fields: [{{type: joint_centering, weight: 2}}]}}
+plant:
+  type: rigid_body
+  inertias: {{random_mass: 0.2, random_inertia: 0.2, random_com: 0.01}}
+  friction: {{coulomb: {coulomb.tolist()}, viscous: 0.2}}
+compensation:
+  momentum_observer: {{bandwidth: 50}}
+  friction_feed_forward: {{coulomb: {(0.8 * coulomb).tolist()}, viscous: 0.16}}
+simulation: {{duration: 2.7, control_period: {H}, log_period: 0.005,
+  integrator: {{type: rk4, step: {H}}}}}
+"""
+    log = hsp.load_experiment(yaml.safe_load(document)).run()
     late = log.t > 1.5
     error = np.linalg.norm(log["task.hand.error"][late], axis=1)
     assert np.sqrt(np.mean(error**2)) < 0.11e-3
@@ -646,4 +549,4 @@ def test_a_copy_of_a_running_predictor_has_memory_of_its_own() -> None:
     other = deepcopy(first)
     first.predict(q + 0.3, -v, efforts, 1e-3)
     for found, once in zip(other.predict(q, v, efforts, 1e-3), expected, strict=True):
-        np.testing.assert_array_equal(found, once)
+        assert_array_equal(found, once)

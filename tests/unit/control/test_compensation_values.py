@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 from compensation_cases import ALL, EVERYTHING, PANDA, Q0, H, circle, controller
-from numpy.typing import NDArray
 
 from hsp_control import Robot
-from hsp_control.common.exceptions import CompensationError, ImmutableError
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import CompensationError
 from hsp_control.control.compensation import (
     Command,
     Compensation,
@@ -23,8 +23,6 @@ from hsp_control.control.compensation import (
     StartUpRamp,
     VelocityFilter,
 )
-
-Array = NDArray[np.float64]
 
 
 def test_one_compensation_serves_many_commands_at_once() -> None:
@@ -63,8 +61,6 @@ def test_compensators_are_values() -> None:
     ki["hand"][0] = 0.0
     assert np.asarray(action.ki["hand"]).tolist() == [400.0, 800.0, 1200.0]
     assert eval(repr(own)) == own
-    with pytest.raises(ImmutableError, match=r"Predictor\.effort_delay cannot"):
-        ALL.predictor.effort_delay = 2  # type: ignore[misc, union-attr]
     with pytest.raises(TypeError):
         action.ki["arm"] = 1.0  # type: ignore[index]
     for each in (action, pickle.loads(pickle.dumps(action))):
@@ -88,25 +84,15 @@ def walker() -> Robot:
     [
         (
             lambda: MomentumObserver(0.0),
-            "MomentumObserver: bandwidth: 0.0 is too small; must be greater than 0",
-        ),
-        (
-            lambda: VelocityFilter(-1.0),
-            "VelocityFilter: cutoff: -1.0 is negative; must be greater",
+            "MomentumObserver: bandwidth: 0.0 is too small",
         ),
         (lambda: VelocityFilter(10.0, 3), r"order: unknown value 3 \(allowed: 1, 2\)"),  # type: ignore[arg-type]
         (lambda: VelocityFilter(600.0, 2).coefficients(H), "needs less than 500 Hz"),
         (lambda: Predictor(0, 0), "a predictor needs a delay"),
-        (lambda: Predictor(-1), "effort_delay: -1 is negative; must be at least 0"),
-        (lambda: Predictor(1, 0.5), "sensor_delay: 0.5 is .*; expected an integer"),  # type: ignore[arg-type]
         (lambda: IntegralAction(), "needs a rate"),
-        (lambda: IntegralAction(0.0), "rate: 0.0 is too small; must be"),
-        (lambda: IntegralAction(1.0, limit=-1.0), "limit: -1.0 is negative"),
         (lambda: IntegralAction(ki={"hand": -1.0}), "ki.hand: -1.0 is negative"),
-        (lambda: StartUpRamp(0.0), "duration: 0.0 is too small; must be"),
         (lambda: StartUpRamp(1.0, -1.0), "natural_frequency: -1.0 is negative; must"),
         (lambda: FrictionFeedForward(1.0, smoothing=0.0), "smoothing: 0.0 is too sm"),
-        (lambda: FrictionFeedForward(viscous=-1.0), "viscous: -1.0 is negative; must"),
         (
             lambda: on(friction_feed_forward=FrictionFeedForward([1.0])),
             r"^friction_feed_forward.coulomb: has shape \(1,\); needs one number",

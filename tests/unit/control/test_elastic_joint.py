@@ -5,31 +5,18 @@ from typing import Any, Literal
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from carriage import MASS, carriage, check_that_it_is_the_loop
 from scipy.integrate import solve_ivp
 
+import hsp_control as hsp
 from hsp_control import Controller, Gains, JointPosture, Robot, simulate
-from hsp_control.control.compensation import (
-    Compensation,
-    IntegralAction,
-    MomentumObserver,
-    Predictor,
-    VelocityFilter,
-)
+from hsp_control.common.arrays import Array
 from hsp_control.control.compensation.elastic_joint import ElasticJoint
 from hsp_control.control.compensation.linear_loop import LinearLoop
 from hsp_control.simulation.plants import EffortDelay, ImperfectPlant, SampledPlant
 from hsp_control.simulation.plants.sensors import SensorDelay
 
-Array = NDArray[np.float64]
 H, OMEGA = 0.001, 20.0
-MASS = 2.0
-CARRIAGE = f"""<robot name="carriage"><link name="rail"/><link name="carriage">
-<inertial><mass value="{MASS}"/>
-<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
-<joint name="slide" type="prismatic"><parent link="rail"/>
-<child link="carriage"/><axis xyz="1 0 0"/>
-<limit lower="-10" upper="10" effort="1000" velocity="100"/></joint></robot>"""
 
 
 class Sprung(SampledPlant):
@@ -77,10 +64,10 @@ def test_the_transition_is_the_solution_of_the_equations() -> None:
     ("delays", "compensation"),
     [
         ((0, 0), {}),
-        ((1, 2), {"integral_action": IntegralAction(5.0)}),
-        ((1, 0), {"predictor": Predictor(1, 0)}),
-        ((0, 1), {"velocity_filter": VelocityFilter(40.0, 2)}),
-        ((0, 2), {"momentum_observer": MomentumObserver(2.0)}),
+        ((1, 2), {"integral_action": hsp.compensation.IntegralAction(5.0)}),
+        ((1, 0), {"predictor": hsp.compensation.Predictor(1, 0)}),
+        ((0, 1), {"velocity_filter": hsp.compensation.VelocityFilter(40.0, 2)}),
+        ((0, 2), {"momentum_observer": hsp.compensation.MomentumObserver(2.0)}),
     ],
 )
 def test_a_simulated_joint_obeys_the_loop_s_polynomial(
@@ -89,13 +76,13 @@ def test_a_simulated_joint_obeys_the_loop_s_polynomial(
     measured: Literal["motor", "link"],
     tmp_path: Path,
 ) -> None:
-    """By Cayley and Hamilton; see `test_the_linear_loop_is_the_chain_link_by_link`."""
-    file = tmp_path / "carriage.urdf"
-    file.write_text(CARRIAGE)
-    robot = Robot.load(str(file))
+    robot = carriage(tmp_path)
     h, joint = 0.01, elastic(measured, 400.0)
     task = JointPosture(np.zeros(1), gains=Gains(natural_frequency=8.0))
-    made, parts = Controller(robot, [task], limits=None), Compensation(**compensation)
+    made, parts = (
+        Controller(robot, [task], limits=None),
+        hsp.compensation.Compensation(**compensation),
+    )
     plant = ImperfectPlant(
         Sprung(robot, joint), [SensorDelay(delays[1])], [EffortDelay(delays[0])]
     )
@@ -107,14 +94,8 @@ def test_a_simulated_joint_obeys_the_loop_s_polynomial(
     action = parts.integral_action
     Ki = np.zeros((1, 1)) if action is None else action.gains(made.tasks)["posture"]
     loop = LinearLoop(Kp, Kv, Ki, h, *delays, parts, joint=joint)
-    coefficients = np.poly(loop.transition())
-    n, begun = len(coefficients), 8
-    residuals = [coefficients[::-1] @ x[k : k + n] for k in range(begun, len(x) - n)]
-    assert np.abs(residuals).max() < 1e-11 * max(1.0, np.abs(x).max())
     other = LinearLoop(1.1 * Kp, Kv, Ki, h, *delays, parts, joint=joint)
-    wrong = np.poly(other.transition())
-    missed = [wrong[::-1] @ x[k : k + n] for k in range(begun, len(x) - n)]
-    assert np.abs(missed).max() > 1e3 * np.abs(residuals).max()
+    check_that_it_is_the_loop(x, loop, other, rounding=1e-11)
 
 
 def growth(joint: ElasticJoint, delay: int, rate: float = 5.0) -> float:

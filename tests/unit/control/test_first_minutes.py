@@ -14,16 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from robot_cases import load
 
-from hsp_control import (
-    Circle,
-    Controller,
-    FramePose,
-    FunctionCost,
-    JointCentering,
-    Limits,
-    TargetPosture,
-    simulate,
-)
+import hsp_control as hsp
 from hsp_control.cli.main import main
 from hsp_control.common.exceptions import ConfigurationError, ControllerError
 from hsp_control.control.first_state import (
@@ -40,8 +31,8 @@ from hsp_control.control.first_state import REST as REST_SPEED
 REST = np.zeros(7)
 
 
-def holding(**options: Any) -> Controller:
-    return Controller(panda(), [track()], limits=None, **options)
+def holding(**options: Any) -> hsp.Controller:
+    return hsp.Controller(panda(), [track()], limits=None, **options)
 
 
 # --- degrees ------------------------------------------------------------------------
@@ -60,7 +51,7 @@ def test_degrees_are_asked_about_at_the_first_state_and_after_a_restart() -> Non
     with pytest.raises(ConfigurationError, match=message):
         holding(start=home).compute(panda().state(0.0, degrees, REST))
     with pytest.raises(ConfigurationError, match=message):
-        simulate(law, degrees, duration=0.01, control_period=0.001)
+        hsp.simulate(law, degrees, duration=0.01, control_period=0.001)
     before = contents(law.compute(0.0, home, REST))
     law.compute(0.0, degrees, REST)  # later states are not looked at
     law.restart()
@@ -131,28 +122,11 @@ FIRST_EFFORT = (
 )
 
 
-@pytest.mark.parametrize("period", [None, 0.001])
-def test_a_simulation_warns_of_its_first_effort(period: float | None) -> None:
-    circle = Circle(radius=0.1, angular_rate=2.0)
-    how: dict[str, Any] = {"duration": 0.01, "control_period": period}
-
-    def law(blend: float | None) -> Controller:
-        hand = FramePose("panda_tcp", circle, blend=blend)
-        return Controller(panda(), [hand], JointCentering())
-
-    with pytest.warns(StartWarning, match="^" + FIRST_EFFORT) as said:
-        simulate(law(None), panda().home(), **how)
-    assert len(said) == 1
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        simulate(law(1.0), panda().home(), **how)
-
-
 def test_a_loop_of_ones_own_is_told_once_when_it_sends() -> None:
     """What is only computed moves nothing; a restart is another start."""
-    circle = Circle(radius=0.1, angular_rate=2.0)
-    hand = FramePose("panda_tcp", circle)
-    law = Controller(panda(), [hand], JointCentering(), limits=None)
+    circle = hsp.Circle(radius=0.1, angular_rate=2.0)
+    hand = hsp.FramePose("panda_tcp", circle)
+    law = hsp.Controller(panda(), [hand], hsp.JointCentering(), limits=None)
     noise = np.full(7, 0.9 * REST_SPEED)
 
     def send(v: np.ndarray) -> None:
@@ -196,30 +170,6 @@ def test_the_commands_warn_of_the_first_effort(
 
 # --- efforts that are slower than gravity -------------------------------------------
 
-SLOW = (
-    r"the effort of joint 'panda_joint2' may change by 10 N·m/s, but gravity by "
-    r"70\.6 N·m/s at its speed limit of 2\.17 rad/s: the robot may fall, and pass its "
-    r"limits; give more limits\.effort_rate, or less limits\.velocity$"
-)
-
-
-def test_a_simulation_warns_of_efforts_slower_than_gravity() -> None:
-    home = panda().home()
-    how: dict[str, Any] = {"duration": 0.01, "control_period": 0.001}
-
-    def law(limits: Limits | None) -> Controller:
-        return Controller(panda(), [FramePose("panda_tcp")], limits=limits, start=home)
-
-    with pytest.warns(StartWarning, match="^" + SLOW):
-        simulate(law(Limits(effort_rate=10.0)), home, **how)
-    for enough in (None, Limits(), Limits(effort_rate=10.0, velocity=0.05)):
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            simulate(law(enough), home, **how)
-    with warnings.catch_warnings():  # without a period efforts have no rate
-        warnings.simplefilter("error")
-        simulate(law(Limits(effort_rate=10.0)), home, duration=0.01)
-
 
 @given(seed=st.integers(0, 2**32 - 1))
 def test_what_gravity_may_need_is_what_it_changes_by(seed: int) -> None:
@@ -232,13 +182,13 @@ def test_what_gravity_may_need_is_what_it_changes_by(seed: int) -> None:
         turned = [robot.integrate(q, a * np.eye(7)[i]) for a in angles]
         tau = [robot.inverse_dynamics(each, rest, rest)[i] for each in turned]
         needed[i] = np.abs(np.diff(tau)).max() / angles[1]
-    limits = Limits(velocity=1.0, effort_rate=1.001 * needed.max())
-    placed = Controller(robot, [track()], limits=limits, start=robot.home()).limits
+    limits = hsp.Limits(velocity=1.0, effort_rate=1.001 * needed.max())
+    placed = hsp.Controller(robot, [track()], limits=limits, start=robot.home()).limits
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         warn_of_slow_efforts(robot, q, placed)
-    limits = Limits(velocity=1.0, effort_rate=0.999 * needed.max())
-    placed = Controller(robot, [track()], limits=limits, start=robot.home()).limits
+    limits = hsp.Limits(velocity=1.0, effort_rate=0.999 * needed.max())
+    placed = hsp.Controller(robot, [track()], limits=limits, start=robot.home()).limits
     with pytest.warns(StartWarning):
         warn_of_slow_efforts(robot, q, placed)
 
@@ -257,11 +207,8 @@ CALLS = (
     [
         lambda law, s: law.compute(s.t, s.q, s.v),
         lambda law, s: law.flow(s.t, s.q),
-        lambda law, s: law.stack(s),
-        lambda law, s: law.restart(),
         lambda law, s: law.at(1.0).null_space_gain(3.0),
     ],
-    ids=["compute", "flow", "stack", "restart", "change"],
 )
 def test_a_field_that_calls_its_own_controller_is_told(call: Any) -> None:
     armed = False
@@ -271,7 +218,7 @@ def test_a_field_that_calls_its_own_controller_is_told(call: Any) -> None:
             call(law, state)
         return float(state.q @ state.q)
 
-    law = holding(field=FunctionCost(cost))
+    law = holding(field=hsp.FunctionCost(cost))
     t, q, v = states(1)[0]
     before = contents(law.compute(t, q, v))
     for form in ((t, q, v), (panda().state(t, q, v),)):
@@ -285,7 +232,7 @@ def test_a_field_that_calls_its_own_controller_is_told(call: Any) -> None:
 def test_a_field_may_call_another_controller() -> None:
     other = holding()
     law = holding(
-        field=FunctionCost(lambda s: float(other.compute(s.t, s.q, s.v).tau[0]))
+        field=hsp.FunctionCost(lambda s: float(other.compute(s.t, s.q, s.v).tau[0]))
     )
     assert np.isfinite(law.compute(*states(1)[0]).tau).all()
 
@@ -300,7 +247,7 @@ def test_another_thread_waits() -> None:
             go.wait(10.0)
         return float(state.q @ state.q)
 
-    law = holding(field=TargetPosture("home") + FunctionCost(cost))
+    law = holding(field=hsp.TargetPosture("home") + hsp.FunctionCost(cost))
     first, second = states(2)
     expected = contents(law.compute(*second))
     found: list[Any] = []

@@ -16,30 +16,16 @@ from controller_cases import (
     states,
     track,
 )
-from numpy.typing import NDArray
+from runs import continuous
 
-from hsp_control import (
-    Circle,
-    Controller,
-    FramePosition,
-    Hold,
-    Robot,
-    RobotState,
-    TargetPosture,
-    simulate,
-)
-from hsp_control.common.exceptions import (
-    ControllerError,
-)
+import hsp_control as hsp
+from hsp_control.common.arrays import Array
 from hsp_control.law import CONSTANT
 from hsp_control.null_space.fields import FunctionField
 from hsp_control.null_space.metrics import Metric, MetricSample
-from hsp_control.robot.integrators import Dop853
-
-Array = NDArray[np.float64]
 
 
-def swaying_posture(state: RobotState) -> Array:
+def swaying_posture(state: hsp.RobotState) -> Array:
     """A field that moves in time: the joints follow sines about the home posture."""
     away = panda().home() - state.q
     return 2.0 * away + np.sin(state.t + np.arange(7.0))
@@ -51,7 +37,7 @@ def test_flow_meets_the_task_and_follows_the_field(kind: str) -> None:
     metric = METRICS[kind](7)
     field = FunctionField(swaying_posture)
     tasks = [track(), hold_orientation()]
-    controller = Controller(
+    controller = hsp.Controller(
         panda(), tasks, field, metric=metric, singularity_threshold=EXACT
     )
     for t, q, _ in states(3, seed=5):
@@ -76,7 +62,7 @@ def test_robot_becomes_the_flow(kind: str) -> None:
 
     Started off the path and moving: exp(-20 · 2) = 4e-18 is left of both errors.
     """
-    controller = Controller(
+    controller = hsp.Controller(
         panda(),
         [track()],
         FunctionField(swaying_posture),
@@ -84,14 +70,8 @@ def test_robot_becomes_the_flow(kind: str) -> None:
         null_space_gain=20.0,
         singularity_threshold=EXACT,
     )
-    rollout = simulate(
-        controller,
-        panda().home(),
-        0.2 * np.ones(7),
-        duration=2.0,
-        log_period=0.25,
-        integrator=Dop853(rtol=1e-10, atol=1e-10),
-    )
+    v0 = 0.2 * np.ones(7)
+    rollout = continuous(controller, panda().home(), v0, duration=2.0, log_period=0.25)
     gaps = [
         np.abs(v - controller.flow(t, q)).max()
         for t, q, v in zip(rollout.t, rollout.q, rollout.v, strict=True)
@@ -104,38 +84,14 @@ def test_robot_becomes_the_flow(kind: str) -> None:
     assert np.abs(rollout.v[-1]).max() > 0.1
 
 
-def test_a_start_on_the_flow_has_no_transient() -> None:
-    """v0 = flow(0, q0) from a point of the path: e and e_N are zero from the start."""
-    field = FunctionField(swaying_posture)
-    home = panda().home()
-    start = panda().state(0.0, home, np.zeros(7)).position(TCP).copy()
-    path = Circle(
-        0.1, 2.0, start - np.array([0.1, 0.0, 0.0]), axes=[[1, 0, 0], [0, 0, 1]]
-    )
-    task = FramePosition(TCP, path, gains=GAINS)
-    controller = Controller(panda(), [task], field, singularity_threshold=EXACT)
-    rollout = simulate(
-        controller,
-        home,
-        controller.flow(0.0, home),
-        duration=1.0,
-        log_period=0.1,
-        integrator=Dop853(rtol=1e-10, atol=1e-10),
-    )
-    for t, q, v in zip(rollout.t, rollout.q, rollout.v, strict=True):
-        out = controller.compute(panda().state(t, q, v))
-        np.testing.assert_allclose(out.task.error, 0.0, rtol=0, atol=1e-9)
-        np.testing.assert_allclose(out.null_space_error, 0.0, rtol=0, atol=1e-8)
-
-
 def test_hold_still() -> None:
     """A robot at rest at its posture and its point stays there: a = 0, tau = N."""
     home = panda().home()
     point = panda().state(0.0, home, np.zeros(7)).position(TCP).copy()
-    task = FramePosition(TCP, Hold(point), gains=GAINS)
-    field = TargetPosture(home)
+    task = hsp.FramePosition(TCP, hsp.Hold(point), gains=GAINS)
+    field = hsp.TargetPosture(home)
     for kind in METRICS:
-        controller = Controller(panda(), [task], field, metric=METRICS[kind](7))
+        controller = hsp.Controller(panda(), [task], field, metric=METRICS[kind](7))
         state = panda().state(0.0, home, np.zeros(7))
         out = controller.compute(state)
         np.testing.assert_allclose(out.acceleration, 0.0, rtol=0, atol=1e-12)
@@ -149,20 +105,13 @@ def test_constant_form_is_asked_for_no_rate() -> None:
     class Growing(Metric):
         form: ClassVar[int] = CONSTANT
 
-        def evaluate(self, state: RobotState, out: MetricSample) -> MetricSample:
+        def evaluate(self, state: hsp.RobotState, out: MetricSample) -> MetricSample:
             out.W_dot[:] = np.nan  # nobody may read it
             return out
 
-    controller = Controller(panda(), [track()], metric=Growing())
-    plain = Controller(panda(), [track()])
+    controller = hsp.Controller(panda(), [track()], metric=Growing())
+    plain = hsp.Controller(panda(), [track()])
     state = panda().state(*states(1)[0])
     np.testing.assert_allclose(
         controller.compute(state).tau, plain.compute(state).tau, rtol=1e-13, atol=1e-12
     )
-
-
-def test_refuses_the_state_of_another_robot_object() -> None:
-    other = Robot.load("panda")
-    state = other.state(0.0, other.home(), np.zeros(7))
-    with pytest.raises(ControllerError, match="the state is of another robot object"):
-        Controller(panda(), [track()]).compute(state)

@@ -1,12 +1,13 @@
 """Force feedback: the felt force goes to the command at the rate K_i, within bounds."""
 
-from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
+from controller_cases import panda
+from runs import held
 
-from hsp_control import Controller, FrameOrientation, Gains, Limits, Robot, simulate
+from hsp_control import Controller, FrameOrientation, Gains, Limits
 from hsp_control.common.exceptions import CompensationError
 from hsp_control.constraints.contacts import CommandedForce, PointContact
 from hsp_control.control.compensation import (
@@ -15,18 +16,12 @@ from hsp_control.control.compensation import (
     ForceFeedback,
     MomentumObserver,
 )
-from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.plants import ContactPlant, Push, RigidContact
 from hsp_control.trajectories import Schedule
 
 TIP, H = "panda_tcp", 1e-3
 OBSERVER = MomentumObserver(100.0, cancel=False)
-
-
-@cache
-def panda() -> Robot:
-    return Robot.load("panda")
 
 
 def pressing(
@@ -47,16 +42,9 @@ def run(
     """Hold a hand against a rigid plane while something else pushes it down."""
     push = Push(TIP, force=(0.0, 0.0, unknown), start=0.0, duration=10.0)
     plant = ContactPlant(panda(), [RigidContact(TIP, "point")], pushes=[push])
-    return simulate(
-        controller,
-        panda().home(),
-        duration=options.get("duration", 0.4),
-        control_period=H,
-        log_period=0.01,
-        integrator=Rk4(H),
-        plant=plant,
-        compensation=compensation,
-    )
+    duration = options.get("duration", 0.4)
+    how = {"duration": duration, "log_period": 0.01, "plant": plant}
+    return held(controller, panda().home(), compensation=compensation, **how)
 
 
 def test_the_error_decays_at_its_rate() -> None:
@@ -110,15 +98,8 @@ def test_an_estimate_needs_no_sensor() -> None:
     log = run(pressing(), both, 0.0)
     assert log["contact.press.estimated"][-1] == pytest.approx(20.0, abs=0.1)
     assert np.abs(log["observer.disturbance"][-1]).max() < 0.1
-    air = simulate(
-        pressing(),
-        panda().home(),
-        duration=0.1,
-        control_period=H,
-        log_period=0.01,
-        integrator=Rk4(H),
-        compensation=both,
-    )
+    how: dict[str, Any] = {"duration": 0.1, "log_period": 0.01}
+    air = held(pressing(), panda().home(), compensation=both, **how)
     assert air["contact.press.estimated"][-1] == pytest.approx(0.0, abs=0.5)
 
 
@@ -129,36 +110,36 @@ def test_a_new_run_begins_anew() -> None:
     np.testing.assert_array_equal(first.tau, second.tau)
 
 
-REFUSED: dict[str, tuple[Controller, Compensation, str]] = {
-    "no force": (
-        pressing(None),
-        Compensation(force_feedback=ForceFeedback()),
-        "force_feedback: no contact has a commanded force",
-    ),
-    "unknown": (
-        pressing(),
-        Compensation(force_feedback=ForceFeedback(contacts=["pres"])),
-        "no contact 'pres' with a commanded force; did you mean 'press'",
-    ),
-    "no observer": (
-        pressing(),
-        Compensation(force_feedback=ForceFeedback(force="estimated")),
-        "force_feedback.force: 'estimated' needs compensation.momentum_observer",
-    ),
-    "cancelled": (
-        pressing(),
-        Compensation(momentum_observer=MomentumObserver(50.0, clip=5.0)),
-        "momentum_observer: the observer would cancel the force at contact 'press'",
-    ),
-}
-
-
-@pytest.mark.parametrize("case", REFUSED)
-def test_what_cannot_be_fed_back(case: str) -> None:
-    controller, compensation, message = REFUSED[case]
-    with pytest.raises(CompensationError) as raised:
-        Command(controller, compensation)
-    assert message in str(raised.value)
+@pytest.mark.parametrize(
+    ("newtons", "parts", "message"),
+    [
+        (
+            None,
+            {"force_feedback": ForceFeedback()},
+            "force_feedback: no contact has a commanded force",
+        ),
+        (
+            20.0,
+            {"force_feedback": ForceFeedback(contacts=["pres"])},
+            "no contact 'pres' with a commanded force; did you mean 'press'",
+        ),
+        (
+            20.0,
+            {"force_feedback": ForceFeedback(force="estimated")},
+            "force_feedback.force: 'estimated' needs compensation.momentum_observer",
+        ),
+        (
+            20.0,
+            {"momentum_observer": MomentumObserver(50.0, clip=5.0)},
+            "momentum_observer: the observer would cancel the force at contact 'press'",
+        ),
+    ],
+)
+def test_what_cannot_be_fed_back(
+    newtons: float | None, parts: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(CompensationError, match=message):
+        Command(pressing(newtons), Compensation(**parts))
 
 
 def test_a_contact_without_a_sensor() -> None:

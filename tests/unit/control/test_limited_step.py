@@ -7,23 +7,18 @@ import limit_oracle
 import numpy as np
 import pytest
 import quadprog
+from controller_cases import panda
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 import hsp_control as hsp
+from hsp_control.common.arrays import Array
 from hsp_control.common.kernels import PLAIN
 from hsp_control.constraints.limits import Scaled
 from hsp_control.control.actuation import Delivered, Status
 from hsp_control.control.actuation.limited_step import Barriers
 
-Array = NDArray[np.float64]
 seeds = st.integers(0, 2**32 - 1)
-
-
-@cache
-def panda() -> hsp.Robot:
-    return hsp.Robot.load("panda")
 
 
 def arm(strength: float = 0.5, **options: Any) -> hsp.Controller:

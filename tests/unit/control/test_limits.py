@@ -1,66 +1,44 @@
 """Limits: the step is the law's where none binds, and keeps them where one does."""
 
-from dataclasses import replace
-from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
+from controller_cases import panda
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
+from runs import held
 
-from hsp_control import (
-    Circle,
-    Controller,
-    FramePosition,
-    Gains,
-    Hold,
-    JointCentering,
-    JointPosture,
-    Limits,
-    Obstacle,
-    ObstacleClearance,
-    Robot,
-    Rollout,
-    Sphere,
-    simulate,
-)
+import hsp_control as hsp
+from hsp_control.common.arrays import Array
 from hsp_control.constraints.limits import ObstacleDistance, RobotLimits
 from hsp_control.constraints.limits.acceleration_bounds import acceleration_bounds
 from hsp_control.control.actuation import Status
 from hsp_control.control.actuation.held_effort import HeldEffort
 from hsp_control.geometry import Scene
 from hsp_control.geometry.start import Start
-from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants import Push, RigidBodyPlant
 from hsp_control.trajectories import Lissajous
 
-Array = NDArray[np.float64]
 seeds = st.integers(0, 2**32 - 1)
 
 
-@cache
-def panda() -> Robot:
-    return Robot.load("panda")
-
-
-def hand(frequency: float = 10.0, **circle: Any) -> FramePosition:
+def hand(frequency: float = 10.0, **circle: Any) -> hsp.FramePosition:
     options = {"angular_rate": 2.0, "normal": [0.0, 0.0, 1.0], **circle}
-    path = Circle(0.15, center=[0.45, 0.0, 0.45], **options)
-    gains = Gains(natural_frequency=frequency)
-    return FramePosition("panda_tcp", path, gains=gains, name="hand")
+    path = hsp.Circle(0.15, center=[0.45, 0.0, 0.45], **options)
+    gains = hsp.Gains(natural_frequency=frequency)
+    return hsp.FramePosition("panda_tcp", path, gains=gains, name="hand")
 
 
 # --- the bounds ----------------------------------------------------------------------
 
 
-def of(robot: Robot, **options: Any) -> RobotLimits:
+def of(robot: hsp.Robot, **options: Any) -> RobotLimits:
     """Return limits as numbers of a robot."""
-    return Limits(**options).placed(at_home(robot))
+    return hsp.Limits(**options).placed(at_home(robot))
 
 
-def at_home(robot: Robot, *scene: Obstacle) -> Start:
+def at_home(robot: hsp.Robot, *scene: hsp.Obstacle) -> Start:
     return Start(robot.state(0.0, robot.home(), np.zeros(robot.nv)), Scene(scene))
 
 
@@ -203,10 +181,10 @@ def test_without_an_active_limit_the_qp_gives_the_law(seed: int) -> None:
     """Wide limits: the step is the law's, to the last bit, over random states."""
     robot, rng = panda(), np.random.default_rng(seed)
     q, v = robot.random_configuration(rng), 0.3 * rng.standard_normal(7)
-    field = JointCentering()
-    free = Controller(robot, [hand()], field, limits=None)
-    wide = Limits(effort=1e6, velocity=None, position=None)
-    limited = Controller(robot, [hand()], field, limits=wide)
+    field = hsp.JointCentering()
+    free = hsp.Controller(robot, [hand()], field, limits=None)
+    wide = hsp.Limits(effort=1e6, velocity=None, position=None)
+    limited = hsp.Controller(robot, [hand()], field, limits=wide)
     state = robot.state(0.3, q, v)
     out, same = free.compute(state), limited.compute(state)
     assert same.status == Status.EXACT
@@ -216,9 +194,11 @@ def test_without_an_active_limit_the_qp_gives_the_law(seed: int) -> None:
 def test_a_controller_keeps_the_robot_s_own_limits_unless_told_otherwise() -> None:
     """Also an effort that is asked for beside a singularity."""
     robot = panda()
-    far = FramePosition("panda_tcp", Hold([3.0, 0.0, 0.5]), largest_error="none")
-    own = Controller(robot, [far])
-    free = Controller(robot, [far], limits=None)
+    far = hsp.FramePosition(
+        "panda_tcp", hsp.Hold([3.0, 0.0, 0.5]), largest_error="none"
+    )
+    own = hsp.Controller(robot, [far])
+    free = hsp.Controller(robot, [far], limits=None)
     most = robot.model.effortLimit
     assert own.limits is not None
     assert free.limits is None
@@ -228,59 +208,10 @@ def test_a_controller_keeps_the_robot_s_own_limits_unless_told_otherwise() -> No
     assert (np.abs(free.compute(*there).tau) > most).any()
 
 
-def test_null_space_gives_way_first_then_the_lower_task() -> None:
-    """One effort limit that binds: what is left exact shows the order."""
-    robot = panda()
-    q, v = robot.home(), np.zeros(7)
-    posture = JointPosture(
-        robot.integrate(q, np.full(7, 0.5)),
-        gains=Gains(natural_frequency=10.0),
-        joints=["panda_joint1", "panda_joint2"],
-        name="posture",
-        priority=2,
-    )
-    state = robot.state(0.3, q, v)
-    # Without an error: then what is below the hand costs least.
-    kept = Hold(state.position("panda_tcp").copy())
-    tasks = [replace(hand(), trajectory=kept), posture]
-    field = 20.0 * JointCentering()
-    free = Controller(robot, tasks, field, limits=None)
-    wanted = free.compute(state)
-    tau, a = wanted.tau.copy(), wanted.acceleration.copy()
-    joint = int(np.abs(tau - state.nonlinear_effects).argmax())
-    for shrink, exact in ((0.999, 2), (0.9, 1)):
-        effort = np.full(7, 1e3)
-        still = state.nonlinear_effects[joint]
-        effort[joint] = abs(still + shrink * (tau[joint] - still))
-        limits = Limits(effort=effort, velocity=None, position=None)
-        controller = Controller(robot, tasks, field, limits=limits)
-        out = controller.compute(state)
-        assert out.status == Status.LIMITED
-        assert abs(out.tau[joint]) <= effort[joint]
-        given_up = out.task.jacobian @ (out.acceleration - a)
-        # What the costs' ratios, 1e-4 a level, leave of strict order.
-        scale = np.abs(out.acceleration - a).max()
-        if exact >= 1:
-            assert np.abs(given_up[:3]).max() < 2e-3 * scale
-        consistent = state.mass_matrix @ out.acceleration + state.nonlinear_effects
-        np.testing.assert_allclose(out.tau, consistent, rtol=0, atol=1e-8)
-
-
 # --- along motions -------------------------------------------------------------------
 
 
-def run(controller: Controller, q0: Array, duration: float = 1.5) -> Rollout:
-    return simulate(
-        controller,
-        q0,
-        duration=duration,
-        control_period=1e-3,
-        log_period=1e-3,
-        integrator=Rk4(1e-3),
-    )
-
-
-def violations(rollout: Rollout, limits: RobotLimits) -> dict[str, float]:
+def violations(rollout: hsp.Rollout, limits: RobotLimits) -> dict[str, float]:
     """Return the worst excess over each limit, in the log alone."""
     q, v, tau = rollout["q"], rollout["v"], rollout["tau"]
     rates = np.abs(np.diff(tau, axis=0)) / 1e-3
@@ -292,24 +223,24 @@ def violations(rollout: Rollout, limits: RobotLimits) -> dict[str, float]:
     }
 
 
-def limit_rich(seed: int) -> tuple[Controller, RobotLimits, Array]:
+def limit_rich(seed: int) -> tuple[hsp.Controller, RobotLimits, Array]:
     """Return a random controller whose limits become active, its limits and a start."""
     robot, rng = panda(), np.random.default_rng(seed)
     lower, upper = robot.position_limits()
     q0 = 0.5 * (lower + upper) + 0.35 * (upper - lower) * rng.uniform(-1.0, 1.0, 7)
     own = of(robot)
-    limits = Limits(
+    limits = hsp.Limits(
         effort=own.effort * rng.uniform(0.7, 1.0),
         effort_rate=1000.0,
         velocity=own.velocity * rng.uniform(0.2, 0.5),
     )
     start = robot.state(0.0, q0, np.zeros(7)).position("panda_tcp")
     center = start + rng.normal(0.0, 0.4, 3)
-    path = Circle(0.2, rng.uniform(1, 6), center, normal=rng.normal(size=3))
-    task = FramePosition(
-        "panda_tcp", path, gains=Gains(natural_frequency=rng.uniform(5, 12))
+    path = hsp.Circle(0.2, rng.uniform(1, 6), center, normal=rng.normal(size=3))
+    task = hsp.FramePosition(
+        "panda_tcp", path, gains=hsp.Gains(natural_frequency=rng.uniform(5, 12))
     )
-    controller = Controller(robot, [task], JointCentering(), limits=limits)
+    controller = hsp.Controller(robot, [task], hsp.JointCentering(), limits=limits)
     assert controller.limits is not None
     return controller, controller.limits, q0
 
@@ -319,7 +250,7 @@ def limit_rich(seed: int) -> tuple[Controller, RobotLimits, Array]:
 def test_no_limit_is_violated(seed: int) -> None:
     """Limit-rich rollouts; benchmarks/limit_rollouts.py runs a thousand of them."""
     controller, limits, q0 = limit_rich(seed)
-    rollout = run(controller, q0, 0.8)
+    rollout = held(controller, q0, duration=0.8)
     assert rollout.meta["status"] == "completed"
     assert (rollout["status"] == Status.LIMITED).any()  # limits did bind
     worst = violations(rollout, limits)
@@ -332,14 +263,7 @@ def test_no_limit_is_violated(seed: int) -> None:
 def test_speed_limits_are_kept_at_any_period(seed: int, period: float) -> None:
     """Seeds that exceed them by 0.6 and 2.7 % with a constant margin."""
     controller, limits, q0 = limit_rich(seed)
-    rollout = simulate(
-        controller,
-        q0,
-        duration=0.8,
-        control_period=period,
-        log_period=period,
-        integrator=Rk4(1e-3),
-    )
+    rollout = held(controller, q0, period, duration=0.8)
     used = np.abs(rollout["v"]) / limits.velocity
     assert used.max() <= 1.0
     assert used.max() > 0.9
@@ -357,17 +281,13 @@ def test_a_load_that_the_model_lacks_drives_no_joint_beyond_its_limit(
     beyond, q0 = robot.home(), robot.home()
     beyond[1], q0[1] = upper[1] + 0.2, upper[1] - 0.5
     beyond[3] = q0[3] = -0.5
-    task = JointPosture(beyond, gains=Gains(natural_frequency=6.0), name="beyond")
-    load = Push("panda_tcp", (0.0, 0.0, -30.0), duration=10.0)
-    rollout = simulate(
-        Controller(robot, [task]),
-        q0,
-        duration=2.5,
-        control_period=period,
-        log_period=period,
-        integrator=Rk4(1e-3),
-        plant=RigidBodyPlant(robot, [load]),
+    task = hsp.JointPosture(
+        beyond, gains=hsp.Gains(natural_frequency=6.0), name="beyond"
     )
+    load = Push("panda_tcp", (0.0, 0.0, -30.0), duration=10.0)
+    plant = RigidBodyPlant(robot, [load])
+    law = hsp.Controller(robot, [task])
+    rollout = held(law, q0, period, duration=2.5, plant=plant)
     joint = rollout["q"][:, 1]
     assert joint.max() < upper[1]
     assert joint[-1] == pytest.approx(upper[1] - 0.005, abs=1e-5)
@@ -402,31 +322,14 @@ def test_the_error_of_the_acceleration_is_what_is_observed() -> None:
     np.testing.assert_allclose(held.error, [8.0, 8.0], rtol=1e-9)
 
 
-@pytest.mark.slow
-def test_a_joint_limit_is_approached_and_not_crossed() -> None:
-    """A posture beyond the limit: the joint comes to rest before it, and stays."""
-    robot = panda()
-    _, upper = robot.position_limits()
-    beyond = robot.home()
-    beyond[3] = upper[3] + 0.5
-    task = JointPosture(beyond, gains=Gains(natural_frequency=6.0), name="beyond")
-    limits = Limits()
-    rollout = run(Controller(robot, [task], limits=limits), robot.home(), 2.5)
-    joint = rollout["q"][:, 3]
-    assert joint.max() <= upper[3]
-    assert joint[-1] > upper[3] - 0.01  # as near as the margin lets it
-    assert np.abs(rollout["v"][-200:, 3]).max() < 1e-3
-    assert np.abs(np.diff(rollout["tau"][-200:, 3])).max() < 1e-2
-
-
 def test_contradiction_is_relaxed_and_told() -> None:
     """A joint that its motor cannot stop before the limit: least violation."""
     robot = panda()
     q, v = robot.home(), np.zeros(7)
     _, upper = robot.position_limits()
     q[3], v[3] = upper[3] - 0.02, 2.0
-    limits = Limits(effort=1.0)
-    out = Controller(robot, [hand()], limits=limits).compute(robot.state(0.0, q, v))
+    limits = hsp.Limits(effort=1.0)
+    out = hsp.Controller(robot, [hand()], limits=limits).compute(robot.state(0.0, q, v))
     assert np.isfinite(out.tau).all()
     assert (np.abs(out.tau) <= 1.0).all()
     assert out.status > Status.LIMITED
@@ -435,8 +338,8 @@ def test_contradiction_is_relaxed_and_told() -> None:
 
 def test_effort_rate_needs_to_know_what_went_out() -> None:
     robot = panda()
-    limits = Limits(effort_rate=1000.0)
-    controller = Controller(robot, [hand()], limits=limits)
+    limits = hsp.Limits(effort_rate=1000.0)
+    controller = hsp.Controller(robot, [hand()], limits=limits)
     state = robot.state(0.0, robot.home(), np.zeros(7))
     before = state.nonlinear_effects.copy()
     controller.applied(before, 1e-3)
@@ -446,37 +349,31 @@ def test_effort_rate_needs_to_know_what_went_out() -> None:
     assert np.abs(controller.compute(state).tau - before).max() > 1.0
 
 
-def test_hold_with_limits_is_still_the_paper() -> None:
-    """A still target within all limits: not one step is limited."""
-    robot = panda()
-    here = robot.state(0.0, robot.home(), np.zeros(7)).position("panda_tcp").copy()
-    task = FramePosition("panda_tcp", Hold(here), gains=Gains(natural_frequency=10.0))
-    rollout = run(Controller(robot, [task], limits=Limits()), robot.home(), 0.2)
-    assert not rollout["status"].any()
-
-
 # --- distances -----------------------------------------------------------------------
 
 
-def swinging() -> Obstacle:
+def swinging() -> hsp.Obstacle:
     """Return a ball that comes into the arm's elbow and goes again."""
     robot = panda()
     elbow = robot.state(0.0, robot.home(), np.zeros(7)).position("panda_link4")
     center = elbow + np.array([0.0, 0.35, 0.0])
     path = Lissajous([0.0, 0.28, 0.0], [1.0, 2.0, 1.0], [0.0, 3.14, 0.0], center)
-    return Obstacle("ball", Sphere(0.08), path)
+    return hsp.Obstacle("ball", hsp.Sphere(0.08), path)
 
 
-def elbow(limits: Limits | None) -> Controller:
+def elbow(limits: hsp.Limits | None) -> hsp.Controller:
     robot = panda()
     here = robot.state(0.0, robot.home(), np.zeros(7)).position("panda_tcp").copy()
-    task = FramePosition(
-        "panda_tcp", Hold(here), gains=Gains(natural_frequency=10.0), name="hand"
+    task = hsp.FramePosition(
+        "panda_tcp",
+        hsp.Hold(here),
+        gains=hsp.Gains(natural_frequency=10.0),
+        name="hand",
     )
-    return Controller(
+    return hsp.Controller(
         robot,
         [task],
-        JointCentering(),
+        hsp.JointCentering(),
         null_space_gain=6.0,
         limits=limits,
         scene=[swinging()],
@@ -487,12 +384,13 @@ def elbow(limits: Limits | None) -> Controller:
 def test_things_stay_apart() -> None:
     """A ball swings into the elbow: without the limit it hits, with it it does not."""
     robot = panda()
-    clearance = ObstacleClearance([swinging()]).placed(at_home(robot))
+    clearance = hsp.ObstacleClearance([swinging()]).placed(at_home(robot))
     proximity = clearance.proximity(at_home(robot).state)
     least: dict[bool, float] = {}
     for limited in (False, True):
-        limits = Limits(distances=[ObstacleDistance(0.02)])
-        rollout = run(elbow(limits if limited else None), robot.home(), 1.6)
+        limits = hsp.Limits(distances=[ObstacleDistance(0.02)])
+        law = elbow(limits if limited else None)
+        rollout = held(law, robot.home(), duration=1.6)
         least[limited] = min(
             float(proximity.measure(robot.state(t, q, v)).min())
             for t, q, v in zip(rollout.t, rollout["q"], rollout["v"], strict=True)

@@ -6,17 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hsp_control import (
-    Controller,
-    FramePosition,
-    Gains,
-    Hold,
-    NullSpaceField,
-    Robot,
-    TargetPosture,
-    load_experiment,
-    simulate,
-)
+import hsp_control as hsp
 from hsp_control.control.compensation import (
     Compensation,
     IntegralAction,
@@ -28,32 +18,29 @@ from hsp_control.control.compensation.loaded_loop import LoadedLoop, loaded_loop
 from hsp_control.control.compensation.null_space_rates import field_slope
 from hsp_control.null_space.fields import FunctionField
 from hsp_control.robot.integrators import Rk4
-from hsp_control.simulation.plants import (
-    ImperfectPlant,
-    IntegratedPlant,
-    RigidBodyPlant,
-)
 from hsp_control.simulation.plants.model_changes import Inertias, Payload, changed
 from hsp_control.simulation.plants.sensors import SensorDelay
 
-ARM = Robot.load("panda", gravity=[0.0, 0.0, 0.0])
+ARM = hsp.Robot.load("panda", gravity=[0.0, 0.0, 0.0])
 Q0 = np.array([0.0, -0.5, 0.1, -2.0, 0.2, 1.6, 0.7])
 H, MASS = 1e-3, 3.0
 
 
-def holding(field: NullSpaceField | None = None, frequency: float = 20.0) -> Controller:
+def holding(
+    field: hsp.NullSpaceField | None = None, frequency: float = 20.0
+) -> hsp.Controller:
     position = ARM.state(0.0, Q0, np.zeros(7)).position("panda_tcp")
-    gains = Gains(natural_frequency=frequency)
-    hand = FramePosition("panda_tcp", Hold(position), gains=gains, name="hand")
-    field = TargetPosture(Q0) if field is None else field
-    return Controller(ARM, [hand], field, null_space_gain=10.0, limits=None)
+    gains = hsp.Gains(natural_frequency=frequency)
+    hand = hsp.FramePosition("panda_tcp", hsp.Hold(position), gains=gains, name="hand")
+    field = hsp.TargetPosture(Q0) if field is None else field
+    return hsp.Controller(ARM, [hand], field, null_space_gain=10.0, limits=None)
 
 
-def loaded(times: float = 1.0) -> Robot:
+def loaded(times: float = 1.0) -> hsp.Robot:
     return changed(ARM, [Payload(frame="panda_hand", mass=times * MASS)])
 
 
-def whole(made: Controller, parts: Compensation, delay: int) -> LoadedLoop:
+def whole(made: hsp.Controller, parts: Compensation, delay: int) -> LoadedLoop:
     state = ARM.state(0.0, Q0, np.zeros(7))
     found = loaded_loop(made, state, loaded(), H, 0, delay, parts)
     assert found is not None
@@ -104,10 +91,13 @@ def test_the_robot_grows_and_decays_at_the_rate_of_the_linear_loop(case: str) ->
     edge = boundary(loop)
     start = ARM.integrate(Q0, 1e-6 * np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0, 0.0]))
     for times, grows in ((0.8 * edge, False), (1.25 * edge, True)):
-        plant = ImperfectPlant(
-            IntegratedPlant(RigidBodyPlant(loaded(times)), Rk4(H)), [SensorDelay(delay)]
+        plant = hsp.plants.ImperfectPlant(
+            hsp.plants.IntegratedPlant(
+                hsp.plants.RigidBodyPlant(loaded(times)), Rk4(H)
+            ),
+            [SensorDelay(delay)],
         )
-        log = simulate(
+        log = hsp.simulate(
             made, start, duration=6.0, control_period=H, log_period=0.01, plant=plant,
             compensation=parts,
         )  # fmt: skip
@@ -159,7 +149,7 @@ def test_what_is_told_is_the_boundary_and_the_advice_works() -> None:
 
 def test_with_the_model_s_bodies_it_is_the_loops_of_its_parts() -> None:
     """The spectrum of the whole is that of the task, and that of the null space."""
-    made = holding(3.0 * TargetPosture(Q0))
+    made = holding(3.0 * hsp.TargetPosture(Q0))
     parts = Compensation(integral_action=IntegralAction(5.0))
     loop = whole(made, parts, 2).with_part(0.0)
     state = ARM.state(0.0, Q0, np.zeros(7))
@@ -187,12 +177,12 @@ def test_configurations_with_a_payload_are_warned_of_it() -> None:
         "plant": {"type": "rigid_body", "payload": {"frame": "panda_hand", "mass": 2}},
         "simulation": {"duration": 0.02, "control_period": H},
     }
-    assert not load_experiment(document).rate_findings
+    assert not hsp.load_experiment(document).rate_findings
     heavier = "plant.payload.mass=3", "compensation.integral_action.rate=7"
-    (found,) = load_experiment(document, *heavier).rate_findings
+    (found,) = hsp.load_experiment(document, *heavier).rate_findings
     assert "it is 5.26 times as heavy at the tasks" in found.message
     driven = document | {"compensation": {}, "simulation": {"duration": 0.02}}
-    assert not load_experiment(driven, "plant.payload.mass=3").rate_findings
+    assert not hsp.load_experiment(driven, "plant.payload.mass=3").rate_findings
 
 
 def test_a_plant_that_is_much_lighter_is_no_less_than_nothing() -> None:

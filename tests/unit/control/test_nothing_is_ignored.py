@@ -6,12 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import hsp_control as hsp
+from hsp_control.common.arrays import Array
 from hsp_control.declaration import Part
-
-Array = NDArray[np.float64]
 
 BALL = hsp.Obstacle("ball", hsp.Sphere(0.1), hsp.Hold([0.6, 0.4, 0.6]))
 
@@ -59,48 +57,11 @@ def parts(waiting: list[Any]) -> list[object]:
 def test_no_attribute_can_be_assigned() -> None:
     """Of the controller and of all its parts; a new attribute cannot escape."""
     all_parts = everything(panda(limits=hsp.Limits()))
-    assert {"Controller", "FramePose", "Circle", "Gains", "JointCentering"} < {
-        type(part).__name__ for part in all_parts
-    }
-    assert {"Obstacle", "Sphere", "RobotLimits", "FieldSum"} < {
-        type(part).__name__ for part in all_parts
-    }
-    check_that_assignment_is_refused(all_parts)
-
-
-def test_no_attribute_of_an_experiment_can_be_assigned() -> None:
-    """Plant, sensors, drives, compensation, live loop, view: all are values."""
-    experiment = hsp.Experiment(
-        "panda",
-        [hsp.FramePose("panda_tcp", name="hand")],
-        hsp.JointCentering(),
-        plant=hsp.plants.RigidBody(
-            friction=hsp.plants.Friction(coulomb=0.1),
-            payload=hsp.plants.Payload("panda_hand", 0.5),
-            pushes=[hsp.plants.Push("panda_hand", [1, 0, 0])],
-            sensors=[hsp.plants.Encoder(1e-4), hsp.plants.SensorDelay(1)],
-            drives=[hsp.plants.EffortDelay(1), hsp.plants.EffortNoise(0.1)],
-        ),
-        compensation=hsp.compensation.Compensation(
-            predictor=hsp.compensation.Predictor(effort_delay=1),
-            start_up_ramp=hsp.compensation.StartUpRamp(0.2),
-        ),
-        simulation={"control_period": 0.001, "check_rate": False},
-        live=hsp.live.LiveSettings(),
-        view=hsp.config.ViewSettings(),
-    )
-    found = parts([experiment.scenario])
     assert {
-        *("Scenario", "RobotDescription", "InitialState", "SimulationSettings"),
-        *("RigidBody", "Friction", "Payload", "Push", "Encoder", "SensorDelay"),
-        *("EffortDelay", "EffortNoise", "Compensation", "Predictor", "StartUpRamp"),
-        *("LiveSettings", "ViewSettings"),
-    } < {type(part).__name__ for part in found}
-    check_that_assignment_is_refused([experiment, *found])
-
-
-def check_that_assignment_is_refused(parts: list[object]) -> None:
-    for part in parts:
+        *("Controller", "FramePose", "Circle", "Gains", "JointCentering"),
+        *("Obstacle", "Sphere", "RobotLimits", "FieldSum"),
+    } < {type(part).__name__ for part in all_parts}
+    for part in all_parts:
         names = public(part)
         assert names
         for name in [*names, "a_new_one"]:
@@ -120,37 +81,11 @@ def test_no_array_can_be_written_except_feedback() -> None:
 
 
 @pytest.mark.parametrize(
-    "convert",
-    [
-        list,
-        tuple,
-        lambda x: np.asarray(x, dtype=np.float32),
-        lambda x: np.stack([x, x], axis=1)[:, 0],
-        lambda x: np.broadcast_to(x, (len(x),)),
-        lambda x: np.asarray(x, dtype=">f8"),
-        lambda x: [np.float64(each) for each in x],
-    ],
-    ids=["list", "tuple", "float32", "strided", "read-only", "big-endian", "numbers"],
-)
-def test_any_array_will_do(convert: Any) -> None:
-    controller = panda()
-    q, v = controller.robot.home().round(3), np.full(7, 0.125)
-    plain = controller.compute(0.1, q.astype(np.float32).astype(float), v).tau
-    single = convert(q.astype(np.float32).astype(float))
-    np.testing.assert_array_equal(
-        controller.compute(0.1, single, convert(v)).tau, plain
-    )
-
-
-@pytest.mark.parametrize(
     ("t", "q", "v", "message"),
     [
         (0.0, np.zeros(6), np.zeros(7), "6"),
-        (0.0, np.zeros(7), np.zeros((7, 1)), r"\(7, 1\)"),
         (0.0, np.full(7, np.nan), np.zeros(7), "nan"),
-        (np.inf, np.zeros(7), np.zeros(7), "inf"),
         (0.0, np.zeros(7, dtype=complex), np.zeros(7), "complex"),
-        (0.0, "home", np.zeros(7), "home"),
         (0.0, ["a"] * 7, np.zeros(7), "'a'"),
         (0.0, None, np.zeros(7), "needs t, q and v"),
         (None, np.zeros(7), np.zeros(7), "time t is None"),
@@ -189,27 +124,6 @@ def test_an_offset_that_is_not_finite_is_never_delivered() -> None:
             np.zeros(7),
             modifier=lambda state, stack, a: (a, np.full(7, np.nan)),
         )
-
-
-def test_outputs_belong_to_the_caller() -> None:
-    controller = panda(limits=hsp.Limits())
-    q, v = controller.robot.home(), np.zeros(7)
-    first = controller.compute(0.0, q, v)
-    kept = [
-        first.tau,
-        first.acceleration,
-        first.null_space_error,
-        *first.task,
-        *first.field,
-    ]
-    copies = [array.copy() for array in kept]
-    second = controller.compute(0.7, q + 0.1, v + 0.2)
-    for array, copied in zip(kept, copies, strict=True):
-        np.testing.assert_array_equal(array, copied)
-    third = controller.compute(0.0, q, v, out=second)
-    assert third is second
-    for name in ("tau", "acceleration", "null_space_error"):
-        np.testing.assert_array_equal(getattr(third, name), getattr(first, name))
 
 
 def test_a_foreign_state_gives_the_same_effort() -> None:

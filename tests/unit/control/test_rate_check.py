@@ -7,7 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
+from carriage import carriage, check_that_it_is_the_loop
+from runs import held
 
+import hsp_control as hsp
 from hsp_control import (
     Controller,
     FramePosition,
@@ -20,13 +24,7 @@ from hsp_control import (
     simulate,
 )
 from hsp_control.cli.main import main
-from hsp_control.common.exceptions import (
-    HspControlError,
-    SimulationError,
-    UnstableRateError,
-)
 from hsp_control.control.compensation import (
-    Command,
     Compensation,
     IntegralAction,
     MomentumObserver,
@@ -117,13 +115,6 @@ def test_an_integral_is_stable_up_to_routh_where_the_rate_is_high() -> None:
         assert (loop.radius() < 1.0) is stable
 
 
-CARRIAGE = """<robot name="carriage"><link name="rail"/><link name="carriage">
-<inertial><mass value="2"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>
-</inertial></link><joint name="slide" type="prismatic"><parent link="rail"/>
-<child link="carriage"/><axis xyz="1 0 0"/>
-<limit lower="-10" upper="10" effort="1000" velocity="100"/></joint></robot>"""
-
-
 @pytest.mark.parametrize("heavy", [1.0, 3.0])
 @pytest.mark.parametrize(
     ("delays", "compensation"),
@@ -151,14 +142,8 @@ CARRIAGE = """<robot name="carriage"><link name="rail"/><link name="carriage">
 def test_the_linear_loop_is_the_chain_link_by_link(
     delays: tuple[int, int], compensation: dict[str, Any], heavy: float, tmp_path: Path
 ) -> None:
-    """A carriage on a rail *is* the linear mode, also one heavier than its model.
-
-    By Cayley and Hamilton its positions obey the recurrence of the transition's
-    characteristic polynomial, once what was there before the run has passed.
-    """
-    file = tmp_path / "carriage.urdf"
-    file.write_text(CARRIAGE)
-    robot = Robot.load(str(file))
+    """A carriage on a rail *is* the linear mode, also one heavier than its model."""
+    robot = carriage(tmp_path)
     h, frequency = 0.01, 12.0
     task = JointPosture(np.zeros(1), gains=Gains(natural_frequency=frequency))
     made, parts = Controller(robot, [task], limits=None), Compensation(**compensation)
@@ -175,15 +160,8 @@ def test_the_linear_loop_is_the_chain_link_by_link(
     Ki = ZERO if action is None else action.gains(made.tasks)["posture"]
     Kp, Kv, *_ = made.feedback("posture")
     loop = LinearLoop(Kp, Kv, Ki, h, *delays, parts, 1.0 / heavy)
-    coefficients = np.poly(loop.transition())
-    n, begun = len(coefficients), 8
-    residuals = [coefficients[::-1] @ x[k : k + n] for k in range(begun, len(x) - n)]
-    # Rounding of coefficients of up to 10, on positions of 1 m.
-    assert np.abs(residuals).max() < 1e-12
     other = LinearLoop(1.1 * Kp, Kv, Ki, h, *delays, parts, 1.0 / heavy)
-    wrong = np.poly(other.transition())
-    missed = [wrong[::-1] @ x[k : k + n] for k in range(begun, len(x) - n)]
-    assert np.abs(missed).max() > 1e3 * np.abs(residuals).max()
+    check_that_it_is_the_loop(x, loop, other)
 
 
 @pytest.mark.slow
@@ -262,18 +240,10 @@ def test_the_robot_grows_just_above_and_dies_just_below(
         engine = IntegratedPlant(RigidBodyPlant(PANDA), Rk4(H))
         plant = ImperfectPlant(engine, [], [EffortDelay(delay)])
         try:
-            log = simulate(
-                made,
-                Q0,
-                duration=0.3,
-                control_period=H,
-                log_period=H,
-                plant=plant,
-                check_rate=False,
-            )
+            log = held(made, Q0, duration=0.3, plant=plant, check_rate=False)
             speed = np.linalg.norm(log.v, axis=1)
             growth = speed[-100:].max() / speed[:100].max()
-        except SimulationError:
+        except hsp.errors.SimulationError:
             growth = np.inf
         assert growth < 0.5 if side < 0.0 else growth > 2.0
         found = rate_findings(made, Q0, H, effort_delay=delay)
@@ -281,10 +251,10 @@ def test_the_robot_grows_just_above_and_dies_just_below(
 
 
 @pytest.mark.parametrize(
-    ("made", "path", "message"),
+    ("how", "path", "message"),
     [
         (
-            lambda: holding(gain=2500.0),
+            {"gain": 2500.0},
             ("null_space", "gain"),
             r"unstable at this rate: K_N times the period is 2.5 \(motion grows by a "
             r"factor of up to 1.501 per period\); use K_N of at most 200 1/s or a "
@@ -292,68 +262,52 @@ def test_the_robot_grows_just_above_and_dies_just_below(
             r"most 1990 1/s or a control_period of at most 0.000799 s$",
         ),
         (
-            lambda: holding(frequency=1500.0),
+            {"frequency": 1500.0},
             ("tasks", "hand", "gains"),
-            r"unstable at this rate: ω0 of task 'hand' times the period is 1.5 \(.*\); "
-            r"use ω0 of task 'hand' of at most 200 1/s or a control_period of at most "
-            r"0.000133 s; the loop is stable with ω0 of task 'hand' of at most "
-            r"(999|1000) 1/s or a control_period of at most 0.000666 s$",
+            r"ω0 of task 'hand' times the period is 1.5 .* of at most (999|1000) 1/s "
+            r"or a control_period of at most 0.000666 s$",
         ),
         (
-            lambda: holding(gain=1100.0, stiffness=1100.0),
+            {"gain": 1100.0, "stiffness": 1100.0},
             ("null_space", "gain"),
-            r"K_N times the period is 1.1, with a field of stiffness 1100 1/s \(.*\); "
-            r"use K_N of at most 200 1/s or a control_period of at most 0.000181 s; "
-            r"the loop is stable with K_N of at most (899|900) 1/s or fields of at "
-            r"most 0.818 times these weights or a control_period of at most "
-            r"0.000909 s$",
+            r"K_N times the period is 1.1, with a field of stiffness 1100 1/s .* of at "
+            r"most (899|900) 1/s or fields of at most 0.818 times these weights or a ",
         ),
     ],
 )
 def test_an_unstable_rate_is_reported_with_stable_values(
-    made: Any, path: tuple[str, ...], message: str
+    how: dict[str, float], path: tuple[str, ...], message: str
 ) -> None:
-    (finding,) = [f for f in rate_findings(made(), Q0, H) if f.unstable]
+    (finding,) = [f for f in rate_findings(holding(**how), Q0, H) if f.unstable]
     assert finding.path == path
     assert finding.radius > 1.0
     assert re.search(message, finding.message), finding.message
-    with pytest.raises(UnstableRateError, match="unstable at this rate"):
-        check_rate(made(), Q0, H)
+    with pytest.raises(hsp.errors.UnstableRateError, match="unstable at this rate"):
+        check_rate(holding(**how), Q0, H)
 
 
 @pytest.mark.parametrize(
-    ("compensation", "delay", "advice"),
+    ("make", "wrong", "delay", "advice"),
     [
         (
-            {"momentum_observer": MomentumObserver(3000.0)},
-            1,
-            r"momentum_observer\.bandwidth of at most ([\d.]+) 1/s",
+            lambda x: Compensation(momentum_observer=MomentumObserver(x)),
+            *(3000.0, 1, r"momentum_observer\.bandwidth of at most ([\d.]+) 1/s"),
         ),
         (
-            {"velocity_filter": VelocityFilter(5.0, 2)},
-            0,
-            r"velocity_filter\.cutoff of at least ([\d.]+) Hz",
+            lambda x: Compensation(velocity_filter=VelocityFilter(x, 2)),
+            *(5.0, 0, r"velocity_filter\.cutoff of at least ([\d.]+) Hz"),
         ),
     ],
 )
 def test_the_advice_on_a_compensator_works(
-    compensation: dict[str, Any], delay: int, advice: str
+    make: Any, wrong: float, delay: int, advice: str
 ) -> None:
     made = holding(frequency=40.0, gain=20.0)
-    options = {"effort_delay": delay}
-    found = rate_findings(made, Q0, H, Compensation(**compensation), **options)
-    numbers = [
-        float(match[1])
-        for finding in found
-        if finding.unstable and (match := re.search(advice, finding.message))
-    ]
-    assert numbers
-    (name,) = compensation
-    if name == "momentum_observer":
-        mended = Compensation(momentum_observer=MomentumObserver(min(numbers)))
-    else:
-        mended = Compensation(velocity_filter=VelocityFilter(max(numbers), 2))
-    check_rate(made, Q0, H, mended, **options)
+    found = rate_findings(made, Q0, H, make(wrong), effort_delay=delay)
+    told = [re.search(advice, each.message) for each in found if each.unstable]
+    numbers = [float(match[1]) for match in told if match]
+    best = min(numbers) if "most" in advice else max(numbers)
+    check_rate(made, Q0, H, make(best), effort_delay=delay)
 
 
 def test_what_misses_the_rule_is_said_and_not_refused() -> None:
@@ -421,55 +375,12 @@ def config(**sections: Any) -> dict[str, Any]:
     }
 
 
-ALL: dict[str, Any] = {
-    "velocity_filter": {"cutoff": 100, "order": 2},
-    "predictor": {"effort_delay": 1},
-    "momentum_observer": {"bandwidth": 20, "clip": [10] * 7},
-    "friction_feed_forward": {"coulomb": 0.1, "viscous": [0.1] * 7},
-    "integral_action": {"ki": {"hand": [[9, 0, 0], [0, 9, 0], [0, 0, 9]]}, "limit": 5},
-    "start_up_ramp": {"duration": 0.01, "natural_frequency": 2},
-}
-
-
-def test_all_compensators_from_yaml_and_each_turned_off(tmp_path: Path) -> None:
-    file = tmp_path / "all.yaml"
-    import yaml
-
-    file.write_text(yaml.safe_dump(config(compensation=ALL)))
-    made = load_experiment(file)
-    assert made.compensation.names == tuple(ALL)
-    assert isinstance(Command(made.controller, made.compensation), Command)
-    log = made.run()
-    assert log["observer.disturbance"].shape == (len(log), 7)
-    for name in ALL:
-        rest = load_experiment(file, f"compensation.{name}=null").compensation.names
-        assert rest == tuple(other for other in ALL if other != name)
-    urdf = load_experiment(file, "compensation.friction_feed_forward=urdf").compensation
-    assert urdf.friction_feed_forward == "urdf"
-    friction = urdf.friction(made.robot)
-    assert friction is not None
-    assert np.asarray(friction.viscous).tolist() == [0.003] * 7
+LATE = {"type": "rigid_body", "sensors": {"delay": 1}}
 
 
 @pytest.mark.parametrize(
     ("sections", "message"),
     [
-        (
-            {"compensation": {"momentum_obsever": {}}},
-            "unknown key 'momentum_obsever'; did you mean 'momentum_observer'",
-        ),
-        (
-            {"compensation": {"momentum_observer": {"clip": [1, 2]}}},
-            "compensation.momentum_observer.clip: has 2 numbers; needs one number or 7",
-        ),
-        (
-            {"compensation": {"integral_action": {"rate": 1, "tasks": ["hnad"]}}},
-            r"compensation.integral_action.tasks: .* 'hnad'; did you mean 'hand'\?",
-        ),
-        (
-            {"compensation": {"predictor": {"effort_delay": 0}}},
-            "compensation.predictor: a pred",
-        ),
         (
             {"compensation": {"start_up_ramp": {}}, "simulation": {"duration": 1}},
             "compensation acts once per control period: set simulation.control_period",
@@ -478,26 +389,8 @@ def test_all_compensators_from_yaml_and_each_turned_off(tmp_path: Path) -> None:
             {"null_space": {"gain": 2500}},
             "null_space.gain: unstable at this rate: K_N times the period is 2.5",
         ),
-        (
-            {
-                "plant": {"type": "rigid_body", "drives": {"delay": 1}},
-                "tasks": {
-                    "hand": {
-                        "type": "frame_position",
-                        "frame": "panda_tcp",
-                        "trajectory": {"type": "hold"},
-                        "gains": {"natural_frequency": 500},
-                    }
-                },
-            },
-            "tasks.hand.gains: unstable at this rate: .* 0.5, 1 period of delay .*"
-            "ω0 of task 'hand' of at most 100 1/s .* of at most 426 1/s",
-        ),
-        (
-            {
-                "plant": {"type": "rigid_body", "sensors": {"delay": 1}},
-                "null_space": {"gain": 1100},  # without a delay up to 2000
-            },
+        (  # without a delay up to 2000
+            {"plant": LATE, "null_space": {"gain": 1100}},
             "null_space.gain: unstable at this rate: .* 1 period of delay",
         ),
         (
@@ -509,7 +402,7 @@ def test_all_compensators_from_yaml_and_each_turned_off(tmp_path: Path) -> None:
 def test_mistakes_are_told_where_they_stand(
     sections: dict[str, Any], message: str
 ) -> None:
-    with pytest.raises(HspControlError, match=message):
+    with pytest.raises(hsp.HspControlError, match=message):
         load_experiment(config(**sections))
 
 
@@ -523,8 +416,6 @@ def test_the_command_line_says_what_is_close(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "close.yaml"
-    import yaml
-
     file.write_text(yaml.safe_dump(config(null_space={"gain": 500})))
     for command in (["check", str(file)], ["run", str(file), "--out", str(tmp_path)]):
         assert main(command) == 0
@@ -542,19 +433,12 @@ def test_the_command_line_says_what_is_close(
         (
             {"gain": 5000.0},
             0,
-            r"^null_space\.gain: unstable at this rate: .*; use K_N of at most 200 1/s "
-            r"or a control_period of at most 4e-05 s; the loop is stable with K_N of "
-            r"at most (1990|2000) 1/s",
-        ),
-        (
-            {"frequency": 1500.0},
-            0,
-            r"^tasks\.hand\.gains: .* use ω0 of task 'hand' of at most 200 1/s or ",
+            r"^null_space\.gain: unstable at this rate: .* most 200 ",
         ),
         (
             {"frequency": 500.0},
             1,
-            r"^tasks\.hand\.gains: .*, 1 period of delay .* use .* at most 100 1/s or ",
+            r"^tasks\.hand\.gains: .*, 1 period of delay .* 100 ",
         ),
     ],
 )
@@ -566,7 +450,7 @@ def test_a_simulation_refuses_what_a_run_refuses(
     if delay:
         engine = IntegratedPlant(RigidBodyPlant(PANDA), Rk4(H))
         how["plant"] = ImperfectPlant(engine, [SensorDelay(0)], [EffortDelay(delay)])
-    with pytest.raises(UnstableRateError, match=message):
+    with pytest.raises(hsp.errors.UnstableRateError, match=message):
         simulate(holding(**gains), Q0, control_period=H, **how)
     if not delay:  # nothing is held
         simulate(holding(**gains), Q0, **how)

@@ -1,38 +1,20 @@
 """Strict priorities: against an oracle of projectors, and along whole motions."""
 
 from dataclasses import replace
-from functools import cache
-from typing import Any
 
 import numpy as np
 import pytest
+from controller_cases import panda
 from hypothesis import given
 from hypothesis import strategies as st
 from law_numbers import Numbers, numbers, resolve
-from numpy.typing import NDArray
+from runs import check_errors, check_null_space, continuous
 
-from hsp_control import (
-    Controller,
-    FramePosition,
-    Gains,
-    Hold,
-    JointCentering,
-    JointPosture,
-    Robot,
-    simulate,
-)
-from hsp_control.common.exceptions import ControllerError
+import hsp_control as hsp
+from hsp_control.common.arrays import Array
 from hsp_control.law import CONSTANT, IDENTITY, VARYING
-from hsp_control.null_space.metrics import (
-    ConstantMetric,
-    IdentityMetric,
-    MassMatrixMetric,
-    Metric,
-)
-from hsp_control.robot.integrators import Dop853
 from hsp_control.trajectories import Circle
 
-Array = NDArray[np.float64]
 FORMS = {"identity": IDENTITY, "constant": CONSTANT, "varying": VARYING}
 forms = pytest.mark.parametrize("form", FORMS.values(), ids=FORMS)
 seeds = st.integers(0, 2**32 - 1)
@@ -159,39 +141,37 @@ def test_priorities_meet_the_stack_where_they_take_over(seed: int) -> None:
 
 # --- along motions -------------------------------------------------------------------
 
-GAINS = Gains(natural_frequency=8.0)
-SIDES = ("left", "right")
+GAINS = hsp.Gains(natural_frequency=8.0)
 
 
-@cache
-def panda() -> Robot:
-    return Robot.load("panda")
-
-
-def metric_of(kind: str) -> Metric:
+def metric_of(kind: str) -> hsp.metrics.Metric:
     if kind == "mass_matrix":
-        return MassMatrixMetric()
-    return IdentityMetric() if kind == "identity" else ConstantMetric(np.arange(1, 8))
+        return hsp.metrics.MassMatrixMetric()
+    return (
+        hsp.metrics.IdentityMetric()
+        if kind == "identity"
+        else hsp.metrics.ConstantMetric(np.arange(1, 8))
+    )
 
 
-def conflicting(kind: str) -> Controller:
+def conflicting(kind: str) -> hsp.Controller:
     """Return a hand on a circle, above one that wants it elsewhere, and a wrist.
 
     The second level's x row is the first's, at every state: rank 5 of 6, for good.
     """
     robot = panda()
     circle = Circle(0.1, 1.5, [0.45, 0.0, 0.4], normal=[0.0, 0.0, 1.0])
-    hand = FramePosition("panda_tcp", circle, gains=GAINS, name="hand")
-    rival = FramePosition(
-        "panda_tcp", Hold([0.6]), gains=GAINS, axes="x", name="rival", priority=2
+    hand = hsp.FramePosition("panda_tcp", circle, gains=GAINS, name="hand")
+    rival = hsp.FramePosition(
+        "panda_tcp", hsp.Hold([0.6]), gains=GAINS, axes="x", name="rival", priority=2
     )
-    wrist = JointPosture(
+    wrist = hsp.JointPosture(
         robot.home(), gains=GAINS, joints=["panda_joint7"], name="wrist", priority=2
     )
-    return Controller(
+    return hsp.Controller(
         robot,
         [replace(task, largest_error="none") for task in (wrist, hand, rival)],
-        2.0 * JointCentering(),
+        2.0 * hsp.JointCentering(),
         null_space_gain=4.0,
         metric=metric_of(kind),
         limits=None,
@@ -204,27 +184,13 @@ def test_propositions_hold_per_level(kind: str) -> None:
     controller = conflicting(kind)
     robot = controller.robot
     q, v0 = robot.home(), 0.3 * np.cos(np.arange(7.0))
-    precise = Dop853(rtol=1e-11, atol=1e-11)
-    rollout = simulate(
-        controller, q, v0, duration=1.0, log_period=0.02, integrator=precise
+    rollout = continuous(
+        controller, q, v0, tolerance=1e-11, duration=1.0, log_period=0.02
     )
     assert rollout["damped"].all()  # the conflict is there throughout
-
-    t, w = rollout.t, 8.0
-
-    def decayed(e: Array, rate: Array) -> Array:
-        """Return the critically damped solution of e'' + 2w e' + w² e = 0."""
-        return np.exp(-w * t)[:, None] * (e + (rate + w * e) * t[:, None])
-
-    for name in ("hand", "wrist"):
-        error, rate = rollout[f"task.{name}.error"], rollout[f"task.{name}.error_rate"]
-        expected = decayed(error[0], rate[0])
-        np.testing.assert_allclose(error, expected, rtol=0, atol=1e-8)
+    check_errors(rollout, 8.0, "hand", "wrist", atol=1e-8)
     assert np.abs(rollout["task.rival.error"][-1]) > 0.03
-
-    norm = rollout["null_space_norm"]
-    assert norm[0] > 0.05
-    np.testing.assert_allclose(norm, norm[0] * np.exp(-4.0 * t), rtol=1e-6, atol=0)
+    check_null_space(rollout, 4.0, least=0.05, rtol=1e-6)
 
 
 def test_levels_are_the_tasks_of_one_priority() -> None:
@@ -236,56 +202,5 @@ def test_levels_are_the_tasks_of_one_priority() -> None:
     assert [controller.priority_of(n) for n in ("hand", "wrist", "rival")] == [1, 2, 2]
     hand, wrist, rival = controller.tasks
     spread = [replace(rival, priority=70), replace(hand, priority=3), wrist]
-    levels = Controller(panda(), spread, limits=None).levels
+    levels = hsp.Controller(panda(), spread, limits=None).levels
     assert [task.name for (task,) in levels] == ["wrist", "hand", "rival"]
-
-
-def test_nested_lists_are_refused() -> None:
-    hand, *others = conflicting("identity").tasks
-    with pytest.raises(ControllerError, match="lists; write the level as priority="):
-        Controller(panda(), [hand, others], limits=None)  # type: ignore[list-item]
-
-
-def test_propositions_hold_for_two_arms() -> None:
-    """Baxter's hands at two levels, the second asking for more than is left of it."""
-    pytest.importorskip("example_robot_data")
-    locked = {
-        "head_pan": 0.0,
-        "l_gripper_l_finger_joint": 0.01,
-        "r_gripper_l_finger_joint": 0.01,
-    }
-    robot = Robot.load("baxter", locked=locked)
-    bend = np.array([-0.5, -0.4, -0.8, 1.4, 0.4, 0.8, 0.0])
-    mirror = np.array([-1.0, 1.0, -1.0, 1.0, -1.0, 1.0, 1.0])
-    q = robot.integrate(robot.neutral(), np.r_[bend, mirror * bend])
-    state = robot.state(0.0, q, np.zeros(robot.nv))
-    left, right = (state.position(f"{side}_gripper").copy() for side in SIDES)
-    x_axis = np.array([1.0, 0.0, 0.0])
-    round_and_round = Circle(0.08, 1.5, left, normal=x_axis)
-    second: dict[str, Any] = {"gains": GAINS, "priority": 2}
-    tasks = [
-        FramePosition("left_gripper", round_and_round, gains=GAINS),
-        FramePosition("right_gripper", Hold(right + 0.05), **second),
-        FramePosition("left_gripper", Hold([0.3]), axes="x", name="rival", **second),
-    ]
-    tasks = [replace(task, largest_error="none") for task in tasks]
-    controller = Controller(
-        robot, tasks, JointCentering(), null_space_gain=4.0, limits=None
-    )
-    v0 = 0.2 * np.cos(np.arange(robot.nv))
-    rollout = simulate(
-        controller,
-        q,
-        v0,
-        duration=0.6,
-        log_period=0.05,
-        integrator=Dop853(rtol=1e-10, atol=1e-10),
-    )
-    assert rollout["damped"].all()
-    t, w = rollout.t, 8.0
-    for name in ("left_gripper", "right_gripper"):
-        e, rate = rollout[f"task.{name}.error"], rollout[f"task.{name}.error_rate"]
-        expected = np.exp(-w * t)[:, None] * (e[0] + (rate[0] + w * e[0]) * t[:, None])
-        np.testing.assert_allclose(e, expected, rtol=0, atol=1e-7)
-    norm = rollout["null_space_norm"]
-    np.testing.assert_allclose(norm, norm[0] * np.exp(-4.0 * t), rtol=1e-5, atol=0)

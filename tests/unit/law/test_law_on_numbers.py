@@ -6,12 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from law_numbers import Numbers, numbers, orthogonal, resolve
-from numpy.typing import NDArray
 
+from hsp_control.common.arrays import Array
 from hsp_control.law import CONSTANT, IDENTITY, VARYING, Resolution, singular_values
 from hsp_control.null_space.metrics import CoordinatesMetric, MetricSample
 
-Array = NDArray[np.float64]
 seeds = st.integers(0, 2**32 - 1)
 
 

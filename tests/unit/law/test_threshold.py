@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from task_cases import FRAMES, load, unit
 
 from hsp_control import Controller, FramePosition, Gains, Hold, Robot
+from hsp_control.common.arrays import Array
 from hsp_control.law import threshold
 from hsp_control.law.threshold import (
     MODEST,
@@ -20,7 +20,6 @@ from hsp_control.law.threshold import (
 )
 from hsp_control.null_space.fields import Rest
 
-Array = NDArray[np.float64]
 seeds = st.integers(0, 2**32 - 1)
 STEP = 1e-6  # of differences; the law bends within ε of 0.03 or more
 
