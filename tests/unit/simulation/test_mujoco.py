@@ -3,7 +3,6 @@
 import pickle
 import re
 import sys
-from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+from robot_texts import ARM
 
 from hsp_control import Robot
 from hsp_control.common.arrays import Array
@@ -32,18 +32,9 @@ from hsp_control.simulation.plants.mujoco import ContactShape, Ground, MujocoPla
 mujoco = pytest.importorskip("mujoco")
 from mujoco_oracle import mass_matrix  # noqa: E402
 
-OTHERS = {
-    "ur5": None,
-    "tiago": None,
-    "tiago_no_hand": "planar",
-    "baxter": None,
-    "talos": None,
-    "g1": None,
-    "solo12": None,
-    "go2": None,
-    "kinova": None,
-    "pr2": None,
-}
+OTHERS: dict[str, str | None] = dict.fromkeys(
+    ["ur5", "tiago", "baxter", "talos", "g1", "solo12", "go2", "kinova", "pr2"]
+) | {"tiago_no_hand": "planar"}
 """Robots of example-robot-data and their root: joints of every kind, and mimic ones."""
 
 
@@ -286,45 +277,6 @@ def test_a_legged_robot_stands_on_its_own_feet(name: str) -> None:
     )
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "contacts"),
-    [
-        (
-            "talos",
-            [
-                ContactShape(f"{side}_sole_link", Box((0.2, 0.12, 0.02)), (0, 0, 0.01))
-                for side in ("left", "right")
-            ],
-        ),
-        (
-            "go2",
-            [
-                ContactShape(f"{leg}_foot", Sphere(0.022))
-                for leg in ("FL", "FR", "RL", "RR")
-            ],
-        ),
-        (
-            "solo12",
-            [
-                ContactShape(
-                    f"{leg}_FOOT", Capsule(0.014, 0.01), rotation=(np.pi / 2, 0, 0)
-                )
-                for leg in ("FL", "FR", "HL", "HR")
-            ],
-        ),
-    ],
-)
-def test_a_legged_robot_stands_on_stated_feet(
-    name: str, contacts: Sequence[ContactShape]
-) -> None:
-    robot, q, _, springs = standing(name)
-    plant = MujocoPlant(robot, contacts=contacts, friction=dampers(robot, springs))
-    moved, v, _ = stand(plant, q, springs, 2.0)
-    assert np.abs(moved[:3]).max() < 0.02
-    assert np.abs(v).max() < 0.1
-
-
 def ball(radius: float = 0.1) -> Robot:
     """Return a ball of 2 kg that floats freely."""
     model = pin.Model()
@@ -426,26 +378,6 @@ def test_a_push_gives_its_impulse() -> None:
     assert v[5] == pytest.approx(turned, rel=1e-9)
 
 
-@pytest.mark.slow
-def test_reading_contacts_changes_nothing() -> None:
-    robot, q, feet, springs = standing("go2")
-    ends = []
-    for looks in (False, True):
-        plant = MujocoPlant(
-            robot,
-            contacts=[ContactShape(foot) for foot in feet],
-            friction=dampers(robot, springs),
-        )
-        plant.reset(0.0, q, np.zeros(18))
-        x, v = q, np.zeros(18)
-        for k in range(100):
-            if looks:
-                plant.log_channels(0.001 * k, x, v, springs)
-            x, v = plant.advance(0.001 * k, 0.001 * (k + 1), np.zeros(18))
-        ends.append(np.concatenate([x, v]))
-    np.testing.assert_array_equal(*ends)
-
-
 # --- refusals ------------------------------------------------------------------------
 
 
@@ -507,20 +439,6 @@ def test_settings_that_are_none(options: Any, kind: Any, message: str) -> None:
         MujocoPlant(load("panda"), **options)
 
 
-BARE = """<robot name="bare">
-  <link name="base"/>
-  <joint name="hip" type="revolute">
-    <parent link="base"/><child link="leg"/><axis xyz="1 0 0"/>
-    <limit lower="-1" upper="1" effort="1" velocity="1"/>
-  </joint>
-  <link name="leg">
-    <inertial>
-      <mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>
-    </inertial>
-  </link>
-</robot>"""
-
-
 def test_two_shapes_of_one_frame_share_its_force() -> None:
     """A foot of two balls, 0.1 and 0.3 m from the weight: one force, one moment."""
     robot = ball()
@@ -542,17 +460,6 @@ def test_two_shapes_of_one_frame_share_its_force() -> None:
     )
     np.testing.assert_allclose(force, [0.0, 0.0, 2.0 * 9.81], rtol=0, atol=1e-3)
     np.testing.assert_allclose(moment, np.zeros(3), rtol=0, atol=1e-3)
-
-
-def test_the_ground_answers_a_push() -> None:
-    push = Push("body", (0.0, 0.0, -10.0), duration=5.0)
-    contact = ContactShape("body", Box((0.2, 0.2, 0.2)))
-    plant = MujocoPlant(ball(), contacts=[contact], pushes=[push])
-    plant.reset(0.0, np.array([0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0]), np.zeros(6))
-    q, v = plant.advance(0.0, 1.0, np.zeros(6))
-    force = plant.log_channels(1.0, q, v, np.zeros(6))["plant.contact.body.force"].value
-    expected = [0.0, 0.0, 2.0 * 9.81 + 10.0]
-    np.testing.assert_allclose(force, expected, rtol=0, atol=1e-3)
 
 
 def test_clearance_is_of_contacts() -> None:
@@ -578,11 +485,11 @@ def test_a_base_that_turns_is_pushed_in_its_own_axes() -> None:
 
 
 def test_a_foot_that_cannot_touch_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "bare.urdf").write_text(BARE)
+    (tmp_path / "bare.urdf").write_text(ARM)
     robot = Robot.load(tmp_path / "bare.urdf")
-    message = r"^contacts.leg: no collision geometry is fixed to it; give a shape$"
+    message = r"^contacts.upper: no collision geometry is fixed to it; give a shape$"
     with pytest.raises(SimulationError, match=message):
-        MujocoPlant(robot, contacts=[ContactShape("leg")])
+        MujocoPlant(robot, contacts=[ContactShape("upper")])
     message = r"^ContactShape: shape: plane is not possible here; needs a sphere, "
     with pytest.raises(SimulationError, match=message):
         ContactShape("leg", HalfSpace())

@@ -30,9 +30,7 @@ from hsp_control.trajectories import Hold
 if not PLAIN:
     from hsp_control.simulation.stretch import MOST
 
-pytestmark = [
-    pytest.mark.skipif(PLAIN, reason="plain Python has no native calls"),
-]
+pytestmark = [pytest.mark.skipif(PLAIN, reason="plain Python has no native calls")]
 
 EULER = "simulation.integrator={type: semi_implicit_euler}"
 RK4 = "simulation.integrator={type: rk4}"
