@@ -22,17 +22,14 @@ from hsp_control.geometry import link_shapes
 from hsp_control.robot import ToolFrame
 
 
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        ("pnada", "no robot 'pnada'; did you mean 'panda'?"),
-        ("PANDA", "did you mean 'panda'?"),
-        ("xyzzy", "no robot 'xyzzy' (give a path to a .urdf file, or one of: "),
-        ("robots/panda/", "is a folder; give a .urdf file in it (it contains panda."),
-        ("/nowhere/arm.urdf", "/nowhere/arm.urdf: no such file"),
-        ("arm_without_folder.urdf", "arm_without_folder.urdf: no such file"),
-    ],
-)
+@pytest.mark.parametrize(("name", "message"), [
+    ("pnada", "no robot 'pnada'; did you mean 'panda'?"),
+    ("PANDA", "did you mean 'panda'?"),
+    ("xyzzy", "no robot 'xyzzy' (give a path to a .urdf file, or one of: "),
+    ("robots/panda/", "is a folder; give a .urdf file in it (it contains panda."),
+    ("/nowhere/arm.urdf", "/nowhere/arm.urdf: no such file"),
+    ("arm_without_folder.urdf", "arm_without_folder.urdf: no such file"),
+])  # fmt: skip
 def test_robot_not_found(
     name: str, message: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

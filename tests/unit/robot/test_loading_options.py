@@ -247,21 +247,8 @@ def test_end_effector_frame(
     assert end_effector_frame(Robot.load(path).model) == expected
 
 
-@pytest.mark.parametrize(
-    ("name", "expected"),
-    [
-        ("planar3r", "tip"),
-        ("panda", "panda_tcp"),
-        ("iiwa14", "iiwa_link_ee"),
-        ("ur5", "tool0"),
-        ("xarm7", "link_eef"),
-        ("kinova", "j2s6s200_end_effector"),
-    ],
-)
-def test_end_effector_frame_of_known_arms(name: str, expected: str) -> None:
-    if name not in BUNDLED:
-        pytest.importorskip("example_robot_data")
+@pytest.mark.parametrize("name", BUNDLED)
+def test_the_end_effector_of_a_bundled_robot_would_be_found(name: str) -> None:
+    """Those of other known arms: tests/integration/test_every_robot.py."""
     robot = Robot.load(name)
-    assert end_effector_frame(robot.model) == expected
-    if name in BUNDLED:  # what the bundle says, found by itself
-        assert robot.source.end_effector == expected
+    assert end_effector_frame(robot.model) == robot.source.end_effector

@@ -8,11 +8,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from hsp_control import Robot, load_experiment
+from hsp_control import Robot
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import (
     FrameNotFoundError,
-    HspControlError,
     ScheduleError,
     SimulationError,
 )
@@ -219,30 +218,3 @@ def test_contacts_that_are_none(
 ) -> None:
     with pytest.raises(error, match=message):
         make()
-
-
-def test_contacts_from_yaml() -> None:
-    """A fixed arm whose hand the world holds for a while: an effort alone moves it."""
-    config = {
-        "robot": {"name": "panda"},
-        "tasks": {"hand": {"type": "frame_position", "trajectory": {
-            "type": "line", "origin": "start", "end": [0.1, 0, 0], "duration": 0.3}}},
-        "plant": {"type": "rigid_contacts", "contacts": {
-            "panda_tcp": {"kind": "point", "on": [[0, 0.2]]}}},
-        "simulation": {"duration": 0.4},
-    }  # fmt: skip
-    experiment = load_experiment(config)
-    assert isinstance(experiment.plant, ContactPlant)
-    run = experiment.run()
-    hand = run["task.hand.actual"]
-    held = run.t < 0.2
-    assert np.abs(hand[held] - hand[0]).max() < 1e-6
-    assert np.abs(hand[-1] - hand[0]).max() > 0.01
-    forces = np.linalg.norm(run["plant.contact.panda_tcp.force"], axis=1)
-    assert forces[held][-1] > 1.0
-    assert not forces[~held].any()
-    config["plant"]["contacts"] = {"panda_tpc": {}}  # type: ignore[index]
-    with pytest.raises(
-        HspControlError, match=r"plant.contacts.panda_tpc: no frame 'pan"
-    ):
-        load_experiment(config)

@@ -364,13 +364,7 @@ def test_the_log_says_how_far_the_robot_is_beyond_its_limits(
     push = {"frame": "panda_hand", "force": [0, 0, 700], "start": 0.05, "duration": 0.1}
     config = {
         "robot": {"name": "panda"},
-        "tasks": {
-            "hand": {
-                "type": "frame_position",
-                "frame": "panda_tcp",
-                "trajectory": {"type": "hold"},
-            }
-        },
+        "tasks": {"hand": {"type": "frame_position", "trajectory": {"type": "hold"}}},
         "limits": {"effort": "none"},
         "simulation": {"duration": 0.2, "control_period": 0.002},
     }

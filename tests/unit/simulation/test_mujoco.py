@@ -1,7 +1,6 @@
 """MuJoCo as a plant: the same mechanics as Pinocchio's, and a ground to stand on."""
 
 import pickle
-import re
 import sys
 from functools import cache
 from pathlib import Path
@@ -128,24 +127,6 @@ def test_states_go_there_and_back(name: str) -> None:
         assert np.abs(v - v_back).max() < 1e-13
 
 
-@pytest.mark.parametrize(
-    "name", [*bundled_robots(), "tiago_no_hand", "go2", "placed", "zoo"]
-)
-def test_a_free_motion_is_pinocchios(name: str) -> None:
-    """0.05 s of falling, RK4 against DOP853: the equations of motion are the same."""
-    robot = load(name)
-    q, v = random_state(robot, np.random.default_rng(3))
-    tau = np.zeros(robot.nv)
-    plant = MujocoPlant(robot, timestep=2.5e-4, integrator="RK4", joint_limits=False)
-    plant.reset(0.0, q, v)
-    q_mujoco, v_mujoco = plant.advance(0.0, 0.05, tau)
-    exact = Dop853(1e-12, 1e-12).advance(
-        robot, lambda t, q, v: robot.forward_dynamics(q, v, tau), 0.0, 0.05, q, v
-    )
-    assert np.abs(robot.difference(exact[0], q_mujoco)).max() < 1e-6
-    assert np.abs(exact[1] - v_mujoco).max() < 1e-6 * max(1.0, np.abs(exact[1]).max())
-
-
 def test_joints_that_mimic_follow_their_leader() -> None:
     """The tie is MuJoCo's own soft constraint: a tenth of a millimetre here."""
     robot = load("baxter")
@@ -202,79 +183,6 @@ def test_dry_friction_sticks_and_viscous_friction_damps() -> None:
 
 
 # --- contacts ------------------------------------------------------------------------
-
-
-def standing(name: str) -> tuple[Robot, Array, list[str], Array]:
-    """Return a robot, its stance in the air, its feet and its springs [N·m/rad]."""
-    robot = load(name)
-    q = robot.home()
-    feet = {
-        "talos": ["left_sole_link", "right_sole_link"],
-        "g1": ["left_ankle_roll_link", "right_ankle_roll_link"],
-        "solo12": ["FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT"],
-        "go2": ["FL_foot", "FR_foot", "RL_foot", "RR_foot"],
-    }[name]
-    stance = {"talos": "half_sitting", "solo12": "straight_standing", "go2": "standing"}
-    if name in stance:
-        model = robot.model.copy()
-        pin.loadReferenceConfigurations(model, str(robot.source.srdf), False)
-        q = np.array(model.referenceConfigurations[stance[name]])
-    stiffness = {"talos": 5000.0, "g1": 500.0, "solo12": 10.0, "go2": 100.0}[name]
-    light = re.compile("gripper|head|wrist|arm_.*_[567]_")
-    springs = np.array(
-        [20.0 if light.search(f) else stiffness for f in robot.dof_names]
-    )
-    springs[:6] = 0.0
-    return robot, q, feet, springs
-
-
-def stand(
-    plant: MujocoPlant, q: Array, springs: Array, duration: float
-) -> tuple[Array, Array, dict[str, Array]]:
-    """Hold the joints with springs, from where the feet touch; return the end."""
-    robot = plant.robot
-    reference = q.copy()
-    reference[2] -= plant.clearance(q)
-    x, v = reference, np.zeros(robot.nv)
-    plant.reset(0.0, x, v)
-    for k in range(round(duration / 0.001)):
-        t, tau = 0.001 * k, springs * robot.difference(x, reference)
-        x, v = plant.advance(t, t + 0.001, tau)
-    tau = springs * robot.difference(x, reference)
-    log_channels = plant.log_channels(duration, x, v, tau)
-    found = {name: np.asarray(reading.value) for name, reading in log_channels.items()}
-    return robot.difference(reference, x)[:6], v, found
-
-
-def dampers(robot: Robot, springs: Array) -> JointFriction:
-    """Return what damps the springs: implicit, as such stiff ones must be."""
-    return JointFriction.of(robot, viscous=0.03 * springs)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["talos", "g1", "solo12", "go2"])
-def test_a_legged_robot_stands_on_its_own_feet(name: str) -> None:
-    """On the collision geometry of its feet: less than 2 cm and 2°, and it rests.
-
-    What it sinks is what its springs give. The ground carries its weight, and the
-    moments of the forces about the centre of mass cancel.
-    """
-    robot, q, feet, springs = standing(name)
-    plant = MujocoPlant(
-        robot,
-        contacts=[ContactShape(foot) for foot in feet],
-        friction=dampers(robot, springs),
-    )
-    moved, v, forces = stand(plant, q, springs, 3.0)
-    assert np.abs(moved[:3]).max() < 0.02
-    assert np.abs(moved[3:]).max() < 0.035
-    assert np.abs(v).max() < 0.1
-    total = sum(forces[f"plant.contact.{foot}.force"] for foot in feet)
-    weight = 9.81 * sum(inertia.mass for inertia in robot.model.inertias)
-    np.testing.assert_allclose(total, [0.0, 0.0, weight], rtol=0, atol=0.01 * weight)
-    assert all(
-        forces[f"plant.contact.{foot}.force"][2] > 0.05 * weight for foot in feet
-    )
 
 
 def ball(radius: float = 0.1) -> Robot:
@@ -417,23 +325,16 @@ def test_impossible_inertias_are_refused() -> None:
         MujocoPlant(Robot(model, find_robot("planar3r")))
 
 
-@pytest.mark.parametrize(
-    ("options", "kind", "message"),
-    [
-        ({"timestep": 0.0}, SimulationError, r"^mujoco: timestep is 0.0; must be posi"),
-        ({"integrator": "rk4"}, SimulationError, r"^mujoco: integrator 'rk4': choose"),
-        (
-            {"contacts": [ContactShape("panda_tpc", Sphere(0.1))]},
-            FrameNotFoundError,
-            r"^contacts.panda_tpc: no frame 'panda_tpc'; did you mean 'panda_tcp'",
-        ),
-        (
-            {"pushes": [Push("panda_tpc")]},
-            FrameNotFoundError,
-            r"^pushes.0.frame: no frame 'panda_tpc'; did you mean 'panda_tcp'",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("options", "kind", "message"), [
+    ({"timestep": 0.0}, SimulationError, r"^mujoco: timestep is 0.0; must be posi"),
+    ({"integrator": "rk4"}, SimulationError, r"^mujoco: integrator 'rk4': choose"),
+    ({"contacts": [ContactShape("panda_tpc", Sphere(0.1))]},
+     FrameNotFoundError,
+     r"^contacts.panda_tpc: no frame 'panda_tpc'; did you mean 'panda_tcp'"),
+    ({"pushes": [Push("panda_tpc")]},
+     FrameNotFoundError,
+     r"^pushes.0.frame: no frame 'panda_tpc'; did you mean 'panda_tcp'"),
+])  # fmt: skip
 def test_settings_that_are_none(options: Any, kind: Any, message: str) -> None:
     with pytest.raises(kind, match=message):
         MujocoPlant(load("panda"), **options)

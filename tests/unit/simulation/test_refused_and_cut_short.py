@@ -64,17 +64,14 @@ def test_times_that_fit_but_for_rounding() -> None:
     assert len(run) == 8
 
 
-@pytest.mark.parametrize(
-    ("q0", "v0", "kind", "message"),
-    [
-        ([0.0] * 3, None, ShapeError, r"^configuration q has shape \(3,\); planar3r "),
-        ([0.0] * 6, None, ConfigurationError, r"^q\[0:2\] = .* of norm 0; needs norm"),
-        ([np.nan] * 6, None, NonFiniteError, r"^configuration q\[0\] is nan"),
-        (None, [0.0] * 6, ShapeError, r"^velocity v0 has shape \(6,\); planar3r needs"),
-        (None, [0.0, np.inf, 0.0], NonFiniteError, r"^velocity v0\[1\] is inf"),
-        (None, "fast", ShapeError, r"^velocity v0 is 'fast' \(str\); needs 3 numbers$"),
-    ],
-)
+@pytest.mark.parametrize(("q0", "v0", "kind", "message"), [
+    ([0.0] * 3, None, ShapeError, r"^configuration q has shape \(3,\); planar3r "),
+    ([0.0] * 6, None, ConfigurationError, r"^q\[0:2\] = .* of norm 0; needs norm"),
+    ([np.nan] * 6, None, NonFiniteError, r"^configuration q\[0\] is nan"),
+    (None, [0.0] * 6, ShapeError, r"^velocity v0 has shape \(6,\); planar3r needs"),
+    (None, [0.0, np.inf, 0.0], NonFiniteError, r"^velocity v0\[1\] is inf"),
+    (None, "fast", ShapeError, r"^velocity v0 is 'fast' \(str\); needs 3 numbers$"),
+])  # fmt: skip
 def test_starts_that_are_none(q0: Any, v0: Any, kind: Any, message: str) -> None:
     with pytest.raises(kind, match=message):
         simulate(
