@@ -63,16 +63,10 @@ def test_every_formula_is_drawn(replays: Path) -> None:
     assert "\\" not in words
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (
-            "```{replay} nobody\n:title: A run\n```",
-            "nobody.html; `make docs` writes it",
-        ),
-        ("![A figure](nobody.png)", "there is no picture nobody.png"),
-    ],
-)
+@pytest.mark.parametrize(("text", "message"), [
+    ("```{replay} nobody\n:title: A run\n```", "nobody.html; `make docs` writes it"),
+    ("![A figure](nobody.png)", "there is no picture nobody.png"),
+])  # fmt: skip
 def test_what_does_not_exist_is_said(tmp_path: Path, text: str, message: str) -> None:
     source = tmp_path / "lecture.md"
     source.write_text(f"# Title\n\n{text}\n", encoding="utf-8")

@@ -75,10 +75,7 @@ def test_towards_a_joint_limit() -> None:
 
 def test_strict_order() -> None:
     """With the least weight of the null space its giving way costs the hand nothing."""
-    strict, _ = run(
-        "panda_towards_limit",
-        "simulation.duration=2.9",
-    )
+    strict, _ = run("panda_towards_limit", "simulation.duration=2.9")
     assert strict["null_space_norm"][-1] > 1.0
     assert error(strict)[-1] < 1e-5
 

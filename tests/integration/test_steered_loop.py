@@ -118,14 +118,11 @@ def test_who_lets_go_of_the_key_stops_the_robot(keyed: Steered) -> None:
     assert stopped == pytest.approx(0.5 + TIMEOUT, abs=0.003)
 
 
-@pytest.mark.parametrize(
-    ("message", "reason"),
-    [
-        ({"do": "hold", "held": False}, "the dead-man's key was released"),
-        ({"do": "left"}, "the dead-man's key was released"),
-        ({"do": "stop"}, "stopped from the page"),
-    ],
-)
+@pytest.mark.parametrize(("message", "reason"), [
+    ({"do": "hold", "held": False}, "the dead-man's key was released"),
+    ({"do": "left"}, "the dead-man's key was released"),
+    ({"do": "stop"}, "stopped from the page"),
+])  # fmt: skip
 def test_it_stops_at_once(keyed: Steered, message: dict[str, Any], reason: str) -> None:
     keyed.at(0.1, **message)
     report = keyed.run(5.0)

@@ -9,6 +9,13 @@ from hsp_control.visualization.viewer import Recorder
 from hsp_control.visualization.viewer.commands import CLIP
 
 
+def told(recorder: Recorder, path: str, kind: str) -> dict[str, Any]:
+    """Return the last command of a kind at a path; there is one."""
+    command = recorder.command(path, kind)
+    assert command is not None
+    return command
+
+
 class Clip:
     """The clip of a recorder: what each node does, at any time."""
 

@@ -93,9 +93,7 @@ def test_ctrl_c_at_any_moment(log: Path) -> None:
 
 
 def test_a_run_that_cannot_be_saved_is_saved_elsewhere(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     from hsp_control.cli import main
 

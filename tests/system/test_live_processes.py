@@ -30,30 +30,17 @@ PATIENT = {"missing": 1000, "age": 5.0, "watchdog": 1000, "velocity_margin": 2.0
 """For a machine on which other tests run: what is shown here is not punctuality."""
 CONFIG: dict[str, Any] = {
     "robot": {"name": "panda"},
-    "tasks": {
-        "tip": {
-            "type": "frame_position",
-            "trajectory": {
-                "type": "circle",
-                "origin": "start",
-                # Gentle: a machine that stalls for 0.3 s leaves the robot with an old
-                # effort; at twice this pace a joint then reaches 8 rad/s.
-                "center": [0.0, 0.0, 0.05],
-                "radius": 0.05,
-                "angular_rate": 1.5,
-                "normal": [1, 0, 0],
-            },
-            "gains": {"natural_frequency": 10.0},
-            "blend": 0.3,
-        }
-    },
-    "simulation": {
-        "duration": 1.0,
-        "control_period": 0.001,
-        "integrator": {"type": "semi_implicit_euler", "step": 0.001},
-    },
+    "tasks": {"tip": {
+        "type": "frame_position", "gains": {"natural_frequency": 10.0}, "blend": 0.3,
+        # Gentle: a machine that stalls for 0.3 s leaves the robot with an old effort;
+        # at twice this pace a joint then reaches 8 rad/s.
+        "trajectory": {"type": "circle", "origin": "start", "center": [0.0, 0.0, 0.05],
+                       "radius": 0.05, "angular_rate": 1.5, "normal": [1, 0, 0]},
+    }},
+    "simulation": {"duration": 1.0, "control_period": 0.001,
+                   "integrator": {"type": "semi_implicit_euler", "step": 0.001}},
     "live": PATIENT,
-}
+}  # fmt: skip
 COUNTED = {"late": "stale", "duplicated": "duplicated", "corrupted": "corrupted"}
 
 
@@ -253,17 +240,14 @@ def test_a_robot_that_cannot_start_says_so(
     robot.close()
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (["--faults", "lots=1"], "no fault 'lots'"),
-        (["--duration", "-1"], "--duration -1; must be positive"),
-        (["--kill", "me=1"], "--kill 'me=1'; needs robot=SECONDS or controller="),
-        (["--robot", "a://b", "--faults", "lost=0.1"], "are for the simulated robot"),
-        (["--robot", "a://b", "--kill", "robot=1"], "are for the simulated robot"),
-        (["--set", "live.missing=-1"], "live.missing"),
-    ],
-)
+@pytest.mark.parametrize(("options", "message"), [
+    (["--faults", "lots=1"], "no fault 'lots'"),
+    (["--duration", "-1"], "--duration -1; must be positive"),
+    (["--kill", "me=1"], "--kill 'me=1'; needs robot=SECONDS or controller="),
+    (["--robot", "a://b", "--faults", "lost=0.1"], "are for the simulated robot"),
+    (["--robot", "a://b", "--kill", "robot=1"], "are for the simulated robot"),
+    (["--set", "live.missing=-1"], "live.missing"),
+])  # fmt: skip
 def test_options_that_are_none(
     options: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

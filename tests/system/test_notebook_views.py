@@ -3,7 +3,6 @@
 Chromium without a window; where there is none these tests are skipped, but not in CI.
 """
 
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ from typing import Any
 import browsers
 import numpy as np
 import pytest
-from browsers import HARMLESS
+from browsers import HARMLESS, until
 
 import hsp_control as hsp
 from hsp_control import Rollout, Viewer, load_experiment
@@ -56,19 +55,11 @@ class Notebook:
         self.page.goto(file.as_uri())
         self.views = self.page.frames[1:]
         for view in self.views:
-            self.until(view, "document.body.dataset.ready === 'yes'")
+            until(view, "document.body.dataset.ready === 'yes'")
 
     def _on_console(self, message: Any) -> None:
         if message.type in {"error", "warning"} and HARMLESS not in message.text:
             self.wrong.append(message.text)
-
-    @staticmethod
-    def until(view: Any, expression: str, timeout: float = 200.0) -> None:
-        """Wait for an event; the time only ends a test that hangs."""
-        deadline = time.monotonic() + timeout
-        while not view.evaluate(expression):
-            assert time.monotonic() < deadline, f"never: {expression}"
-            time.sleep(0.02)
 
     def close(self) -> None:
         self.page.close()
@@ -112,7 +103,7 @@ def test_a_viewer_is_shown_after_its_server_has_ended(
     notebook.page.keyboard.press("Home")
     assert view.evaluate("[player.time, player.playing]") == [0, False]
     notebook.page.keyboard.press(" ")
-    notebook.until(view, "player.time > 0.02")
+    until(view, "player.time > 0.02")
     # What it holds cannot reach the notebook.
     assert view.evaluate("window.origin") == "null"
     notebook.close()

@@ -86,16 +86,13 @@ def test_a_page_that_stalls_or_leaves_holds_nothing_up(
 
 
 @pytest.mark.smoke
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["whole_body"], "no configuration 'whole_body'"),
-        (["talos"], "talos has a free-flyer root"),
-        (["panda", "--host", "0.0.0.0"], "every address of this computer"),
-        (["panda", "--host", "192.0.2.1"], "cannot listen on 192.0.2.1"),
-        (["panda", "--set", "null_space.gain=-1"], "null_space.gain"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "message"), [
+    (["whole_body"], "no configuration 'whole_body'"),
+    (["talos"], "talos has a free-flyer root"),
+    (["panda", "--host", "0.0.0.0"], "every address of this computer"),
+    (["panda", "--host", "192.0.2.1"], "cannot listen on 192.0.2.1"),
+    (["panda", "--set", "null_space.gain=-1"], "null_space.gain"),
+])  # fmt: skip
 def test_mistakes_are_said_in_a_line(
     arguments: list[str],
     message: str,

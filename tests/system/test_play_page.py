@@ -22,64 +22,30 @@ pytestmark = pytest.mark.browser
 TURN = [0.0, np.sin(0.2), 0.0, np.cos(0.2)]
 HAND, ELBOW, BALL = [0.9, 0.3, 0.25, *TURN], [0.2, 0.9, 0.1, *TURN], [-0.4, 0.5, 0.3]
 SETUP: dict[str, Any] = {
-    "type": "play_setup",
-    "path": "/play",
-    "title": "three joints",
+    "type": "play_setup", "path": "/play", "title": "three joints",
     "targets": [
         {"name": "hand", "kind": "pose", "axes": [True] * 3, "pose": HAND},
-        {
-            "name": "elbow",
-            "kind": "position",
-            "axes": [True, True, False],
-            "pose": ELBOW,
-        },
+        {"name": "elbow", "kind": "position", "axes": [True, True, False],
+         "pose": ELBOW},
     ],
     "obstacles": [
         {"name": "ball", "path": "/obstacles/ball", "position": BALL, "radius": 0.1}
     ],
     "controls": [
-        {
-            "id": "stiffness",
-            "group": "Hand",
-            "label": "Stiffness",
-            "unit": "N/m",
-            "kind": "slider",
-            "value": 400.0,
-            "low": 10.0,
-            "high": 4000.0,
-            "log": True,
-        },
-        {
-            "id": "friction",
-            "group": "Robot",
-            "label": "Friction",
-            "kind": "switch",
-            "value": False,
-        },
+        {"id": "stiffness", "group": "Hand", "label": "Stiffness", "unit": "N/m",
+         "kind": "slider", "value": 400.0, "low": 10.0, "high": 4000.0, "log": True},
+        {"id": "friction", "group": "Robot", "label": "Friction", "kind": "switch",
+         "value": False},
     ],
     "plots": [
-        {
-            "id": "error",
-            "title": "Error",
-            "unit": "mm",
-            "log": True,
-            "series": [{"name": "hand", "color": "#0072B2"}],
-        },
-        {
-            "id": "torque",
-            "title": "Torque",
-            "unit": "N m",
-            "log": False,
-            "series": [
-                {"name": "q1", "color": "#0072B2"},
-                {"name": "q2", "color": "#22272B"},
-            ],
-        },
+        {"id": "error", "title": "Error", "unit": "mm", "log": True,
+         "series": [{"name": "hand", "color": "#0072B2"}]},
+        {"id": "torque", "title": "Torque", "unit": "N m", "log": False,
+         "series": [{"name": "q1", "color": "#0072B2"},
+                    {"name": "q2", "color": "#22272B"}]},
     ],
-    "pull": True,
-    "loop": "simulated",
-    "period_ms": 1.0,
-}
+    "pull": True, "loop": "simulated", "period_ms": 1.0,
+}  # fmt: skip
 
 # Keep what the page says; the server gets only what it knows.
 LISTEN = """() => {

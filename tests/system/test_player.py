@@ -3,15 +3,14 @@
 Chromium without a window; where there is none these tests are skipped, but not in CI.
 """
 
-import os
-import shutil
-import time
 from collections.abc import Iterator
 from typing import Any
 
+import browsers
 import numpy as np
 import pinocchio as pin
 import pytest
+from browsers import until
 
 from hsp_control import Robot
 from hsp_control.visualization.viewer import Viewer, threejs
@@ -33,34 +32,15 @@ from hsp_control.visualization.viewer.mesh_files import collada_object
 
 pytestmark = pytest.mark.browser
 
-sync_api = pytest.importorskip("playwright.sync_api")
+pytest.importorskip("playwright.sync_api")
 
-OPTIONS = [
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
-HARMLESS = "GPU stall due to ReadPixels"  # a remark of the software renderer
 JOINT, TRAIL = "/robot/joint1", "/paths/tip/actual"
 TIMES = np.linspace(1.0, 3.0, 21)
 
 
 @pytest.fixture(scope="module")
 def chromium() -> Iterator[Any]:
-    found = shutil.which("chromium") or shutil.which("google-chrome")
-    if found is None:
-        if os.environ.get("CI") == "true":
-            pytest.fail("CI needs Chromium: apt-get install chromium")
-        pytest.skip("there is no Chromium on the path")
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=found, args=OPTIONS)
-        yield browser
-        browser.close()
+    yield from browsers.started()
 
 
 @pytest.fixture(scope="module")
@@ -71,18 +51,8 @@ def viewer() -> Iterator[Viewer]:
 
 @pytest.fixture(scope="module")
 def opened(chromium: Any, viewer: Viewer) -> Iterator[tuple[Any, list[str]]]:
-    page = chromium.new_page(viewport={"width": 900, "height": 600})
-    wrong: list[str] = []
-    page.on("pageerror", lambda error: wrong.append(str(error)))
-    page.on(
-        "console",
-        lambda said: (
-            wrong.append(said.text)
-            if said.type in {"error", "warning"} and HARMLESS not in said.text
-            else None
-        ),
-    )
-    page.goto(viewer.url)
+    size = {"width": 900, "height": 600}
+    page, wrong = browsers.opened(chromium, str(viewer.url), viewport=size)
     assert viewer.wait_for_browser(200.0)
     yield page, wrong
     page.close()
@@ -128,14 +98,6 @@ def tell(viewer: Viewer, commands: list[Any]) -> None:
 
 def player(page: Any, name: str) -> Any:
     return page.evaluate(f"player.{name}")
-
-
-def until(page: Any, expression: str, timeout: float = 200.0) -> None:
-    """Wait for an event; the time only ends a test that hangs."""
-    deadline = time.monotonic() + timeout
-    while not page.evaluate(expression):
-        assert time.monotonic() < deadline, f"never: {expression}"
-        time.sleep(0.02)
 
 
 def thing(page: Any, name: str) -> Any:
@@ -425,19 +387,6 @@ def test_a_trail_lies_about_its_path_even_where_that_rests_or_turns_back(
     np.testing.assert_allclose(distances, 0.1, atol=1e-6)
 
 
-def test_a_page_opened_again_shows_the_same(
-    page: Any, viewer: Viewer, chromium: Any
-) -> None:
-    again = chromium.new_page()
-    again.goto(viewer.url)
-    assert viewer.wait_for_browser(200.0)
-    until(again, "player.loaded && player.end === 3")
-    page.evaluate("player.seek(2)")
-    again.evaluate("player.seek(2)")
-    assert thing(again, "quaternion") == thing(page, "quaternion")
-    again.close()
-
-
 MULTICOLOURED = """<?xml version="1.0"?>
 <COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
 <asset><up_axis>Z_UP</up_axis></asset>
@@ -510,9 +459,6 @@ def test_every_triangle_of_a_mesh_file_has_its_surface(
     expected = [
         [start, count, color]
         for k in range(parts)
-        for start, count, color in (
-            (9 * k, 3, [1, 0, 0]),
-            (9 * k + 3, 6, [0, 0, 1]),
-        )
+        for start, count, color in ((9 * k, 3, [1, 0, 0]), (9 * k + 3, 6, [0, 0, 1]))
     ]
     assert groups == expected

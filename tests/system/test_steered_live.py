@@ -107,13 +107,10 @@ def test_a_robot_moves_while_the_key_is_held(
     assert (tmp_path / "panda_obstacle-live.npz").is_file()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["--steer", "--robot=arm://x"], "say --steer hardware"),
-        (["--port=7100"], "need --steer"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "message"), [
+    (["--steer", "--robot=arm://x"], "say --steer hardware"),
+    (["--port=7100"], "need --steer"),
+])  # fmt: skip
 def test_what_makes_no_sense_is_refused(
     arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

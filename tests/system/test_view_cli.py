@@ -1,6 +1,5 @@
 """``hsp view`` and ``hsp run --view`` as a person uses them, with a browser or none."""
 
-import re
 import socket
 import time
 from collections.abc import Iterator
@@ -55,9 +54,7 @@ def address(printed: str) -> int:
 
 
 def test_view_prints_its_address_and_keeps_no_script_waiting(
-    log: Path,
-    capsys: pytest.CaptureFixture[str],
-    caplog: pytest.LogCaptureFixture,
+    log: Path, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
 ) -> None:
     begin = time.monotonic()
     assert main(["view", str(log)]) == 0
@@ -117,31 +114,6 @@ def test_a_port_in_use_is_said_and_the_run_goes_on(
     assert f"{message}; the run continues without a view" in captured.err
     assert "completed" in captured.out
     assert len(Rollout.load(tmp_path / "4_moving_obstacle.npz")) == 21
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (None, "made from Python: it has no configuration of its robot 'planar3r'"),
-        ({"name": "planar4r"}, "robot cannot be rebuilt: .*'planar4r'"),
-    ],
-)
-def test_a_log_without_its_robot_is_said(
-    log: Path,
-    tmp_path: Path,
-    change: dict[str, str] | None,
-    message: str,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    rollout = Rollout.load(log)
-    config = rollout.meta.pop("config")
-    if change is not None:
-        rollout.meta["config"] = {**config, "robot": change}
-    path = rollout.save(tmp_path / "lost.npz")
-    assert main(["view", str(path)]) == 2
-    error = capsys.readouterr().err
-    assert error.startswith(f"hsp: {path}: ")
-    assert re.search(message, error)
 
 
 def test_what_makes_no_sense_is_refused(

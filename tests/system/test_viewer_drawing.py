@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from clips import Clip
+from clips import Clip, told
 
 from hsp_control import Obstacle, Robot, Rollout, load_experiment
 from hsp_control.geometry import Scene
@@ -24,10 +24,7 @@ from hsp_control.geometry.shapes import (
     Sphere,
 )
 from hsp_control.trajectories import Hold, UniformLine
-from hsp_control.visualization.viewer import (
-    Recorder,
-    Viewer,
-)
+from hsp_control.visualization.viewer import Recorder, Viewer
 from hsp_control.visualization.viewer.commands import CAMERA, CAPTION, CLIP
 from hsp_control.visualization.viewer.threejs import _Y_TO_Z
 
@@ -52,8 +49,7 @@ def recorder() -> Recorder:
 
 
 def children(recorder: Recorder, path: str) -> list[dict[str, Any]]:
-    command = recorder.command(path, "object")
-    assert command is not None
+    command = told(recorder, path, "object")
     return list(command["object"]["object"]["children"])
 
 
@@ -102,8 +98,7 @@ def test_the_planar_arm_is_drawn_from_above(arm: Robot, recorder: Recorder) -> N
     shapes = [shape for path in links[1:] for shape in geometries(recorder, path)]
     sizes = [s["radius"] for s in shapes if s["type"] == "SphereGeometry"]
     assert sizes == [0.08] * 3  # the point masses
-    camera = recorder.command(CAMERA, "camera")
-    assert camera is not None
+    camera = told(recorder, CAMERA, "camera")
     assert camera["direction"] == [0.0, 0.0, 1.0]
     assert camera["up"] == [0.0, 1.0, 0.0]
     floor = recorder.transform("/floor/shadow")[2, 3]
@@ -111,8 +106,7 @@ def test_the_planar_arm_is_drawn_from_above(arm: Robot, recorder: Recorder) -> N
 
 
 def geometries(recorder: Recorder, path: str) -> list[dict[str, Any]]:
-    command = recorder.command(path, "object")
-    assert command is not None
+    command = told(recorder, path, "object")
     return list(command["object"]["geometries"])
 
 
@@ -121,14 +115,12 @@ def test_a_spatial_arm_is_seen_from_above_its_front_unless_told(
 ) -> None:
     robot = Robot.load("iiwa14")
     Viewer(robot, transport=recorder)
-    camera = recorder.command(CAMERA, "camera")
-    assert camera is not None
+    camera = told(recorder, CAMERA, "camera")
     assert camera["up"] == [0.0, 0.0, 1.0]
     assert camera["direction"][0] > 0.0
     assert camera["direction"][2] > 0.0
     Viewer(robot, transport=recorder, camera=[2, 0, 0.5], target=[0, 0, 0.5])
-    camera = recorder.command(CAMERA, "camera")
-    assert camera is not None
+    camera = told(recorder, CAMERA, "camera")
     assert camera["eye"] == [2.0, 0.0, 0.5]
     assert camera["target"] == [0.0, 0.0, 0.5]
     assert "direction" not in camera
@@ -196,8 +188,7 @@ def test_paths_target_and_obstacle_follow_the_log(
     assert recorder.paths("/obstacles/") == ["/obstacles/disk"]
     (disk,) = geometries(recorder, "/obstacles/disk")
     assert (disk["type"], disk["radius"]) == ("SphereGeometry", 0.2)
-    desired = recorder.command("/paths/tip/desired", "object")
-    assert desired is not None
+    desired = told(recorder, "/paths/tip/desired", "object")
     points = np.reshape(desired["points"], (-1, 3))[:, :2]
     np.testing.assert_allclose(points, run["task.tip.reference"], atol=1e-6)
 
@@ -216,8 +207,7 @@ def test_paths_target_and_obstacle_follow_the_log(
             shown = clip.pose(f"/robot/joint{joint}", t)
             expected = data.oMi[joint].homogeneous
             np.testing.assert_allclose(shown, expected, atol=1e-6)
-    caption = recorder.command(CAPTION, "caption")
-    assert caption is not None
+    caption = told(recorder, CAPTION, "caption")
     assert caption["title"] == run.meta["title"]
     assert [entry["name"] for entry in caption["legend"]] == [
         "desired path", "actual path", "target", "obstacle disk", "manipulability",
@@ -238,16 +228,14 @@ def test_a_state_is_shown_with_what_the_run_did_then(
     viewer.draw_scene(run)
     q = arm.integrate(run.q[37], np.full(3, 0.1))
     viewer.show(arm.state(run.t[37], q, run.v[37]))
-    sought = recorder.command(CLIP, "seek")
-    assert sought is not None
+    sought = told(recorder, CLIP, "seek")
     assert sought["time"] == run.t[37]
     expected = arm.state(0.0, q, np.zeros(3)).data.oMi[3].homogeneous
     np.testing.assert_array_equal(recorder.transform("/robot/joint3"), expected)
     viewer.draw_scene(Scene())
     assert recorder.command(CLIP, "begin") == {"type": "still", "path": CLIP}
     viewer.show(arm.state(0.25, q, run.v[37]))
-    clock = recorder.command(CAPTION, "time")
-    assert clock is not None
+    clock = told(recorder, CAPTION, "time")
     assert clock["text"] == "t = 0.25 s"
 
 
@@ -266,23 +254,12 @@ def test_a_new_scene_replaces_the_old(
 
 
 def test_a_pose_task_shows_its_axes(recorder: Recorder) -> None:
+    screw = {"type": "screw", "position": [0.5, 0.1, 0.5], "rotation": [3.0, 0.2, 0.0]}
+    hand = {"type": "frame_pose", "trajectory": screw | {"duration": 0.1}}
     experiment = load_experiment(
-        {
-            "robot": {"name": "iiwa14"},
-            "tasks": {
-                "hand": {
-                    "type": "frame_pose",
-                    "trajectory": {
-                        "type": "screw",
-                        "position": [0.5, 0.1, 0.5],
-                        "rotation": [3.0, 0.2, 0.0],
-                        "duration": 0.1,
-                    },
-                },
-            },
-            "simulation": {"duration": 0.1},
-        }
-    )
+        {"robot": {"name": "iiwa14"}, "tasks": {"hand": hand},
+         "simulation": {"duration": 0.1}}
+    )  # fmt: skip
     rollout = experiment.run()
     viewer = Viewer(experiment.robot, transport=recorder)
     viewer.play(rollout, speed=10.0)

@@ -5,16 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from clips import Clip
+from clips import Clip, told
 
 from hsp_control import Robot, Rollout, load_experiment
 from hsp_control.common.exceptions import ViewerError
-from hsp_control.visualization.viewer import (
-    Recorder,
-    Viewer,
-    robot_of,
-    view_logs,
-)
+from hsp_control.visualization.viewer import Recorder, Viewer, robot_of, view_logs
 from hsp_control.visualization.viewer.commands import CAMERA, CLIP
 from hsp_control.visualization.viewer.motion import motion_of
 
@@ -43,12 +38,10 @@ def test_the_page_is_told_how_to_play(
 ) -> None:
     viewer = Viewer(arm, transport=recorder, speed=0.5)
     viewer.play(run)
-    begin = recorder.command(CLIP, "begin")
-    assert begin is not None
+    begin = told(recorder, CLIP, "begin")
     assert (begin["play"], begin["loop"], begin["speed"]) == (True, False, 0.5)
     viewer.play(run, speed=3.0, loop=True)
-    begin = recorder.command(CLIP, "begin")
-    assert begin is not None
+    begin = told(recorder, CLIP, "begin")
     assert (begin["play"], begin["loop"], begin["speed"]) == (True, True, 3.0)
 
 
@@ -124,14 +117,11 @@ def test_a_log_is_viewed_as_its_configuration_says(
     assert (robot.name, robot.nq) == ("planar3r", 6)
     assert not robot.model.gravity.linear.any()  # as configured
     viewer = view_logs([path], transport=recorder)
-    camera = recorder.command(CAMERA, "camera")
-    assert camera is not None
+    camera = told(recorder, CAMERA, "camera")
     assert camera["eye"] == [0.0, 0.0, 9.0]
-    begin = recorder.command(CLIP, "begin")
-    assert begin is not None
+    begin = told(recorder, CLIP, "begin")
     assert begin["speed"] == 20.0
-    hidden = recorder.command("/paths/tip/actual", "visible")
-    assert hidden is not None
+    hidden = told(recorder, "/paths/tip/actual", "visible")
     assert hidden["value"] is False
     assert recorder.command("/targets", "visible") is None
     tip = Clip(recorder).pose("/robot/joint3", run.t[-1]) @ [1.0, 0.0, 0.0, 1.0]
@@ -140,10 +130,7 @@ def test_a_log_is_viewed_as_its_configuration_says(
 
 
 def test_a_log_whose_controller_is_gone_shows_what_its_columns_tell(
-    tmp_path: Path,
-    run: Rollout,
-    recorder: Recorder,
-    caplog: pytest.LogCaptureFixture,
+    tmp_path: Path, run: Rollout, recorder: Recorder, caplog: pytest.LogCaptureFixture
 ) -> None:
     config = {**(run.config or {})}
     field = {"type": "point_distance", "frames": ["gone"], "obstacle": "disk"}

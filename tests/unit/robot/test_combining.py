@@ -35,6 +35,7 @@ Array = NDArray[np.float64]
 
 LEFT = placement([0.0, 0.3, 0.1], [0.0, 0.0, 0.0])
 RIGHT = placement([0.9, -0.4, 0.2], [0.7, -0.4, 2.5])  # tilted: gravity pulls otherwise
+HERE = pin.SE3.Identity()
 
 
 @cache
@@ -81,56 +82,66 @@ def test_placement_is_a_position_and_roll_pitch_yaw() -> None:
     np.testing.assert_array_equal(place.translation, [1.0, 2.0, 3.0])
 
 
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("arm", ARMS)
-def test_dynamics_are_block_diagonal_and_each_block_is_the_robots_own(
-    arm: str, seed: int
-) -> None:
-    """M, M', N, RNEA and ABA, to rounding; nothing couples the arms."""
-    own, place = ARMS[arm]
-    q, v, a = draw(seed)
-    both, single = pair().state(0.0, q, v), alone(place).state(0.0, q[own], v[own])
-    exactly = {"rtol": 0, "atol": 5e-13}  # of torques up to 1e2
-    for what in ("mass_matrix", "mass_matrix_rate"):
-        whole, part = getattr(both, what), getattr(single, what)
-        np.testing.assert_allclose(whole[own, own], part, **exactly)
-        across = whole[own].copy()
-        across[:, own] = 0.0
-        assert not across.any()
-    np.testing.assert_allclose(
-        both.nonlinear_effects[own], single.nonlinear_effects, **exactly
-    )
-    tau = both.inverse_dynamics(a).copy()
-    np.testing.assert_allclose(tau[own], single.inverse_dynamics(a[own]), **exactly)
-    back = pair().forward_dynamics(q, v, tau)
+def test_combined_robots_do_not_mix() -> None:
+    """Each part moves, weighs and is limited as if alone, where it was put.
+
+    A tilted Panda, a planar arm (cos, sin) upside down, and a dog that floats.
+    """
+    up = pin.SE3(pin.rpy.rpyToMatrix(np.pi, 0.2, 0.3), np.array([1.0, 2.0, 0.5]))
+    own = {
+        "left": (load("panda"), RIGHT),
+        "flat": (load("planar3r"), up),
+        "dog": (load("solo12"), pin.SE3.Identity()),
+    }
+    both = Robot.combine(own)
+    assert (both.nq, both.nv) == (7 + 6 + 19, 7 + 3 + 18)
+    rng = np.random.default_rng(29)
+    q = both.random_configuration(rng)
+    v, a = rng.standard_normal((2, both.nv))
+    state = both.state(0.0, q, v)
+    M, M_dot = state.mass_matrix.copy(), state.mass_matrix_rate.copy()
+    tau = state.inverse_dynamics(a)
+    back = both.forward_dynamics(q, v, tau)
     np.testing.assert_allclose(back, a, rtol=0, atol=1e-9)  # M of condition 1e4
+    lower, upper = both.position_limits()
+    home = both.joint_positions(both.home())
+    start_q = start_v = 0
+    for name, (robot, place) in own.items():
+        of_q = slice(start_q, start_q + robot.nq)
+        of_v = slice(start_v, start_v + robot.nv)
+        start_q, start_v = of_q.stop, of_v.stop
+        # Gravity as the part feels it, which may hang from the ceiling.
+        turned = copy.deepcopy(robot)
+        turned.model.gravity.linear = place.rotation.T @ robot.model.gravity.linear
+        alone = turned.state(0.0, q[of_q], v[of_v])
+        for actual, expected in (
+            (M[of_v, of_v], alone.mass_matrix),
+            (M_dot[of_v, of_v], alone.mass_matrix_rate),
+            (state.nonlinear_effects[of_v], alone.nonlinear_effects),
+            (tau[of_v], alone.inverse_dynamics(a[of_v])),
+            (lower[of_v], robot.position_limits()[0]),
+            (upper[of_v], robot.position_limits()[1]),
+            (home[of_v], robot.joint_positions(robot.home())),
+        ):
+            np.testing.assert_allclose(actual, expected, rtol=1e-12, atol=1e-12)
+        M[of_v, of_v] = M_dot[of_v, of_v] = 0.0
+        # The last frame: moved to where the part stands, by its own joints alone.
+        frame, mine = robot.frame_names[-1], alone.frame(robot.frame_names[-1])
+        there = state.frame(f"{name}_{frame}")
+        R = np.kron(np.eye(2), place.rotation)
+        np.testing.assert_allclose(there.position, place.act(mine.position), atol=1e-14)
+        np.testing.assert_allclose(there.drift, R @ mine.drift, atol=1e-12)
+        for what in ("jacobian", "jacobian_dot"):
+            moved = getattr(there, what).copy()
+            expected = R @ getattr(mine, what)
+            np.testing.assert_allclose(moved[:, of_v], expected, rtol=0, atol=1e-12)
+            moved[:, of_v] = 0.0
+            assert not moved.any()
+    assert not M.any()  # nothing outside the blocks
+    assert not M_dot.any()
 
 
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("arm", ARMS)
-@pytest.mark.parametrize("frame", ["panda_tcp", "panda_link4", "panda_link0"])
-def test_frames_are_the_robots_own_moved_to_where_it_stands(
-    frame: str, arm: str, seed: int
-) -> None:
-    """J, J', drift and pose, turned with the placement; 0 for the other arm."""
-    own, place = ARMS[arm]
-    q, v, _ = draw(seed)
-    here = pair().state(0.0, q, v).frame(f"{arm}_{frame}")
-    there = load("panda").state(0.0, q[own], v[own]).frame(frame)
-    R = np.kron(np.eye(2), place.rotation)
-    np.testing.assert_allclose(here.position, place.act(there.position), atol=1e-14)
-    np.testing.assert_allclose(
-        here.rotation, place.rotation @ there.rotation, atol=1e-14
-    )
-    for what in ("jacobian", "jacobian_dot"):
-        J = getattr(here, what).copy()
-        np.testing.assert_allclose(J[:, own], R @ getattr(there, what), atol=1e-12)
-        J[:, own] = 0.0
-        assert not J.any()
-    np.testing.assert_allclose(here.drift, R @ there.drift, atol=1e-12)
-
-
-def test_names_limits_and_home() -> None:
+def test_names_and_limits() -> None:
     both, panda = pair(), load("panda")
     assert both.name == "panda+panda"
     assert both.joint_names == tuple(
@@ -140,35 +151,20 @@ def test_names_limits_and_home() -> None:
         for name in panda.frame_names[1:]:
             assert f"{arm}_{name}" in both.frame_names
         assert both.velocity_index(f"{arm}_panda_joint4").start == own.start + 3
-        lower, upper = both.position_limits()
-        np.testing.assert_array_equal(lower[own], panda.position_limits()[0])
-        np.testing.assert_array_equal(upper[own], panda.position_limits()[1])
-        np.testing.assert_array_equal(both.home()[own], panda.home())
         for what in ("upperEffortLimit", "upperVelocityLimit", "armature", "damping"):
-            np.testing.assert_array_equal(
-                getattr(both.model, what)[own], getattr(panda.model, what)
-            )
+            ours, theirs = getattr(both.model, what), getattr(panda.model, what)
+            np.testing.assert_array_equal(ours[own], theirs)
     assert both.frame_names.count("universe") == 1
-    np.testing.assert_array_equal(both.model.gravity.linear, [0.0, 0.0, -9.81])
 
 
-def test_robots_of_other_kinds_beside_each_other() -> None:
-    """A planar arm (cos, sin), a Panda and a dog that floats: nq and home line up."""
-    arm, panda, dog = load("planar3r"), load("panda"), load("solo12")
-    zoo = Robot.combine(
-        {"arm": (arm, LEFT), "panda": (panda, RIGHT), "dog": (dog, pin.SE3.Identity())}
-    )
-    assert (zoo.nq, zoo.nv) == (6 + 7 + 19, 3 + 7 + 18)
-    home = zoo.home()
-    np.testing.assert_allclose(home[:6], arm.home(), atol=1e-15)
-    np.testing.assert_allclose(home[6:13], panda.home(), atol=1e-15)
-    np.testing.assert_allclose(home[13:], dog.home(), atol=1e-15)
-    q = zoo.random_configuration(np.random.default_rng(1))
-    state = zoo.state(0.0, q, np.zeros(zoo.nv))
-    tip = arm.state(0.0, q[:6], np.zeros(3)).position("tip")
-    np.testing.assert_allclose(state.position("arm_tip"), LEFT.act(tip), atol=1e-14)
-    foot = dog.state(0.0, q[13:], np.zeros(18)).position("FL_FOOT")
-    np.testing.assert_allclose(state.position("dog_FL_FOOT"), foot, atol=1e-14)
+def test_gravity_is_the_robots_own() -> None:
+    weightless = {
+        name: (Robot.load(robot, gravity=(0.0, 0.0, 0.0)), HERE)
+        for name, robot in (("a", "panda"), ("b", "iiwa14"))
+    }
+    both = Robot.combine(weightless)
+    state = both.state(0.0, both.home(), np.zeros(both.nv))
+    np.testing.assert_allclose(state.nonlinear_effects, 0.0, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("proxy", ["capsules", "spheres", "meshes"])
@@ -265,8 +261,6 @@ def test_each_arm_moves_as_if_alone() -> None:
 
 
 # -- what cannot be --------------------------------------------------------------------
-
-HERE = pin.SE3.Identity()
 
 
 def source() -> RobotSource:

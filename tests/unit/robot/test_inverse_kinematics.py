@@ -74,13 +74,3 @@ def test_limits_hold_where_they_bind() -> None:
     found = reach(robot, target, robot.home(), robot.home(), lower, upper)
     assert found.converged  # four joints are left for three numbers
     assert found.q[3] >= lower[3]
-
-
-def test_the_same_question_has_the_same_answer_to_the_last_bit() -> None:
-    robot = Robot.load("iiwa14")
-    place = pin.SE3(np.eye(3), np.array([0.4, 0.2, 0.6]))
-    target = Target(robot.end_effector, place, 3)
-    first, second = (
-        search(Robot.load("iiwa14"), target, robot.home(), None).q for _ in range(2)
-    )
-    np.testing.assert_array_equal(first, second)

@@ -113,14 +113,6 @@ def test_frame_rates_are_derivatives_along_the_flow(case: str) -> None:
         )
 
 
-def test_position_is_the_frames() -> None:
-    robot, q, v, _ = draw("panda", seed=4)
-    state = robot.state(0.0, q, v)
-    np.testing.assert_array_equal(
-        state.position("panda_hand"), state.frame("panda_hand").position
-    )
-
-
 # --- dynamics ------------------------------------------------------------------------
 
 
@@ -216,13 +208,6 @@ def test_inverse_dynamics_is_m_a_plus_n_and_forward_dynamics_undoes_it(
     back = robot.forward_dynamics(q, v, tau)
     cond = np.linalg.cond(state.mass_matrix)
     np.testing.assert_allclose(back, a, rtol=0, atol=1e-14 * cond + 1e-12)
-
-
-def test_forward_dynamics_of_a_fixed_robot_is_aba() -> None:
-    robot, q, v, rng = draw("panda", seed=10)
-    tau = rng.standard_normal(7)
-    expected = pin.aba(robot.model, robot.model.createData(), q, v, tau)
-    np.testing.assert_array_equal(robot.forward_dynamics(q, v, tau), expected)
 
 
 def test_mimic_fingers_carry_both_fingers_inertia() -> None:

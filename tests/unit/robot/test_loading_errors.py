@@ -22,28 +22,14 @@ from hsp_control.geometry import link_shapes
 from hsp_control.robot import ToolFrame
 
 
-@pytest.fixture
-def write(tmp_path: Path) -> Callable[..., Path]:
-    def write_file(text: str | bytes, name: str = "arm.urdf") -> Path:
-        path = tmp_path / name
-        path.write_bytes(text if isinstance(text, bytes) else text.encode())
-        return path
-
-    return write_file
-
-
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        ("pnada", "no robot 'pnada'; did you mean 'panda'?"),
-        ("PANDA", "did you mean 'panda'?"),
-        ("planar", "did you mean 'planar3r'?"),
-        ("xyzzy", "no robot 'xyzzy' (give a path to a .urdf file, or one of: "),
-        ("robots/panda/", "is a folder; give a .urdf file in it (it contains panda."),
-        ("/nowhere/arm.urdf", "/nowhere/arm.urdf: no such file"),
-        ("arm_without_folder.urdf", "arm_without_folder.urdf: no such file"),
-    ],
-)
+@pytest.mark.parametrize(("name", "message"), [
+    ("pnada", "no robot 'pnada'; did you mean 'panda'?"),
+    ("PANDA", "did you mean 'panda'?"),
+    ("xyzzy", "no robot 'xyzzy' (give a path to a .urdf file, or one of: "),
+    ("robots/panda/", "is a folder; give a .urdf file in it (it contains panda."),
+    ("/nowhere/arm.urdf", "/nowhere/arm.urdf: no such file"),
+    ("arm_without_folder.urdf", "arm_without_folder.urdf: no such file"),
+])  # fmt: skip
 def test_robot_not_found(
     name: str, message: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -74,90 +60,42 @@ def test_file_that_may_not_be_read(
         Robot.load(path)
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ('<robot name="r">\n  <link name="a">\n</robot>', r":3:3: malformed XML: mism"),
-        ("", r"arm\.urdf:1:1: malformed XML: no element found"),
-        (b"\xff\xfe\x00\x00binary", r"arm\.urdf:1:\d+: malformed XML"),
-        (
-            '<?xml version="1.0" encoding="no-such"?>' + ARM,
-            "malformed XML: unknown enc",
-        ),
-        (
-            "<mujoco/>",
-            r"in a URDF it is <robot>; an MJCF's robot is robot: {mjcf: FILE}",
-        ),
-        ("<sdf version='1.6'/>", "the top element is <sdf>"),
-        ("<robot/>", "Pinocchio cannot build a model: No name given for the robot"),
-        ("<robot name='r'/>", "Pinocchio cannot build a model"),
-        (
-            ARM.replace('lower="-3" upper="3"', 'lower="3" upper="-3"', 1),
-            "joint 'shoulder': its lower limit 3 is above its upper limit -3",
-        ),
-        (robot_xml(link("a")), "the robot has no moving joint"),
-        (
-            robot_xml(link("a"), link("b"), joint("j", "a", "b", "fixed")),
-            "the robot has no moving joint",
-        ),
-        (robot_xml(link("a"), joint("j", "a", "b")), "Pinocchio cannot build a model"),
-        (robot_xml(link("b"), joint("j", "a", "b")), "Pinocchio cannot build a model"),
-        (robot_xml(link("a"), link("b")), "Pinocchio cannot build a model"),
-        (robot_xml(link("a"), link("a")), "link 'a': 2 links have this name"),
-        (
-            ARM.replace("</robot>", joint("elbow", "base", "lower") + "</robot>"),
-            "joint 'elbow': 2 joints have this name",
-        ),
-        (
-            ARM.replace('<mass value="2"/>', '<mass value="2"/><mass value="3"/>', 1),
-            "link 'upper': <inertial>: contains 2 elements <mass>; must be one",
-        ),
-        (
-            ARM.replace(INERTIA, 2 * INERTIA, 1),
-            "link 'upper': <link>: contains 2 elements <inertial>; must be one",
-        ),
-        (
-            ARM.replace("<axis", '<axis xyz="1 0 0"/><axis', 1),
-            "joint 'shoulder': <joint>: contains 2 elements <axis>; must be one",
-        ),
-        (
-            ARM.replace(
-                INERTIA,
-                '<collision><geometry><sphere radius="1"/><box size="1 1 1"/>'
-                "</geometry></collision>",
-                1,
-            ),
-            "link 'upper': <geometry>: contains sphere, box; must be one shape",
-        ),
-        (
-            ARM.replace('<mass value="2"/>', '<mass value="٢"/>', 1),
-            "link 'upper': <mass>: value=\"٢\" must be a number in the digits 0 to 9",
-        ),
-        (
-            ARM.replace('xyz="0.2 0.1 0.3"', 'xyz="0.2 0.1 ３"', 1),
-            'xyz="0.2 0.1 ３" must be 3 numbers in the digits 0 to 9',
-        ),
-        (
-            ARM.replace('type="revolute"', 'type="bent"'),
-            "Pinocchio cannot build a model",
-        ),
-        (ARM.replace("<limit", "<limits"), "Pinocchio cannot build a model"),
-        (
-            robot_xml(ARM, joint("loop", "lower", "base")),
-            "Pinocchio cannot build a model",
-        ),
-        (
-            ARM.replace("</joint>", '<mimic joint="ghost"/></joint>', 1),
-            "joint 'shoulder' mimics 'ghost', which is not a moving joint; load its",
-        ),
-        (
-            gripper().replace(
-                '"follower" type="revolute"', '"follower" type="continuous"'
-            ),
-            "build a model: Mimicking and .* different sizes; load .*mimic=False",
-        ),
-    ],
-)
+BUILD = "Pinocchio cannot build a model"
+TWO_SHAPES = '<geometry><sphere radius="1"/><box size="1 1 1"/></geometry>'
+NO_ROBOTS = [
+    ('<robot name="r">\n  <link name="a">\n</robot>', r":3:3: malformed XML: mism"),
+    ("", r"arm\.urdf:1:1: malformed XML: no element found"),
+    (b"\xff\xfe\x00\x00binary", r"arm\.urdf:1:\d+: malformed XML"),
+    ('<?xml version="1.0" encoding="no-such"?>' + ARM, "malformed XML: unknown enc"),
+    ("<mujoco/>", "in a URDF it is <robot>; an MJCF's robot is robot: {mjcf: FILE}"),
+    ("<robot/>", BUILD + ": No name given for the robot"),
+    (ARM.replace('lower="-3" upper="3"', 'lower="3" upper="-3"', 1),
+     "joint 'shoulder': its lower limit 3 is above its upper limit -3"),
+    (robot_xml(link("a"), link("b"), joint("j", "a", "b", "fixed")),
+     "the robot has no moving joint"),
+    (robot_xml(link("a"), joint("j", "a", "b")), BUILD),
+    (robot_xml(ARM, joint("loop", "lower", "base")), BUILD),
+    (robot_xml(link("a"), link("a")), "link 'a': 2 links have this name"),
+    (ARM.replace("</robot>", joint("elbow", "base", "lower") + "</robot>"),
+     "joint 'elbow': 2 joints have this name"),
+    (ARM.replace('<mass value="2"/>', '<mass value="2"/><mass value="3"/>', 1),
+     "link 'upper': <inertial>: contains 2 elements <mass>; must be one"),
+    (ARM.replace("<axis", '<axis xyz="1 0 0"/><axis', 1),
+     "joint 'shoulder': <joint>: contains 2 elements <axis>; must be one"),
+    (ARM.replace(INERTIA, f"<collision>{TWO_SHAPES}</collision>", 1),
+     "link 'upper': <geometry>: contains sphere, box; must be one shape"),
+    (ARM.replace('<mass value="2"/>', '<mass value="٢"/>', 1),
+     "link 'upper': <mass>: value=\"٢\" must be a number in the digits 0 to 9"),
+    (ARM.replace('xyz="0.2 0.1 0.3"', 'xyz="0.2 0.1 ３"', 1),
+     'xyz="0.2 0.1 ３" must be 3 numbers in the digits 0 to 9'),
+    (ARM.replace("</joint>", '<mimic joint="ghost"/></joint>', 1),
+     "joint 'shoulder' mimics 'ghost', which is not a moving joint; load its"),
+    (gripper().replace('"follower" type="revolute"', '"follower" type="continuous"'),
+     "build a model: Mimicking and .* different sizes; load .*mimic=False"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "message"), NO_ROBOTS)
 def test_file_that_is_no_robot(
     text: str | bytes, message: str, write: Callable[..., Path]
 ) -> None:
@@ -178,13 +116,7 @@ def test_hint_to_load_mimic_joints_as_free_ones_helps(
 
 
 @pytest.mark.parametrize(
-    ("name", "options"),
-    [
-        ("bravo7_gripper", {}),
-        ("falcon_bravo7_gripper", {}),
-        ("bluevolta_bravo7_gripper", {}),
-        ("romeo", {"mimic": False}),
-    ],
+    ("name", "options"), [("bravo7_gripper", {}), ("romeo", {"mimic": False})]
 )
 def test_hint_to_lock_joints_that_move_no_mass_helps(
     name: str, options: dict[str, Any]
@@ -279,75 +211,33 @@ def test_root_and_joint_that_do_the_same(write: Callable[..., Path]) -> None:
         Robot.load(path, root="planar")
 
 
-@pytest.mark.parametrize(
-    ("options", "error", "message"),
-    [
-        (
-            {"root": "free_flier"},
-            ModelError,
-            "RobotDescription: root: unknown value 'free_flier'; "
-            "did you mean 'free_flyer'? (allowed: fixed, planar, free_flyer)",
-        ),
-        (
-            {"locked": {"sholder": 0.0}},
-            JointNotFoundError,
-            "cannot lock 'sholder': no such joint; did you mean 'shoulder'? "
-            "(the model has shoulder, elbow)",
-        ),
-        (
-            {"locked": {"universe": 0.0}},
-            JointNotFoundError,
-            "cannot lock 'universe': no such joint",
-        ),
-        (
-            {"locked": {"shoulder": 0.0, "elbow": 1.0}},
-            ModelError,
-            "every joint is locked; at least one must be left to control",
-        ),
-        (
-            {"locked": {"elbow": float("nan")}},
-            ModelError,
-            "RobotDescription: locked.elbow: .nan is not a finite number",
-        ),
-        (
-            {"root": "free_flyer", "locked": {"root_joint": 0.0}},
-            ModelError,
-            "cannot lock 'root_joint': it has 6 degrees of freedom, only joints with "
-            "one can be locked; for a fixed base use root: fixed",
-        ),
-        (
-            {"tool_frames": {"pen": ToolFrame("lowr")}},
-            FrameNotFoundError,
-            "tool frame 'pen': no parent frame 'lowr'; did you mean 'lower'? "
-            "(the model has universe, ",
-        ),
-        (
-            {"tool_frames": {"lower": ToolFrame("lower")}},
-            ModelError,
-            "cannot add tool frame 'lower': the model has a frame with this name",
-        ),
-        (
-            {"tool_frames": {"elbow": ToolFrame("lower")}},  # joints are frames, too
-            ModelError,
-            "cannot add tool frame 'elbow': the model has a frame with this name",
-        ),
-        (
-            {"root": "fxed"},
-            ModelError,
-            "RobotDescription: root: unknown value 'fxed'; did you mean 'fixed'?",
-        ),
-        (
-            {"gravity": (0.0, -9.81)},
-            ModelError,
-            "RobotDescription: gravity: [0.0, -9.81] has 2 entries, needs 3",
-        ),
-        (
-            {"gravity": (0.0, 0.0, float("nan"))},
-            ModelError,
-            "RobotDescription: gravity.2: .nan is not a finite number",
-        ),
-    ],
-)
+OPTIONS: list[tuple[dict[str, Any], type[Exception], str]] = [
+    ({"root": "free_flier"}, ModelError,
+     "RobotDescription: root: unknown value 'free_flier'; did you mean 'free_flyer'? "
+     "(allowed: fixed, planar, free_flyer)"),
+    ({"locked": {"sholder": 0.0}}, JointNotFoundError,
+     "cannot lock 'sholder': no such joint; did you mean 'shoulder'? (the model has "
+     "shoulder, elbow)"),
+    ({"locked": {"universe": 0.0}}, JointNotFoundError,
+     "cannot lock 'universe': no such joint"),
+    ({"locked": {"shoulder": 0.0, "elbow": 1.0}}, ModelError,
+     "every joint is locked; at least one must be left to control"),
+    ({"locked": {"elbow": float("nan")}}, ModelError,
+     "RobotDescription: locked.elbow: .nan is not a finite number"),
+    ({"root": "free_flyer", "locked": {"root_joint": 0.0}}, ModelError,
+     "cannot lock 'root_joint': it has 6 degrees of freedom, only joints with one can "
+     "be locked; for a fixed base use root: fixed"),
+    ({"tool_frames": {"pen": ToolFrame("lowr")}}, FrameNotFoundError,
+     "tool frame 'pen': no parent frame 'lowr'; did you mean 'lower'? (the model has "
+     "universe, "),
+    ({"tool_frames": {"elbow": ToolFrame("lower")}}, ModelError,  # joints are frames
+     "cannot add tool frame 'elbow': the model has a frame with this name"),
+    ({"gravity": (0.0, -9.81)}, ModelError,
+     "RobotDescription: gravity: [0.0, -9.81] has 2 entries, needs 3"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("options", "error", "message"), OPTIONS)
 def test_option_that_does_not_fit(
     options: dict[str, Any],
     error: type[Exception],

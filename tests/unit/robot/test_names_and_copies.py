@@ -15,10 +15,6 @@ from hsp_control.common.exceptions import (
     JointNotFoundError,
     ModelError,
 )
-from hsp_control.robot.description.loading import load_model
-from hsp_control.robot.description.sources import (
-    find_robot,
-)
 
 # --- names ---------------------------------------------------------------------------
 
@@ -71,16 +67,8 @@ def test_names_of_joints_and_freedoms() -> None:
     assert solo.velocity_index("FL_HAA") == slice(6, 7)
 
     planar = load("talos_arm_planar")
-    assert planar.dof_names[:3] == (
-        "root_joint.x",
-        "root_joint.y",
-        "root_joint.yaw",
-    )
+    assert planar.dof_names[:3] == ("root_joint.x", "root_joint.y", "root_joint.yaw")
     assert planar.velocity_index("root_joint") == slice(0, 3)
-
-
-def test_repr() -> None:
-    assert repr(load("planar3r")) == "Robot('planar3r', nq=6, nv=3)"
 
 
 # --- persistence ---------------------------------------------------------------------
@@ -124,11 +112,3 @@ def test_joint_coordinates() -> None:
     assert A is not None
     np.testing.assert_array_equal(A @ [1.0, 2.0, 4.0], [1.0, 3.0, 7.0])
     assert load("panda").joint_coordinates is None
-
-
-def test_robot_of_a_given_model() -> None:
-    """`Robot.load` adds nothing to the constructor."""
-    source = find_robot("panda")
-    robot, loaded = Robot(load_model(source), source), load("panda")
-    assert robot.model == loaded.model
-    assert robot.source == loaded.source

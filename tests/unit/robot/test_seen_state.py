@@ -87,15 +87,12 @@ def write(state: RobotState) -> Any:
     return 0.0
 
 
-@pytest.mark.parametrize(
-    "field",
-    [
-        FunctionCost(write),
-        FunctionCost(lambda s: 0.0, gradient_function=write),
-        FunctionField(write),
-        FunctionField(lambda s: np.zeros(7), rate_function=write),
-    ],
-)
+@pytest.mark.parametrize("field", [
+    FunctionCost(write),
+    FunctionCost(lambda s: 0.0, gradient_function=write),
+    FunctionField(write),
+    FunctionField(lambda s: np.zeros(7), rate_function=write),
+])  # fmt: skip
 def test_a_function_of_the_user_cannot_move_the_robot(field: Any) -> None:
     law = Controller(panda(), [track()], field, limits=None)
     with pytest.raises(ValueError, match="read-only"):

@@ -14,12 +14,9 @@ from hsp_control.simulation.plants.sensors import Imu, SensorDelay
 pytest.importorskip("example_robot_data")
 SILENT = dict.fromkeys(
     (
-        "gyroscope_noise",
-        "accelerometer_noise",
-        "gyroscope_walk",
-        "accelerometer_walk",
-        "gyroscope_bias",
-        "accelerometer_bias",
+        f"{what}_{how}"
+        for what in ("gyroscope", "accelerometer")
+        for how in ("noise", "walk", "bias")
     ),
     0.0,
 )

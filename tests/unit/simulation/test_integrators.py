@@ -20,10 +20,7 @@ from closed_loops import (
 from numpy.typing import NDArray
 
 from hsp_control import Robot, simulate
-from hsp_control.common.exceptions import (
-    LogError,
-    SimulationError,
-)
+from hsp_control.common.exceptions import LogError, SimulationError
 from hsp_control.common.kernels import PLAIN
 from hsp_control.robot import integrators
 from hsp_control.robot.integrators import Dop853, Rk4, SemiImplicitEuler

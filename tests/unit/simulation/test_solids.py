@@ -91,23 +91,13 @@ def test_its_own_friction_counts(slip_damping: float | None) -> None:
     assert np.linalg.norm(across) <= 0.15 * (force @ normal) + 1e-9
 
 
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (
-            lambda: plant(Solid("wall", Box([1.0, 1.0, 1.0])), contacts=()),
-            "solids: nothing may touch them: declare contacts",
-        ),
-        (
-            lambda: Solid("steps", Box([1.0, 1.0, 1.0]), copies=3),
-            "3 copies have the spacing",
-        ),
-        (
-            lambda: Solid("floor", HalfSpace()),
-            "shape: plane is not possible here",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("make", "message"), [
+    (lambda: plant(Solid("wall", Box([1.0, 1.0, 1.0])), contacts=()),
+     "solids: nothing may touch them: declare contacts"),
+    (lambda: Solid("steps", Box([1.0, 1.0, 1.0]), copies=3),
+     "3 copies have the spacing"),
+    (lambda: Solid("floor", HalfSpace()), "shape: plane is not possible here"),
+])  # fmt: skip
 def test_what_no_solid_can_be(make: Any, message: str) -> None:
     with pytest.raises(SimulationError) as raised:
         make()

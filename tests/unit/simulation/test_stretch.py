@@ -30,9 +30,7 @@ from hsp_control.trajectories import Hold
 if not PLAIN:
     from hsp_control.simulation.stretch import MOST
 
-pytestmark = [
-    pytest.mark.skipif(PLAIN, reason="plain Python has no native calls"),
-]
+pytestmark = [pytest.mark.skipif(PLAIN, reason="plain Python has no native calls")]
 
 EULER = "simulation.integrator={type: semi_implicit_euler}"
 RK4 = "simulation.integrator={type: rk4}"
@@ -271,16 +269,13 @@ def test_a_motion_that_diverges_stops_the_same_way(
     assert max(counted.many) > 1
 
 
-@pytest.mark.parametrize(
-    "override",
-    [
-        "compensation.velocity_filter={cutoff: 100}",
-        "plant={type: rigid_body, sensors: {velocity_noise: 0.01}}",
-        "plant={type: rigid_body, pushes: [{frame: panda_link4, force: [1, 0, 0], "
-        "start: 0, duration: 1}]}",
-        "simulation.integrator={type: dop853}",
-    ],
-)
+@pytest.mark.parametrize("override", [
+    "compensation.velocity_filter={cutoff: 100}",
+    "plant={type: rigid_body, sensors: {velocity_noise: 0.01}}",
+    "plant={type: rigid_body, pushes: [{frame: panda_link4, force: [1, 0, 0], "
+    "start: 0, duration: 1}]}",
+    "simulation.integrator={type: dop853}",
+])  # fmt: skip
 def test_what_is_not_native_is_made_alone(override: str, counted: Counted) -> None:
     short("panda_obstacle", override, duration=0.05).run()
     assert sum(counted.many) == 0
