@@ -185,7 +185,7 @@ ERRORS: dict[str, tuple[Callable[[], Any], type[HspControlError], str]] = {
     "vector, number": (lambda: used(FunctionField(lambda s: 1.0)),  # type: ignore
      FieldError, r"returned g = 1.0 at t"),
     "rate, shape": (lambda: used(
-     FunctionField(lambda s: np.zeros(3), rate_function=lambda s: np.zeros(1))),
+        FunctionField(lambda s: np.zeros(3), rate_function=lambda s: np.zeros(1))),
      FieldError,
      r"^field 'function_field' returned g' = array\(\[0.\]\) at t = 0.25 s; needs 3"),
     "rate, infinite": (lambda: used(
