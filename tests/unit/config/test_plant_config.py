@@ -221,52 +221,29 @@ def test_feet_from_yaml() -> None:
 @pytest.mark.parametrize(
     ("plant", "message"),
     [
-        (
-            "mujcoo",
-            r"plant.type: unknown type 'mujcoo'; did you mean 'mujoco'",
-        ),
-        (
-            {"type": "mujcoo"},
-            r"plant.type: unknown type 'mujcoo'; did you mean 'mujoco'",
-        ),
-        (
-            {"type": "mujoco", "timstep": 1},
-            r"plant.timstep: unknown key 'timstep'; did you mean 'timestep'\?",
-        ),
-        (
-            {"type": "rigid_body", "payload": {"frame": "panda_tpc", "mass": 1}},
-            r"plant.payload.frame: no frame 'panda_tpc'; did you mean 'panda_tcp'\?",
-        ),
-        (
-            {"type": "rigid_body", "pushes": [{"frame": "panda_tpc"}]},
-            r"plant.pushes.0.frame: no frame 'panda_tpc'; did you mean 'panda_tcp'\?",
-        ),
-        (
-            {"type": "rigid_body", "friction": {"coulomb": [1, 2]}},
-            r"plant.friction.coulomb: has shape \(2,\); needs one number, or one",
-        ),
-        (
-            {"type": "rigid_body", "motor_inertia": [1, 2]},
-            r"plant.motor_inertia: has shape \(2,\); needs one number, or one for",
-        ),
-        (
-            {"type": "rigid_body", "sensors": {"velocity_noise": [1]}},
-            r"plant.sensors.velocity_noise.std: has shape \(1,\); needs one number",
-        ),
-        (
-            {"type": "rigid_body", "drives": {"noise": [1]}},
-            r"plant.drives.noise.std: has shape \(1,\); needs one number, or one",
-        ),
-        (
-            {"type": "rigid_body", "drives": {"dropped": 1.0}},
-            r"plant.drives.dropped.probability: 1.0 is too large; must be less than 1$",
-        ),
-        (
-            {"type": "rigid_body", "robot": {"name": "planar3r"}},
-            r"plant: the plant moves planar3r with the joints joint1, joint2, joint3; ",
-        ),
+        ("mujcoo", r"plant.type: unknown type 'mujcoo'; did you mean 'mujoco'"),
+        ({"type": "mujcoo"},
+         r"plant.type: unknown type 'mujcoo'; did you mean 'mujoco'"),
+        ({"type": "mujoco", "timstep": 1},
+         r"plant.timstep: unknown key 'timstep'; did you mean 'timestep'\?"),
+        ({"type": "rigid_body", "payload": {"frame": "panda_tpc", "mass": 1}},
+         r"plant.payload.frame: no frame 'panda_tpc'; did you mean 'panda_tcp'\?"),
+        ({"type": "rigid_body", "pushes": [{"frame": "panda_tpc"}]},
+         r"plant.pushes.0.frame: no frame 'panda_tpc'; did you mean 'panda_tcp'\?"),
+        ({"type": "rigid_body", "friction": {"coulomb": [1, 2]}},
+         r"plant.friction.coulomb: has shape \(2,\); needs one number, or one"),
+        ({"type": "rigid_body", "motor_inertia": [1, 2]},
+         r"plant.motor_inertia: has shape \(2,\); needs one number, or one for"),
+        ({"type": "rigid_body", "sensors": {"velocity_noise": [1]}},
+         r"plant.sensors.velocity_noise.std: has shape \(1,\); needs one number"),
+        ({"type": "rigid_body", "drives": {"noise": [1]}},
+         r"plant.drives.noise.std: has shape \(1,\); needs one number, or one"),
+        ({"type": "rigid_body", "drives": {"dropped": 1.0}},
+         r"plant.drives.dropped.probability: 1.0 is too large; must be less than 1$"),
+        ({"type": "rigid_body", "robot": {"name": "planar3r"}},
+         r"plant: the plant moves planar3r with the joints joint1, joint2, joint3; "),
     ],
-)
+)  # fmt: skip
 def test_plants_that_are_none(plant: Any, message: str) -> None:
     with pytest.raises(HspControlError, match=message):
         load_experiment(panda(plant))
