@@ -19,10 +19,7 @@ def shown(terminal: bool, bar: bool = False) -> str:
     """Return what is printed while three kernels are compiled."""
     text = io.StringIO()
     console = Console(file=text, force_terminal=terminal, width=100)
-    with (
-        compiling_shown(console),
-        Progress(console=console) if bar else nullcontext(),
-    ):
+    with compiling_shown(console), Progress(console=console) if bar else nullcontext():
         for _ in range(3):
             assert kernels._watched(lambda: "code") == "code"
     assert kernels._watched(lambda: "code") == "code"  # and no longer

@@ -481,10 +481,7 @@ def step_results() -> dict[str, list[float]]:
     gains = Gains(25.0, 10.0)
     tasks = (
         FramePosition(
-            "panda_tcp",
-            Hold(frame.position + 0.1),
-            gains=gains,
-            largest_error="none",
+            "panda_tcp", Hold(frame.position + 0.1), gains=gains, largest_error="none"
         ),
         FrameOrientation(
             "panda_tcp",

@@ -7,12 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import pytest
-from pydantic import (
-    BaseModel,
-    Discriminator,
-    Field,
-    Tag,
-)
+from pydantic import BaseModel, Discriminator, Field, Tag
 from scenario_document import Circle, Line, Part, Positive, Trajectory, message
 from typing_extensions import TypeAliasType
 

@@ -11,14 +11,8 @@ import pytest
 from clearance_cases import ends, load, outside, placed, still, turned
 from odd_robots import FACES, OCTAHEDRON, collision, odd_robot, write_stl
 
-from hsp_control import (
-    Obstacle,
-    Robot,
-)
-from hsp_control.common.exceptions import (
-    ModelError,
-    SceneError,
-)
+from hsp_control import Obstacle, Robot
+from hsp_control.common.exceptions import ModelError, SceneError
 from hsp_control.geometry import link_shapes
 from hsp_control.geometry.shapes import (
     Box,
@@ -30,13 +24,8 @@ from hsp_control.geometry.shapes import (
     PointCloud,
     Sphere,
 )
-from hsp_control.null_space.fields import (
-    ObstacleClearance,
-    SelfClearance,
-)
-from hsp_control.trajectories import (
-    Hold,
-)
+from hsp_control.null_space.fields import ObstacleClearance, SelfClearance
+from hsp_control.trajectories import Hold
 
 
 @pytest.mark.parametrize("name", ["panda", "iiwa14", "ur5"])

@@ -234,10 +234,7 @@ TRICKS: dict[str, tuple[dict[int, Trick], str]] = {
     "nan": ({200: nan_velocity}, r"not finite: v\[2\] is nan"),
     "infinite": ({200: infinite}, r"not finite: q\[0\] is inf"),
     "short": ({200: short}, r"q has shape \(5,\)"),
-    "time": (
-        {200: lambda m: m._replace(t=np.nan)},
-        "the state's time is nan",
-    ),
+    "time": ({200: lambda m: m._replace(t=np.nan)}, "the state's time is nan"),
     "missing": (always(missing, 200, 21), "no new state for 21 periods"),
     "frozen": (
         always(lambda m: m._replace(sequence=199), 200, 21),

@@ -12,27 +12,16 @@ from oracles import slope
 
 from hsp_control import Cost, Obstacle, RobotState
 from hsp_control.geometry import Proxy
-from hsp_control.geometry.shapes import (
-    Sphere,
-)
-from hsp_control.null_space.fields import (
-    FieldSample,
-    ObstacleClearance,
-)
+from hsp_control.geometry.shapes import Sphere
+from hsp_control.null_space.fields import FieldSample, ObstacleClearance
 from hsp_control.null_space.fields.barrier import CORE, barrier
 from hsp_control.null_space.metrics import IdentityMetric, MetricSample
-from hsp_control.trajectories import (
-    Hold,
-    UniformLine,
-)
+from hsp_control.trajectories import Hold, UniformLine
 
 # --- the barrier ---------------------------------------------------------------------
 
 
-@given(
-    s=st.floats(-2.0, 1.5),
-    influence=st.floats(0.01, 10.0),
-)
+@given(s=st.floats(-2.0, 1.5), influence=st.floats(0.01, 10.0))
 def test_barrier_is_its_formula_and_its_own_derivatives(
     s: float, influence: float
 ) -> None:

@@ -18,17 +18,9 @@ from hsp_control.common.exceptions import (
     SceneError,
 )
 from hsp_control.geometry import Proximity, link_shapes
-from hsp_control.geometry.shapes import (
-    Mesh,
-    Sphere,
-)
-from hsp_control.null_space.fields import (
-    ObstacleClearance,
-    SelfClearance,
-)
-from hsp_control.trajectories import (
-    Hold,
-)
+from hsp_control.geometry.shapes import Mesh, Sphere
+from hsp_control.null_space.fields import ObstacleClearance, SelfClearance
+from hsp_control.trajectories import Hold
 
 BALL = Obstacle("ball", Sphere(0.1), Hold([0.5, 0.3, 0.5]))
 

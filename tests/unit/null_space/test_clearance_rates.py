@@ -31,18 +31,10 @@ from hsp_control.geometry.shapes import (
     PointCloud,
     Sphere,
 )
-from hsp_control.null_space.fields import (
-    ObstacleClearance,
-)
+from hsp_control.null_space.fields import ObstacleClearance
 from hsp_control.robot import Dop853, Rk4
 from hsp_control.robot.integrators import Integrator
-from hsp_control.trajectories import (
-    Hold,
-    HoldOrientation,
-    Lissajous,
-    Spin,
-    Trajectory,
-)
+from hsp_control.trajectories import Hold, HoldOrientation, Lissajous, Spin, Trajectory
 
 Array = NDArray[np.float64]
 

@@ -156,9 +156,7 @@ def test_given_derivatives_are_used() -> None:
         raise AssertionError("called")
 
     cost = FunctionCost(
-        never,
-        gradient_function=lambda s: np.arange(3.0),
-        rate_function=lambda s: s.v,
+        never, gradient_function=lambda s: np.arange(3.0), rate_function=lambda s: s.v
     )
     g, g_dot = evaluate(cost, IdentityMetric(), state)
     np.testing.assert_array_equal(g, [0.0, -1.0, -2.0])
@@ -179,11 +177,7 @@ weights = st.floats(0.0, 1e3)
 @given(weights, weights, weights)
 def test_sums_are_linear(a: float, b: float, c: float) -> None:
     robot = load("panda")
-    terms = [
-        JointCentering(),
-        posture("panda"),
-        swirl_field("panda", rate=True),
-    ]
+    terms = [JointCentering(), posture("panda"), swirl_field("panda", rate=True)]
     state = robot.state(TIME, *draw("panda", 30))
     metric = metrics(robot)["constant"][0]
     samples = [evaluate(field, metric, state) for field in terms]

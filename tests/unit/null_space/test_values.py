@@ -60,7 +60,7 @@ EXAMPLES: dict[str, list[dict[str, Any]]] = {
         {"frames": ["panda_hand", "panda_link4"], "obstacle": "ball"},
     ],
     "manipulability": [
-        COMMON | JACOBIAN | {"form": "log", "rows": "pose", "length": 0.3, "metric": W},
+        COMMON | JACOBIAN | {"form": "log", "rows": "pose", "length": 0.3, "metric": W}
     ],
     "inverse_condition": [COMMON | JACOBIAN | {"rows": "pose", "length": 0.3}],
     "transmission": [COMMON | JACOBIAN | {"direction": [1, 2.5], "kind": "force"}],

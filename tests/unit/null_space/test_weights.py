@@ -445,9 +445,7 @@ def test_the_field_keeps_a_pushed_joint_off_its_limit() -> None:
     """A field that drives joint 4 up into its limit is balanced before it is there."""
     robot = load("panda")
     push = FunctionField(
-        lambda s: np.eye(7)[3] * 0.8,
-        rate_function=lambda s: np.zeros(7),
-        name="push",
+        lambda s: np.eye(7)[3] * 0.8, rate_function=lambda s: np.zeros(7), name="push"
     )
     upper = robot.position_limits()[1][3]
     start = robot.home()

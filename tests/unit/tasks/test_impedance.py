@@ -43,11 +43,7 @@ from hsp_control.control.compensation import (
 )
 from hsp_control.geometry import Scene
 from hsp_control.geometry.start import Start
-from hsp_control.null_space.metrics import (
-    IdentityMetric,
-    MassMatrixMetric,
-    Metric,
-)
+from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric, Metric
 from hsp_control.tasks import Impedance, TaskSample
 from hsp_control.tasks.impedance_gains import Rotating, Scratch, impedance_gains
 

@@ -256,10 +256,7 @@ def test_a_blend_leads_from_rest_at_the_start_into_the_trajectory(robot: str) ->
         Spin([0, 0, 1], 0.7, rotation=TURNED),
     )
     cases: list[tuple[Any, Any]] = [
-        (
-            FramePosition(trajectory=path, blend=0.5),
-            Blend(path, 0.5, start=x),
-        ),
+        (FramePosition(trajectory=path, blend=0.5), Blend(path, 0.5, start=x)),
         (
             FramePosition(trajectory=Circle(0.2, 2.0), blend=0.5),
             Blend(Circle(0.2, 2.0, x), 0.5, start=x),

@@ -27,11 +27,7 @@ from trajectory_cases import (
 from values import assert_is_a_value
 
 import hsp_control.trajectories as family
-from hsp_control.common.exceptions import (
-    ScheduleError,
-    ShapeError,
-    TrajectoryError,
-)
+from hsp_control.common.exceptions import ScheduleError, ShapeError, TrajectoryError
 from hsp_control.declaration.families import value_fields
 from hsp_control.trajectories import (
     Blend,

@@ -48,19 +48,10 @@ from hsp_control.null_space.metrics import CoordinatesMetric
 from hsp_control.simulation import log_series
 from hsp_control.simulation.decay import predicted_decay
 from hsp_control.tasks.task import ErrorPart
-from hsp_control.trajectories import (
-    Circle as Round,
-)
-from hsp_control.trajectories import (
-    Spin,
-)
+from hsp_control.trajectories import Circle as Round
+from hsp_control.trajectories import Spin
 from hsp_control.visualization import palette
-from hsp_control.visualization.plots import (
-    logged_geometry,
-    obstacles,
-    paths,
-    views,
-)
+from hsp_control.visualization.plots import logged_geometry, obstacles, paths, views
 from hsp_control.visualization.viewer.targets import read_targets
 
 pytestmark = pytest.mark.slow
@@ -290,11 +281,7 @@ def test_frames_are_even_in_time_or_where_they_are_asked_for(
     assert len(rows) == 8
     assert (rows[0], rows[-1]) == (0, 100)
     assert np.ptp(np.diff(rows)) <= 1
-    assert log_series.chosen_rows(log, times=[0.25, -3.0, 99.0, 0.251]) == [
-        0,
-        25,
-        100,
-    ]
+    assert log_series.chosen_rows(log, times=[0.25, -3.0, 99.0, 0.251]) == [0, 25, 100]
     together = drawn(plots.draw_superimposed, log, rows)
     arms = [line for line in together.lines if len(line.get_xdata()) == 9]
     np.testing.assert_array_equal(

@@ -17,10 +17,7 @@ from hsp_control.visualization.viewer.comparison import run_parts
 from hsp_control.visualization.viewer.packed.held_effort import expected_floor
 from hsp_control.visualization.viewer.packed.packing import ArrayTable
 from hsp_control.visualization.viewer.packed.panels import Edge, Panel, panels_of
-from hsp_control.visualization.viewer.packed.plot_packing import (
-    PlottedRun,
-    pack_panels,
-)
+from hsp_control.visualization.viewer.packed.plot_packing import PlottedRun, pack_panels
 
 PLANAR = "paper/4_moving_obstacle"
 

@@ -12,15 +12,10 @@ from drawn_logs import PAPER, both, changed, drawn, planar, spatial, visible
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import hsp_control.visualization.plots as plots
-from hsp_control import (
-    Rollout,
-)
+from hsp_control import Rollout
 from hsp_control.common.exceptions import PlotError
 from hsp_control.visualization import palette
-from hsp_control.visualization.plots import (
-    box_axes,
-    views,
-)
+from hsp_control.visualization.plots import box_axes, views
 
 pytestmark = pytest.mark.slow
 

@@ -19,9 +19,7 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.text import Text
 
 import hsp_control.visualization.plots as plots
-from hsp_control import (
-    Rollout,
-)
+from hsp_control import Rollout
 from hsp_control.simulation import log_series
 
 pytestmark = pytest.mark.slow
