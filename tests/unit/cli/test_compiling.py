@@ -26,13 +26,6 @@ def shown(terminal: bool, bar: bool = False) -> str:
     return text.getvalue()
 
 
-def test_a_terminal_counts_them() -> None:
-    text = shown(terminal=True)
-    assert "Compiling kernels (once" in text
-    assert "2 done" in text
-    assert "3 done" not in text
-
-
 def test_kernels_that_a_kernel_calls_are_counted() -> None:
     """The largest one takes half of the time: the number goes on within it."""
     said: list[str] = []

@@ -167,14 +167,6 @@ def test_meshes_without_a_place_or_a_hull(tmp_path: Path) -> None:
         Mesh(file, convex=True).geometry()
 
 
-def test_unknown_proxies_are_named() -> None:
-    with pytest.raises(ModelError) as caught:
-        link_shapes(load("panda"), "capsule")  # type: ignore[arg-type]
-    assert str(caught.value) == (
-        "proxy 'capsule' is not one of capsules, spheres, hulls, meshes"
-    )
-
-
 def test_a_robot_without_geometry_gets_capsules_and_one_warning(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:

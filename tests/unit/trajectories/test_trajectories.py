@@ -171,6 +171,17 @@ def test_writing_into_out_equals_a_fresh_sample(name: str) -> None:
             assert a.dtype == np.float64
 
 
+@every_member
+def test_samples_are_the_callers_own(name: str) -> None:
+    trajectory, _ = MEMBERS[name]
+    for t in (-0.5, 0.7, 3.0):
+        before = copy.deepcopy(trajectory.sample(t))
+        for array in flat(trajectory.sample(t)):
+            array.fill(7.0)
+        for a, b in zip(flat(before), flat(trajectory.sample(t)), strict=True):
+            np.testing.assert_array_equal(a, b)
+
+
 @pytest.mark.parametrize("name", POINT_MEMBERS)
 def test_dimension(name: str) -> None:
     trajectory, _ = POINT_MEMBERS[name]

@@ -409,9 +409,3 @@ def test_no_prediction_where_there_is_none(
     axes = drawn(plots.draw_null_space_error, logs[name])
     assert legend_texts(axes) == [r"actual $\Vert e_N \Vert_W$", why]
     assert axes.get_ylim()[1] >= 1e-6  # rounding does not fill the axis
-
-
-def test_a_constant_metric_is_read_from_the_log(logs: dict[str, Rollout]) -> None:
-    np.testing.assert_array_equal(log_series.constant_metric(logs["rest"]), A.T @ A)
-    varying = changed(logs["rest"], metric="MassMatrixMetric", metric_matrix=None)
-    assert log_series.constant_metric(varying) is None

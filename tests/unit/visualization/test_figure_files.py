@@ -36,11 +36,6 @@ def test_one_row_is_drawn(logs: dict[str, Rollout], name: str) -> None:
         assert figure.get_supxlabel().startswith("interrupted: by the user")
 
 
-def test_two_rows_are_drawn(logs: dict[str, Rollout]) -> None:
-    for figure in both(changed(logs["space"], slice(2), status="diverged")):
-        figure.canvas.draw()
-
-
 def test_a_log_without_rows_says_so(logs: dict[str, Rollout]) -> None:
     empty = changed(logs["rest"], slice(0), status="diverged")
     for draw in (plots.paper_figure, plots.diagnostics_figure):
