@@ -24,41 +24,19 @@ from hsp_control.config import json_schema
 MOVING = "paper/4_moving_obstacle"
 
 PANDA = {
-    "robot": {
-        "name": "panda",
-        "tool_frames": {"pen": {"parent": "panda_hand", "translation": [0, 0, 0.2]}},
-    },
+    "robot": {"name": "panda",
+     "tool_frames": {"pen": {"parent": "panda_hand", "translation": [0, 0, 0.2]}}},
     "start": {"joints": {"panda_joint4": -2.0}},
-    "tasks": {
-        "pen": {
-            "type": "frame_pose",
-            "frame": "pen",
-            "blend": 0.5,
-            "gains": {"natural_frequency": [8, 8, 8, 5, 5, 5], "damping_ratio": 0.9},
-            "trajectory": {
-                "type": "composed",
-                "position": {
-                    "type": "circle",
-                    "origin": "start",
-                    "center": [0, 0, 0],
-                    "radius": 0.05,
-                    "angular_rate": 2,
-                    "normal": [0, 0, 1],
-                },
-            },
-        }
-    },
-    "null_space": {
-        "gain": 6,
-        "metric": {"type": "mass_matrix"},
-        "fields": [{"type": "joint_centering", "weight": 2.0}],
-    },
-    "simulation": {
-        "duration": 0.02,
-        "control_period": 0.001,
-        "integrator": {"type": "rk4", "step": 0.0005},
-    },
-}
+    "tasks": {"pen": {"type": "frame_pose", "frame": "pen", "blend": 0.5,
+        "gains": {"natural_frequency": [8, 8, 8, 5, 5, 5], "damping_ratio": 0.9},
+        "trajectory": {"type": "composed", "position": {"type": "circle",
+              "origin": "start", "center": [0, 0, 0], "radius": 0.05,
+              "angular_rate": 2, "normal": [0, 0, 1]}}}},
+    "null_space": {"gain": 6, "metric": {"type": "mass_matrix"},
+     "fields": [{"type": "joint_centering", "weight": 2.0}]},
+    "simulation": {"duration": 0.02, "control_period": 0.001,
+     "integrator": {"type": "rk4", "step": 0.0005}},
+}  # fmt: skip
 
 
 def changed(path: str, value: object) -> dict:
@@ -227,6 +205,7 @@ MISTAKES = [
     ("tasks", {}, "ConfigError", "tasks: "),
     ("tasks.pen.frame", "pan", "FrameNotFoundError",
      "tasks.pen.frame: no frame 'pan'; did you mean 'pen'?"),
+    ("tasks.pen.wieght", 1, "ConfigError", "unknown key 'wieght'"),
     ("tasks.pen.gains", {"kp": 1}, "GainError",
      "tasks.pen.gains: give both kp and kv; one of them is missing"),
     ("tasks.pen.gains", {"kp": [1, 2], "kv": 1}, "GainError",

@@ -52,33 +52,18 @@ def test_a_configuration_runs_on_mujoco_with_the_same_tracking(name: str) -> Non
 
 EVERYTHING: dict[str, Any] = {
     "type": "rigid_body",
-    "inertias": {
-        "mass_factor": 1.1,
-        "com_shift": [0.001, 0.0, 0.0],
-        "random_mass": 0.1,
-        "random_inertia": 0.2,
-        "random_com": 0.001,
-    },
+    "inertias": {"mass_factor": 1.1, "com_shift": [0.001, 0.0, 0.0],
+     "random_mass": 0.1, "random_inertia": 0.2, "random_com": 0.001},
     "payload": {"frame": "panda_tcp", "mass": 0.5, "radius": 0.03},
     "motor_inertia": 0.01,
     "friction": {"coulomb": 0.3, "viscous": [0.1] * 7},
     "pushes": [{"frame": "panda_tcp", "force": [5, 0, 0], "start": 0.01}],
-    "sensors": {
-        "delay": 1,
-        "position_noise": 1e-5,
-        "encoder_resolution": 1.2e-5,
-        "differenced_velocity": True,
-        "velocity_noise": 0.001,
-    },
-    "drives": {
-        "dropped": 0.05,
-        "delay": 1,
-        "jitter": 0.0003,
-        "noise": 0.05,
-        "saturation": "model",
-    },
+    "sensors": {"delay": 1, "position_noise": 1e-5, "encoder_resolution": 1.2e-5,
+     "differenced_velocity": True, "velocity_noise": 0.001},
+    "drives": {"dropped": 0.05, "delay": 1, "jitter": 0.0003, "noise": 0.05,
+     "saturation": "model"},
     "seed": 7,
-}
+}  # fmt: skip
 
 
 def panda(plant: Any) -> dict[str, Any]:

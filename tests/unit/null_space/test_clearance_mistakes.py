@@ -87,17 +87,11 @@ def test_every_mistake_is_named(
 TOUCHING = {
     "robot": {"name": "panda"},
     "tasks": {"hand": {"type": "frame_position", "trajectory": {"type": "hold"}}},
-    "scene": {
-        "obstacles": {
-            "ball": {
-                "shape": {"type": "sphere", "radius": 0.1},
-                "center": {"type": "hold", "point": [0.2, 0.0, 0.7]},
-            }
-        }
-    },
+    "scene": {"obstacles": {"ball": {"shape": {"type": "sphere", "radius": 0.1},
+           "center": {"type": "hold", "point": [0.2, 0.0, 0.7]}}}},
     "null_space": {"fields": [{"type": "obstacle_clearance"}]},
     "simulation": {"duration": 0.02},
-}
+}  # fmt: skip
 
 
 def test_a_start_in_contact_is_refused_where_the_configuration_says_so() -> None:

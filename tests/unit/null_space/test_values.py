@@ -48,38 +48,25 @@ EXAMPLES: dict[str, list[dict[str, Any]]] = {
     "uncontrolled": [{"name": "mine"}],
     "joint_centering": [COMMON | {"weights": np.linspace(0.0, 2.0, 7)}],
     "limit_barrier": [COMMON | {"zone": 1.0, "weights": [1, 2, 3, 4, 5, 6, 7]}],
-    "target_posture": [
-        COMMON | {"target": np.linspace(-0.5, 0.5, 7), "weights": 2},
-        {"target": "home"},
-        {"target": np.linspace(-0.4, 0.5, 7)},
-        {"displacement": paths.Hold(np.full(7, 0.1))},
-    ],
+    "target_posture": [COMMON | {"target": np.linspace(-0.5, 0.5, 7), "weights": 2},
+     {"target": "home"}, {"target": np.linspace(-0.4, 0.5, 7)},
+     {"displacement": paths.Hold(np.full(7, 0.1))}],
     "equal_joint_angles": [COMMON | {"joints": ["panda_joint1", "panda_joint3"]}],
-    "point_distance": [
-        COMMON | {"frames": ("panda_hand",), "obstacle": BALL},
-        {"frames": ["panda_hand", "panda_link4"], "obstacle": "ball"},
-    ],
+    "point_distance": [COMMON | {"frames": ("panda_hand",), "obstacle": BALL},
+     {"frames": ["panda_hand", "panda_link4"], "obstacle": "ball"}],
     "manipulability": [
-        COMMON | JACOBIAN | {"form": "log", "rows": "pose", "length": 0.3, "metric": W}
-    ],
+     COMMON | JACOBIAN | {"form": "log", "rows": "pose", "length": 0.3, "metric": W}],
     "inverse_condition": [COMMON | JACOBIAN | {"rows": "pose", "length": 0.3}],
     "transmission": [COMMON | JACOBIAN | {"direction": [1, 2.5], "kind": "force"}],
-    "obstacle_clearance": [
-        COMMON
-        | {
-            "obstacles": [BALL, BOX],
-            "influence": 0.5,
-            "links": ["panda_link5", "panda_hand"],
-            "proxy": "hulls",
-        },
-        {"obstacles": ("ball",)},
-    ],
+    "obstacle_clearance": [COMMON | {"obstacles": [BALL, BOX], "influence": 0.5,
+        "links": ["panda_link5", "panda_hand"], "proxy": "hulls"},
+     {"obstacles": ("ball",)}],
     "self_clearance": [COMMON | {"influence": 0.3, "proxy": "spheres"}],
     "identity": [{}],
     "constant": [{"matrix": np.linspace(0.5, 2.0, 7)}, {"matrix": W}],
     "coordinates": [{"matrix": np.tril(np.ones((7, 7)))}],
     "mass_matrix": [{"inertia": 0.3}],
-}
+}  # fmt: skip
 OTHER: dict[str, Any] = {
     "joints": ["panda_joint1", "panda_joint2"],
     "frames": ["panda_link4"],

@@ -1,14 +1,11 @@
 """Placing: what a task leaves to the robot and its start becomes numbers and names."""
 
-import copy
-import pickle
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import pytest
-from numpy.typing import NDArray
 from task_cases import load, panda, planar, single_joints
 
 from hsp_control import (
@@ -51,8 +48,6 @@ from hsp_control.trajectories import (
     Spin,
     UniformLine,
 )
-
-Array = NDArray[np.float64]
 
 TCP = "panda_tcp"
 POINT = np.array([0.4, 0.1, 0.5])
@@ -123,21 +118,6 @@ def test_placing_twice_gives_an_equal_task(name: str) -> None:
     assert getattr(placed, "blend", None) is None
     assert placed.name == task.name
     assert placed.rows <= 7
-
-
-@every_task
-def test_a_placed_task_says_all_that_is_to_be_known(name: str) -> None:
-    """It needs no start: it can be pickled and computes the same bits elsewhere."""
-    here = state()
-    placed = place(TASKS[name])
-    copies = [pickle.loads(pickle.dumps(placed)), copy.deepcopy(placed)]
-    sample = placed.evaluate(here)
-    for twin in copies:
-        for mine, other in zip(sample, twin.evaluate(here), strict=True):
-            np.testing.assert_array_equal(mine, other)
-        for mine, other in zip(placed.measure(here), twin.measure(here), strict=True):
-            np.testing.assert_array_equal(mine, other)
-    assert all(np.isfinite(array).all() for array in sample)
 
 
 @pytest.mark.parametrize(
