@@ -85,24 +85,13 @@ def test_trajectories_are_values(name: str) -> None:
     assert all(value != other for key, other in VALUES.items() if key != name)
 
 
-def read_only(points: Array) -> Array:
-    points = points.copy()
-    points.setflags(write=False)
-    return points
-
-
 FORMS: dict[str, Callable[[Array], Any]] = {
     "list": lambda x: x.tolist(),
     "tuple of lists": lambda x: tuple(x.tolist()),
-    "tuples": lambda x: tuple(map(tuple, x)) if x.ndim > 1 else tuple(x),
-    "list of arrays": list,
     "float32": lambda x: x.astype(np.float32),
     "integers": lambda x: x.astype(int),
-    "integers of Python": lambda x: x.astype(int).tolist(),
-    "Fortran order": np.asfortranarray,
     "strided": lambda x: np.repeat(x, 3, axis=0)[::3],
     "backwards": lambda x: x[::-1].copy()[::-1],
-    "read-only": read_only,
     "masked": np.ma.array,
 }
 
