@@ -120,8 +120,6 @@ FISH = {
         ("hsp ch", "check ", {}),
         ("hsp check panda_ob", "panda_obstacle ", {}),
         ("hsp run paper/4", "paper/4_moving_obstacle ", {}),
-        ("hsp robots pl", "planar3r ", {}),
-        ("hsp sweep --sch", "--scheduler ", {}),
         ("hsp ch", "check\tcheck a configuration without running it", FISH),
         ("hsp check panda_ob", "panda_obstacle\t", FISH),
     ],

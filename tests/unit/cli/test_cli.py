@@ -178,12 +178,6 @@ def test_check_says_what_it_found(capsys: pytest.CaptureFixture[str]) -> None:
     assert f"{MOVING}: OK" in text
 
 
-def test_check_warns_of_a_singular_start(capsys: pytest.CaptureFixture[str]) -> None:
-    stretched = ["--set", "start.coordinates=[0, 0, 0]"]
-    assert main(["check", MOVING, *stretched]) == 0
-    assert "singular at the start" in capsys.readouterr().out
-
-
 def test_check_warns_of_motors_that_cannot_hold_the_robot(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -293,11 +287,6 @@ def test_what_was_mistyped_is_guessed(
     assert told in capsys.readouterr().err
 
 
-def test_schema_is_json(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["schema"]) == 0
-    assert "null_space" in json.loads(capsys.readouterr().out)["properties"]
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -343,12 +332,6 @@ def test_a_library_that_a_slim_system_lacks_is_named(
     lacks("no module", "a mistake of ours")
     with pytest.raises(ImportError, match="a mistake of ours"):
         main(["check", MOVING])
-
-
-def test_bad_usage_ends_with_status_2() -> None:
-    with pytest.raises(SystemExit) as caught:
-        main(["run"])
-    assert caught.value.code == 2
 
 
 @pytest.mark.slow

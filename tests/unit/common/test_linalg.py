@@ -111,16 +111,6 @@ def test_add_rows(seed: int, n: int, m: int) -> None:
     assert (np.abs(out - 1.0 - rows[:m, :n].T @ weights) <= bound).all()
 
 
-def test_products_of_views() -> None:
-    """Rows, columns and transposes of other arrays are arguments, too."""
-    A, x = normal(0, 6, 8), normal(1, 8, 3)
-    out = junk(3, 2)
-    multiply(A[::2, 1:4], x[:3, 1], out[:, 0])
-    multiply(A.T[1:4, ::2], A[::2, 5], out[:, 1])
-    close(out[:, 0], A[::2, 1:4] @ x[:3, 1], 1e-14)
-    close(out[:, 1], A.T[1:4, ::2] @ A[::2, 5], 1e-14)
-
-
 # --- triangles -----------------------------------------------------------------------
 
 
@@ -481,10 +471,7 @@ def step_results() -> dict[str, list[float]]:
     gains = Gains(25.0, 10.0)
     tasks = (
         FramePosition(
-            "panda_tcp",
-            Hold(frame.position + 0.1),
-            gains=gains,
-            largest_error="none",
+            "panda_tcp", Hold(frame.position + 0.1), gains=gains, largest_error="none"
         ),
         FrameOrientation(
             "panda_tcp",

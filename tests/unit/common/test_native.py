@@ -249,14 +249,6 @@ def test_calls_are_made_only_if_something_was_found(plain: bool) -> None:
     assert called(log) == []
 
 
-def test_several_calls_as_one_return_what_one_of_them_says() -> None:
-    log = np.zeros(9)
-    calls = [bind(_note, log, float(k)) for k in range(3)]
-    assert CallSequence(*calls)() == 2.0
-    assert CallSequence(*calls, result=1)() == 1.0
-    assert called(log) == [0.0, 1.0, 2.0, 0.0, 1.0, 2.0]
-
-
 @compiled
 def test_native_parts_of_a_call_of_the_time_are_merged() -> None:
     """Windows of time included; with one part in Python the call stays as it is."""

@@ -62,13 +62,6 @@ def test_stumpff_functions_equal_their_series(s: float) -> None:
         assert value == pytest.approx(float(exact), rel=0, abs=2e-15)
 
 
-def test_stumpff_functions_have_no_seam() -> None:
-    for below, above in zip(
-        so3.stumpff(np.nextafter(10.0, 0.0)), so3.stumpff(10.0), strict=True
-    ):
-        assert above == pytest.approx(below, rel=0, abs=1e-15)
-
-
 def test_stumpff_derivatives_are_those_of_the_docstring() -> None:
     s = 2.3
     c = so3.stumpff(s)

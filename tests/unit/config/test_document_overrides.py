@@ -52,33 +52,20 @@ def test_overrides_create_mappings_and_fill_empty_ones() -> None:
         ("fields.2.weight=3", "fields has no entry '2' (entries: 0 to 1)"),
         ("fields.-1.weight=3", "fields has no entry '-1' (entries: 0 to 1)"),
         ("fields.first=3", "fields has no entry 'first' (entries: 0 to 1)"),
-        (
-            "fields.0=[1,",
-            "not YAML: while parsing a flow node, "
-            "expected the node content, but found '<stream end>'",
-        ),
+        ("fields.0=[1,", "not YAML: while parsing a flow node, expected the node "
+         "content, but found '<stream end>'"),
         ("steps=!!x 1", "the tag '!!x' is not allowed: plain data only"),
-        (
-            "steps=a\nb: 1",
-            "not YAML: a key is not allowed here; check the indentation, "
-            "and put text that contains ': ' in quotes",
-        ),
+        ("steps=a\nb: 1", "not YAML: a key is not allowed here; check the "
+         "indentation, and put text that contains ': ' in quotes"),
         ("steps=x", "steps: 'x' is text; expected an integer"),
-        (
-            "fields.0.wieght=1",
-            "fields.0.wieght: unknown key 'wieght'; did you mean 'weight'? "
-            "(allowed: type, weight, reference)",
-        ),
-        (
-            "fields.1={type: x}",
-            "fields.1.type: unknown type 'x' (allowed: manipulability, centering)",
-        ),
-        (
-            "tasks.foot.gains.kp=1",
-            "tasks.foot: missing key 'frame'; required here: frame",
-        ),
+        ("fields.0.wieght=1", "fields.0.wieght: unknown key 'wieght'; did you mean "
+         "'weight'? (allowed: type, weight, reference)"),
+        ("fields.1={type: x}",
+         "fields.1.type: unknown type 'x' (allowed: manipulability, centering)"),
+        ("tasks.foot.gains.kp=1",
+         "tasks.foot: missing key 'frame'; required here: frame"),
     ],
-)
+)  # fmt: skip
 def test_mistakes_in_overrides(override: str, expected: str) -> None:
     origin = f"--set {' '.join(override.split())}"
     if expected.startswith("tasks.foot"):  # the task was created, not written

@@ -11,7 +11,6 @@ from mjcf_texts import CELL
 from places import ROOT
 
 from hsp_control import Experiment, Robot, load_experiment
-from hsp_control.cli import main
 from hsp_control.common.exceptions import (
     AccessError,
     FrameNotFoundError,
@@ -181,14 +180,6 @@ def test_a_scene_needs_an_mjcf(folder: Path) -> None:
         SimulationError, match=r"plant: panda is not declared by an MJC"
     ):
         load_experiment(path)
-
-
-def test_the_command_line_reports_a_mistake(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = write(folder, "root: base", "root: bas")
-    assert main(["run", str(path)]) == 2
-    assert capsys.readouterr().err.startswith(f"hsp: {path}:1: robot.root: no body")
 
 
 @pytest.mark.parametrize(

@@ -52,33 +52,18 @@ def test_a_configuration_runs_on_mujoco_with_the_same_tracking(name: str) -> Non
 
 EVERYTHING: dict[str, Any] = {
     "type": "rigid_body",
-    "inertias": {
-        "mass_factor": 1.1,
-        "com_shift": [0.001, 0.0, 0.0],
-        "random_mass": 0.1,
-        "random_inertia": 0.2,
-        "random_com": 0.001,
-    },
+    "inertias": {"mass_factor": 1.1, "com_shift": [0.001, 0.0, 0.0],
+     "random_mass": 0.1, "random_inertia": 0.2, "random_com": 0.001},
     "payload": {"frame": "panda_tcp", "mass": 0.5, "radius": 0.03},
     "motor_inertia": 0.01,
     "friction": {"coulomb": 0.3, "viscous": [0.1] * 7},
     "pushes": [{"frame": "panda_tcp", "force": [5, 0, 0], "start": 0.01}],
-    "sensors": {
-        "delay": 1,
-        "position_noise": 1e-5,
-        "encoder_resolution": 1.2e-5,
-        "differenced_velocity": True,
-        "velocity_noise": 0.001,
-    },
-    "drives": {
-        "dropped": 0.05,
-        "delay": 1,
-        "jitter": 0.0003,
-        "noise": 0.05,
-        "saturation": "model",
-    },
+    "sensors": {"delay": 1, "position_noise": 1e-5, "encoder_resolution": 1.2e-5,
+     "differenced_velocity": True, "velocity_noise": 0.001},
+    "drives": {"dropped": 0.05, "delay": 1, "jitter": 0.0003, "noise": 0.05,
+     "saturation": "model"},
     "seed": 7,
-}
+}  # fmt: skip
 
 
 def panda(plant: Any) -> dict[str, Any]:
@@ -221,52 +206,29 @@ def test_feet_from_yaml() -> None:
 @pytest.mark.parametrize(
     ("plant", "message"),
     [
-        (
-            "mujcoo",
-            r"plant.type: unknown type 'mujcoo'; did you mean 'mujoco'",
-        ),
-        (
-            {"type": "mujcoo"},
-            r"plant.type: unknown type 'mujcoo'; did you mean 'mujoco'",
-        ),
-        (
-            {"type": "mujoco", "timstep": 1},
-            r"plant.timstep: unknown key 'timstep'; did you mean 'timestep'\?",
-        ),
-        (
-            {"type": "rigid_body", "payload": {"frame": "panda_tpc", "mass": 1}},
-            r"plant.payload.frame: no frame 'panda_tpc'; did you mean 'panda_tcp'\?",
-        ),
-        (
-            {"type": "rigid_body", "pushes": [{"frame": "panda_tpc"}]},
-            r"plant.pushes.0.frame: no frame 'panda_tpc'; did you mean 'panda_tcp'\?",
-        ),
-        (
-            {"type": "rigid_body", "friction": {"coulomb": [1, 2]}},
-            r"plant.friction.coulomb: has shape \(2,\); needs one number, or one",
-        ),
-        (
-            {"type": "rigid_body", "motor_inertia": [1, 2]},
-            r"plant.motor_inertia: has shape \(2,\); needs one number, or one for",
-        ),
-        (
-            {"type": "rigid_body", "sensors": {"velocity_noise": [1]}},
-            r"plant.sensors.velocity_noise.std: has shape \(1,\); needs one number",
-        ),
-        (
-            {"type": "rigid_body", "drives": {"noise": [1]}},
-            r"plant.drives.noise.std: has shape \(1,\); needs one number, or one",
-        ),
-        (
-            {"type": "rigid_body", "drives": {"dropped": 1.0}},
-            r"plant.drives.dropped.probability: 1.0 is too large; must be less than 1$",
-        ),
-        (
-            {"type": "rigid_body", "robot": {"name": "planar3r"}},
-            r"plant: the plant moves planar3r with the joints joint1, joint2, joint3; ",
-        ),
+        ("mujcoo", r"plant.type: unknown type 'mujcoo'; did you mean 'mujoco'"),
+        ({"type": "mujcoo"},
+         r"plant.type: unknown type 'mujcoo'; did you mean 'mujoco'"),
+        ({"type": "mujoco", "timstep": 1},
+         r"plant.timstep: unknown key 'timstep'; did you mean 'timestep'\?"),
+        ({"type": "rigid_body", "payload": {"frame": "panda_tpc", "mass": 1}},
+         r"plant.payload.frame: no frame 'panda_tpc'; did you mean 'panda_tcp'\?"),
+        ({"type": "rigid_body", "pushes": [{"frame": "panda_tpc"}]},
+         r"plant.pushes.0.frame: no frame 'panda_tpc'; did you mean 'panda_tcp'\?"),
+        ({"type": "rigid_body", "friction": {"coulomb": [1, 2]}},
+         r"plant.friction.coulomb: has shape \(2,\); needs one number, or one"),
+        ({"type": "rigid_body", "motor_inertia": [1, 2]},
+         r"plant.motor_inertia: has shape \(2,\); needs one number, or one for"),
+        ({"type": "rigid_body", "sensors": {"velocity_noise": [1]}},
+         r"plant.sensors.velocity_noise.std: has shape \(1,\); needs one number"),
+        ({"type": "rigid_body", "drives": {"noise": [1]}},
+         r"plant.drives.noise.std: has shape \(1,\); needs one number, or one"),
+        ({"type": "rigid_body", "drives": {"dropped": 1.0}},
+         r"plant.drives.dropped.probability: 1.0 is too large; must be less than 1$"),
+        ({"type": "rigid_body", "robot": {"name": "planar3r"}},
+         r"plant: the plant moves planar3r with the joints joint1, joint2, joint3; "),
     ],
-)
+)  # fmt: skip
 def test_plants_that_are_none(plant: Any, message: str) -> None:
     with pytest.raises(HspControlError, match=message):
         load_experiment(panda(plant))

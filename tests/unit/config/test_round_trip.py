@@ -44,55 +44,35 @@ SCHEMA = jsonschema.Draft202012Validator(json_schema())
 EVERYTHING: dict[str, Any] = {
     "robot": {"name": "panda", "tool_frames": {"pen": {"parent": "panda_hand"}}},
     "start": {"joints": {"panda_joint4": -2.0}},
-    "scene": {
-        "obstacles": {
-            "ball": {
-                "shape": {"type": "sphere", "radius": 0.1},
-                "center": {"type": "hold", "point": [1, 1, 1]},
-                "orientation": {"type": "spin", "axis": [0, 0, 1], "rate": 1},
-            },
-        }
-    },
-    "tasks": {
-        "hand": {
-            "type": "frame_pose",
-            "trajectory": {"type": "composed", "position": {"type": "hold"}},
-            "gains": {"kp": [1, 1, 1, 2, 2, 2], "kv": 2},
-            "schedule": {"intervals": [[0, None]], "ramp": 0.1},
-        },
-        "posture": {"type": "joint_posture", "reference": "home", "priority": 2},
-    },
-    "limits": {
-        "effort": {"scale": {"panda_joint1": 0.5}},
-        "velocity": "none",
-        "acceleration": [None, 1, 1, 1, 1, 1, 1],
-        "position": {"lower": -3, "upper": [3, 3, 3, None, 3, 3, 3]},
-        "distances": [{"type": "obstacles", "obstacles": ["ball"]}, {"type": "self"}],
-    },
-    "null_space": {
-        "gain": [[2, 1], [0, 2]],
-        "metric": {"type": "constant", "matrix": [1, 2]},
-        "fields": [
-            {"type": "joint_centering", "weight": {"final": 1, "duration": 2}},
-            {"type": "target_posture", "target": "start"},
-        ],
-    },
-    "changes": [
-        {"type": "add_task", "at": 1, "task": {"type": "pointing", "name": "eye",
-                                               "direction": [0, 0, 1]}},
-        {"type": "gains", "at": 2, "task": "hand", "gains": {"kp": 1, "kv": 1}},
-        {"type": "field", "at": 3, "fields": [{"type": "manipulability"}]},
-        {"type": "weight", "at": 4, "field": "manipulability", "weight": 2},
-        {"type": "null_space_gain", "at": 5, "gain": 3},
-        {"type": "remove_task", "at": 6, "task": "hand"},
-        {"type": "contact", "at": 7, "contact": "sole", "bears": False},
-    ],
+    "scene": {"obstacles": {"ball": {"shape": {"type": "sphere", "radius": 0.1},
+           "center": {"type": "hold", "point": [1, 1, 1]},
+           "orientation": {"type": "spin", "axis": [0, 0, 1], "rate": 1}}}},
+    "tasks": {"hand": {"type": "frame_pose",
+        "trajectory": {"type": "composed", "position": {"type": "hold"}},
+        "gains": {"kp": [1, 1, 1, 2, 2, 2], "kv": 2},
+        "schedule": {"intervals": [[0, None]], "ramp": 0.1}},
+     "posture": {"type": "joint_posture", "reference": "home", "priority": 2}},
+    "limits": {"effort": {"scale": {"panda_joint1": 0.5}}, "velocity": "none",
+     "acceleration": [None, 1, 1, 1, 1, 1, 1],
+     "position": {"lower": -3, "upper": [3, 3, 3, None, 3, 3, 3]},
+     "distances": [{"type": "obstacles", "obstacles": ["ball"]}, {"type": "self"}]},
+    "null_space": {"gain": [[2, 1], [0, 2]],
+     "metric": {"type": "constant", "matrix": [1, 2]}, "fields": [
+        {"type": "joint_centering", "weight": {"final": 1, "duration": 2}},
+        {"type": "target_posture", "target": "start"}]},
+    "changes": [{"type": "add_task", "at": 1,
+        "task": {"type": "pointing", "name": "eye", "direction": [0, 0, 1]}},
+     {"type": "gains", "at": 2, "task": "hand", "gains": {"kp": 1, "kv": 1}},
+     {"type": "field", "at": 3, "fields": [{"type": "manipulability"}]},
+     {"type": "weight", "at": 4, "field": "manipulability", "weight": 2},
+     {"type": "null_space_gain", "at": 5, "gain": 3},
+     {"type": "remove_task", "at": 6, "task": "hand"},
+     {"type": "contact", "at": 7, "contact": "sole", "bears": False}],
     "plant": {"type": "mujoco", "contacts": {
         "panda_hand": {"shape": {"type": "sphere", "radius": 0.01}}}},
-    "compensation": {
-        "predictor": {}, "momentum_observer": {"clip": [1, None]},
-        "friction_feed_forward": "urdf",
-        "integral_action": {"ki": {"hand": [[9, 0], [0, 9]]}, "tasks": ["hand"]}},
+    "compensation": {"predictor": {}, "momentum_observer": {"clip": [1, None]},
+     "friction_feed_forward": "urdf",
+     "integral_action": {"ki": {"hand": [[9, 0], [0, 9]]}, "tasks": ["hand"]}},
     "simulation": {"control_period": 0.001},
 }  # fmt: skip
 

@@ -13,10 +13,10 @@ from typing import Annotated, Any, Literal
 import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
+from values import assert_is_a_value
 
 from hsp_control.common.exceptions import ConfigError, HspControlError, ImmutableError
 from hsp_control.declaration import AnyOf, Part, families
-from hsp_control.declaration.families import value_fields
 from hsp_control.declaration.quantities import (
     Count,
     Flag,
@@ -162,15 +162,6 @@ every_value = pytest.mark.parametrize("name", VALUES)
 
 
 # --- constructors ---------------------------------------------------------------------
-
-
-def test_fields_become_a_constructor() -> None:
-    assert (BALL.radius, BALL.label, BALL.size) == (0.5, "red", 1.0)
-    assert type(Ball(1).radius) is float
-    assert Rod(2.0).size == 2.0
-    assert dataclasses.replace(Rod(2.0), size=3) == Rod(3.0)
-    assert [field.name for field in value_fields(Ball)] == ["label", "radius", "center"]
-    assert Ball(1, label="b").changed_fields() == {"radius": 1.0, "label": "b"}
 
 
 def test_a_part_is_made_from_plain_data_too() -> None:
@@ -344,27 +335,18 @@ def test_a_field_may_be_of_several_families() -> None:
 
 MESSAGES: dict[str, Callable[[], Any]] = {
     "Ball: missing key 'radius'; required here: radius": lambda: Ball(),  # type: ignore
-    "Bag: missing key 'first'; required here: first": lambda: Bag(spare=BALL),  # type: ignore
     "Ball: radus: unknown key 'radus'; did you mean 'radius'? (allowed: label, radius, "
     "center)": lambda: Ball(radus=1),  # type: ignore
-    "Ball: colour: unknown key 'colour' (allowed: label, radius, center)": (
-        lambda: Ball(1, colour="red")  # type: ignore
-    ),
     "Ball: takes 2 positional arguments (radius, center); the others are given by "
     "name": (
         lambda: Ball(1, [1, 2, 3], "red")  # type: ignore
     ),
-    "Hammer: takes 1 positional argument (weight); the others are given by name": (
-        lambda: Hammer(1, 2)  # type: ignore
-    ),
     "Ball: radius: 'wide' is text; expected a number": lambda: Ball("wide"),  # type: ignore
     "Ball: radius: -1 is negative; must be greater than 0": lambda: Ball(-1),
-    "Ball: radius: 0.0 is too small; must be greater than 0": lambda: Ball(0.0),
     "Ball: center: [1, 2] has 2 entries, needs 3": lambda: Ball(1, [1, 2]),
     "Ball: center.1: 'up' is text; expected a number": lambda: Ball(1, [0, "up", 0]),
     "Ball: center: nothing given; expected a list of 3 numbers": (
-        lambda: Ball(1, None)
-    ),
+     lambda: Ball(1, None)),
     "Rod: a mass of 11.0 is too much for this size": lambda: Rod(1.0, 11.0),
     "Bag: first: 3 is an integer; expected a mapping": lambda: Bag(3),  # type: ignore
     "Bag: first: a Hammer is not one of the gadgets": lambda: Bag(Hammer(1)),  # type: ignore
@@ -375,51 +357,31 @@ MESSAGES: dict[str, Callable[[], Any]] = {
     "rod, bag)": (
         lambda: Bag({"type": "bal", "radius": 1})  # type: ignore
     ),
-    "Bag: first.radius: 'wide' is text; expected a number": (
-        lambda: Bag({"type": "ball", "radius": "wide"})  # type: ignore
-    ),
-    "Bag: first: missing key 'radius'; required here: type, radius": (
-        lambda: Bag({"type": "ball"})  # type: ignore
-    ),
     "Bag: first.radus: unknown key 'radus'; did you mean 'radius'? (allowed: type, "
     "label, radius, center)": lambda: Bag({"type": "ball", "radus": 1}),  # type: ignore
     "Bag: first: a mass of 11.0 is too much for this size": (
         lambda: Bag({"type": "rod", "size": 1, "mass": 11})  # type: ignore
     ),
-    "Bag: spare.first.first.center.2: .nan is not a finite number": (
-        lambda: Bag(BALL, {"type": "bag", "first": {"type": "bag", "first": {  # type: ignore
-            "type": "ball", "radius": 1, "center": [0, 0, math.nan]}}})
-    ),
+    "Bag: spare.first.first.center.2: .nan is not a finite number": (lambda: Bag(BALL,
+        {"type": "bag", "first": {"type": "bag", "first": {  # type: ignore
+              "type": "ball", "radius": 1, "center": [0, 0, math.nan]}}})),
     "Bag: grid: rows have different lengths [1, 2]; need the same": (
-        lambda: Bag(BALL, grid=[[1], [2, 3]])
-    ),
+     lambda: Bag(BALL, grid=[[1], [2, 3]])),
     "Bag: counts.a: 'many' is text; expected a list of numbers": (
-        lambda: Bag(BALL, counts={"a": "many"})
-    ),
+     lambda: Bag(BALL, counts={"a": "many"})),
     "Box: number: .inf is not a finite number": lambda: Box(math.inf),
     "Box: number: true is a boolean; expected a number": lambda: Box(True),
-    "Box: number: nothing given; expected a number": lambda: Box(None),  # type: ignore
-    "Box: non_negative: -0.1 is negative; must be at least 0": (
-        lambda: Box(non_negative=-0.1)
-    ),
     "Box: count: 1.5 is a decimal number; expected an integer": lambda: Box(count=1.5),  # type: ignore
-    "Box: count: -1 is negative; must be at least 0": lambda: Box(count=-1),
     "Box: flag: 1 is an integer; expected true or false": lambda: Box(flag=1),  # type: ignore
     "Box: name: '' has 0 characters, needs at least 1": lambda: Box(name=""),
-    "Box: name: 3 is an integer; expected text": lambda: Box(name=3),  # type: ignore
     "Box: names.1: 3 is an integer; expected text": lambda: Box(names=["a", 3]),  # type: ignore
     "Box: vector: [] has 0 entries, needs at least 1": lambda: Box(vector=[]),
     "Box: tensor: rows have different lengths; need the same": (
-        lambda: Box(tensor=[[[1], [2, 3]]])
-    ),
+     lambda: Box(tensor=[[[1], [2, 3]]])),
     "Box: gain: -1 is negative; must be greater than 0": lambda: Box(gain=-1),
     "Box: gain: 'stiff' is text; expected a number, a list of numbers or a matrix": (
-        lambda: Box(gain="stiff")
-    ),
+     lambda: Box(gain="stiff")),
     "Box: weights.1: -1 is negative; must be at least 0": lambda: Box(weights=[1, -1]),
-    "Box: either.weight: 'heavy' is text; expected a number": (
-        lambda: Box(either={"type": "hammer", "weight": "heavy"})  # type: ignore
-    ),
     "Box: degree: unknown value 4 (allowed: 3, 5)": lambda: Box(degree=4),  # type: ignore
 }  # fmt: skip
 
@@ -488,14 +450,6 @@ def test_every_property_has_a_description(base: type[Part]) -> None:
             assert "default" not in about or "oneOf" not in about
 
 
-def test_a_part_of_parts_has_a_schema_too() -> None:
-    schema = TypeAdapter(Box).json_schema()
-    for name, about in schema["properties"].items():
-        assert about["description"] == Box.documentation[name]
-    assert schema["properties"]["count"]["type"] == "integer"
-    assert len(schema["properties"]["either"]["oneOf"]) == 5 - 1  # rod: the first one
-
-
 def test_docstrings_of_fields_are_inherited() -> None:
     label = "What it is called, on one line [-]."
     assert Ball.documentation == {
@@ -524,16 +478,10 @@ def test_docstrings_of_fields_are_inherited() -> None:
 
 
 @every_value
-def test_copies_and_pickles_are_equal(name: str) -> None:
+def test_parts_are_values(name: str) -> None:
     value = VALUES[name]
-    assert copy.copy(value) is value
-    assert copy.deepcopy(value) is value
-    again = pickle.loads(pickle.dumps(value))
-    assert again is not value
-    assert again == value
-    assert hash(again) == hash(value)
-    assert repr(again) == repr(value)
-    assert len({value, again}) == 1
+    assert_is_a_value(value, {"np": np, **globals()})
+    assert copy.copy(value) is copy.deepcopy(value) is value
 
 
 def test_arrays_stay_read_only() -> None:
@@ -592,22 +540,15 @@ def test_repr_is_the_call_that_makes_it() -> None:
         "Bag(first=Ball(label='red', radius=0.5, center=[1.0, 2.0, 3.0]), "
         "spare=Rod(size=2.0))"
     )
-    for value in VALUES.values():
-        assert eval(repr(value), {"np": np, **globals()}) == value
 
 
 def test_assignment_is_refused() -> None:
-    for name in ("radius", "center", "label", "nothing", "_private"):
-        with pytest.raises(ImmutableError) as caught:
-            setattr(BALL, name, 1)
-        assert str(caught.value) == (
-            f"Ball.{name} cannot be assigned: parts never change; make another with "
-            f"dataclasses.replace(part, {name}=...)"
-        )
-        with pytest.raises(ImmutableError, match=f"Ball.{name} cannot be deleted"):
-            delattr(BALL, name)
-    with pytest.raises(ImmutableError, match=r"Rod.size cannot be assigned"):
-        Rod(1.0).size = 2.0  # type: ignore[misc]
+    with pytest.raises(ImmutableError) as caught:
+        BALL.label = "blue"  # type: ignore[misc]
+    assert str(caught.value) == (
+        "Ball.label cannot be assigned: parts never change; make another with "
+        "dataclasses.replace(part, label=...)"
+    )
 
 
 @pytest.mark.parametrize(

@@ -11,20 +11,12 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
-from hsp_control import (
-    Obstacle,
-)
+from hsp_control import Obstacle
 from hsp_control.geometry import LinkShape, link_shapes
 from hsp_control.geometry.capsule_fit import enclosing_capsule
-from hsp_control.geometry.shapes import (
-    Sphere,
-)
-from hsp_control.null_space.fields import (
-    ObstacleClearance,
-)
-from hsp_control.trajectories import (
-    Hold,
-)
+from hsp_control.geometry.shapes import Sphere
+from hsp_control.null_space.fields import ObstacleClearance
+from hsp_control.trajectories import Hold
 
 Array = NDArray[np.float64]
 

@@ -11,10 +11,7 @@ from clearance_cases import load, placed, still
 from numpy.typing import NDArray
 from odd_robots import FACES, OCTAHEDRON, write_stl
 
-from hsp_control import (
-    Obstacle,
-    Robot,
-)
+from hsp_control import Obstacle, Robot
 from hsp_control.geometry import LinkShape, Proximity, link_shapes
 from hsp_control.geometry.shapes import (
     Box,
@@ -27,13 +24,8 @@ from hsp_control.geometry.shapes import (
     Shape,
     Sphere,
 )
-from hsp_control.null_space.fields import (
-    ObstacleClearance,
-)
-from hsp_control.trajectories import (
-    Hold,
-    HoldOrientation,
-)
+from hsp_control.null_space.fields import ObstacleClearance
+from hsp_control.trajectories import Hold, HoldOrientation
 
 Array = NDArray[np.float64]
 

@@ -11,14 +11,8 @@ import pytest
 from clearance_cases import ends, load, outside, placed, still, turned
 from odd_robots import FACES, OCTAHEDRON, collision, odd_robot, write_stl
 
-from hsp_control import (
-    Obstacle,
-    Robot,
-)
-from hsp_control.common.exceptions import (
-    ModelError,
-    SceneError,
-)
+from hsp_control import Obstacle, Robot
+from hsp_control.common.exceptions import ModelError, SceneError
 from hsp_control.geometry import link_shapes
 from hsp_control.geometry.shapes import (
     Box,
@@ -30,13 +24,8 @@ from hsp_control.geometry.shapes import (
     PointCloud,
     Sphere,
 )
-from hsp_control.null_space.fields import (
-    ObstacleClearance,
-    SelfClearance,
-)
-from hsp_control.trajectories import (
-    Hold,
-)
+from hsp_control.null_space.fields import ObstacleClearance, SelfClearance
+from hsp_control.trajectories import Hold
 
 
 @pytest.mark.parametrize("name", ["panda", "iiwa14", "ur5"])
@@ -176,14 +165,6 @@ def test_meshes_without_a_place_or_a_hull(tmp_path: Path) -> None:
     Mesh(file).geometry()
     with pytest.raises(SceneError, match=r"is flat and has no convex hull; use conv"):
         Mesh(file, convex=True).geometry()
-
-
-def test_unknown_proxies_are_named() -> None:
-    with pytest.raises(ModelError) as caught:
-        link_shapes(load("panda"), "capsule")  # type: ignore[arg-type]
-    assert str(caught.value) == (
-        "proxy 'capsule' is not one of capsules, spheres, hulls, meshes"
-    )
 
 
 def test_a_robot_without_geometry_gets_capsules_and_one_warning(

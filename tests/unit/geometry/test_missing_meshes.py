@@ -4,7 +4,7 @@ import logging
 from pathlib import Path
 
 import pytest
-from odd_robots import FACES, OCTAHEDRON, collision, odd_robot, write_stl
+from odd_robots import collision, odd_robot
 
 from hsp_control.common.exceptions import ModelError
 from hsp_control.geometry import link_shapes
@@ -26,19 +26,6 @@ def test_primitives_serve_and_the_missing_mesh_is_named(
     assert "of 1 links are missing, which distances therefore do not see: arm" in text
     assert "(package://acme_arm/upper.stl)" in text
     assert "ROS_PACKAGE_PATH=<the folder that contains acme_arm>" in text
-
-
-def test_a_folder_in_ros_package_path_is_the_cure(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    package = tmp_path / "elsewhere" / "acme_arm"
-    package.mkdir(parents=True)
-    write_stl(package / "upper.stl", OCTAHEDRON, FACES)
-    mesh = collision('<mesh filename="package://acme_arm/upper.stl"/>')
-    monkeypatch.setenv("ROS_PACKAGE_PATH", str(package.parent))
-    robot = odd_robot(tmp_path, arm=mesh, base=BALL)
-    assert [shape.link for shape in link_shapes(robot)] == ["base", "arm"]
-    assert not caplog.records
 
 
 @pytest.mark.parametrize(

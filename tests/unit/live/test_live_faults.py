@@ -21,6 +21,7 @@ from live_rigs import (
     always,
     law,
     missing,
+    nan_velocity,
     panda,
     start,
     watched,
@@ -147,6 +148,18 @@ def shifted(**shifts: float) -> Trick:
     return lambda m: m._replace(**{k: getattr(m, k) + s for k, s in shifts.items()})
 
 
+def far(found: Measurement) -> Measurement:
+    q = found.q.copy()
+    q[3] = 0.1  # a Panda's fourth joint ends at -0.07
+    return found._replace(q=q)
+
+
+def fast(found: Measurement) -> Measurement:
+    v = found.v.copy()
+    v[1] = 2.5  # its limit is 2.175
+    return found._replace(v=v)
+
+
 class Frozen:
     """Repeats the first state that it sees, as if it were new."""
 
@@ -159,6 +172,17 @@ class Frozen:
 
 
 FAULTS: dict[str, tuple[Any, int, str]] = {
+    "a speed that is NaN": (nan_velocity, 1, r"not finite: v\[2\] is nan"),
+    "an infinite position": (replaced(q=np.full(7, np.inf)), 1, r"q\[0\] is inf"),
+    "five joints": (lambda m: m._replace(q=m.q[:5]), 1, r"q has shape \(5,\)"),
+    "a time that is NaN": (replaced(t=np.nan), 1, "the state's time is nan"),
+    "no state": (missing, 21, "no new state for 21 periods"),
+    "always the same state": (replaced(sequence=59), 21, "no new state for 21 periods"),
+    "an old state": (replaced(age=0.03), 1, "0.03 s old; 0.02 s are allowed"),
+    "a gap": (shifted(sequence=30), 20_000, "30 states in a row were not received"),
+    "beyond a joint's limit": (far, 1, "panda_joint4 is at 0.1, outside"),
+    "too fast": (fast, 1, "panda_joint2 moves at 2.5, outside"),
+    "a robot that stopped": (replaced(halted=True), 1, "has stopped by itself"),
     "an age that is NaN": (replaced(age=np.nan), 1, "age is nan"),
     "an age of the future": (replaced(age=-0.5), 1, "-0.5 s old"),
     "a sequence that is no number": (replaced(sequence=1.5), 1, "sequence is of type"),
@@ -188,9 +212,12 @@ def test_each_fault_of_a_measurement_is_named(kind: str, tmp_path: Path) -> None
     with pytest.raises(AssertionError, match=reason):
         raise AssertionError(report.reason)
     assert_safe(robot, report)
+    if count < 20_000:  # the loop holds the robot itself, for states come again
+        assert (report.phase, report.silent) == (Phase.HOLDING, False)
     logged = Rollout.load(log)
     assert (logged.status, logged.meta["message"]) == ("stopped", report.reason)
-    assert (np.diff(logged.t) < 0.02).all()  # also where the robot's clock jumps
+    longest = 0.02 if count != 21 else 0.03  # without a state there is no row
+    assert (np.diff(logged.t) < longest).all()  # also where the robot's clock jumps
 
 
 @pytest.mark.parametrize("end", ["lower", "upper"])
@@ -320,7 +347,9 @@ def test_whatever_is_raised(method: str, error: Exception, times: int) -> None:
 
 
 @pytest.mark.parametrize("what", ["applied", "effort", "log_channels"])
-@pytest.mark.parametrize("given_", [RuntimeError("mine"), None, np.zeros(3), "tau"])
+@pytest.mark.parametrize(
+    "given_", [RuntimeError("mine"), None, np.zeros(3), np.full(7, np.nan), "tau"]
+)
 def test_whatever_an_effort_source_does(what: str, given_: Any, tmp_path: Path) -> None:
     class Mine(Command):
         calls = 0

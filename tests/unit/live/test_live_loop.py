@@ -185,90 +185,7 @@ def test_tau_less_gravity_is_the_same_motion() -> None:
     assert np.abs(relieved[-1]).max() < 0.05
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("compensates", [True, False])
-def test_what_is_sent_keeps_rate_and_effort(compensates: bool) -> None:
-    most, rate = 60.0, 200.0
-    settings = LiveSettings(
-        compensates_gravity=compensates, effort_rate=rate, effort=most
-    )
-    rig = Rig(watched(settings))
-    wild = law(gains=Gains(30.0 * 100.0, 20.0))  # more than such a motor can do
-    run_loop(wild, rig, duration=0.3, settings=settings)
-    sent = np.array(rig.sent)
-    # The first step is from what holds a robot at rest: g(q), or nothing.
-    at_rest = np.zeros(7) if compensates else gravity(start())
-    steps = np.abs(np.diff(np.vstack([at_rest, sent]), axis=0))
-    assert steps.max() <= rate * PERIOD * (1.0 + 1e-9)
-    assert steps.max() > 0.99 * rate * PERIOD
-    if not compensates:
-        assert np.abs(sent).max() <= most
-
-
 # --- whatever happens: the safe stop -------------------------------------------------
-
-
-def far(found: Measurement) -> Measurement:
-    q = found.q.copy()
-    q[3] = 0.1  # a Panda's fourth joint ends at -0.07
-    return found._replace(q=q)
-
-
-def fast(found: Measurement) -> Measurement:
-    v = found.v.copy()
-    v[1] = 2.5  # its limit is 2.175
-    return found._replace(v=v)
-
-
-def infinite(found: Measurement) -> Measurement:
-    q = found.q.copy()
-    q[0] = np.inf
-    return found._replace(q=q)
-
-
-def short(found: Measurement) -> Measurement:
-    return found._replace(q=found.q[:5])
-
-
-TRICKS: dict[str, tuple[dict[int, Trick], str]] = {
-    "nan": ({200: nan_velocity}, r"not finite: v\[2\] is nan"),
-    "infinite": ({200: infinite}, r"not finite: q\[0\] is inf"),
-    "short": ({200: short}, r"q has shape \(5,\)"),
-    "time": (
-        {200: lambda m: m._replace(t=np.nan)},
-        "the state's time is nan",
-    ),
-    "missing": (always(missing, 200, 21), "no new state for 21 periods"),
-    "frozen": (
-        always(lambda m: m._replace(sequence=199), 200, 21),
-        "no new state for 21 periods",
-    ),
-    "old": ({200: lambda m: m._replace(age=0.03)}, "0.03 s old; 0.02 s are allowed"),
-    "gap": (
-        always(lambda m: m._replace(sequence=m.sequence + 30), 200),
-        "30 states in a row were not received",
-    ),
-    "far": ({200: far}, "panda_joint4 is at 0.1, outside"),
-    "fast": ({200: fast}, "panda_joint2 moves at 2.5, outside"),
-    "halted": ({200: lambda m: m._replace(halted=True)}, "has stopped by itself"),
-}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", TRICKS)
-def test_a_state_that_is_none_ends_in_the_safe_stop(kind: str, tmp_path: Path) -> None:
-    tricks, reason = TRICKS[kind]
-    rig, log = Rig(tricks=tricks), tmp_path / "run.journal"
-    report = run_loop(law(), rig, duration=5.0, log=log)
-    assert report.ended == "fault"
-    with pytest.raises(AssertionError, match=reason):
-        raise AssertionError(report.reason)
-    assert_held(rig, report)
-    assert np.isfinite(rig.sent).all()
-    run = Rollout.load(log)
-    assert (run.status, run.meta["message"]) == ("stopped", report.reason)
-    assert run.t[-1] < 1.5
-    assert np.isfinite(run.tau).all()
 
 
 def test_a_gap_that_is_allowed_is_held_over_and_counted() -> None:
@@ -295,43 +212,6 @@ def test_without_any_state_the_model_stops_it_and_the_loop_falls_silent() -> Non
     assert len(rig.sent) == pytest.approx(199 + predicted, abs=3)
     assert report.speed < 0.05
     assert np.abs(rig.robot.v).max() < AT_REST
-
-
-def raising(error: Exception) -> Trick:
-    def trick(found: Measurement) -> Measurement:
-        raise error
-
-    return trick
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("error", [HardwareError("the cable"), OSError(5, "gone")])
-def test_a_robot_that_cannot_be_read_is_left_at_once(error: Exception) -> None:
-    rig = Rig(tricks=always(raising(error), 200))
-    report = run_loop(law(), rig, duration=5.0)
-    assert report.ended == "fault"
-    assert report.error is error
-    assert "no state can be read" in report.reason
-    assert report.silent
-    assert rig.reads == 200
-    assert rig.robot.phase is Phase.HOLDING  # by itself
-
-
-def test_a_robot_that_cannot_be_written_to(monkeypatch: pytest.MonkeyPatch) -> None:
-    rig = Rig()
-    write = rig.write
-
-    def broken(effort: Array) -> None:
-        if len(rig.sent) >= 100:
-            raise HardwareError("no route")
-        write(effort)
-
-    monkeypatch.setattr(rig, "write", broken)
-    report = run_loop(law(), rig, duration=5.0)
-    assert report.ended == "fault"
-    assert "cannot be sent: no route" in report.reason
-    assert rig.robot.reason.startswith("the watchdog")
-    assert rig.robot.phase is Phase.HOLDING
 
 
 def bad_field(t: float, what: Any) -> FunctionField:
@@ -361,19 +241,6 @@ def test_a_law_that_fails_ends_in_the_safe_stop(what: Any, tmp_path: Path) -> No
     assert np.isfinite(run.q).all()
 
 
-def test_a_nan_of_an_effort_source_is_not_sent() -> None:
-    class Broken(Command):
-        def effort(self, t: float, q: Array, v: Array, period: float) -> Array:
-            tau = super().effort(t, q, v, period)
-            return np.full(7, np.nan) if t > 0.1 else tau
-
-    rig = Rig()
-    report = run_loop(Broken(law()), rig, duration=5.0)
-    assert "the effort is not finite" in report.reason
-    assert np.isfinite(rig.sent).all()
-    assert_held(rig, report)
-
-
 def interrupt(found: Measurement) -> Measurement:
     raise KeyboardInterrupt
 
@@ -399,28 +266,6 @@ def test_the_operator_s_stop_and_ctrl_c(tmp_path: Path) -> None:
     assert report.ended == "operator"
     assert_held(rig, report)
     assert Rollout.load(log).status == "interrupted"
-
-
-def test_a_second_ctrl_c_leaves_it_to_the_robot() -> None:
-    rig = Rig(tricks={150: interrupt, 160: interrupt})
-    report = run_loop(law(), rig)
-    assert report.silent
-    assert rig.reads == 160
-    assert rig.robot.phase is Phase.HOLDING
-
-
-@pytest.mark.slow
-def test_what_a_change_raises_stops_it() -> None:
-    requests, rig = OperatorRequests(), Rig()
-    gains = Gains(natural_frequency=5.0)
-    requests.call(lambda: law().at(0.0).gains("tipp", gains))
-    report = run_loop(law(), rig, requests=requests)
-    assert "'tipp'" in report.reason
-    assert_held(rig, report)
-    rig = Rig()
-    report = run_loop(law(), rig, on_period=call_from(0.1, lambda: 1 // 0))
-    assert "ZeroDivisionError" in report.reason
-    assert_held(rig, report)
 
 
 def test_a_disk_that_is_full_stops_it(
@@ -454,10 +299,10 @@ EVENTS = st.lists(
             [
                 missing,
                 nan_velocity,
-                infinite,
-                far,
-                fast,
-                short,
+                lambda m: m._replace(q=m.q + np.inf),
+                lambda m: m._replace(q=m.q + 3.0),
+                lambda m: m._replace(v=m.v + 2.5),
+                lambda m: m._replace(q=m.q[:5]),
                 lambda m: m._replace(sequence=m.sequence - 3),
                 lambda m: m._replace(t=m.t - 0.1),
                 lambda m: m._replace(t=-np.inf),
@@ -587,20 +432,14 @@ def test_a_floating_base_that_nothing_holds_is_refused() -> None:
     [
         ({"duration": 0.0}, "duration is 0.0 s; must be positive"),
         ({"log_period": 1e-4}, "log_period is 0.0001 s; must be a period, 0.001 s"),
-        (
-            {"settings": LiveSettings(stop=StopSettings(damping=600.0))},
-            "damping is 600; at a period of 0.001 s it may be 500 at most",
-        ),
-        (
-            {"settings": LiveSettings(effort_rate=[1.0, 2.0])},
-            "effort_rate: has 2 numbers; needs one number or 7",
-        ),
-        (
-            {"settings": LiveSettings(effort=[1.0, 2.0, 3.0])},
-            "effort: has 3 numbers; needs one number or 7",
-        ),
+        ({"settings": LiveSettings(stop=StopSettings(damping=600.0))},
+         "damping is 600; at a period of 0.001 s it may be 500 at most"),
+        ({"settings": LiveSettings(effort_rate=[1.0, 2.0])},
+         "effort_rate: has 2 numbers; needs one number or 7"),
+        ({"settings": LiveSettings(effort=[1.0, 2.0, 3.0])},
+         "effort: has 3 numbers; needs one number or 7"),
     ],
-)
+)  # fmt: skip
 def test_settings_that_are_none(options: dict[str, Any], message: str) -> None:
     with pytest.raises(LiveError, match=message):
         run_loop(law(), Rig(), **options)
@@ -610,13 +449,9 @@ def test_settings_that_are_none(options: dict[str, Any], message: str) -> None:
     ("make", "message"),
     [
         (lambda: LiveSettings(missing=-1), "LiveSettings: missing: -1 is negative"),
-        (lambda: LiveSettings(missing=1.5), "missing: 1.5"),  # type: ignore[arg-type]
-        (lambda: LiveSettings(age=0.0), "age: 0"),
         (lambda: LiveSettings(prediction_time=np.nan), "prediction_time: .nan is not"),
-        (lambda: LiveSettings(effort=-1.0), "effort: -1"),
         (lambda: LiveSettings(effort_rate="fast"), "effort_rate: 'fast'"),
         (lambda: StopSettings(rest_speed=0.0), "StopSettings: rest_speed: 0"),
-        (lambda: StopSettings(hold=-1.0), "hold: -1"),
         (lambda: StopSettings(damping=np.inf), "damping: .inf is not"),
     ],
 )
@@ -632,28 +467,11 @@ def test_a_robot_that_is_silent_or_unfit_is_not_started() -> None:
         run_loop(law(), rig, clock=lambda: float(next(clock)))
     assert rig.closed
     assert not rig.sent
-    for trick, why in ((nan_velocity, "not finite"), (far, "panda_joint4 is at")):
-        rig = Rig(tricks=always(trick, 1))
-        with pytest.raises(HardwareError, match=f"cannot be started: .*{why}"):
-            run_loop(law(), rig)
-        assert not rig.sent
-        assert rig.closed
-
-
-def test_the_monitor_uses_the_limits_of_the_controller() -> None:
-    q = start()
-    limits = Limits(position=PositionRange(q - 0.05, q + 0.05))
-    unaware = law()  # does not know of them, and swings by 0.5 rad
-
-    class Beyond(Command):
-        def effort(self, t: float, q: Array, v: Array, period: float) -> Array:
-            super().effort(t, q, v, period)
-            return unaware.compute(t, q, v).tau
-
-    report = run_loop(Beyond(law(limits=limits)), Rig(), duration=5.0)
-    assert report.ended == "fault"
-    assert "outside" in report.reason
-    assert report.t < 3.0
+    rig = Rig(tricks=always(nan_velocity, 1))
+    with pytest.raises(HardwareError, match=r"cannot be started: .*not finite"):
+        run_loop(law(), rig)
+    assert not rig.sent
+    assert rig.closed
 
 
 @pytest.mark.parametrize("at_first", [None, Limits()])

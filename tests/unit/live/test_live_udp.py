@@ -24,7 +24,7 @@ from hsp_control.live.link import AgeEstimator
 from hsp_control.live.packets import Kind, Packet, decode, encode
 from hsp_control.live.udp_robot import CLOSED_BY_LOOP
 
-numbers = st.lists(st.floats(allow_nan=False), max_size=20)
+numbers = st.lists(st.floats(), max_size=20)
 
 
 def packet(sequence: int = 1, payload: list[float] | None = None) -> Packet:
@@ -41,6 +41,7 @@ def same(a: Packet, b: Packet) -> bool:
 
 @given(payload=numbers, sequence=st.integers(0, 2**64 - 1))
 def test_a_packet_comes_back(payload: list[float], sequence: int) -> None:
+    """Numbers that are not finite too: they are left to the monitor."""
     sent = packet(sequence, payload)
     found = decode(encode(sent))
     assert found is not None
@@ -74,12 +75,6 @@ def test_other_versions_kinds_and_lengths_are_refused() -> None:
     for at, value in ((0, b"X"), (4, b"\x02"), (5, b"\x09"), (8, b"\x03")):
         body = whole[:at] + value + whole[at + 1 : -4]
         assert decode(body + struct.pack("<I", zlib.crc32(body))) is None
-
-
-def test_not_finite_numbers_are_decoded_and_left_to_the_monitor() -> None:
-    found = decode(encode(packet(1, [np.nan, np.inf])))
-    assert found is not None
-    assert same(found, packet(1, [np.nan, np.inf]))
 
 
 # --- faults --------------------------------------------------------------------------

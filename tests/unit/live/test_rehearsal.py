@@ -14,15 +14,10 @@ from hsp_control.live.rehearsal import rehearse
 
 CONFIG = {
     "robot": {"name": "panda"},
-    "tasks": {
-        "tip": {"type": "frame_position"},
-        "turn": {
-            "type": "frame_orientation",
-            "schedule": {"intervals": [[1.0, 2.0]], "ramp": 0.2},
-        },
-    },
+    "tasks": {"tip": {"type": "frame_position"}, "turn": {"type": "frame_orientation",
+        "schedule": {"intervals": [[1.0, 2.0]], "ramp": 0.2}}},
     "changes": [{"type": "null_space_gain", "at": 5.0, "gain": 3.0}],
-}
+}  # fmt: skip
 LATER = 0.1, 1.1, 1.5, 1.9, 3.0, 5.1, 6.0
 
 

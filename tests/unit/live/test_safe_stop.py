@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from live_rigs import PERIOD, Rig, law, panda, start, watched
 from numpy.typing import NDArray
 
-from hsp_control import Limits, Robot
-from hsp_control.common.exceptions import LiveError
+from hsp_control import Limits
 from hsp_control.constraints.limits import own_limits
 from hsp_control.control.compensation import Command
 from hsp_control.live import LiveSettings, Phase, SafeStop, StopSettings, run_loop
@@ -169,14 +168,6 @@ def test_the_limiter_keeps_both_limits_where_both_can_be(
     np.testing.assert_array_equal(limiter.sent, before)
 
 
-def test_the_urdf_s_limits_are_the_limiter_s() -> None:
-    limiter = EffortLimiter(panda(), LiveSettings(), PERIOD)
-    np.testing.assert_array_equal(limiter.effort_limits, panda().model.effortLimit)
-    endless = Robot.load("planar3r")
-    limits = LiveSettings().effort_limits(endless)
-    assert (limits > 0.0).all()
-
-
 def test_the_limiter_follows_the_limits_of_the_controller() -> None:
     half, most = np.full(7, 0.5), np.array([87.0] * 4 + [np.inf] * 3)
     own = own_limits(panda())
@@ -277,11 +268,6 @@ def test_of_several_efforts_the_last_counts_and_none_may_be_nan() -> None:
     assert robot.phase is Phase.DAMPING
     assert "not finite" in robot.reason
     assert np.isfinite(robot.tau).all()
-
-
-def test_a_watchdog_needs_a_period() -> None:
-    with pytest.raises(LiveError, match="watchdog: 0 is"):
-        LiveSettings(watchdog=0)
 
 
 def test_compensation_is_of_the_robot_s_own_mass() -> None:

@@ -5,7 +5,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from clearance_cases import AIR, load, still
 from field_cases import placed
@@ -18,23 +17,10 @@ from hsp_control.common.exceptions import (
     ModelError,
     SceneError,
 )
-from hsp_control.geometry import Proximity, Scene, link_shapes
-from hsp_control.geometry.shapes import (
-    Box,
-    Capsule,
-    Cylinder,
-    HeightField,
-    Mesh,
-    PointCloud,
-    Sphere,
-)
-from hsp_control.null_space.fields import (
-    ObstacleClearance,
-    SelfClearance,
-)
-from hsp_control.trajectories import (
-    Hold,
-)
+from hsp_control.geometry import Proximity, link_shapes
+from hsp_control.geometry.shapes import Mesh, Sphere
+from hsp_control.null_space.fields import ObstacleClearance, SelfClearance
+from hsp_control.trajectories import Hold
 
 BALL = Obstacle("ball", Sphere(0.1), Hold([0.5, 0.3, 0.5]))
 
@@ -53,26 +39,17 @@ MISTAKES: list[tuple[Callable[[Path], Any], type[HspControlError], str]] = [
      "obstacles.1: no obstacle 'bell'; did you mean 'ball'? (the scene has ball)"),
     (lambda _: ObstacleClearance([BALL], influence=0.0), FieldError,
      "ObstacleClearance: influence: 0.0 is too small; must be greater than 0"),
-    (lambda _: ObstacleClearance([BALL], influence=-1.0), FieldError,
-     "influence: -1.0 is negative; must be greater than 0"),
     (lambda _: SelfClearance(influence=float("nan")), FieldError,
      "SelfClearance: influence: .nan is not a finite number"),
-    (lambda _: SelfClearance(influence=float("inf")), FieldError,
-     "influence: .inf is not a finite number"),
     (lambda _: on(load("panda"), ObstacleClearance([BALL], links=["panda_lnk3"])),
      FieldError, "links.0: link 'panda_lnk3' has no geometry; did "
      "you mean 'panda_link3'? (links with geometry: panda_link0, panda_link1, "),
     (lambda _: on(load("panda"), ObstacleClearance(links=["panda_link0"])),
      FieldError, "there are no pairs of shapes to keep apart"),
-    (lambda _: on(load("panda"), ObstacleClearance([BALL], links=[])), FieldError,
-     "there are no pairs of shapes to keep apart"),
     (lambda _: Proximity(load("panda"), link_shapes(load("panda")), [], []), FieldError,
      "there are no pairs of shapes to keep apart"),
     (lambda at: on(odd_robot(at, collision('<sphere radius="1"/>')), SelfClearance()),
      FieldError, "there are no pairs of shapes to keep apart"),
-    (lambda _: ObstacleClearance([BALL], proxy="boxes"),  # type: ignore[arg-type]
-     FieldError, "ObstacleClearance: proxy: unknown value 'boxes' (allowed: capsules, "
-     "spheres, hulls, meshes)"),
     (lambda _: link_shapes(load("panda"), "boxes"),  # type: ignore[arg-type]
      ModelError, "proxy 'boxes' is not one of capsules, spheres, hulls, meshes"),
     (lambda at: on(load("panda"), ObstacleClearance(
@@ -82,44 +59,6 @@ MISTAKES: list[tuple[Callable[[Path], Any], type[HspControlError], str]] = [
     (lambda at: Mesh(at).geometry(), SceneError, "mesh: no such file "),
     (lambda at: Mesh(junk(at)).geometry(), SceneError, "mesh: cannot read "),
     (lambda at: Mesh(junk(at)).bounding_radius, SceneError, "junk.stl: "),
-    (lambda at: Mesh(at / "a.stl", scale=0.0), SceneError,
-     "Mesh: scale: 0.0 is too small; must be greater than 0"),
-    (lambda _: Sphere(-0.1), SceneError,
-     "Sphere: radius: -0.1 is negative; must be at least 0"),
-    (lambda _: Sphere(float("nan")), SceneError, "Sphere: radius: .nan is not a fin"),
-    (lambda _: Sphere(float("inf")), SceneError, "Sphere: radius: .inf is not a fin"),
-    (lambda _: Capsule(0.0, 0.1), SceneError,
-     "Capsule: radius: 0.0 is too small; must be greater than 0"),
-    (lambda _: Capsule(0.1, -0.1), SceneError,
-     "Capsule: length: -0.1 is negative; must be at least 0"),
-    (lambda _: Cylinder(0.1, 0.0), SceneError, "Cylinder: length: 0.0 is too small"),
-    (lambda _: Box((0.1, 0.2)), SceneError, "Box: size: [0.1, 0.2] has 2 entries, "),
-    (lambda _: Box((0.1, 0.0, 0.2)), SceneError, "Box: size.1: 0.0 is too small; must"),
-    (lambda _: PointCloud([]), SceneError,
-     "PointCloud: points: [] has 0 entries, needs at least 1"),
-    (lambda _: PointCloud(np.zeros((0, 3))), SceneError, "points: [] has 0 entries"),
-    (lambda _: PointCloud([[0.0, 0.0]]), SceneError, "points.0: [0.0, 0.0] has 2 entr"),
-    (lambda _: PointCloud([[0.0, 0.0, 0.0], [1.0]]), SceneError,
-     "points.1: [1.0] has 1 entry, needs 3"),
-    (lambda _: PointCloud([[0.0, 0.0, np.nan]]), SceneError,
-     "PointCloud: points.0.2: .nan is not a finite number"),
-    (lambda _: PointCloud([[0.0, 0.0, 0.0]], 0.0), SceneError,
-     "PointCloud: resolution: 0.0 is too small; must be greater than 0"),
-    (lambda _: HeightField((1.0, 0.0), [[0, 0], [0, 0]]), SceneError,
-     "HeightField: size.1: 0.0 is too small; must be greater than 0"),
-    (lambda _: HeightField((1.0,), [[0, 0], [0, 0]]), SceneError,
-     "HeightField: size: [1.0] has 1 entry, needs 2"),
-    (lambda _: HeightField((1.0, 1.0), [[0, 0]]), SceneError,
-     "HeightField: heights: [[0, 0]] has 1 entry, needs at least 2"),
-    (lambda _: HeightField((1.0, 1.0), [[0, 0], [0]]), SceneError,
-     "HeightField: heights.1: [0] has 1 entry, needs at least 2"),
-    (lambda _: HeightField((1.0, 1.0), [[0, 0], [0, float("inf")]]), SceneError,
-     "HeightField: heights.1.1: .inf is not a finite number"),
-    (lambda _: Obstacle("it", Sphere(0.1), center=Hold([0.0, 0.0])), SceneError,
-     "Obstacle: center: its dimension is 2; needs 3 (x, y, z)"),
-    (lambda _: Scene([BALL, BALL]), SceneError, "two have the name 'ball'"),
-    (lambda _: Scene([BALL])["bell"], SceneError,
-     "no obstacle 'bell'; did you mean 'ball'? (the scene has ball)"),
 ]  # fmt: skip
 
 
@@ -148,17 +87,11 @@ def test_every_mistake_is_named(
 TOUCHING = {
     "robot": {"name": "panda"},
     "tasks": {"hand": {"type": "frame_position", "trajectory": {"type": "hold"}}},
-    "scene": {
-        "obstacles": {
-            "ball": {
-                "shape": {"type": "sphere", "radius": 0.1},
-                "center": {"type": "hold", "point": [0.2, 0.0, 0.7]},
-            }
-        }
-    },
+    "scene": {"obstacles": {"ball": {"shape": {"type": "sphere", "radius": 0.1},
+           "center": {"type": "hold", "point": [0.2, 0.0, 0.7]}}}},
     "null_space": {"fields": [{"type": "obstacle_clearance"}]},
     "simulation": {"duration": 0.02},
-}
+}  # fmt: skip
 
 
 def test_a_start_in_contact_is_refused_where_the_configuration_says_so() -> None:

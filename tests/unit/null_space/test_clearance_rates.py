@@ -31,18 +31,10 @@ from hsp_control.geometry.shapes import (
     PointCloud,
     Sphere,
 )
-from hsp_control.null_space.fields import (
-    ObstacleClearance,
-)
+from hsp_control.null_space.fields import ObstacleClearance
 from hsp_control.robot import Dop853, Rk4
 from hsp_control.robot.integrators import Integrator
-from hsp_control.trajectories import (
-    Hold,
-    HoldOrientation,
-    Lissajous,
-    Spin,
-    Trajectory,
-)
+from hsp_control.trajectories import Hold, HoldOrientation, Lissajous, Spin, Trajectory
 
 Array = NDArray[np.float64]
 
@@ -261,19 +253,12 @@ def test_a_floor_has_no_edge_where_links_lie_level() -> None:
 PASSING = Lissajous([0.1, 0.1, 0.2], [2.0, 3.0, 2.5], center=[0.1, 0.45, 0.7])
 LOOPS = {
     "ball": Obstacle("ball", Sphere(0.1), PASSING),
-    "box": Obstacle(
-        "box",
-        Box((0.2, 0.15, 0.25)),
-        PASSING,
-        Spin([0.0, 0.6, 0.8], 1.0, rotation=np.eye(3)),
-    ),
-    "floor": Obstacle(
-        "floor",
-        HalfSpace(),
-        Lissajous([0.0, 0.0, 0.05], [0.0, 0.0, 3.0], center=[0.0, 0.0, 0.15]),
-        HoldOrientation(turned(0.2, -0.1, 0.0)),
-    ),
-}
+    "box": Obstacle("box", Box((0.2, 0.15, 0.25)), PASSING,
+     Spin([0.0, 0.6, 0.8], 1.0, rotation=np.eye(3))),
+    "floor": Obstacle("floor", HalfSpace(),
+     Lissajous([0.0, 0.0, 0.05], [0.0, 0.0, 3.0], center=[0.0, 0.0, 0.15]),
+     HoldOrientation(turned(0.2, -0.1, 0.0))),
+}  # fmt: skip
 GAIN = 5.0
 
 

@@ -17,7 +17,6 @@ from field_oracles import (
 from numpy.typing import NDArray
 
 from hsp_control.null_space import differences
-from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric
 
 Array = NDArray[np.float64]
 
@@ -90,18 +89,6 @@ def test_the_field_does_not_depend_on_the_velocity(name: str, which: str) -> Non
         first = evaluate(field, metric, robot.state(TIME, q, v)).g
         second = evaluate(field, metric, robot.state(TIME, q, -2.0 * v)).g
         np.testing.assert_allclose(first, second, rtol=0, atol=0)
-
-
-@every_field
-def test_fields_have_no_memory(name: str, which: str) -> None:
-    """The same state gives the same bits, whatever was evaluated between."""
-    robot, field = load(name), MEMBERS[which].build(name)
-    here, there = robot.state(TIME, *draw(name, 4)), robot.state(0.1, *draw(name, 5))
-    first = evaluate(field, IdentityMetric(), here)
-    evaluate(field, MassMatrixMetric(), there)
-    again = evaluate(field, IdentityMetric(), here)
-    np.testing.assert_array_equal(again.g, first.g)
-    np.testing.assert_array_equal(again.g_dot, first.g_dot)
 
 
 # --- differences ---------------------------------------------------------------------

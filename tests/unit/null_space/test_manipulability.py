@@ -38,7 +38,6 @@ from hsp_control.null_space.fields.jacobian_cost import (
     Rows,
 )
 from hsp_control.robot import ToolFrame
-from hsp_control.robot.description.sources import example_robots
 
 Array = NDArray[np.float64]
 WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
@@ -124,22 +123,6 @@ def load(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Robot]:
 def hand(name: str) -> str:
     """Return the frame that is watched."""
     return ARMS[name] if name in ARMS else OTHERS[name][2]
-
-
-@pytest.mark.slow
-def test_no_arm_is_left_out() -> None:
-    """Every fixed-base robot that loads with 6 or 7 freedoms is in the table."""
-    pytest.importorskip("example_robot_data")
-    found = set()
-    for name in {*bundled_robots(), *example_robots()}:
-        if example_robots().get(name) and example_robots()[name].root != "fixed":
-            continue
-        try:
-            if Robot.load(name).nv in {6, 7}:
-                found.add(name)
-        except HspControlError:
-            continue
-    assert found == set(ARMS)
 
 
 # -- what is known without the package -------------------------------------------------
@@ -287,6 +270,10 @@ def states(robot: Robot, number: int, seed: int) -> list[tuple[Array, Array]]:
     ]
 
 
+def close(actual: Array, expected: Array, atol: float, label: str = "") -> None:
+    np.testing.assert_allclose(actual, expected, rtol=0, atol=atol, err_msg=label)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", EVERY)
 def test_value_gradient_and_rate_at_random_states(
@@ -319,18 +306,7 @@ def test_value_gradient_and_rate_at_random_states(
                     0.01 / kappa,
                 )
             tolerance = (2e-12 + 1e-13 * kappa) * size * kappa
-            gradient = field.gradient(state)
-            np.testing.assert_allclose(
-                gradient, expected, rtol=0, atol=tolerance, err_msg=label
-            )
-            # The package's own differences: h⁴ f⁽⁵⁾/30 with f⁽⁵⁾ up to 4! |f| κ⁵.
-            np.testing.assert_allclose(
-                gradient,
-                differences.gradient(field.value, state),
-                rtol=0,
-                atol=tolerance * 10 + (1e-3 * kappa) ** 4 * size * kappa,
-                err_msg=label,
-            )
+            close(field.gradient(state), expected, tolerance, label)
 
             speed = float(np.linalg.norm(v))
             rate = slope(
@@ -340,13 +316,8 @@ def test_value_gradient_and_rate_at_random_states(
                 0.01 / kappa / speed,
             )
             unit = size * kappa**2 * speed
-            np.testing.assert_allclose(
-                field.gradient_rate(state),
-                rate,
-                rtol=0,
-                atol=(2e-12 + 1e-14 * kappa**2) * unit,
-                err_msg=label,
-            )
+            tolerance = (2e-12 + 1e-14 * kappa**2) * unit
+            close(field.gradient_rate(state), rate, tolerance, label)
             turned = max(turned, float(np.abs(rate).max()) / unit)
         if (name, which) != ("solo12", "determinant, orientation"):
             # (A leg's axes, one across and two along, look the same in every posture.)
@@ -356,7 +327,7 @@ def test_value_gradient_and_rate_at_random_states(
 # -- Pinocchio's kinematic Hessian, which needs no differences -------------------------
 
 
-def kinematic_hessian(robot: Robot, q: Array, joint: int, *, order: str = "F") -> Array:
+def kinematic_hessian(robot: Robot, q: Array, joint: int) -> Array:
     """Return ∂J/∂q_i of a joint's frame, shape (6, nv, nv), the last index i.
 
     Pinocchio's tensor comes to Python with strides of C order over memory in Fortran's.
@@ -364,7 +335,7 @@ def kinematic_hessian(robot: Robot, q: Array, joint: int, *, order: str = "F") -
     memory = data(robot)
     pin.computeJointKinematicHessians(robot.model, memory, q)
     tensor = pin.getJointKinematicHessian(robot.model, memory, joint, WORLD_ALIGNED)
-    return np.ravel(tensor, order="C").reshape(tensor.shape, order=order)
+    return np.ravel(tensor, order="C").reshape(tensor.shape, order="F")
 
 
 @pytest.mark.parametrize("rows", ["position", "orientation", "pose"])
@@ -392,65 +363,13 @@ def test_gradient_by_the_kinematic_hessian(
         kappa = np.linalg.norm(frame_jacobian(robot, q, frame), 2) / sigma[-1]
         sharpest = max(sharpest, kappa)
         # The floor of 1e-6 under σ takes (1e-6/σ)² of the slope away.
-        floor = (1e-6 / sigma[-1]) ** 2
-        np.testing.assert_allclose(
-            field.gradient(robot.state(0.0, q, v)),
-            expected,
-            rtol=0,
-            atol=(1e-14 * kappa**2 + 2.0 * floor) * kappa,
-        )
+        tolerance = (1e-14 * kappa**2 + 2.0 * (1e-6 / sigma[-1]) ** 2) * kappa
+        close(field.gradient(robot.state(0.0, q, v)), expected, tolerance)
     if name == "iiwa14":  # stretched out at zero; the others have offsets there
         assert sharpest > 1e3
 
 
-def test_the_memory_order_of_the_hessian_is_a_trap(
-    load: Callable[[str], Robot],
-) -> None:
-    """Read as it comes it looks like a tensor of derivatives, and is not one."""
-    robot = load("panda")
-    frame = robot.model.names[7]
-    ((q, _),) = states(robot, 1, seed=3)
-    by_differences = np.stack(
-        [
-            slope(
-                lambda s, e=e: frame_jacobian(robot, robot.integrate(q, s * e), frame),
-                0.01,
-            )
-            for e in np.eye(7)
-        ],
-        axis=-1,
-    )
-    right = kinematic_hessian(robot, q, 7)
-    np.testing.assert_allclose(right, by_differences, rtol=0, atol=1e-12)
-    wrong = kinematic_hessian(robot, q, 7, order="C")
-    assert np.abs(wrong - by_differences).max() > 0.3
-    assert np.abs(wrong.transpose(0, 2, 1) - by_differences).max() > 0.3
-
-
 # -- what the costs say ----------------------------------------------------------------
-
-
-def test_forms_are_functions_of_each_other(load: Callable[[str], Robot]) -> None:
-    """-det = -(√det)², -½ log det = -log √det, and so are their slopes and rates."""
-    robot, frame = load("panda"), hand("panda")
-    forms = ("root", "determinant", "log")
-    w, d, log = (
-        Manipulability(frame, form=form, rows="pose", length=0.4)  # type: ignore[arg-type]
-        for form in forms
-    )
-    for q, v in states(robot, 5, seed=4):
-        state = robot.state(0.0, q, v)
-        f, g, r = w.value(state), w.gradient(state), w.gradient_rate(state)
-        f_dot = float(g @ v)
-        close = {"rtol": 1e-11, "atol": 1e-11}
-        np.testing.assert_allclose(d.value(state), -(f**2), **close)
-        np.testing.assert_allclose(d.gradient(state), -2.0 * f * g, **close)
-        expected = -2.0 * (f_dot * g + f * r)
-        np.testing.assert_allclose(d.gradient_rate(state), expected, **close)
-        np.testing.assert_allclose(log.value(state), -np.log(-f), **close)
-        np.testing.assert_allclose(log.gradient(state), -g / f, **close)
-        expected = -(r / f - f_dot * g / f**2)
-        np.testing.assert_allclose(log.gradient_rate(state), expected, **close)
 
 
 def test_the_planar_arm_in_closed_form(load: Callable[[str], Robot]) -> None:
@@ -465,12 +384,8 @@ def test_the_planar_arm_in_closed_form(load: Callable[[str], Robot]) -> None:
         state = robot.state(0.0, q, np.array([0.3, -0.7, 0.2]))
         # The floor of 1e-12 in G stands beside σ² of 0.02 and more.
         assert field.value(state) == pytest.approx(-np.sin(q2), abs=1e-10)
-        np.testing.assert_allclose(
-            field.gradient(state), [0.0, -np.cos(q2), 0.0], rtol=0, atol=1e-9
-        )
-        np.testing.assert_allclose(
-            field.gradient_rate(state), [0.0, -0.7 * np.sin(q2), 0.0], rtol=0, atol=1e-8
-        )
+        close(field.gradient(state), [0.0, -np.cos(q2), 0.0], 1e-9)
+        close(field.gradient_rate(state), [0.0, -0.7 * np.sin(q2), 0.0], 1e-8)
 
 
 def test_joints_beyond_the_frame_are_left_alone(load: Callable[[str], Robot]) -> None:
@@ -502,47 +417,25 @@ def test_isotropy_is_1_where_all_singular_values_agree() -> None:
         assert -1.0 < field.value(robot.state(0.0, q, np.zeros(3))) <= 0.0
 
 
-def test_the_direction_goes_with_the_axes_as_they_are_named(
-    load: Callable[[str], Robot],
-) -> None:
-    robot, frame = load("panda"), hand("panda")
-    ((q, v),) = states(robot, 1, seed=8)
-    state = robot.state(0.0, q, v)
-    one = Transmission(frame, direction=[1.0, 2.0], axes="zx")
-    two = Transmission(frame, direction=[2.0, 1.0], axes="xz")
-    assert one.value(state) == two.value(state)
-    np.testing.assert_array_equal(one.unit_direction, two.unit_direction)
-
-
 # -- singularities ---------------------------------------------------------------------
 
 
 def singular_members(robot: Robot, frame: str, axes: str) -> dict[str, JacobianCost]:
     """Return every cost, with metrics of large and of small numbers."""
     members: dict[str, JacobianCost] = {}
-    every = ("position", "orientation", "pose") if len(axes) == 3 else ("position",)
+    every: tuple[Any, ...] = ("position", "orientation", "pose")[: 2 * len(axes) - 3]
     for rows in every:
         for form in ("determinant", "root", "log"):
             for unit in (1.0, 1e-8, 1e4):
+                options: Any = {"form": form, "metric": unit * coupling(robot.nv)}
                 members[f"{form} {rows} {unit}"] = Manipulability(
-                    frame,
-                    form=form,  # type: ignore[arg-type]
-                    rows=rows,  # type: ignore[arg-type]
-                    axes=axes,
-                    metric=unit * coupling(robot.nv),
+                    frame, rows=rows, axes=axes, **options
                 )
-        members[f"condition {rows}"] = InverseCondition(
-            frame,
-            rows=rows,  # type: ignore[arg-type]
-            axes=axes,
-        )
+        members[f"condition {rows}"] = InverseCondition(frame, rows=rows, axes=axes)
     for kind in ("velocity", "force"):
         for u in np.eye(len(axes)):
             members[f"{kind} {u}"] = Transmission(
-                frame,
-                direction=u,
-                kind=kind,  # type: ignore[arg-type]
-                axes=axes,
+                frame, direction=u, kind=kind, axes=axes
             )
     return members
 
@@ -577,14 +470,9 @@ def test_finite_at_every_singularity(name: str, load: Callable[[str], Robot]) ->
         J = state.frame(frame).jacobian
         worst = min(worst, np.linalg.svd(J[:2] if planar else J)[1][-1])
         for which, field in members.items():
-            value, g, g_dot = (
-                field.value(state),
-                field.gradient(state),
-                field.gradient_rate(state),
-            )
-            assert np.isfinite(value), which
-            assert np.isfinite(g).all(), which
-            assert np.isfinite(g_dot).all(), which
+            assert np.isfinite(field.value(state)), which
+            assert np.isfinite(field.gradient(state)).all(), which
+            assert np.isfinite(field.gradient_rate(state)).all(), which
 
     finite()
     assert worst < 1e-12  # some of them were as singular as can be
@@ -597,30 +485,17 @@ UP = {"direction": [0.0, 0.0, 1.0]}
 MISTAKES: list[tuple[type, dict[str, Any], type[HspControlError], str]] = [
     (Manipulability, {"frame": "panda_tpc"}, FrameNotFoundError,
      "frame: no frame 'panda_tpc'; did you mean 'panda_tcp'? (the model has "),
-    (InverseCondition, {"frame": ""}, FrameNotFoundError, "frame: no frame ''"),
-    (Transmission, UP | {"frame": "x"}, FrameNotFoundError, "frame: no frame 'x'"),
     (Manipulability, {"form": "rot"}, FieldError,
      "Manipulability: form: unknown value 'rot'; did you mean 'root'?"),
     (Manipulability, {"rows": "positions"}, FieldError,
      "Manipulability: rows: unknown value 'positions'; did you mean 'position'?"),
-    (InverseCondition, {"axes": ""}, FieldError,
-     "InverseCondition: axes: '' must be distinct letters of x, y and z"),
-    (InverseCondition, {"axes": "xx"}, FieldError, "axes: 'xx' must be distinct"),
     (InverseCondition, {"axes": "xw"}, FieldError, "axes: 'xw' must be distinct"),
     (Manipulability, {"length": 0.0}, FieldError, "length: 0.0 is too small; must be"),
-    (Manipulability, {"length": np.nan}, FieldError, "length: .nan is not a finite nu"),
-    (Manipulability, {"length": np.inf}, FieldError, "length: .inf is not a finite nu"),
     (Transmission, UP | {"length": 1.0}, FieldError, "length: unknown key 'length'"),
-    (Manipulability, {"metric": np.ones(7)}, FieldError,
-     "Manipulability: metric.0: 1.0 is a decimal number; expected a list of numbers"),
     (Manipulability, {"metric": np.ones((6, 7))}, FieldError,
      "Manipulability: metric has shape (6, 7); needs (nv, nv), symmetric"),
-    (Manipulability, {"metric": np.triu(np.ones((7, 7)))}, FieldError,
-     "Manipulability: metric has shape (7, 7); needs (nv, nv), symmetric"),
     (Manipulability, {"metric": np.ones((7, 7))}, FieldError,
      "Manipulability: metric is not positive definite"),
-    (Manipulability, {"metric": np.full((7, 7), np.nan)}, FieldError,
-     "Manipulability: metric.0.0: .nan is not a finite number"),
     (Manipulability, {"metric": np.eye(6)}, FieldError,
      "metric: metric has shape (6, 6); needs (7, 7)"),
     (Manipulability, {"frame": "panda_link2"}, FieldError,
@@ -632,14 +507,10 @@ MISTAKES: list[tuple[type, dict[str, Any], type[HspControlError], str]] = [
      "Transmission: direction [0.0, 0.0, 0.0] needs 3 numbers, one for each of the "
      "axes 'xyz', of a length that is not 0 or infinite"),
     (Transmission, {}, FieldError, "Transmission: missing key 'direction'"),
-    (Transmission, {"direction": [1, 0]}, FieldError, "needs 3 numbers, one for each"),
     (Transmission, {"direction": [1, 0, 0], "axes": "xy"}, FieldError,
      "needs 2 numbers, one for each of the axes 'xy'"),
-    (Transmission, {"direction": [1e200, 1e200, 1e200]}, FieldError, "needs 3 numbers"),
     (Transmission, {"direction": [1, np.nan, 0]}, FieldError,
      "Transmission: direction.1: .nan is not a finite number"),
-    (Transmission, {"direction": [1, 0, np.inf]}, FieldError,
-     "Transmission: direction.2: .inf is not a finite number"),
     (Transmission, UP | {"kind": "speed"}, FieldError,
      "Transmission: kind: unknown value 'speed' (allowed: velocity, force)"),
 ]  # fmt: skip
@@ -688,29 +559,18 @@ def test_a_user_s_own_cost_of_the_jacobian(
     scale = np.array([1.0 if k < 3 or rows != "pose" else 0.5 for k in kept])[:, None]
     J = scale * frame_jacobian(robot, q, frame)[kept]
     assert field.value(state) == pytest.approx(-0.5 * (J * J).sum(), rel=1e-14)
-    np.testing.assert_allclose(
-        field.gradient(state),
-        differences.gradient(field.value, state),
-        rtol=0,
-        atol=1e-10,
-    )
-    np.testing.assert_allclose(
-        field.gradient_rate(state),
-        differences.rate_along_flow(field.gradient, state),
-        rtol=0,
-        atol=1e-9,
-    )
+    close(field.gradient(state), differences.gradient(field.value, state), 1e-10)
+    rate = differences.rate_along_flow(field.gradient, state)
+    close(field.gradient_rate(state), rate, 1e-9)
 
 
 def test_frames_beyond_a_joint_that_mimics(load: Callable[[str], Robot]) -> None:
     """The running sums know no freedom twice; frames before it, or elsewhere, serve."""
     robot = Robot.load("panda", locked={})
     assert robot.mimics
+    at_home = robot.state(0.0, robot.home(), np.zeros(robot.nv))
     with pytest.raises(FieldError) as caught:
-        placed(
-            Manipulability("panda_rightfinger"),
-            robot.state(0.0, robot.home(), np.zeros(robot.nv)),
-        )
+        placed(Manipulability("panda_rightfinger"), at_home)
     assert str(caught.value) == (
         "frame: frame 'panda_rightfinger' is moved by 'panda_finger_joint2', which "
         "mimics another joint; choose a frame before it, or load with mimic: false"
@@ -719,16 +579,9 @@ def test_frames_beyond_a_joint_that_mimics(load: Callable[[str], Robot]) -> None
     q = free.random_configuration(np.random.default_rng(9))
     state = free.state(0.0, q, np.ones(9))
     beyond = Manipulability("panda_rightfinger", rows="pose")
-    np.testing.assert_allclose(
-        beyond.gradient(state),
-        differences.gradient(beyond.value, state),
-        rtol=0,
-        atol=1e-9,
-    )
+    close(beyond.gradient(state), differences.gradient(beyond.value, state), 1e-9)
     # The finger that leads is an ordinary prismatic joint, also where it is followed.
     leading = Manipulability("panda_leftfinger")
     state = robot.state(0.0, q[:8], np.ones(8))
     other = free.state(0.0, q, np.ones(9))
-    np.testing.assert_allclose(
-        leading.gradient(state), leading.gradient(other)[:8], rtol=0, atol=1e-13
-    )
+    close(leading.gradient(state), leading.gradient(other)[:8], 1e-13)

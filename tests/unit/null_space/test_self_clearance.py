@@ -14,9 +14,7 @@ from oracles import gradient
 from hsp_control import Robot
 from hsp_control.common.exceptions import ModelError
 from hsp_control.geometry import Proximity, link_shapes, self_pairs
-from hsp_control.null_space.fields import (
-    SelfClearance,
-)
+from hsp_control.null_space.fields import SelfClearance
 
 Array = NDArray[np.float64]
 

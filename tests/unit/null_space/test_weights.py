@@ -139,31 +139,6 @@ def memory() -> RobotState:
     return load("panda").state(0.0, load("panda").home(), np.zeros(7))
 
 
-@pytest.mark.parametrize("edge", [0.5, 2.5])
-def test_a_ramp_is_twice_continuously_differentiable(edge: float) -> None:
-    """w' and w'' vanish at both ends like s² and s: 30 · 1 · s²/T and 60 s/T²."""
-    ramp = Ramp(initial=1.0, final=2.0, start=0.5, duration=2.0)
-    for tiny in (1e-3, 1e-5):
-        inside = edge + tiny * np.sign(1.5 - edge)
-        (w, w_dot), (w0, w0_dot) = ramp.sample(at(inside)), ramp.sample(at(edge))
-        assert w0_dot == 0.0
-        assert abs(w - w0) <= 10.0 * (tiny / 2.0) ** 3 + 1e-15
-        assert 0.0 < w_dot <= 15.0 * (tiny / 2.0) ** 2
-        bend = (w_dot - w0_dot) / tiny
-        assert abs(bend) <= 15.0 * (tiny / 2.0)
-
-
-@pytest.mark.parametrize(("a", "b"), [(0.0, 3.0), (3.0, 0.5)])
-def test_a_ramp_is_monotone(a: float, b: float) -> None:
-    ramp = Ramp(initial=a, final=b, start=0.2, duration=0.7)
-    values, rates = zip(
-        *(ramp.sample(at(t)) for t in np.linspace(0, 1, 301)), strict=True
-    )
-    assert all((y - x) * (b - a) >= 0.0 for x, y in pairwise(values))
-    assert all(rate * (b - a) >= 0.0 for rate in rates)
-    assert (values[0], values[-1]) == (a, pytest.approx(b))
-
-
 def test_a_weight_of_the_state_and_its_rate() -> None:
     """Exact by the product rule where the function is written out."""
     robot = load("panda")
@@ -241,29 +216,6 @@ def shares(
     for write in plan.write:
         write()
     return out, terms
-
-
-@pytest.mark.parametrize("metric", METRICS)
-@pytest.mark.parametrize("seed", range(3))
-def test_rate_of_a_sum_whose_weights_move(metric: str, seed: int) -> None:
-    """g' = Σ w g_k' + w' g_k, against differences of g along the flow.
-
-    Good to 1e-10 of the field's scale: a state's weight is differenced as well.
-    """
-    robot = load("panda")
-    field = moving_sum(robot)
-    state = random_state(robot, seed)
-    g, g_dot = evaluate(field, METRICS[metric], state)
-    expected = along(state, lambda s: evaluate(field, METRICS[metric], s).g, 3e-3)
-    scale = max(float(np.abs(g).max()), float(np.abs(expected).max()))
-    np.testing.assert_allclose(g_dot, expected, rtol=0, atol=1e-10 * scale)
-    assert np.abs(g_dot).max() > 1e-2
-    # Leaving out the weights' own rates would be seen.
-    unmoved = np.zeros(7)
-    for term in field.terms:
-        w, _ = sample_weight(term.weight, state)
-        unmoved += w * evaluate(term, METRICS[metric], state).g_dot
-    assert np.abs(unmoved - expected).max() > 1e-3 * scale
 
 
 def test_each_terms_share_is_kept_and_they_add_up() -> None:
@@ -465,28 +417,6 @@ def test_limit_barrier_is_exactly_0_in_the_middle(name: str) -> None:
     assert all(y > 2.0 * x > 0.0 for x, y in pairwise(values))
 
 
-def test_joints_without_limits_are_left_free() -> None:
-    """Continuous joints and floating roots, wherever they are."""
-    for name, free in (
-        ("kinova", ["j2s6s200_joint_1", "j2s6s200_joint_4", "j2s6s200_joint_6"]),
-        ("tiago", ["wheel_left_joint", "wheel_right_joint"]),
-        ("floating talos_arm", ["root_joint"]),
-    ):
-        robot = load(*LIMITED[name])
-        field = LimitBarrier(zone=1.0)
-        state = random_state(robot, 5)
-        g = field.gradient(state)
-        at_all = np.zeros(robot.nv, dtype=bool)
-        for joint in free:
-            at_all[robot.velocity_index(joint)] = True
-        assert not g[at_all].any()
-        assert not field.gradient_rate(state)[at_all].any()
-        lower, upper = robot.position_limits()
-        assert (np.isfinite(lower) & np.isfinite(upper) == ~at_all).all()
-        # Up to the torso's 0.35 m, every bounded joint is off its very middle here.
-        assert g[~at_all].all()
-
-
 def test_limits_that_are_not_written_count_as_none(tmp_path: Path) -> None:
     """A URDF's revolute joint without numbers has a range of 0 to 0, which is none."""
     inertial = (
@@ -515,9 +445,7 @@ def test_the_field_keeps_a_pushed_joint_off_its_limit() -> None:
     """A field that drives joint 4 up into its limit is balanced before it is there."""
     robot = load("panda")
     push = FunctionField(
-        lambda s: np.eye(7)[3] * 0.8,
-        rate_function=lambda s: np.zeros(7),
-        name="push",
+        lambda s: np.eye(7)[3] * 0.8, rate_function=lambda s: np.zeros(7), name="push"
     )
     upper = robot.position_limits()[1][3]
     start = robot.home()
@@ -547,18 +475,12 @@ def test_the_field_keeps_a_pushed_joint_off_its_limit() -> None:
 MISTAKES: list[tuple[Callable[[], Any], str]] = [
     (lambda: ConstantWeight(-1.0), "ConstantWeight: value: -1.0 is negative; must be "),
     (lambda: ConstantWeight(np.nan), "ConstantWeight: value: .nan is not a finite num"),
-    (lambda: ConstantWeight(np.inf), "ConstantWeight: value: .inf is not a finite num"),
     (lambda: Ramp(initial=-1.0, final=1.0, duration=1.0), "initial: -1.0 is negative"),
-    (lambda: Ramp(initial=1.0, final=np.nan, duration=1.0), "final: .nan is not a fin"),
     (lambda: Ramp(final=1.0, duration=0.0),
      "Ramp: duration: 0.0 is too small; must be greater than 0"),
-    (lambda: Ramp(final=1.0, duration=-2.0), "Ramp: duration: -2.0 is negative; must "),
-    (lambda: Ramp(final=1.0, start=np.nan, duration=1.0), "start: .nan is not a finit"),
-    (lambda: Ramp(final=1.0, duration=np.inf), "Ramp: duration: .inf is not a finite "),
     (lambda: Ramp(final=1.0), "Ramp: missing key 'duration'"),
     (lambda: Ramp(0.0, 1.0), "Ramp: takes none by position; argu"),  # type: ignore
     (lambda: StateWeight(lambda s: -0.5).sample(at(0.0)), "weight is -0.5"),
-    (lambda: StateWeight(lambda s: np.nan).sample(at(0.0)), "weight is nan"),
     (lambda: StateWeight(2.0), "StateWeight: function: "),  # type: ignore
     (lambda: -1.0 * JointCentering(), "JointCentering: weight: -1.0 is negative; must"),
     (lambda: JointCentering(weight="much"),  # type: ignore
@@ -570,7 +492,6 @@ MISTAKES: list[tuple[Callable[[], Any], str]] = [
     (lambda: LimitBarrier(zone=0.0),
      "LimitBarrier: zone: 0.0 is too small; must be greater than 0"),
     (lambda: LimitBarrier(zone=1.1), "LimitBarrier: zone: 1.1 is too large; must be"),
-    (lambda: LimitBarrier(zone=np.nan), "LimitBarrier: zone: .nan is not a finite num"),
 ]  # fmt: skip
 
 

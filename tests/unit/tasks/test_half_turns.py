@@ -22,16 +22,8 @@ from task_cases import (
     planar,
 )
 
-from hsp_control import (
-    Controller,
-    FrameOrientation,
-    Gains,
-    Pointing,
-    simulate,
-)
-from hsp_control.trajectories import (
-    HoldOrientation,
-)
+from hsp_control import Controller, FrameOrientation, Gains, Pointing, simulate
+from hsp_control.trajectories import HoldOrientation
 
 Array = NDArray[np.float64]
 

@@ -43,11 +43,7 @@ from hsp_control.control.compensation import (
 )
 from hsp_control.geometry import Scene
 from hsp_control.geometry.start import Start
-from hsp_control.null_space.metrics import (
-    IdentityMetric,
-    MassMatrixMetric,
-    Metric,
-)
+from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric, Metric
 from hsp_control.tasks import Impedance, TaskSample
 from hsp_control.tasks.impedance_gains import Rotating, Scratch, impedance_gains
 
@@ -376,85 +372,54 @@ def test_many_changes_overlap_and_a_copy_goes_on() -> None:
         np.testing.assert_array_equal(mine, its)
 
 
+def later(first: Impedance) -> Any:
+    """Return the changes at 1 s of a hand that begins with an impedance."""
+    return panda_hand(impedance=first).at(1.0)
+
+
 COUPLED = [[200.0, 50.0, 0.0], [50.0, 200.0, 0.0], [0.0, 0.0, 100.0]]
 REFUSED: dict[str, tuple[Callable[[], Any], type[Exception], str]] = {
-    "two dampings": (
-        lambda: Impedance(1.0, damping=1.0, damping_ratio=1.0),
-        GainError,
-        "give either damping or damping_ratio",
-    ),
-    "bounded matrix": (
-        lambda: Impedance(COUPLED, largest_error=0.1),
-        GainError,
-        "largest_error needs a diagonal stiffness: with .* would have no energy",
-    ),
+    "two dampings": (lambda: Impedance(1.0, damping=1.0, damping_ratio=1.0), GainError,
+     "give either damping or damping_ratio"),
+    "bounded matrix": (lambda: Impedance(COUPLED, largest_error=0.1), GainError,
+     "largest_error needs a diagonal stiffness: with .* would have no energy"),
     "gains and impedance": (
-        lambda: FramePosition(gains=Gains(1.0, 2.0), impedance=Impedance(1.0)),
-        GainError,
-        r"give either gains \[1/s², 1/s\] or impedance \[N/m, N·s/m\], not both",
-    ),
-    "rows": (
-        lambda: panda_hand(impedance=Impedance([1.0, 2.0])),
-        GainError,
-        r"tasks.hand.impedance: stiffness has shape \(2,\); needs a number, 3 numbers",
-    ),
+     lambda: FramePosition(gains=Gains(1.0, 2.0), impedance=Impedance(1.0)), GainError,
+     r"give either gains \[1/s², 1/s\] or impedance \[N/m, N·s/m\], not both"),
+    "rows": (lambda: panda_hand(impedance=Impedance([1.0, 2.0])), GainError,
+     r"tasks.hand.impedance: stiffness has shape \(2,\); needs a number, 3 numbers"),
     "rows of a bound": (
-        lambda: panda_hand(impedance=Impedance(1.0, largest_error=[1.0, 2.0])),
-        GainError,
-        r"tasks.hand.impedance: largest_error has shape \(2,\); needs a number, 3",
-    ),
-    "another task": (
-        lambda: hsp.CenterOfMass(impedance=Impedance(1.0)),  # type: ignore[call-arg]
-        TaskError,
-        "impedance",
-    ),
+     lambda: panda_hand(impedance=Impedance(1.0, largest_error=[1.0, 2.0])), GainError,
+     r"tasks.hand.impedance: largest_error has shape \(2,\); needs a number, 3"),
+    "another task": (lambda: hsp.CenterOfMass(impedance=Impedance(1.0)),  # type: ignore[call-arg]
+     TaskError, "impedance"),
     "gains of a spring": (
-        lambda: panda_hand(impedance=Impedance(1.0)).at(1.0).gains("hand", GAINS),
-        ControllerError,
-        "task 'hand' has an impedance instead of gains; a change of type impedance",
-    ),
-    "spring of gains": (
-        lambda: panda_hand().at(1.0).impedance("hand", Impedance(1.0)),
-        ControllerError,
-        "task 'hand' has no impedance from the start, so none can follow",
-    ),
+     lambda: panda_hand(impedance=Impedance(1.0)).at(1.0).gains("hand", GAINS),
+     ControllerError,
+     "task 'hand' has an impedance instead of gains; a change of type impedance"),
+    "spring of gains": (lambda: panda_hand().at(1.0).impedance("hand", Impedance(1.0)),
+     ControllerError,
+     "task 'hand' has no impedance from the start, so none can follow"),
     "rows of a change": (
-        lambda: (
-            panda_hand(impedance=Impedance(1.0))
-            .at(1.0)
-            .impedance("hand", Impedance([1.0, 2.0]))
-        ),
-        GainError,
-        r"impedance: stiffness has shape \(2,\); needs a number, 3 numbers",
-    ),
+     lambda: later(Impedance(1.0)).impedance("hand", Impedance([1.0, 2.0])), GainError,
+     r"impedance: stiffness has shape \(2,\); needs a number, 3 numbers"),
     "bounds beside a matrix": (
-        lambda: (
-            panda_hand(impedance=Impedance(COUPLED))
-            .at(1.0)
-            .impedance("hand", Impedance(1.0))
-            .impedance("hand", Impedance(1.0, largest_error=0.1))
-        ),
-        GainError,
-        "impedance: largest_error needs a diagonal stiffness",
-    ),
+     lambda: later(Impedance(COUPLED)).impedance("hand", Impedance(1.0))
+     .impedance("hand", Impedance(1.0, largest_error=0.1)),
+     GainError, "impedance: largest_error needs a diagonal stiffness"),
     "integral action": (
-        lambda: IntegralAction(1.0).check(panda_hand(impedance=Impedance(1.0)).tasks),
-        CompensationError,
-        "task 'hand' has an impedance: integral action would press against what",
-    ),
-    "a cancelling observer": (
-        lambda: Compensation(momentum_observer=MomentumObserver()).check(
-            hsp.Robot.load("panda"), panda_hand(impedance=Impedance(1.0)).tasks
-        ),
-        CompensationError,
-        "momentum_observer: the observer would cancel every force to which task 'hand'",
-    ),
-    "clip of what is not cancelled": (
-        lambda: MomentumObserver(clip=3.0, cancel=False),
-        CompensationError,
-        "clip bounds the effort that is cancelled, and cancel is false",
-    ),
-}
+     lambda: IntegralAction(1.0).check(panda_hand(impedance=Impedance(1.0)).tasks),
+     CompensationError,
+     "task 'hand' has an impedance: integral action would press against what"),
+    "a cancelling observer": (lambda: Compensation(
+        momentum_observer=MomentumObserver()).check(hsp.Robot.load("panda"),
+        panda_hand(impedance=Impedance(1.0)).tasks),
+     CompensationError,
+     "momentum_observer: the observer would cancel every force to which task 'hand'"),
+    "clip of what is not cancelled": (lambda: MomentumObserver(clip=3.0, cancel=False),
+     CompensationError,
+     "clip bounds the effort that is cancelled, and cancel is false"),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", REFUSED)

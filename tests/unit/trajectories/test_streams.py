@@ -16,7 +16,6 @@ from hypothesis import strategies as st
 from hsp_control.common.exceptions import StreamError, TrajectoryError
 from hsp_control.common.rotations import jexp3, jexp3_dot
 from hsp_control.trajectories import (
-    PoseSample,
     Stream,
     StreamOrientation,
     StreamPose,
@@ -303,24 +302,6 @@ def test_a_seam_between_chunks_is_bridged_from_what_the_reference_is() -> None:
     k = round(0.2 / H)
     assert np.abs(np.diff(x, axis=0)[k : k + 10]).max() < 1e-3
     assert x[-1, 0] == pytest.approx(path[-1, 0] + 0.1, abs=1e-9)
-
-
-def test_smoothing_takes_noise_out_of_waypoints() -> None:
-    def roughness(smoothing: float) -> float:
-        rng = np.random.default_rng(2)
-        stream = Stream(
-            [0.0, 0.0], policy="interpolate", delay=0.2, smoothing=smoothing
-        ).anchored(None)
-        events = [
-            (t, lambda t=t: stream.send(circle(t) + 2e-4 * rng.normal(size=2), t=t))
-            for t in np.arange(0.05, 2.0, 1 / 60)
-        ]
-        _, _, acceleration = columns(sampled(stream, 2.0, at_times(*events)))
-        x = np.array([circle(k * H - 0.2) for k in range(len(acceleration))])
-        true = np.gradient(np.gradient(x, H, axis=0), H, axis=0)
-        return float(np.sqrt(np.mean((acceleration - true)[1500:-400] ** 2)))
-
-    assert roughness(0.1) < 0.5 * roughness(0.0)
 
 
 def test_derivatives_of_a_parabola_are_exact() -> None:
@@ -726,9 +707,3 @@ def test_a_flood_drops_the_oldest() -> None:
     sampled(stream, 0.5)
     assert stream.counts()["taken"] == 4096
     assert stream.sample(1.0).position[0] == pytest.approx(9999e-6, abs=1e-9)
-
-
-def test_out_receives_the_sample() -> None:
-    stream = StreamPose().anchored(pin.SE3.Identity())
-    out = PoseSample.allocate()
-    assert stream.sample(0.0, out) is out

@@ -115,9 +115,7 @@ def test_chattering_is_one_band(obstacle: tuple[Experiment, Rollout]) -> None:
     assert len(band.spans) > 10
 
 
-def test_a_run_is_shown_with_its_bands(
-    obstacle: tuple[Experiment, Rollout],
-) -> None:
+def test_a_run_is_shown_with_its_bands(obstacle: tuple[Experiment, Rollout]) -> None:
     experiment, run = obstacle
     recorder = Recorder()
     viewer = Viewer(experiment.robot, transport=recorder)

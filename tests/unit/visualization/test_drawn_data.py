@@ -48,12 +48,8 @@ from hsp_control.null_space.metrics import CoordinatesMetric
 from hsp_control.simulation import log_series
 from hsp_control.simulation.log_series import predicted_decay
 from hsp_control.tasks.task import ErrorPart
-from hsp_control.trajectories import (
-    Circle as Round,
-)
-from hsp_control.trajectories import (
-    Spin,
-)
+from hsp_control.trajectories import Circle as Round
+from hsp_control.trajectories import Spin
 from hsp_control.visualization import palette
 from hsp_control.visualization.plots import (
     logged_geometry,
@@ -289,11 +285,7 @@ def test_frames_are_even_in_time_or_where_they_are_asked_for(
     assert len(rows) == 8
     assert (rows[0], rows[-1]) == (0, 100)
     assert np.ptp(np.diff(rows)) <= 1
-    assert log_series.chosen_rows(log, times=[0.25, -3.0, 99.0, 0.251]) == [
-        0,
-        25,
-        100,
-    ]
+    assert log_series.chosen_rows(log, times=[0.25, -3.0, 99.0, 0.251]) == [0, 25, 100]
     together = drawn(plots.draw_superimposed, log, rows)
     arms = [line for line in together.lines if len(line.get_xdata()) == 9]
     np.testing.assert_array_equal(
@@ -421,9 +413,3 @@ def test_no_prediction_where_there_is_none(
     axes = drawn(plots.draw_null_space_error, logs[name])
     assert legend_texts(axes) == [r"actual $\Vert e_N \Vert_W$", why]
     assert axes.get_ylim()[1] >= 1e-6  # rounding does not fill the axis
-
-
-def test_a_constant_metric_is_read_from_the_log(logs: dict[str, Rollout]) -> None:
-    np.testing.assert_array_equal(log_series.constant_metric(logs["rest"]), A.T @ A)
-    varying = changed(logs["rest"], metric="MassMatrixMetric", metric_matrix=None)
-    assert log_series.constant_metric(varying) is None

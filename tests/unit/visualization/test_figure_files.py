@@ -12,9 +12,7 @@ from drawn_logs import PAPER, both, changed, drawn, planar, spatial, visible
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import hsp_control.visualization.plots as plots
-from hsp_control import (
-    Rollout,
-)
+from hsp_control import Rollout
 from hsp_control.common.exceptions import PlotError
 from hsp_control.visualization import palette
 from hsp_control.visualization.plots import (
@@ -39,11 +37,6 @@ def test_one_row_is_drawn(logs: dict[str, Rollout], name: str) -> None:
     for figure in both(short):
         figure.canvas.draw()
         assert figure.get_supxlabel().startswith("interrupted: by the user")
-
-
-def test_two_rows_are_drawn(logs: dict[str, Rollout]) -> None:
-    for figure in both(changed(logs["space"], slice(2), status="diverged")):
-        figure.canvas.draw()
 
 
 def test_a_log_without_rows_says_so(logs: dict[str, Rollout]) -> None:

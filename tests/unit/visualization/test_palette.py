@@ -11,22 +11,13 @@ from hsp_control.visualization import palette
 # Machado, Oliveira, Fernandes (2009), severity 1, on linear RGB.
 BLINDNESS = {
     "none": np.eye(3),
-    "protan": [
-        [0.152286, 1.052583, -0.204868],
-        [0.114503, 0.786281, 0.099216],
-        [-0.003882, -0.048116, 1.051998],
-    ],
-    "deutan": [
-        [0.367322, 0.860646, -0.227968],
-        [0.280085, 0.672501, 0.047413],
-        [-0.011820, 0.042940, 0.968881],
-    ],
-    "tritan": [
-        [1.255528, -0.076749, -0.178779],
-        [-0.078411, 0.930809, 0.147602],
-        [0.004733, 0.691367, 0.303900],
-    ],
-}
+    "protan": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216],
+     [-0.003882, -0.048116, 1.051998]],
+    "deutan": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413],
+     [-0.011820, 0.042940, 0.968881]],
+    "tritan": [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602],
+     [0.004733, 0.691367, 0.303900]],
+}  # fmt: skip
 
 
 def lab(color: str, blindness: str) -> np.ndarray:
@@ -55,28 +46,15 @@ def lab(color: str, blindness: str) -> np.ndarray:
     [
         palette.SERIES,
         palette.TASKS,
-        (
-            palette.ACTUAL,
-            palette.DESIRED,
-            palette.OBSTACLE,
-            palette.LINK,
-            palette.JOINT,
-        ),
+        (palette.ACTUAL, palette.DESIRED, palette.OBSTACLE, palette.LINK,
+         palette.JOINT),
         (palette.TASK, palette.WARNING, palette.PAPER),
         (palette.FIELD, palette.INK, palette.WARNING, palette.PAPER),
         (palette.EARLY, palette.LATE, palette.OBSTACLE, palette.DESIRED),
     ],
-)
+)  # fmt: skip
 def test_colours_stay_apart_for_all_eyes(
     colors: tuple[str, ...], blindness: str
 ) -> None:
     for one, other in itertools.combinations(colors, 2):
         assert np.linalg.norm(lab(one, blindness) - lab(other, blindness)) > 12.0
-
-
-def test_colours_blend_and_come_again() -> None:
-    assert palette.blend("#000000", "#FF8000", 0.0) == "#000000"
-    assert palette.blend("#000000", "#FF8000", 1.0) == "#FF8000"
-    assert palette.blend("#000000", "#FF8000", 0.5) == "#804000"
-    assert palette.series(0) == palette.series(len(palette.SERIES))
-    assert palette.task(0) == palette.ACTUAL

@@ -16,12 +16,9 @@ from drawn_logs import (
     visible,
 )
 from matplotlib.figure import Figure, SubFigure
-from matplotlib.text import Text
 
 import hsp_control.visualization.plots as plots
-from hsp_control import (
-    Rollout,
-)
+from hsp_control import Rollout
 from hsp_control.simulation import log_series
 
 pytestmark = pytest.mark.slow
@@ -188,21 +185,6 @@ def test_the_title_is_the_configurations(logs: dict[str, Rollout]) -> None:
         assert figure.get_suptitle() == title
     bare = changed(log, config=None, title="", name=None)
     assert plots.paper_figure(bare).get_suptitle() == "planar3r, field: rest"
-
-
-def test_letters_and_headings(drawings: dict[str, list[Figure]]) -> None:
-    paper, diagnostics = drawings["obstacle"]
-    texts = {text.get_text() for text in paper.findobj(Text)}
-    for heading in (
-        "(a)  End effector",
-        "(b)  Joints",
-        "(c)  Manipulability",
-        "(d)  Selected frames",
-        "(e)  Frames together",
-    ):
-        assert heading in texts
-    titles = [axes.get_title(loc="left")[:3] for axes in visible(diagnostics)]
-    assert titles == [f"({letter})" for letter in "abcdefgh"]
 
 
 def test_frames_bear_one_number_in_every_panel(logs: dict[str, Rollout]) -> None:

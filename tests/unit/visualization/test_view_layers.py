@@ -670,9 +670,7 @@ class Watched(Recorder):
 
 
 @pytest.mark.slow
-def test_a_run_is_shown_while_it_is_computed(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_run_is_shown_while_it_is_computed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(live, "MIN_PERIOD", 0.0)
     monkeypatch.setattr(live, "MAX_PERIOD", 0.0)
     experiment = load_experiment(PLANAR, "simulation.duration=0.5")
