@@ -392,6 +392,8 @@ def arguments(name: str) -> tuple[Any, ...]:
         "smallest_singular_value_bound": (triangular(6),),
         "_rotate_rows": (independent.copy(), np.eye(5), 1, 3),
         "orthogonalise_rows": (deficient.copy(), np.zeros((5, 5))),
+        "bounded_inverse": (independent, 0.1, np.zeros((5, 7)), np.zeros((5, 5))),
+        "_bounded_factors": (independent, 0.1, np.zeros((5, 7)), np.zeros((5, 5))),
         "acceleration": (
             *(rows_of(J, J_dot, sample[1][:m]), triangular(7), CONSTANT),
             *(normal(14, m, n), triangular(4), sample[0], sample[2]),
