@@ -7,10 +7,10 @@ does, G = Λ⁻¹ = J_e M⁻¹ J_eᵀ and an external force f, τ = J_eᵀ f:
 
 so that e''_commanded = -Kv e' - Kp e with
 
-    Kp = G K S,    Kv = -½ G' Λ + G D + 2 ζ √(G K)
+    Kp = G S,    Kv = -½ G' Λ + G D + 2 ζ √(G K)
 
-gives Λ e'' + (½ Λ' + D + D_ζ) e' + K S e = -f, because Λ' = -Λ G' Λ. S = diag(s) is
-the part of the error that counts, s_i e_i = sat(e_i). D_ζ = 2 ζ Λ √(G K) is symmetric,
+gives Λ e'' + (½ Λ' + D + D_ζ) e' + S e = -f, because Λ' = -Λ G' Λ. S = K up to the
+spring's largest force (`slipping`). D_ζ = 2 ζ Λ √(G K) is symmetric,
 and damps each mode of (Λ, K) with the ratio ζ. With K = C Cᵀ,
 
     √(G K) = C⁻ᵀ √(Cᵀ G C) Cᵀ,
@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hsp_control.common.arrays import Array
+from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.bounded_inverse import bounded_inverse
 from hsp_control.common.kernels import kernel
 from hsp_control.common.linalg import (
@@ -36,6 +36,7 @@ from hsp_control.common.linalg import (
 )
 from hsp_control.common.rotations import compose, jexp3_dot, jlog3
 from hsp_control.law import TaskSample
+from hsp_control.tasks.slipping import bounded_stiffness
 from hsp_control.tasks.task import Feedback
 
 _THRESHOLD = 0.03
@@ -62,9 +63,10 @@ class Scratch(NamedTuple):
     Attributes:
         factor: Shape (nv, nv).
         wide: Shape (5, m, nv).
-        square: Shape (6, m, m).
+        square: Shape (10, m, m).
         turning: Shape (4, 3, 3).
         vectors: Shape (2, 3).
+        rows: Shape (4, m).
     """
 
     factor: Array
@@ -72,6 +74,7 @@ class Scratch(NamedTuple):
     square: Array
     turning: Array
     vectors: Array
+    rows: Array
 
     @classmethod
     def allocate(cls, rows: int, nv: int) -> "Scratch":
@@ -79,9 +82,10 @@ class Scratch(NamedTuple):
         return cls(
             np.zeros((nv, nv)),
             np.zeros((5, rows, nv)),
-            np.zeros((6, rows, rows)),
+            np.zeros((10, rows, rows)),
             np.zeros((4, 3, 3)),
             np.zeros((2, 3)),
+            np.zeros((4, rows)),
         )
 
 
@@ -91,6 +95,7 @@ def impedance_gains(
     M_dot: Array,
     rotating: Rotating,
     numbers: Array,
+    ends: Indices,
     sample: TaskSample,
     scratch: Scratch,
     mobility: Array,
@@ -105,7 +110,8 @@ def impedance_gains(
         M: Mass matrix, shape (nv, nv).
         M_dot: Its rate, shape (nv, nv).
         rotating: The rows that are a rotation vector.
-        numbers: K, D, ζ, 1/largest error: see `Impedance.numbers`.
+        numbers: K, D, ζ and the bounds: see `Impedance.numbers`.
+        ends: Where each part of the error ends, shape (parts,).
         sample: J, J', e and e' of the task at the state.
         scratch: Overwritten.
         mobility: G = Λ⁻¹, written, shape (m, m).
@@ -113,7 +119,6 @@ def impedance_gains(
     """
     m, nv = sample.jacobian.shape
     K, D, ratio = numbers[:m], numbers[m : 2 * m], numbers[2 * m, 0]
-    inverse_bound, e = numbers[2 * m + 1], sample.error
     Kp, Kv = feedback.Kp, feedback.Kv
     L, B, B_dot, X = scratch.factor, scratch.wide[0], scratch.wide[1], scratch.wide[2]
     G, G_dot, GK, root = (
@@ -154,17 +159,15 @@ def impedance_gains(
     # J L⁻ᵀ may be less than those of J by √(largest eigenvalue of M).
     bounded_inertia(B, _THRESHOLD / np.sqrt(total), Q, scratch.square[4], inertia)
     gram(G_dot, inertia, False, root)
+    S = scratch.square[6]
+    if bounded_stiffness(
+        numbers, ends, sample.error, scratch.square[7:], scratch.rows, S
+    ):
+        gram(G, S, False, GK)
     for i in range(m):
         for j in range(m):
             Kv[i, j] -= 0.5 * root[i, j]
-            Kp[i, j] = GK[i, j] * counted(e[j], inverse_bound[j])
-
-
-@kernel
-def counted(e: float, inverse_bound: float) -> float:
-    """Return sat(e)/e, where sat clips e to ± the bound; 1 without a bound."""
-    beyond = abs(e) * inverse_bound
-    return 1.0 / beyond if beyond > 1.0 else 1.0
+            Kp[i, j] = GK[i, j]
 
 
 @kernel

@@ -265,10 +265,10 @@ MUTANTS = (
     ),
     Mutant(
         "impedance: a bounded spring pulls on",
-        TASKS + "impedance_gains.py",
-        "return 1.0 / beyond if beyond > 1.0 else 1.0",
-        "return 1.0",
-        UNIT + "tasks/test_impedance.py -k equation",
+        TASKS + "slipping.py",
+        "acts = acts or length(force, first, end) > most",
+        "acts = acts or length(force, first, end) > 2.0 * most",
+        UNIT + "tasks/test_slipping.py -k slips_only_there",
     ),
     Mutant(
         "impedance: the mass matrix of another state",
@@ -280,8 +280,8 @@ MUTANTS = (
     Mutant(
         "impedance: bounded spring taken for soft",
         TASKS + "compliant_task.py",
-        "parts_of(numbers)[3][:] = 0.0",
-        "parts_of(numbers)[3][:] *= 1.0",
+        "inverse[:] = 0.0",
+        "inverse[:] *= 1.0",
         UNIT + "tasks/test_impedance.py -k of_the_step",
     ),
     Mutant(
