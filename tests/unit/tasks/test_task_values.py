@@ -113,6 +113,7 @@ OTHERS: dict[type[Part], dict[str, Any]] = {
         "damping": [2, [1, 2], [[4, 0.1], [0.1, 5]]],
         "damping_ratio": 0.7,
         "largest_error": [0.1, [0.1, 0.2]],
+        "largest_force": [40, "none", None, [40.0, None], np.array([40.0, 5.0])],
     },
     JointPosture: {
         **_TASK,
@@ -413,6 +414,11 @@ WRONG: dict[type[Part], Wrong] = {
             (0, "largest_error: 0 is too small; must be greater than 0"),
             ([[0.1]], r"largest_error.0: \[0.1\] is a list; expected"),
             (np.inf, "largest_error: .inf is not a finite number"),
+        ],
+        "largest_force": [
+            (0, "largest_force: 0 is too small; must be greater than 0"),
+            ([40, -1], "largest_force.1: -1 is negative; must be greater than 0"),
+            ("robt", "largest_force: 'robt' is text; expected 'robot', 'none', a"),
         ],
     },
     JointPosture: {
