@@ -192,3 +192,28 @@ def test_its_energy_falls(force: float) -> None:
     assert (np.diff(energy) <= 1e-12).all()
     lost = 2e-3 * 0.5 * (np.array(power)[1:] + np.array(power)[:-1])
     assert energy[0] - energy[-1] == pytest.approx(lost.sum(), rel=1e-4)
+
+
+def change_at_the_end(**declared: Any) -> float:
+    """Return the largest change of an effort in 1 ms, in the last of 4 s, of a Z1.
+
+    Its target is out of reach, and efforts are held for 10 ms. As a part of the limit.
+    """
+    robot = hsp.Robot.load("z1")
+    q0 = np.array([-0.22, 1.41, -1.64, -0.16, 0.27, -0.16, -0.53])
+    target = hsp.Hold([-0.27, -0.74, 1.67])
+    spring = hsp.Impedance(600.0, **declared)
+    hand = hsp.FramePosition("gripperStator", target, impedance=spring, name="hand")
+    run = hsp.simulate(
+        hsp.Controller(robot, [hand], hsp.JointCentering()), q0, duration=4.0,
+        control_period=0.01, log_period=0.01, integrator=hsp.integrators.Rk4(1e-3),
+    )  # fmt: skip
+    change = np.abs(np.diff(run["tau"], axis=0)) / robot.model.effortLimit / 10.0
+    return float(change[run.t[1:] > 3.0].max())
+
+
+def test_a_weak_arm_rests_whose_target_is_out_of_reach() -> None:
+    """With nothing but defaults; and it shakes without a largest force."""
+    pytest.importorskip("example_robot_data")
+    assert change_at_the_end() < 1e-3
+    assert change_at_the_end(largest_force="none") > 1e-3
