@@ -21,7 +21,8 @@ from hsp_control.null_space.metrics import Metric
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
-from hsp_control.tasks.task import Feedback, InForce, write_asked
+from hsp_control.tasks.slipping import slipped
+from hsp_control.tasks.task import Feedback, InForce, beyond_largest, write_asked
 from hsp_control.trajectories.streams.stream import Streamed
 
 
@@ -101,7 +102,7 @@ class ActiveStack:
         self.first_task_row = held + free
         tasks = [each for level in planned for each in level]
         self.task_rows = _places([each.task for each in tasks], self.first_task_row)
-        self.bounds: list[tuple[str, int, Array]] = []
+        self.bounds: list[tuple[str, slice, Callable[[Array], float]]] = []
         self._parts: list[tuple[Task | Contact, TaskSample]] = []
         plans: list[Callable[[], StepPlan]] = []
         row = 0
@@ -120,8 +121,13 @@ class ActiveStack:
             asked = self.resolution.problem.asked[here]
             spring = impedance_of(each.task) is not None
             self.resolution.problem.springs[here] = spring
-            if len(in_force.feedback.largest):
-                self.bounds.append((each.task.name, row, in_force.feedback.largest))
+            if spring:
+                ends = each.task.part_ends
+                away = partial(slipped, in_force.numbers, ends)
+                self.bounds.append((each.task.name, here, away))
+            elif len(in_force.feedback.largest):
+                away = partial(beyond_largest, largest=in_force.feedback.largest)
+                self.bounds.append((each.task.name, here, away))
                 # Who is about to fall needs the balance whatever it costs.
                 if not each.task.keeps_balance(robot):
                     plans.append(partial(_asked, in_force.feedback, sample, asked))

@@ -27,7 +27,7 @@ from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields import NullSpaceField
 from hsp_control.tasks import Gains, Impedance, Task
 from hsp_control.tasks.compliant_task import impedance_of
-from hsp_control.tasks.gains import check_bounded, parts_of
+from hsp_control.tasks.impedance import check_bounded, parts_of
 from hsp_control.trajectories import (
     Crossfade,
     OrientationTrajectory,
@@ -137,6 +137,13 @@ class ChangeImpedance(Change, type="impedance"):
     impedance: Impedance
     """The new impedance."""
 
+    def placed(self, start: Start, setup: Setup) -> Self:
+        """Return the change with the spring's largest force in numbers."""
+        task = setup.task(self.task).task
+        with within("impedance"):
+            impedance = self.impedance.placed(task.error_parts, start.state.robot)
+        return replace(self, impedance=impedance)
+
     def apply(self, setup: Setup) -> Setup:
         """Return the setup with the impedance; see `Change.apply`.
 
@@ -151,7 +158,7 @@ class ChangeImpedance(Change, type="impedance"):
                 "follow; give it one"
             )
         with within("impedance"):
-            target = self.impedance.numbers(planned.task.rows)
+            target = self.impedance.numbers(planned.task.error_parts)
             numbers = planned.gains.then(self.at, self.ramp, target)
             values = [numbers.initial, *(each.target for each in numbers.transitions)]
             # In between, the stiffness of one meets the bounds of another.

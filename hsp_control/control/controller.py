@@ -44,7 +44,7 @@ from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.robot import Move
 from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
-from hsp_control.tasks.gains import parts_of
+from hsp_control.tasks.impedance import parts_of
 from hsp_control.tasks.task import Feedback
 
 if TYPE_CHECKING:

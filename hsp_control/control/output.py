@@ -1,6 +1,6 @@
 """What a controller returns: an effort, and everything that explains it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -8,7 +8,6 @@ from hsp_control.common.arrays import Array
 from hsp_control.control.actuation.status import Status
 from hsp_control.law import FieldSample, TaskSample, singular_values
 from hsp_control.law.problem import Record
-from hsp_control.tasks.task import beyond_largest
 
 
 class ControlOutput:
@@ -51,7 +50,9 @@ class ControlOutput:
     relaxation: float
     # Bytes are made faster than arrays, and most are never looked at.
     _acceleration: bytes | None  # None: the law's own
-    _bounds: Sequence[tuple[str, int, Array]]  # see `ActiveStack.bounds`
+    _bounds: Sequence[
+        tuple[str, slice, Callable[[Array], float]]
+    ]  # see `ActiveStack.bounds`
     _memory: Array | bytes
     _rows: int
     _views: Record | None  # of the memory, once they were asked for
@@ -66,12 +67,13 @@ class ControlOutput:
     def bounded(self) -> dict[str, float]:
         """How far a target is from what should be there, where it is too far to count.
 
-        By the name of each task whose error is longer than its `largest_error`: the
-        length of that part of the error [m or rad]. Empty, and so false, if none is.
+        By the name of each task whose error is longer than its `largest_error`, or
+        whose spring pulls with its largest force: the length of that part of the error
+        [m or rad]. Empty, and so false, if none is.
         """
         error, found = self._record.task.error, {}
-        for task, row, largest in self._bounds:
-            away = beyond_largest(error[row:], largest)
+        for task, rows, away_of in self._bounds:
+            away = away_of(error[rows])
             if away > 0.0:
                 found[task] = away
         return found

@@ -12,11 +12,12 @@ are behind, they catch up in half of the change's ramp, so that no effort jumps.
 
 import numpy as np
 
-from hsp_control.common.arrays import Array
+from hsp_control.common.arrays import Array, Indices
 from hsp_control.control.evolution import Evolution
 from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
-from hsp_control.tasks.gains import parts_of
+from hsp_control.tasks.impedance import parts_of
+from hsp_control.tasks.slipping import spring_force
 
 
 def changes_impedance(task: Task, numbers: Evolution[Array]) -> bool:
@@ -27,6 +28,7 @@ def changes_impedance(task: Task, numbers: Evolution[Array]) -> bool:
 def next_numbers(
     now: Array,
     planned: Evolution[Array],
+    ends: Indices,
     mobility: Array,
     e: Array,
     e_dot: Array,
@@ -39,7 +41,7 @@ def next_numbers(
     if not np.allclose(now, planned.at(t), rtol=1e-4, atol=1e-9):  # it has waited
         begun = [each.ramp for each in planned.transitions if each.start <= t]
         step *= min(2.0 * period / max(begun[-1] if begun else 0.3, period), 1.0)
-    needed = spring_energy(now + step, e) - spring_energy(now, e)
+    needed = spring_energy(now + step, ends, e) - spring_energy(now, ends, e)
     if needed > 0.0:
         given = period * dissipated(now, mobility, e_dot)
         if needed > given:
@@ -47,21 +49,15 @@ def next_numbers(
     return None if np.array_equal(now + step, then) else now + step
 
 
-def spring_energy(numbers: Array, e: Array) -> float:
-    """Return U(e): ½ eᵀK e, and linear beyond the largest error."""
-    K, _, _, inverse_bound = parts_of(numbers)
-    if not inverse_bound.any():
-        return float(0.5 * e @ K @ e)
-    away = np.abs(e)
-    with np.errstate(divide="ignore"):
-        bound = np.where(inverse_bound > 0.0, 1.0 / inverse_bound, np.inf)
-    inside = np.minimum(away, bound)
-    return float(np.diag(K) @ (inside * (away - 0.5 * inside)))
+def spring_energy(numbers: Array, ends: Indices, e: Array) -> float:
+    """Return U(e) = sᵀe - ½ sᵀK⁻¹s: ½ eᵀK e, and linear where s is at its bound."""
+    force = spring_force(numbers, ends, e)
+    return float(force @ e - 0.5 * force @ np.linalg.solve(parts_of(numbers)[0], force))
 
 
 def dissipated(numbers: Array, mobility: Array, e_dot: Array) -> float:
     """Return e'ᵀ(D + D_ζ) e' [W], with D_ζ = 2 ζ C S⁻¹ Cᵀ, K = C Cᵀ, S² = Cᵀ Λ⁻¹ C."""
-    K, D, ratio, _ = parts_of(numbers)
+    K, D, ratio, *_ = parts_of(numbers)
     power = float(e_dot @ D @ e_dot)
     if ratio[0] > 0.0:
         C = np.linalg.cholesky(K)

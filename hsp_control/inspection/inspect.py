@@ -102,6 +102,7 @@ def _facts(robot: Robot, condition: float, dof: str) -> dict[str, str]:
         "end effector": f"{robot.end_effector} (by default)",
         "size": f"{robot.size:.3g} m, the longest chain from the first joint",
         "effort rate": _rates(robot),
+        "springs": _springs(robot),
         "mass": f"{pin.computeTotalMass(robot.model):.4g} kg move",
         "mass matrix": f"condition number up to {condition:.2g}, by {dof}",
         "home": f"[{home}]",
@@ -115,6 +116,14 @@ def _rates(robot: Robot) -> str:
     low, high = (f"{1e-3 * each:.2g}" for each in (rates.min(), rates.max()))
     most = high if low == high else f"{low} to {high}"
     return f"no effort changes by more than {most} N·m or N in 1 ms"
+
+
+def _springs(robot: Robot) -> str:
+    force, moment = robot.spring_force
+    if not np.isfinite(force):
+        return "no effort limits, so they pull with any force"
+    turned = f" and {moment:.3g} N·m" if np.isfinite(moment) else ""
+    return f"a hand's pull with at most {force:.3g} N{turned} by default"
 
 
 def _of_file(xml: Element, source: RobotSource) -> Iterator[Finding]:

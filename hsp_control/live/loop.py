@@ -11,6 +11,7 @@ import numpy as np
 from hsp_control.common.exceptions import LiveError
 from hsp_control.control.controller import Controller
 from hsp_control.control.estimator import Estimator
+from hsp_control.control.first_state import warn_of_slow_efforts
 from hsp_control.control.plan import Plan
 from hsp_control.geometry.scene import Scene
 from hsp_control.live.balance import balance_of
@@ -121,6 +122,7 @@ def run_loop(
                 limiter.reset(first.q)
             end = np.inf if duration is None else start_time + duration - 0.5 * period
             rehearse(controller, start_time, end, first.q, first.v)
+            warn_of_slow_efforts(robot, first.q, limits)
             shown = scene or controller.scene
             loop_log = LoopLog(log, log_period, chain, shown, dict(meta or {}))
             loop_log.warm_up(reader, limiter)

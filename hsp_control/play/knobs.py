@@ -5,6 +5,7 @@ to the robot, and what is refused, is the controller's business (`Controller.at`
 """
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -158,9 +159,8 @@ def _stiffen(name: str, impedance: Impedance, at: Changes, factor: float) -> Non
 def _scaled(impedance: Impedance, factor: float) -> Impedance:
     """Return an impedance with a multiple of the stiffness, and the same ratio."""
     damping = impedance.damping
-    return Impedance(
-        factor * np.asarray(impedance.stiffness, dtype=float),
+    return replace(
+        impedance,
+        stiffness=factor * np.asarray(impedance.stiffness, dtype=float),
         damping=None if damping is None else np.sqrt(factor) * np.asarray(damping),
-        damping_ratio=impedance.damping_ratio,
-        largest_error=impedance.largest_error,
     )

@@ -315,6 +315,24 @@ class RobotModel(ConfigurationSpace):
         return (_LEG_RATE if self.unactuated else _ARM_RATE) * rate
 
     @cached_property
+    def spring_force(self) -> tuple[float, float]:
+        """The largest force and moment of springs by default [N, N·m]; inf for none.
+
+        The force is what the strongest motor holds at half of `size`, the moment half
+        of that motor's effort. Only motors that slide count as they are.
+        """
+        effort = np.array(self.model.effortLimit)
+        effort[(effort <= 0.0) | (effort >= np.finfo(np.float32).max)] = np.inf
+        effort[list(self.unactuated)] = np.inf
+        turns = np.array(self.units) == "rad"
+        found = effort[turns & np.isfinite(effort)]
+        if found.size and self.size > 0.0:
+            strongest = float(found.max())
+            return strongest / (0.5 * self.size), 0.5 * strongest
+        found = effort[~turns & np.isfinite(effort)]
+        return (float(found.max()) if found.size else np.inf), np.inf
+
+    @cached_property
     def largest_inertias(self) -> Array:
         """Largest M_ii in any posture, nearly, shape (nv,) [kg·m² or kg].
 

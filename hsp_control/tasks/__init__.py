@@ -8,7 +8,7 @@ from .frame_pose import FrameOrientation as FrameOrientation
 from .frame_pose import FramePose as FramePose
 from .frame_position import FramePosition as FramePosition
 from .gains import Gains as Gains
-from .gains import Impedance as Impedance
+from .impedance import Impedance as Impedance
 from .joint_posture import JointPosture as JointPosture
 from .pointing import Pointing as Pointing
 from .relative_pose import RelativePose as RelativePose

@@ -1,7 +1,7 @@
 """The base class of tasks that may have an impedance instead of gains."""
 
 from collections.abc import Callable
-from dataclasses import KW_ONLY
+from dataclasses import KW_ONLY, replace
 from functools import partial
 from typing import ClassVar, Self
 
@@ -14,7 +14,8 @@ from hsp_control.common.step_plan import StepPlan
 from hsp_control.declaration import within
 from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
-from hsp_control.tasks.gains import Gains, Impedance, parts_of
+from hsp_control.tasks.gains import Gains
+from hsp_control.tasks.impedance import Impedance, parts_of
 from hsp_control.tasks.impedance_gains import Rotating, Scratch, impedance_gains
 from hsp_control.tasks.task import Feedback, InForce, SecondOrderTask, Task
 
@@ -39,7 +40,7 @@ class CompliantTask(SecondOrderTask):
     _: KW_ONLY
     impedance: Impedance | None = None
     """Stiffness and damping of the rows [N/m and N·s/m, or N·m/rad and N·m·s/rad],
-    instead of `gains`; none by default. Its spring has a largest error of its own, and
+    instead of `gains`; none by default. Its spring has a largest force of its own, and
     fades by itself where the hand cannot move: `largest_error` does not count."""
 
     def __post_init__(self) -> None:
@@ -54,14 +55,18 @@ class CompliantTask(SecondOrderTask):
         return Rotating(self.rows, np.eye(3), np.zeros(3))
 
     def checked(self, robot: Robot) -> Self:
-        """Return the task itself, whose rows and gains fit; see `Task.checked`."""
-        if self.impedance is not None and robot.unactuated:
-            with within("impedance"):
+        """Return the task with its largest force in numbers; see `Task.checked`."""
+        if self.impedance is None:
+            return super().checked(robot)
+        with within("impedance"):
+            if robot.unactuated:
                 raise GainError(
                     f"{robot.name} has a free-flyer root: its inertia at a task "
                     "depends on the contacts; needs a robot with a fixed base"
                 )
-        return super().checked(robot)
+            impedance = self.impedance.placed(self.error_parts, robot)
+        placed = replace(self, impedance=impedance)
+        return super(CompliantTask, placed).checked(robot)
 
     def feedback(self) -> Feedback:
         """Return new arrays of feedback; zeros with an impedance, see `feedback_at`."""
@@ -69,7 +74,7 @@ class CompliantTask(SecondOrderTask):
             return super().feedback()
         rows = self.rows
         with within("impedance"):
-            self.impedance.numbers(rows)
+            self.impedance.numbers(self.error_parts)
         zeros = np.zeros((2, rows, rows))
         return Feedback(zeros[0], zeros[1], np.zeros(rows))
 
@@ -78,7 +83,8 @@ class CompliantTask(SecondOrderTask):
         if self.impedance is None:
             return super().in_force()
         mobility = np.zeros((self.rows, self.rows))
-        return InForce(self.impedance.numbers(self.rows), self.feedback(), mobility)
+        numbers = self.impedance.numbers(self.error_parts)
+        return InForce(numbers, self.feedback(), mobility)
 
     def compile_in_force(
         self, state: RobotState, in_force: InForce, out: TaskSample
@@ -97,6 +103,7 @@ class CompliantTask(SecondOrderTask):
             *matrices,
             self._rotating(state),
             in_force.numbers,
+            self.part_ends,
             out,
             Scratch.allocate(self.rows, state.robot.nv),
             in_force.mobility,
@@ -115,7 +122,8 @@ class CompliantTask(SecondOrderTask):
         if self.impedance is None:
             return super().linear_feedback(state, in_force)
         numbers = in_force.numbers.copy()
-        parts_of(numbers)[3][:] = 0.0
+        for inverse in parts_of(numbers)[3:]:
+            inverse[:] = 0.0
         return self._at(state, numbers)
 
     def _at(self, state: RobotState, numbers: Array) -> Feedback:

@@ -7,10 +7,10 @@ does, G = Λ⁻¹ = J_e M⁻¹ J_eᵀ and an external force f, τ = J_eᵀ f:
 
 so that e''_commanded = -Kv e' - Kp e with
 
-    Kp = G K S,    Kv = -½ G' Λ + G D + 2 ζ √(G K)
+    Kp = G S,    Kv = -½ G' Λ + G D + 2 ζ √(G K)
 
-gives Λ e'' + (½ Λ' + D + D_ζ) e' + K S e = -f, because Λ' = -Λ G' Λ. S = diag(s) is
-the part of the error that counts, s_i e_i = sat(e_i). D_ζ = 2 ζ Λ √(G K) is symmetric,
+gives Λ e'' + (½ Λ' + D + D_ζ) e' + S e = -f, because Λ' = -Λ G' Λ. S = K up to the
+spring's largest force (`slipping`). D_ζ = 2 ζ Λ √(G K) is symmetric,
 and damps each mode of (Λ, K) with the ratio ζ. With K = C Cᵀ,
 
     √(G K) = C⁻ᵀ √(Cᵀ G C) Cᵀ,
@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hsp_control.common.arrays import Array
+from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
 from hsp_control.common.linalg import (
     bounded_inverse,
@@ -36,6 +36,7 @@ from hsp_control.common.linalg import (
 )
 from hsp_control.common.rotations import compose, jexp3_dot, jlog3
 from hsp_control.law import TaskSample
+from hsp_control.tasks.slipping import bounded_stiffness
 from hsp_control.tasks.task import Feedback
 
 _THRESHOLD = 0.03  # default threshold of the law's singularities: see `Controller`
@@ -54,9 +55,10 @@ class Scratch(NamedTuple):
 
     factor: Array  # (nv, nv)
     wide: Array  # (5, m, nv)
-    square: Array  # (6, m, m)
+    square: Array  # (10, m, m)
     turning: Array  # (4, 3, 3)
     vectors: Array  # (2, 3)
+    rows: Array  # (4, m)
 
     @classmethod
     def allocate(cls, rows: int, nv: int) -> "Scratch":
@@ -64,9 +66,10 @@ class Scratch(NamedTuple):
         return cls(
             np.zeros((nv, nv)),
             np.zeros((5, rows, nv)),
-            np.zeros((6, rows, rows)),
+            np.zeros((10, rows, rows)),
             np.zeros((4, 3, 3)),
             np.zeros((2, 3)),
+            np.zeros((4, rows)),
         )
 
 
@@ -76,6 +79,7 @@ def impedance_gains(
     M_dot: Array,
     rotating: Rotating,
     numbers: Array,
+    ends: Indices,
     sample: TaskSample,
     scratch: Scratch,
     mobility: Array,
@@ -86,11 +90,10 @@ def impedance_gains(
     Where M is singular they are NaN, so that the law reports that the step is not
     finite.
 
-    Shapes: M (nv, nv), M_dot (nv, nv), mobility (m, m).
+    Shapes: M (nv, nv), M_dot (nv, nv), ends (parts,), mobility (m, m).
     """
     m, nv = sample.jacobian.shape
     K, D, ratio = numbers[:m], numbers[m : 2 * m], numbers[2 * m, 0]
-    inverse_bound, e = numbers[2 * m + 1], sample.error
     Kp, Kv = feedback.Kp, feedback.Kv
     L, B, B_dot, X = scratch.factor, scratch.wide[0], scratch.wide[1], scratch.wide[2]
     G, G_dot, GK, root = (
@@ -131,17 +134,15 @@ def impedance_gains(
     # J L⁻ᵀ may be less than those of J by √(largest eigenvalue of M).
     bounded_inertia(B, _THRESHOLD / np.sqrt(total), Q, scratch.square[4], inertia)
     gram(G_dot, inertia, False, root)
+    S = scratch.square[6]
+    if bounded_stiffness(
+        numbers, ends, sample.error, scratch.square[7:], scratch.rows, S
+    ):
+        gram(G, S, False, GK)
     for i in range(m):
         for j in range(m):
             Kv[i, j] -= 0.5 * root[i, j]
-            Kp[i, j] = GK[i, j] * counted(e[j], inverse_bound[j])
-
-
-@kernel
-def counted(e: float, inverse_bound: float) -> float:
-    """Return sat(e)/e, where sat clips e to ± the bound; 1 without a bound."""
-    beyond = abs(e) * inverse_bound
-    return 1.0 / beyond if beyond > 1.0 else 1.0
+            Kp[i, j] = GK[i, j]
 
 
 @kernel

@@ -2,7 +2,7 @@
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, replace
 from functools import partial
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
@@ -10,8 +10,8 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator
 
-from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import TaskError
+from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.exceptions import HspControlError, TaskError
 from hsp_control.common.kernels import kernel
 from hsp_control.common.step_plan import StepPlan
 from hsp_control.declaration import Part, within
@@ -169,6 +169,11 @@ class Task(Part, ABC, family="tasks", error=TaskError):
     def rows(self) -> int:
         """Number of rows m."""
         return sum(part.size for part in self.error_parts)
+
+    @property
+    def part_ends(self) -> Indices:
+        """Where each part of the error ends, shape (parts,)."""
+        return np.cumsum([part.size for part in self.error_parts])
 
     @abstractmethod
     def feedback(self) -> Feedback:
@@ -403,21 +408,36 @@ def largest_errors(
     declared: Any, parts: Sequence[ErrorPart], robot: Robot
 ) -> Sequence[float | None] | str:
     """Return the largest error of each part, None for no bound; or "none" for all."""
+    own = {"m": _OF_SIZE * robot.size, "rad": _ANGLE, "-": _ANGLE}
+    return each_part(declared, parts, own, TaskError)
+
+
+def each_part(
+    declared: Any,
+    parts: Sequence[ErrorPart],
+    own: Mapping[str, float],
+    error: type[HspControlError],
+) -> Sequence[float | None] | str:
+    """Return a bound for each part of an error, None for no bound; or "none" for all.
+
+    ``own`` is what the robot has by the unit of the error, inf for no bound.
+    """
     if declared == "none" or declared is None:
         return "none"
     if declared == "robot":
-        own = {"m": _OF_SIZE * robot.size, "rad": _ANGLE, "-": _ANGLE}
-        found = [own.get(each.unit) for each in parts]
+        found = [own.get(each.unit, np.inf) for each in parts]
     else:
         several = isinstance(declared, tuple)
         found = [*declared] if several else [declared] * len(parts)
         if len(found) != len(parts):
             names = " and ".join(f"{each.name} [{each.unit}]" for each in parts)
-            raise TaskError(
+            raise error(
                 f"has {len(found)} numbers; needs one for each part of the error: "
                 f"{names}"
             )
-    return tuple(None if each is None else float(each) for each in found)
+    return tuple(
+        None if each is None or np.isinf(each) else float(each) for each in found
+    )
 
 
 def beyond_largest(e: Array, largest: Array) -> float:

@@ -25,6 +25,7 @@ from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric, Met
 from hsp_control.robot.integrators import Dop853, Rk4
 from hsp_control.simulation.plants import Push, RigidBody
 from hsp_control.tasks import Impedance
+from hsp_control.tasks.task import ErrorPart
 
 Array = NDArray[np.float64]
 
@@ -290,7 +291,8 @@ def test_the_power_of_the_damping_is_that_of_the_gains(seed: int) -> None:
         (Impedance(K, damping=D), D),
         (Impedance(K, damping_ratio=0.7), D_ratio.real),
     ):
-        power = dissipated(impedance.numbers(m), G, rate)
+        parts = [ErrorPart("joints", "rad", "rad/s", int(m))]
+        power = dissipated(impedance.numbers(parts), G, rate)
         assert power == pytest.approx(rate @ damping @ rate, rel=1e-8)
 
 
@@ -300,7 +302,8 @@ def test_the_spring_s_energy_is_the_integral_of_its_force() -> None:
         s = np.linspace(0.0, 1.0, 20001)[:, None]
         force = np.array([200.0, 300.0]) * np.clip(s * e, [-0.1, -0.2], [0.1, 0.2])
         work = simpson(force @ e, x=s[:, 0])
-        assert spring_energy(spring.numbers(2), e) == pytest.approx(work, rel=1e-6)
+        numbers = spring.numbers([ErrorPart("position", "m", "m/s", 2)])
+        assert spring_energy(numbers, np.array([2]), e) == pytest.approx(work, rel=1e-6)
 
 
 def test_limits_that_an_observer_tells_are_not_bound_by_a_push() -> None:

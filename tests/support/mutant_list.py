@@ -144,14 +144,15 @@ impedance: no rate of the inertia | equation
   Kv[i, j] -= 0.5 * root[i, j] => Kv[i, j] -= 0.0 * root[i, j]
 impedance: rotated axes stand still | equation
   T_dot[i, 0] = -part[i, 0] - (b * w[2] - c * w[1]) => T_dot[i, 0] = -part[i, 0]
-impedance: a bounded spring pulls on | equation
-  return 1.0 / beyond if beyond > 1.0 else 1.0 => return 1.0
+@ tasks/slipping.py | unit/tasks/test_slipping.py
+impedance: a bounded spring pulls on | slips_only_there
+  acts = acts or length(force, first, end) > most => acts = False
 @ tasks/compliant_task.py | unit/tasks/test_impedance.py
 impedance: the mass matrix of another state | all_joints
 -StepPlan(task.follow, (*update, *task.write, write, *task.write))
 +StepPlan(task.follow, (*task.write, write, *task.write))
 impedance: bounded spring taken for soft | of_the_step
-  parts_of(numbers)[3][:] = 0.0 => parts_of(numbers)[3][:] *= 1.0
+  inverse[:] = 0.0 => inverse[:] *= 1.0
 @ control/compensation/momentum_observer.py | integration/test_compliance.py
 observer: it cancels what it is only to see | observer
 -        if not self.cancel:

@@ -157,6 +157,14 @@ def test_a_first_effort_that_jumps_is_warned_of_before_it_is_sent() -> None:
     assert sent[0] == 0
 
 
+def test_a_rate_that_gravity_outruns_is_warned_of() -> None:
+    """As before a simulation."""
+    message = "panda_joint2' may change by 300 N·m/s, but gravity by"
+    limits = hsp.Limits(effort_rate=300.0, velocity={"joints": {"panda_joint2": 30.0}})
+    with pytest.warns(StartWarning, match=message):
+        run_loop(law(limits=limits), Rig(), duration=0.01)
+
+
 def test_a_stream_that_falls_silent_stops_the_robot_safely() -> None:
     target = hsp.StreamPose(stop_after=0.05)
     hand = hsp.FramePose("panda_tcp", target)

@@ -76,9 +76,10 @@ def impedance(kind: str, rows: int, rng: np.random.Generator) -> Impedance:
     """Return an impedance of one kind; stiff rows beside soft ones."""
     each = (200.0 * rng.uniform(0.3, 3.0, rows)).tolist()
     if kind == "ratio":
-        return Impedance(each, damping_ratio=0.7)
+        return Impedance(each, damping_ratio=0.7, largest_force="none")
     if kind == "matrices":
-        return Impedance(definite(rng, rows, 150.0), damping=definite(rng, rows, 20.0))
+        stiffness, damping = definite(rng, rows, 150.0), definite(rng, rows, 20.0)
+        return Impedance(stiffness, damping=damping, largest_force="none")
     return Impedance(each, damping=30.0, largest_error=0.2)
 
 
@@ -125,7 +126,7 @@ def inverse_inertias(task: Any, motion: Motion) -> Callable[[float], Array]:
 def test_the_equation_holds_whatever_the_force_and_the_metric(
     case: Case, kind: str
 ) -> None:
-    """Λ e'' + (½ Λ' + D) e' + K sat(e) = -f along the motion that follows from f."""
+    """Λ e'' + (½ Λ' + D) e' + s(e) = -f along the motion that follows from f."""
     rng = np.random.default_rng(3)
     metrics: list[tuple[int, Metric]]
     metrics = [(2, MassMatrixMetric()), (1, IdentityMetric())]
@@ -253,8 +254,9 @@ def test_a_singular_mass_matrix_is_not_a_number() -> None:
     in_force, sample = task.in_force(), TaskSample.allocate(3, 3)
     flat, none = np.zeros((3, 3)), Rotating(3, np.eye(3), np.zeros(3))
     numbers, scratch = in_force.numbers, Scratch.allocate(3, 3)
+    mobility, feedback = in_force.mobility, in_force.feedback
     impedance_gains(
-        flat, flat, none, numbers, sample, scratch, in_force.mobility, in_force.feedback
+        flat, flat, none, numbers, task.part_ends, sample, scratch, mobility, feedback
     )
     assert np.isnan(in_force.feedback.Kp[0, 0])
     assert np.isnan(in_force.feedback.Kv[0, 0])

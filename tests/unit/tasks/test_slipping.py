@@ -1,0 +1,219 @@
+"""A spring whose force is bounded: it slips, and takes no energy from anywhere."""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from task_cases import placed
+
+import hsp_control as hsp
+from hsp_control.common.exceptions import GainError
+from hsp_control.control.stiffening import spring_energy
+from hsp_control.tasks.impedance import parts_of
+from hsp_control.tasks.slipping import slipped, spring_force
+from hsp_control.tasks.task import ErrorPart
+
+Array = NDArray[np.float64]
+
+MOST = 30.0, 2.0  # of the position and of the orientation [N, N·m]
+PARTS = (
+    ErrorPart("position", "m", "m/s", 3),
+    ErrorPart("orientation", "rad", "rad/s", 3),
+)
+ENDS = np.array([3, 6])
+
+
+@cache
+def panda() -> hsp.Robot:
+    return hsp.Robot.load("panda")
+
+
+def springs(kind: str, rng: np.random.Generator) -> Array:
+    """Return the numbers of a random impedance of a pose."""
+    each = np.exp(rng.uniform(np.log(10.0), np.log(2000.0), 6))
+    stiffness: Any = each.tolist()
+    if kind == "coupled":
+        turn = np.linalg.qr(rng.normal(size=(6, 6)))[0]
+        stiffness = (turn * each) @ turn.T
+        stiffness = (0.5 * (stiffness + stiffness.T)).tolist()
+    numbers = hsp.Impedance(stiffness, largest_force=list(MOST)).numbers(PARTS)
+    if kind == "both":  # between a largest error and a largest force
+        parts_of(numbers)[3][:] = rng.uniform(5.0, 50.0, 6)
+    return numbers
+
+
+kinds = pytest.mark.parametrize("kind", ["diagonal", "coupled", "both"])
+
+
+@kinds
+@pytest.mark.parametrize("seed", range(20))
+def test_the_force_is_the_gradient_of_a_convex_energy(kind: str, seed: int) -> None:
+    """By differences; and (s(a) - s(b))ᵀ(a - b) >= 0, so that it is convex."""
+    rng = np.random.default_rng(seed)
+    numbers = springs(kind, rng)
+    a, b = 10.0 ** rng.uniform(-3.0, 0.5, (2, 1)) * rng.normal(size=(2, 6))
+    force = spring_force(numbers, ENDS, a)
+    step = 1e-6 * float(np.linalg.norm(a))
+    slope = [
+        (
+            spring_energy(numbers, ENDS, a + step * way)
+            - spring_energy(numbers, ENDS, a - step * way)
+        )
+        / (2.0 * step)
+        for way in np.eye(6)
+    ]
+    scale = np.abs(force).max()
+    np.testing.assert_allclose(slope, force, rtol=0, atol=1e-5 * scale)
+    assert (force - spring_force(numbers, ENDS, b)) @ (a - b) >= 0.0
+
+
+@kinds
+@pytest.mark.parametrize("seed", range(20))
+def test_no_part_pulls_with_more_and_slips_only_there(kind: str, seed: int) -> None:
+    """The slip e - K⁻¹s of a part is along its force, and zero below its bound."""
+    rng = np.random.default_rng(100 + seed)
+    numbers = springs(kind, rng)
+    K = parts_of(numbers)[0]
+    e = 10.0 ** rng.uniform(-3.0, 0.5) * rng.normal(size=6)
+    force = spring_force(numbers, ENDS, e)
+    slip = e - np.linalg.solve(K, force)
+    free = np.abs(K @ e)
+    for rows, most in zip((slice(0, 3), slice(3, 6)), MOST, strict=True):
+        size = float(np.linalg.norm(force[rows]))
+        assert size <= most * (1.0 + 1e-9)
+        if kind != "both":
+            along = float(slip[rows] @ force[rows])
+            assert along >= -1e-9 * size * float(np.linalg.norm(e))
+            off = along - size * np.linalg.norm(slip[rows])
+            assert abs(off) < 1e-9 * size * float(np.linalg.norm(e))
+        if size < most * (1.0 - 1e-9) and kind != "both":
+            np.testing.assert_allclose(slip[rows], 0.0, atol=1e-10)
+    if kind == "both":
+        bounds = np.diag(K) / parts_of(numbers)[3]
+        assert (np.abs(force) <= bounds * (1.0 + 1e-9)).all()
+        free = np.minimum(free, bounds)
+    inside = all(np.linalg.norm((K @ e)[a:b]) <= f for a, b, f in
+                 zip((0, 3), (3, 6), MOST, strict=True))  # fmt: skip
+    if inside and kind != "both":
+        np.testing.assert_array_equal(force, K @ e)
+        assert slipped(numbers, ENDS, e) == 0.0
+
+
+def test_the_default_of_a_robot() -> None:
+    """What its strongest motor holds at half of its size, and half of its effort."""
+    robot = panda()
+    task = placed(hsp.FramePose("panda_tcp", impedance=hsp.Impedance(100.0)), robot)
+    strongest = 87.0
+    own = (strongest / (0.5 * robot.size), 0.5 * strongest)
+    assert task.impedance is not None
+    assert task.impedance.largest_force == own
+    assert placed(task, robot).impedance == task.impedance
+    numbers = task.impedance.numbers(task.error_parts)
+    np.testing.assert_allclose(parts_of(numbers)[4], 1.0 / np.repeat(own, 3))
+    for without in (
+        hsp.Impedance(100.0, largest_force="none"),
+        hsp.Impedance(100.0, largest_error=0.1),
+    ):
+        task = placed(hsp.FramePose("panda_tcp", impedance=without), robot)
+        assert task.impedance is not None
+        assert not parts_of(task.impedance.numbers(task.error_parts))[4].any()
+    joints = placed(hsp.JointPosture("home", impedance=hsp.Impedance(100.0)), robot)
+    assert joints.impedance is not None
+    assert joints.impedance.largest_force == (None,)
+    with pytest.raises(GainError, match=r"largest_force: has 3 numbers; needs one for"):
+        placed(
+            hsp.FramePose(
+                "panda_tcp", impedance=hsp.Impedance(1.0, largest_force=[1.0] * 3)
+            ),
+            robot,
+        )
+
+
+def test_everyday_forces_are_below_it() -> None:
+    """Springs stay linear at 40 N and more, at any stiffness."""
+    for name in ("panda", "iiwa14"):
+        force, moment = hsp.Robot.load(name).spring_force
+        assert force > 100.0
+        assert moment > 40.0
+
+
+@pytest.mark.parametrize(
+    ("efforts", "size", "expected"),
+    [
+        ((60.0, 20.0), 3.0, (40.0, 30.0)),
+        ((0.5, 0.2), 0.1, (10.0, 0.25)),
+        ((0.0, np.inf), 1.0, (np.inf, np.inf)),
+        ((0.0, 8.0), 1.0, (16.0, 4.0)),
+    ],
+)
+def test_arms_of_any_size(
+    efforts: tuple[float, float], size: float, expected: tuple[float, float],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    """A planar arm of 3 m, a hand of 10 cm, and one whose motors nobody knows."""
+    robot = hsp.Robot.load("planar3r")
+    monkeypatch.setattr(type(robot), "size", size)
+    robot.model.effortLimit = np.array([*efforts, 0.0])
+    assert robot.spring_force == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("force", [5.0, 20.0])
+def test_its_energy_falls(force: float) -> None:
+    """E = ½ e'ᵀΛe' + U(e) falls by what is damped; within it nothing is different."""
+    robot = panda()
+    q0 = robot.home()
+    here = robot.state(0.0, q0, np.zeros(7)).position("panda_tcp").copy()
+    target = hsp.Hold(here + np.array([-0.1, 0.2, -0.1]))
+    spring = hsp.Impedance([300.0, 600.0, 200.0], damping=40.0, largest_force=force)
+    hand = hsp.FramePosition("panda_tcp", target, impedance=spring, name="hand")
+    controller = hsp.Controller(robot, [hand], limits=None)
+    run = hsp.simulate(
+        controller, q0, duration=1.0, log_period=2e-3,
+        integrator=hsp.integrators.Rk4(2e-3),
+    )  # fmt: skip
+    numbers = spring.numbers(controller.tasks[0].error_parts)
+    numbers[-1] = 1.0 / force
+    assert run["task.hand.bounded"][0] == pytest.approx(np.sqrt(0.06))
+    energy, power = [], []
+    e, rate = run["task.hand.error"], run["task.hand.error_rate"]
+    for row, q in enumerate(run.q):
+        state = robot.state(0.0, q, run.v[row])
+        J = state.frame("panda_tcp").jacobian[:3]
+        inertia = np.linalg.inv(J @ np.linalg.solve(state.mass_matrix, J.T))
+        potential = spring_energy(numbers, np.array([3]), e[row])
+        energy.append(0.5 * rate[row] @ inertia @ rate[row] + potential)
+        power.append(40.0 * rate[row] @ rate[row])
+        assert np.linalg.norm(spring_force(numbers, np.array([3]), e[row])) <= (
+            force * (1.0 + 1e-10)
+        )
+    assert not run["damped"].any()
+    assert (np.diff(energy) <= 1e-12).all()
+    lost = 2e-3 * 0.5 * (np.array(power)[1:] + np.array(power)[:-1])
+    assert energy[0] - energy[-1] == pytest.approx(lost.sum(), rel=1e-4)
+
+
+def change_at_the_end(**declared: Any) -> float:
+    """Return the largest change of an effort in 1 ms, in the last of 4 s, of a Z1.
+
+    Its target is out of reach, and efforts are held for 10 ms. As a part of the limit.
+    """
+    robot = hsp.Robot.load("z1")
+    q0 = np.array([-0.22, 1.41, -1.64, -0.16, 0.27, -0.16, -0.53])
+    target = hsp.Hold([-0.27, -0.74, 1.67])
+    spring = hsp.Impedance(600.0, **declared)
+    hand = hsp.FramePosition("gripperStator", target, impedance=spring, name="hand")
+    run = hsp.simulate(
+        hsp.Controller(robot, [hand], hsp.JointCentering()), q0, duration=4.0,
+        control_period=0.01, log_period=0.01, integrator=hsp.integrators.Rk4(1e-3),
+    )  # fmt: skip
+    change = np.abs(np.diff(run["tau"], axis=0)) / robot.model.effortLimit / 10.0
+    return float(change[run.t[1:] > 3.0].max())
+
+
+def test_a_weak_arm_rests_whose_target_is_out_of_reach() -> None:
+    """With nothing but defaults; and it shakes without a largest force."""
+    pytest.importorskip("example_robot_data")
+    assert change_at_the_end() < 1e-3
+    assert change_at_the_end(largest_force="none") > 1e-3
