@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hsp_control import Rollout, load_experiment
+from hsp_control.cli import main
 from hsp_control.common.exceptions import LogError
 from hsp_control.simulation.journal import (
     KILLED,
@@ -192,3 +193,15 @@ def test_a_full_disk_is_an_error_with_the_file_s_name() -> None:
         pytest.skip("this system has no /dev/full")
     with pytest.raises(LogError, match="/dev/full"):
         JournalWriter(full)
+
+
+@pytest.mark.system
+@pytest.mark.slow
+def test_the_commands_take_it(
+    rollout: Rollout, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write(tmp_path / "run.journal", rollout, end=False)
+    assert main(["plot", str(path), "--out", str(tmp_path)]) == 0
+    assert (tmp_path / "run-paper.png").is_file()
+    assert main(["check", str(path)]) == 0
+    capsys.readouterr()

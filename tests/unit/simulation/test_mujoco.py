@@ -1,6 +1,7 @@
 """MuJoCo as a plant: the same mechanics as Pinocchio's, and a ground to stand on."""
 
 import pickle
+import re
 import sys
 from functools import cache
 from pathlib import Path
@@ -183,6 +184,79 @@ def test_dry_friction_sticks_and_viscous_friction_damps() -> None:
 
 
 # --- contacts ------------------------------------------------------------------------
+
+
+def standing(name: str) -> tuple[Robot, Array, list[str], Array]:
+    """Return a robot, its stance in the air, its feet and its springs [N·m/rad]."""
+    robot = load(name)
+    q = robot.home()
+    feet = {
+        "talos": ["left_sole_link", "right_sole_link"],
+        "g1": ["left_ankle_roll_link", "right_ankle_roll_link"],
+        "solo12": ["FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT"],
+        "go2": ["FL_foot", "FR_foot", "RL_foot", "RR_foot"],
+    }[name]
+    stance = {"talos": "half_sitting", "solo12": "straight_standing", "go2": "standing"}
+    if name in stance:
+        model = robot.model.copy()
+        pin.loadReferenceConfigurations(model, str(robot.source.srdf), False)
+        q = np.array(model.referenceConfigurations[stance[name]])
+    stiffness = {"talos": 5000.0, "g1": 500.0, "solo12": 10.0, "go2": 100.0}[name]
+    light = re.compile("gripper|head|wrist|arm_.*_[567]_")
+    springs = np.array(
+        [20.0 if light.search(f) else stiffness for f in robot.dof_names]
+    )
+    springs[:6] = 0.0
+    return robot, q, feet, springs
+
+
+def stand(
+    plant: MujocoPlant, q: Array, springs: Array, duration: float
+) -> tuple[Array, Array, dict[str, Array]]:
+    """Hold the joints with springs, from where the feet touch; return the end."""
+    robot = plant.robot
+    reference = q.copy()
+    reference[2] -= plant.clearance(q)
+    x, v = reference, np.zeros(robot.nv)
+    plant.reset(0.0, x, v)
+    for k in range(round(duration / 0.001)):
+        t, tau = 0.001 * k, springs * robot.difference(x, reference)
+        x, v = plant.advance(t, t + 0.001, tau)
+    tau = springs * robot.difference(x, reference)
+    log_channels = plant.log_channels(duration, x, v, tau)
+    found = {name: np.asarray(reading.value) for name, reading in log_channels.items()}
+    return robot.difference(reference, x)[:6], v, found
+
+
+def dampers(robot: Robot, springs: Array) -> JointFriction:
+    """Return what damps the springs: implicit, as such stiff ones must be."""
+    return JointFriction.of(robot, viscous=0.03 * springs)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["talos", "g1", "solo12", "go2"])
+def test_a_legged_robot_stands_on_its_own_feet(name: str) -> None:
+    """On the collision geometry of its feet: less than 2 cm and 2°, and it rests.
+
+    What it sinks is what its springs give. The ground carries its weight, and the
+    moments of the forces about the centre of mass cancel.
+    """
+    robot, q, feet, springs = standing(name)
+    plant = MujocoPlant(
+        robot,
+        contacts=[ContactShape(foot) for foot in feet],
+        friction=dampers(robot, springs),
+    )
+    moved, v, forces = stand(plant, q, springs, 3.0)
+    assert np.abs(moved[:3]).max() < 0.02
+    assert np.abs(moved[3:]).max() < 0.035
+    assert np.abs(v).max() < 0.1
+    total = sum(forces[f"plant.contact.{foot}.force"] for foot in feet)
+    weight = 9.81 * sum(inertia.mass for inertia in robot.model.inertias)
+    np.testing.assert_allclose(total, [0.0, 0.0, weight], rtol=0, atol=0.01 * weight)
+    assert all(
+        forces[f"plant.contact.{foot}.force"][2] > 0.05 * weight for foot in feet
+    )
 
 
 def ball(radius: float = 0.1) -> Robot:
