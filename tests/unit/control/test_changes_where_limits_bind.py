@@ -341,6 +341,37 @@ def test_a_foot_that_a_plan_switches(seed: int) -> None:
     np.testing.assert_allclose(effort(early + 0.04), before, rtol=0, atol=OF_LEGS)
 
 
+@given(seed=seeds)
+@many
+def test_a_foot_that_is_lifted_while_it_moves(seed: int) -> None:
+    """Also in the forces: they stay at their places among those of all contacts."""
+    pytest.importorskip("example_robot_data")
+    rng, robot = np.random.default_rng(seed), load("solo12")
+    feet = [name for name in robot.frame_names if name.endswith("_FOOT")]
+    away = np.r_[np.zeros(6), 0.1 * rng.standard_normal(12)]
+    controller = hsp.Controller(
+        robot,
+        [hsp.FramePose("base_link", name="trunk")],
+        hsp.TargetPosture(robot.integrate(robot.home(), away)),
+        contacts=[hsp.contacts.PointContact(foot) for foot in feet],
+        start=robot.home(),
+    )
+    lifted(controller, feet[seed % 4])
+    q, v = robot.home(), 0.2 * rng.standard_normal(robot.nv)
+    for edge in EVENTS:
+        for t in edge + np.linspace(-1e-6, 1e-6, 21):
+            before = controller.compute(t, q, v)
+            after = controller.compute(t + 1e-9, q, v)
+            np.testing.assert_allclose(after.tau, before.tau, rtol=0, atol=OF_LEGS)
+    out = controller.compute(START + 0.02, q, v)
+    support, state = controller.active_stack.support, controller.state
+    np.testing.assert_allclose(
+        out.tau + support.map @ out.forces,
+        state.inverse_dynamics(out.acceleration),
+        atol=1e-7,
+    )
+
+
 @pytest.mark.parametrize(
     "what", ["limits_change", "limits_go_and_others_come", "limits_come"]
 )
