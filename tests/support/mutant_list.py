@@ -427,14 +427,14 @@ MUTANTS = (
     ),
     Mutant(
         "M' without Cᵀ",
-        METRICS + "mass_matrix.py",
+        METRICS + "metric.py",
         "W_dot[i, j] = (C[i, j] + C[j, i]) / unit",
         "W_dot[i, j] = C[i, j] / unit",
         ON_ROBOTS + "applies_the_short_form",
     ),
     Mutant(
         "metric of coordinates: A Aᵀ for AᵀA",
-        METRICS + "fixed.py",
+        METRICS + "metric.py",
         "return np.asarray(A.T @ A)",
         "return np.asarray(A @ A.T)",
         ON_ROBOTS + "coordinates_metric",
@@ -1438,14 +1438,14 @@ MUTANTS = (
     ),
     Mutant(
         "play: its own path comes back at once",
-        PLAY + "grips.py",
+        PLAY + "handles.py",
         "self._refer(self._own, t, BACK)",
         "self._refer(self._own, t, 0.0)",
         OF_PLAY + "jolt",
     ),
     Mutant(
         "play: the hand of the posture runs away",
-        PLAY + "grips.py",
+        PLAY + "handles.py",
         "_HOLDING * lost, np.zeros",
         "-_HOLDING * lost, np.zeros",
         OF_PLAY + "elbow",
