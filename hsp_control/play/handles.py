@@ -1,14 +1,338 @@
-"""What a page can touch of a controller: targets, obstacles and settings."""
+"""What a page can touch of a controller: targets, the posture, obstacles and settings.
 
+Whoever takes hold of one lets a stream take over from its trajectory, with a crossfade
+as in any change while running. So whatever is dragged, however wildly, the law sees a
+C² reference within bounds, and the log repeats it.
+
+The posture is held by its elbow, a frame of the robot at the target posture. Where that
+is dragged to, the posture follows by damped least squares, its hand staying where it is
+as far as it can; a stream moves the field's target there. The robot follows as far as
+its tasks leave it free: the field may move in time, and the theorem holds throughout.
+"""
+
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
-from hsp_control.common.exceptions import HspControlError
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import HspControlError, StreamError
 from hsp_control.control.controller import Controller
-from hsp_control.play.grips import Grip, obstacles_of, posture_of, targets_of
+from hsp_control.declaration.nested import parts_within
+from hsp_control.geometry.scene import Obstacle
+from hsp_control.null_space.fields import TargetPosture
+from hsp_control.null_space.fields.field import terms_of
+from hsp_control.null_space.fields.weight import sample_weight
 from hsp_control.play.knobs import RAMP, Knob, knobs_of
+from hsp_control.robot import Robot, RobotState
+from hsp_control.tasks import FrameOrientation, FramePose, FramePosition, Task
+from hsp_control.trajectories import Stream, StreamOrientation, StreamPose
+from hsp_control.trajectories.crossfade import AnyReference
+from hsp_control.trajectories.remembering import Written
+from hsp_control.trajectories.streams.stream import Streamed
+from hsp_control.visualization.palette import FIELD
+
+BACK = 1.5
+"""Time over which a path of its own comes back [s]: half a metre at 0.6 m/s at most."""
+_MOVING: dict[str, Any] = {"speed": 0.5, "acceleration": 3.0, "jerk": 60.0}
+"""Bounds of what is dragged [m/s, m/s², m/s³]: those that arms bear, whose limits then
+rarely bind."""
+_TURNING: dict[str, Any] = {
+    "angular_speed": 1.5,
+    "angular_acceleration": 8.0,
+    "angular_jerk": 200.0,
+}
+"""The same for turning [rad/s, rad/s², rad/s³]."""
+DELAY = 0.03  # time to a target that is dragged [s]: about two of a page's pictures
+
+
+class Grip(ABC):
+    """Something that can be dragged."""
+
+    def __init__(self, name: str, controller: Controller) -> None:
+        """Begin on its own path."""
+        self.name = name
+        self._controller = controller
+        self._stream: Streamed | None = None
+
+    def move(self, value: Any, t: float) -> None:
+        """Lead it somewhere from time t on [s]."""
+        wanted = self._wanted(np.asarray(value, dtype=float))
+        stream = self._stream or self._make_stream()
+        stream.send(wanted)  # before it leads: it may refuse
+        if self._stream is None:
+            self._let_follow(stream, t)
+            self._stream = stream
+
+    def resume(self, t: float) -> None:
+        """Let it return to its own path from time t on [s]."""
+        if self._stream is not None:
+            self._return(t)
+        self._stream = None
+
+    @abstractmethod
+    def describe(self, state: RobotState) -> dict[str, Any]:
+        """Return what a page must know of it."""
+
+    @abstractmethod
+    def where(self, state: RobotState) -> list[float]:
+        """Return where it is now: x, y, z and a quaternion, or less."""
+
+    @abstractmethod
+    def _make_stream(self) -> Streamed: ...
+
+    @abstractmethod
+    def _wanted(self, value: Array) -> Array: ...
+
+    @abstractmethod
+    def _let_follow(self, stream: Streamed, t: float) -> None: ...
+
+    @abstractmethod
+    def _return(self, t: float) -> None: ...
+
+
+class TargetGrip(Grip):
+    """The target of a frame's position, orientation or pose."""
+
+    def __init__(self, task: Task, controller: Controller) -> None:
+        """Remember the task's own path."""
+        super().__init__(task.name, controller)
+        self._kind = type(task)
+        self._frame = task.frame  # type: ignore[attr-defined]
+        self._own = task.followed
+        axes = task.axes if isinstance(task, FramePosition) else "xyz"
+        self._axes = [axis in axes for axis in "xyz"]
+        self._tracked = ["xyz".index(axis) for axis in axes]
+
+    def describe(self, state: RobotState) -> dict[str, Any]:
+        """Return its name, its kind, its axes and its pose."""
+        kinds = {FramePose: "pose", FramePosition: "position"}
+        return {
+            "name": self.name,
+            "kind": kinds.get(self._kind, "orientation"),
+            "axes": self._axes,
+            "pose": self.where(state),
+        }
+
+    def where(self, state: RobotState) -> list[float]:
+        """Return x, y, z and a quaternion; the frame's own where the task is free."""
+        frame = state.frame(self._frame)
+        pose = pin.SE3ToXYZQUAT(pin.SE3(frame.rotation, frame.position))
+        task = self._task()
+        if task is not None:
+            reference, _ = task.measure(state)
+            if self._kind is FramePosition:
+                pose[self._tracked] = reference
+            elif self._kind is FrameOrientation:
+                pose[3:] = reference
+            else:
+                pose[:] = reference
+        return [float(x) for x in pose]
+
+    def _task(self) -> Task | None:
+        found = [each for each in self._controller.tasks if each.name == self.name]
+        return found[0] if found else None
+
+    def _make_stream(self) -> Streamed:
+        if self._kind is FramePosition:
+            return Stream(**_MOVING, delay=DELAY)
+        if self._kind is FrameOrientation:
+            return StreamOrientation(**_TURNING, delay=DELAY)
+        return StreamPose(**_MOVING, **_TURNING, delay=DELAY)
+
+    def _wanted(self, value: Array) -> Array:
+        if value.shape != (7,) or not np.isfinite(value).all():
+            raise StreamError(f"a pose is x, y, z and a quaternion; got {value}")
+        if self._kind is FramePosition:
+            return value[self._tracked]
+        return value[3:] if self._kind is FrameOrientation else value
+
+    def _let_follow(self, stream: Streamed, t: float) -> None:
+        self._refer(stream, t, RAMP)  # type: ignore[arg-type]
+
+    def _return(self, t: float) -> None:
+        assert self._own is not None
+        self._refer(self._own, t, BACK)
+
+    def _refer(self, reference: AnyReference, t: float, ramp: float) -> None:
+        self._controller.at(t).ramp(ramp).reference(self.name, reference)
+
+
+class ObstacleGrip(Grip):
+    """An obstacle of the scene; it keeps its orientation."""
+
+    def __init__(self, obstacle: Obstacle, controller: Controller) -> None:
+        """Remember the obstacle's own path."""
+        super().__init__(obstacle.name, controller)
+        self._obstacle = obstacle
+
+    def describe(self, state: RobotState) -> dict[str, Any]:
+        """Return its name, its position and its size."""
+        radius = self._obstacle.shape.bounding_radius
+        return {
+            "name": self.name,
+            "position": self.where(state),
+            "radius": radius if np.isfinite(radius) else 0.0,
+        }
+
+    def where(self, state: RobotState) -> list[float]:
+        """Return the position of its frame."""
+        place = self._controller.scene[self.name].placement(state.t)
+        return [float(x) for x in place.translation]
+
+    def _make_stream(self) -> Streamed:
+        return Stream(**_MOVING, delay=DELAY)
+
+    def _wanted(self, value: Array) -> Array:
+        if value.shape != (3,) or not np.isfinite(value).all():
+            raise StreamError(f"a position is x, y and z; got {value}")
+        return value
+
+    def _let_follow(self, stream: Streamed, t: float) -> None:
+        assert isinstance(stream, Stream)
+        self._controller.at(t).ramp(RAMP).obstacle(self.name, stream)
+
+    def _return(self, t: float) -> None:
+        own = self._obstacle.center
+        self._controller.at(t).ramp(BACK).obstacle(self.name, own)
+
+
+def targets_of(controller: Controller) -> dict[str, TargetGrip]:
+    """Return the draggable targets by name; what a plan writes is the plan's."""
+    kinds = FramePose, FramePosition, FrameOrientation
+    return {
+        task.name: TargetGrip(task, controller)
+        for task in controller.tasks
+        if isinstance(task, kinds)
+        and task.followed is not None
+        and not any(parts_within(task.followed, Written))
+    }
+
+
+def obstacles_of(controller: Controller) -> dict[str, ObstacleGrip]:
+    """Return the grips of the obstacles that have a place, by name."""
+    found = {}
+    for obstacle in controller.scene.values():
+        try:
+            ObstacleGrip(obstacle, controller).where(controller.state)
+        except HspControlError:
+            continue
+        found[obstacle.name] = ObstacleGrip(obstacle, controller)
+    return found
+
+
+_JOINTS_MOVING: dict[str, Any] = {"speed": 1.0, "acceleration": 5.0, "jerk": 100.0}
+"""Bounds of the target of each joint [1/s, 1/s², 1/s³, in rad or m]."""
+_STEPS = 20
+_DAMPING, _HOLDING = 1e-2, 0.3
+"""Of the least squares: how much joints stay [m/rad], and how much the hand does."""
+POSTURE = "posture"
+
+
+class PostureGrip(Grip):
+    """The target of a field's posture, by a joint in the middle of the arm."""
+
+    def __init__(self, field: TargetPosture, controller: Controller) -> None:
+        """Remember the field, and choose the joint."""
+        super().__init__(POSTURE, controller)
+        self._field = field
+        self._robot: Robot = controller.robot
+        self._own = np.asarray(field.target, dtype=float)
+        self._target = self._own.copy()
+        self._data = self._robot.model.createData()
+        self._joint = self._elbow()
+
+    def describe(self, state: RobotState) -> dict[str, Any]:
+        """Return its name, its kind, its axes and its pose."""
+        return {
+            "name": self.name,
+            "kind": "position",
+            "axes": [True, True, True],
+            "color": FIELD,
+            "pose": self.where(state),
+        }
+
+    def where(self, state: RobotState) -> list[float]:
+        """Return the joint's pose in the target posture, x, y, z and a quaternion."""
+        terms = [
+            t for t in terms_of(self._controller.field) if isinstance(t, TargetPosture)
+        ]
+        weights = np.array([sample_weight(term.weight, state)[0] for term in terms])
+        if terms and not weights.any():  # the field is switched off: the newest counts
+            weights[-1] = 1.0
+        moved = np.zeros(self._robot.nv)
+        for term, weight in zip(terms, weights / weights.sum(), strict=True):
+            if term.displacement is not None:
+                moved += weight * term.displacement.sample(state.t).position
+        q = self._robot.integrate(self._own, moved)
+        pin.forwardKinematics(self._robot.model, self._data, q)
+        return [float(x) for x in pin.SE3ToXYZQUAT(self._data.oMi[self._joint])]
+
+    def _make_stream(self) -> Streamed:
+        return Stream(np.zeros(self._robot.nv), **_JOINTS_MOVING, delay=DELAY)
+
+    def _wanted(self, value: Array) -> Array:
+        if value.shape != (7,) or not (np.abs(value) < 1e3).all():
+            raise StreamError(f"a pose is x, y, z and a quaternion; got {value}")
+        self._target = self._posture_with(self._target, value[:3])
+        return self._robot.difference(self._own, self._target)
+
+    def _let_follow(self, stream: Streamed, t: float) -> None:
+        assert isinstance(stream, Stream)
+        moving = replace(self._field, displacement=stream)
+        self._controller.at(t).ramp(RAMP).exchange(self._field.name, moving)
+
+    def _return(self, t: float) -> None:
+        self._target = self._own.copy()
+        self._controller.at(t).ramp(BACK).exchange(self._field.name, self._field)
+
+    def _posture_with(self, q: Array, point: Array) -> Array:
+        """Return the posture near q whose joint is nearest to a point [m]."""
+        robot, model, data = self._robot, self._robot.model, self._data
+        hand = robot.frame_id(robot.end_effector)
+        pin.framesForwardKinematics(model, data, q)
+        held = data.oMf[hand].translation.copy()
+        world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        single = np.zeros(robot.nv)
+        single[robot.single_dof_joints[:, 0]] = 1.0
+        for _ in range(_STEPS):
+            pin.computeJointJacobians(model, data, q)
+            pin.updateFramePlacements(model, data)
+            J = pin.getJointJacobian(model, data, self._joint, world)[:3] * single
+            H = pin.getFrameJacobian(model, data, hand, world)[:3] * single
+            away = point - data.oMi[self._joint].translation
+            lost = held - data.oMf[hand].translation
+            A = np.vstack([J, _HOLDING * H, _DAMPING * np.eye(robot.nv)])
+            b = np.concatenate([away, _HOLDING * lost, np.zeros(robot.nv)])
+            q = robot.integrate(q, np.linalg.lstsq(A, b, rcond=None)[0])
+        return q
+
+    def _elbow(self) -> int:
+        """Return the joint that is farthest from the line from the base to the hand."""
+        model, data = self._robot.model, self._data
+        pin.forwardKinematics(model, data, self._own)
+        hand = model.frames[self._robot.frame_id(self._robot.end_effector)].parentJoint
+        joints = [j for j in model.supports[hand] if j > 0]
+        points = np.array([data.oMi[j].translation for j in joints])
+        along = points[-1] - points[0]
+        along /= max(float(np.linalg.norm(along)), 1e-9)
+        away = np.linalg.norm(np.cross(points - points[0], along), axis=1)
+        return int(joints[int(np.argmax(away))])
+
+
+def posture_of(controller: Controller) -> dict[str, PostureGrip]:
+    """Return the grip of the field's posture, by its name; none without one."""
+    terms = terms_of(controller.field)
+    postures = [term for term in terms if isinstance(term, TargetPosture)]
+    if len(postures) != 1 or postures[0].displacement is not None:
+        return {}
+    if any(task.name == POSTURE for task in controller.tasks):
+        return {}
+    return {POSTURE: PostureGrip(postures[0], controller)}
+
 
 KNOB_PERIOD = 0.1  # time between two changes by one knob [s]: a slider says much more
 

@@ -12,10 +12,10 @@ from .curves import Lissajous as Lissajous
 from .curves import UniformLine as UniformLine
 from .hold import Hold as Hold
 from .hold import HoldOrientation as HoldOrientation
+from .orientation import OrientationPath as OrientationPath
 from .orientation import OrientationSample as OrientationSample
 from .orientation import OrientationTrajectory as OrientationTrajectory
-from .orientation_path import OrientationPath as OrientationPath
-from .orientation_path import Spin as Spin
+from .orientation import Spin as Spin
 from .piecewise_polynomial import Line as Line
 from .piecewise_polynomial import MinimumJerk as MinimumJerk
 from .piecewise_polynomial import PiecewisePolynomial as PiecewisePolynomial

@@ -1,7 +1,8 @@
-"""The abstract trajectory of an orientation in SO(3)."""
+"""Orientations that move: the abstract one, from waypoint to waypoint, a spin."""
 
 from abc import ABC, abstractmethod
-from dataclasses import replace
+from dataclasses import KW_ONLY, replace
+from functools import cached_property
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -9,8 +10,14 @@ from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TrajectoryError
+from hsp_control.common.kernels import kernel
+from hsp_control.common.rotations import compose_back, log3, rotate, turn
 from hsp_control.declaration import Part
-from hsp_control.trajectories.following import Follower, follow_by
+from hsp_control.declaration.quantities import Number, Vector, Vector3
+from hsp_control.declaration.rotation import Rotation, Rotations, matrix_of
+from hsp_control.trajectories import checks
+from hsp_control.trajectories.following import Compiled, Follower, Kernel, follow_by
+from hsp_control.trajectories.timing import smooth_step
 
 
 class OrientationSample(NamedTuple):
@@ -85,3 +92,101 @@ class OrientationTrajectory(Part, ABC, family="orientations", error=TrajectoryEr
                 "starts, which only a controller knows; give rotation, or `anchored`"
             )
         return OrientationSample.allocate() if out is None else out
+
+
+class OrientationPath(Compiled, OrientationTrajectory, type="path"):
+    """R(t) = exp(s a_i) R_i from t_i to t_{i+1}, s the `smooth_step`.
+
+    a_i = R_i log(R_iᵀ R_{i+1}) is the shortest rotation to the next waypoint, in the
+    world frame. For an angle of π its sense is not unique: add a waypoint in between.
+    The body rests at each waypoint, before the first and after the last; the motion is
+    C².
+    """
+
+    rotations: Rotations
+    """R_i, at least two, body to world: each as roll, pitch and yaw [rad], as a
+    quaternion or as a matrix [-]."""
+    times: Vector
+    """t_i, increasing, shape (m,) [s]."""
+
+    def __post_init__(self) -> None:
+        """Check the waypoints and their times."""
+        checks.waypoint_times(self.times, len(self._matrices))
+
+    @cached_property
+    def _matrices(self) -> Array:
+        return np.array([matrix_of(each) for each in np.asarray(self.rotations)])
+
+    def _kernel(self) -> Kernel:
+        R = self._matrices
+        turns, between = np.zeros((len(R) - 1, 3)), np.zeros((3, 3))
+        for i, a in enumerate(turns):
+            compose_back(R[i], R[i + 1], between)
+            log3(between, a)
+            rotate(R[i], a, a)
+        return _path, (np.asarray(self.times), R, turns)
+
+
+@kernel
+def _path(
+    times: Array,
+    rotations: Array,
+    turns: Array,
+    rotation: Array,
+    velocity: Array,
+    acceleration: Array,
+    t: float,
+) -> None:
+    last = times.size - 1
+    i = 0
+    while i < last - 1 and t >= times[i + 1]:
+        i += 1
+    s, s_dot, s_ddot = smooth_step(t, times[i], times[i + 1] - times[i])
+    if s < 1.0:
+        turn(rotations[i], turns[i], s, rotation)
+    else:
+        turn(rotations[i + 1], turns[i], 0.0, rotation)  # exactly the waypoint
+    for k in range(3):
+        velocity[k] = s_dot * turns[i, k]
+        acceleration[k] = s_ddot * turns[i, k]
+
+
+class Spin(Compiled, OrientationTrajectory, type="spin"):
+    """R(t) = exp(t ω) R0 with ω = rate · axis in the world frame, for all t."""
+
+    axis: Vector3
+    """Direction of the axis in the world, of any length but zero, shape (3,) [-]."""
+    rate: Number
+    """Angular rate about the axis [rad/s]."""
+    _: KW_ONLY
+    rotation: Rotation | None = None
+    """R0, the orientation at t = 0, body to world: roll, pitch and yaw [rad], a
+    quaternion or a matrix [-]; that in which the robot starts by default."""
+
+    def __post_init__(self) -> None:
+        """Check that the axis is not zero."""
+        checks.direction(self.axis, "axis")
+
+    def _kernel(self) -> Kernel:
+        return self._call
+
+    @cached_property
+    def _call(self) -> Kernel:
+        assert self.rotation is not None
+        omega = self.rate * checks.direction(self.axis, "axis")
+        return _spin, (np.asarray(omega), matrix_of(self.rotation))
+
+
+@kernel
+def _spin(
+    omega: Array,
+    start: Array,
+    rotation: Array,
+    velocity: Array,
+    acceleration: Array,
+    t: float,
+) -> None:
+    turn(start, omega, t, rotation)
+    for i in range(3):
+        velocity[i] = omega[i]
+        acceleration[i] = 0.0

@@ -14,8 +14,8 @@ from browsers import until
 
 from hsp_control import Robot
 from hsp_control.visualization.viewer import Viewer, threejs
-from hsp_control.visualization.viewer.bands import Band
 from hsp_control.visualization.viewer.clip import (
+    Band,
     Clip,
     Track,
     extend_clip,

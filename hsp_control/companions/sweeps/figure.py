@@ -29,13 +29,8 @@ def save_sweep_figure(
     sweep: Sweep, folder: str | Path, stem: str, formats: Sequence[str] = ("png",)
 ) -> list[Path]:
     """Write ``<stem>-sensitivity`` in every format."""
-    figure = sweep_figure(sweep)
-    paths = []
-    for suffix in formats:
-        path = Path(folder) / f"{stem}-sensitivity.{suffix}"
-        save_figure(figure, path, suffix)
-        paths.append(path)
-    return paths
+    beginning = Path(folder) / f"{stem}-sensitivity"
+    return save_figure(sweep_figure(sweep), beginning, formats)
 
 
 def sweep_figure(sweep: Sweep, outcomes: Sequence[str] | None = None) -> Figure:

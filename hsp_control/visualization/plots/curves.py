@@ -20,13 +20,12 @@ from hsp_control.simulation.log_series import (
 from hsp_control.visualization import palette
 from hsp_control.visualization.plots.lines import (
     draw_lines,
-    legend_below,
+    finish_time_axis,
     literal_text,
     log_scale,
     mark_damped,
     note,
     point_marker,
-    time_axis,
 )
 
 _UNIT_DASHES = {"rad": "--", "–": ":"}
@@ -52,8 +51,7 @@ def draw_task_errors(axes: Axes, rollout: Rollout) -> None:
     log_scale(axes, np.concatenate(norms), top=1e-6)
     units = ", ".join(dict.fromkeys(part.unit for part in parts))
     axes.set_ylabel(rf"task error $\Vert e \Vert$ [{units}]")
-    time_axis(axes, t)
-    legend_below(axes)
+    finish_time_axis(axes, t)
 
 
 def draw_joint_positions(
@@ -64,8 +62,7 @@ def draw_joint_positions(
     names, units = joint_names(rollout), position_units(rollout)
     unit = draw_lines(axes, rollout.t, positions, names, units)
     axes.set_ylabel(f"{what} [{unit}]")
-    time_axis(axes, rollout.t)
-    legend_below(axes)
+    finish_time_axis(axes, rollout.t)
 
 
 def draw_efforts(axes: Axes, rollout: Rollout) -> None:
@@ -73,8 +70,7 @@ def draw_efforts(axes: Axes, rollout: Rollout) -> None:
     names, units = joint_names(rollout), effort_units(rollout)
     unit = draw_lines(axes, rollout.t, rollout.tau, names, units)
     axes.set_ylabel(f"effort τ [{unit}]")
-    time_axis(axes, rollout.t)
-    legend_below(axes)
+    finish_time_axis(axes, rollout.t)
 
 
 _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
@@ -103,8 +99,7 @@ def draw_manipulability(axes: Axes, rollout: Rollout) -> None:
     axes.set_ylim(0.0, 1.08 * maximum)
     unit = column_unit(rollout, "manipulability")
     axes.set_ylabel(rf"$\det(J\,W^{{-1}}J^{{\mathsf{{T}}}})$ [{unit}]")
-    time_axis(axes, t)
-    legend_below(axes)
+    finish_time_axis(axes, t)
 
 
 def draw_singular_values(axes: Axes, rollout: Rollout) -> None:
@@ -119,8 +114,7 @@ def draw_singular_values(axes: Axes, rollout: Rollout) -> None:
         axes.set_ylim(bottom=0.0)
     unit = column_unit(rollout, "singular_values")
     axes.set_ylabel(rf"singular values of $J\,L^{{-\mathsf{{T}}}}$ [{unit}]")
-    time_axis(axes, rollout.t)
-    legend_below(axes)
+    finish_time_axis(axes, rollout.t)
 
 
 def draw_null_space_error(axes: Axes, rollout: Rollout) -> None:
@@ -163,8 +157,7 @@ def draw_null_space_error(axes: Axes, rollout: Rollout) -> None:
     mark_damped(axes, rollout)
     log_scale(axes, norm, top=1e-6)
     axes.set_ylabel(rf"$\Vert e_N \Vert_W$ [{rate_unit(rollout)}]")
-    time_axis(axes, t)
-    legend_below(axes)
+    finish_time_axis(axes, t)
 
 
 def draw_field_value(axes: Axes, rollout: Rollout) -> None:
@@ -177,8 +170,7 @@ def draw_field_value(axes: Axes, rollout: Rollout) -> None:
         axes.set_ylim(float(values[0]) - 0.5, float(values[0]) + 0.5)
     unit = column_unit(rollout, "field.value")
     axes.set_ylabel(f"field value [{unit}]")
-    time_axis(axes, t)
-    legend_below(axes)
+    finish_time_axis(axes, t)
 
 
 def draw_field_terms(axes: Axes, rollout: Rollout) -> None:
@@ -188,8 +180,7 @@ def draw_field_terms(axes: Axes, rollout: Rollout) -> None:
     draw_lines(axes, rollout.t, np.column_stack(norms), names)
     axes.set_ylim(bottom=0.0)
     axes.set_ylabel(rf"contribution $\Vert g_k \Vert$ [{rate_unit(rollout)}]")
-    time_axis(axes, rollout.t)
-    legend_below(axes)
+    finish_time_axis(axes, rollout.t)
 
 
 def draw_distances(axes: Axes, rollout: Rollout) -> None:
@@ -207,5 +198,4 @@ def draw_distances(axes: Axes, rollout: Rollout) -> None:
                 label=name or None,
             )
     axes.set_ylabel("minimum distance [m]")
-    time_axis(axes, rollout.t)
-    legend_below(axes)
+    finish_time_axis(axes, rollout.t)

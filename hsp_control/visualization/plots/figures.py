@@ -148,31 +148,29 @@ def save_figures(
     absolute: bool = True,
 ) -> list[Path]:
     """Write ``<stem>-paper`` and ``<stem>-diagnostics`` in every format."""
-    figures = {
-        "paper": paper_figure(rollout, absolute=absolute),
-        "diagnostics": diagnostics_figure(rollout),
-    }
-    paths = []
-    for name, figure in figures.items():
-        for suffix in formats:
-            path = Path(folder) / f"{stem}-{name}.{suffix}"
-            save_figure(figure, path, suffix)
-            paths.append(path)
-    return paths
+    paper = paper_figure(rollout, absolute=absolute)
+    diagnostics = diagnostics_figure(rollout)
+    return [
+        *save_figure(paper, Path(folder) / f"{stem}-paper", formats),
+        *save_figure(diagnostics, Path(folder) / f"{stem}-diagnostics", formats),
+    ]
 
 
-def save_figure(figure: Figure, path: Path, suffix: str) -> None:
-    """Write one figure in one format."""
+def save_figure(figure: Figure, stem: Path, formats: Sequence[str]) -> list[Path]:
+    """Write one figure in every format; return its files."""
     known = figure.canvas.get_supported_filetypes()
-    if suffix not in known:
-        raise PlotError(
-            f"no picture format {suffix!r}{did_you_mean(suffix, known)} "
-            f"(there are {listing(known)})"
-        )
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with styled():
-            figure.savefig(path, format=suffix)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise PlotError(f"{path}: cannot write the picture: {reason}") from error
+    paths = [stem.with_name(f"{stem.name}.{suffix}") for suffix in formats]
+    for path, suffix in zip(paths, formats, strict=True):
+        if suffix not in known:
+            raise PlotError(
+                f"no picture format {suffix!r}{did_you_mean(suffix, known)} "
+                f"(there are {listing(known)})"
+            )
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with styled():
+                figure.savefig(path, format=suffix)
+        except OSError as error:
+            reason = error.strerror or str(error)
+            raise PlotError(f"{path}: cannot write the picture: {reason}") from error
+    return paths

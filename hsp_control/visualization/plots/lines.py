@@ -107,11 +107,12 @@ def point_marker(t: Array) -> str:
     return "o" if len(t) == 1 else ""
 
 
-def time_axis(axes: Axes, t: Array) -> None:
-    """Label the time axis and fit it to the log."""
+def finish_time_axis(axes: Axes, t: Array) -> None:
+    """Label the time axis, fit it to the log, and add the legend."""
     axes.set_xlabel("time [s]")
     if t[-1] > t[0]:
         axes.set_xlim(float(t[0]), float(t[-1]))
+    legend_below(axes)
 
 
 def log_scale(axes: Axes, values: Array, *, top: float = 0.0) -> None:

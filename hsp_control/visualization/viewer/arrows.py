@@ -15,6 +15,7 @@ from hsp_control.visualization.viewer.appearance import (
     CONTACT,
     FIELD,
     FIELD_OPACITY,
+    LegendEntry,
 )
 from hsp_control.visualization.viewer.clip import Track
 from hsp_control.visualization.viewer.commands import Command, Json, set_object
@@ -22,7 +23,6 @@ from hsp_control.visualization.viewer.controller_analysis import (
     from_the_start,
     null_space_projector,
 )
-from hsp_control.visualization.viewer.legend import LegendEntry
 from hsp_control.visualization.viewer.motion import Motion
 from hsp_control.visualization.viewer.scene_path import path_element
 from hsp_control.visualization.viewer.threejs import (

@@ -1,12 +1,19 @@
-"""A clip: an animation of the scene's nodes, played by the page's player."""
+"""A clip: an animation that the page plays, and the bands on its time line."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hsp_control.common.arrays import Array
-from hsp_control.visualization.viewer.bands import Band
+from hsp_control.control.controller import Controller
+from hsp_control.null_space.fields import Clearance, NullSpaceField, SelfClearance
+from hsp_control.simulation import Rollout
+from hsp_control.simulation.limit_excess import POSITION, VELOCITY
+from hsp_control.simulation.term_columns import logged_terms
+from hsp_control.simulation.unreached import FAR, OUT, Unreached, unreached
+from hsp_control.visualization import palette
 from hsp_control.visualization.viewer.commands import (
     Command,
     Json,
@@ -14,6 +21,101 @@ from hsp_control.visualization.viewer.commands import (
     forget_clip,
     typed_array,
 )
+from hsp_control.visualization.viewer.controller_analysis import from_the_start
+
+CLOSED_SHARE = 1 / 200
+"""Gaps up to this share of the whole run are closed: nobody would see them."""
+_SAME = 0.9
+"""Distances of which the smallest is this share of the largest are told as one."""
+_LIMITED = 2  # the log's status from which on a limit changes the motion
+
+
+class Band(NamedTuple):
+    """When something that the law reacts to is active."""
+
+    name: str  # its name before a time, such as ``limit active``
+    caption: str  # what is shown while the time is inside: ``a limit is active``
+    color: str  # its colour, ``#RRGGBB``
+    spans: list[tuple[float, float]]  # its intervals [s], ascending and apart
+
+
+def bands_of(
+    rollout: Rollout, controller: Controller | None, *, duration: float | None = None
+) -> list[Band]:
+    """Return the bands of a run, without those that have no interval."""
+    times = rollout.t
+    whole = float(times[-1] - times[0]) if duration is None else duration
+    bands = [
+        band._replace(spans=spans_of(times, active, CLOSED_SHARE * whole))
+        for band, active in _activities(rollout, controller)
+    ]
+    return [band for band in bands if band.spans]
+
+
+def spans_of(
+    times: Array, active: NDArray[np.bool_], closed: float = 0.0
+) -> list[tuple[float, float]]:
+    """Return the intervals in which rows are active; each row lasts until the next."""
+    edges = np.diff(np.concatenate([[False], active, [False]]).astype(np.int8))
+    starts = times[np.flatnonzero(edges > 0)].tolist()
+    stops = times[np.flatnonzero(edges < 0).clip(max=len(times) - 1)].tolist()
+    spans: list[tuple[float, float]] = []
+    for start, stop in zip(starts, stops, strict=True):
+        if spans and start - spans[-1][1] <= closed:
+            spans[-1] = spans[-1][0], stop
+        else:
+            spans.append((start, stop))
+    return spans
+
+
+def _activities(
+    rollout: Rollout, controller: Controller | None
+) -> Iterator[tuple[Band, NDArray[np.bool_]]]:
+    """Yield the bands without intervals, and in which rows each is active."""
+    if "status" in rollout:
+        limit = Band("limit active", "a limit is active", palette.DESIRED, [])
+        yield limit, rollout["status"] >= _LIMITED
+    beyond = np.zeros(len(rollout), bool)
+    for name in (POSITION, VELOCITY):
+        if name in rollout:
+            beyond |= (rollout[name] > 0.0).any(axis=1)
+    words = "beyond a limit"
+    yield Band(words, f"a joint is {words}", palette.MUTED, []), beyond
+    for task in unreached(rollout.columns, rollout.meta.get("tasks", {})):
+        name = f"{task.task}: {FAR}"
+        yield Band(name, name, palette.SERIES[2], []), task.far
+        yield _out_of_reach(task), task.out > 0.0
+    if "damped" in rollout:
+        words = "bounded at a singularity"
+        singular = Band(words, f"the law is {words}", palette.WARNING, [])
+        yield singular, rollout["damped"] > 0.0
+    obstacle = itself = np.zeros(len(rollout), bool)
+    for name, field in _fields_of(controller).items():
+        if isinstance(field, Clearance) and f"distance.{name}" in rollout:
+            near = rollout[f"distance.{name}"] < field.influence
+            if isinstance(field, SelfClearance):
+                itself = itself | near
+            else:
+                obstacle = obstacle | near
+    words = "inside an influence zone"
+    yield Band(words, f"a link is {words}", palette.OBSTACLE, []), obstacle
+    words = "links near each other"
+    yield Band(words, words, palette.SERIES[4], []), itself
+
+
+def _out_of_reach(task: Unreached) -> Band:
+    """Return the band of a target out of reach; it tells the largest distance."""
+    name, away = f"{task.task}: {OUT}", task.out[task.out > 0.0]
+    varies = away.min(initial=np.inf) < _SAME * away.max(initial=0.0)
+    length = ("up to " if varies else "") + task.length(int(task.out.argmax()))
+    return Band(name, f"{name}, {length}", palette.SERIES[0], [])
+
+
+def _fields_of(controller: Controller | None) -> dict[str, NullSpaceField]:
+    """Return the fields at the run's start and now, by their names in the log."""
+    if controller is None:
+        return {}
+    return logged_terms(from_the_start(controller)) | logged_terms(controller)
 
 
 class Track(NamedTuple):

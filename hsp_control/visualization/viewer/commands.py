@@ -8,8 +8,8 @@ import numpy as np
 import umsgpack  # type: ignore[import-untyped]
 
 from hsp_control.common.arrays import Array
+from hsp_control.visualization.viewer.appearance import LegendEntry
 from hsp_control.visualization.viewer.latest_commands import LatestCommands, key_of
-from hsp_control.visualization.viewer.legend import LegendEntry
 
 Json = dict[str, Any]
 

@@ -10,12 +10,10 @@ from hsp_control.control.controller import Controller
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
 from hsp_control.visualization import palette
-from hsp_control.visualization.viewer.appearance import ACTUAL
+from hsp_control.visualization.viewer.appearance import ACTUAL, LegendEntry, merged
 from hsp_control.visualization.viewer.arrows import SelfMotion
-from hsp_control.visualization.viewer.bands import Band, bands_of
-from hsp_control.visualization.viewer.clip import Clip
+from hsp_control.visualization.viewer.clip import Band, Clip, bands_of
 from hsp_control.visualization.viewer.commands import Command, set_ghost, set_transform
-from hsp_control.visualization.viewer.legend import LegendEntry, merged
 from hsp_control.visualization.viewer.motion import motion_of
 from hsp_control.visualization.viewer.robot_drawing import RobotDrawing
 from hsp_control.visualization.viewer.run_drawing import (

@@ -10,10 +10,14 @@ from hsp_control.common.arrays import Array
 from hsp_control.control.controller import Controller
 from hsp_control.robot import Robot
 from hsp_control.visualization.viewer import threejs
-from hsp_control.visualization.viewer.appearance import ELLIPSOID, ELLIPSOID_OPACITY
+from hsp_control.visualization.viewer.appearance import (
+    ELLIPSOID,
+    ELLIPSOID_OPACITY,
+    LegendEntry,
+    translucent,
+)
 from hsp_control.visualization.viewer.clip import Track
 from hsp_control.visualization.viewer.commands import Command, set_object
-from hsp_control.visualization.viewer.legend import LegendEntry, translucent
 from hsp_control.visualization.viewer.motion import Motion
 from hsp_control.visualization.viewer.scene_path import path_element
 from hsp_control.visualization.viewer.threejs import material

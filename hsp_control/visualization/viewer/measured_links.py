@@ -25,6 +25,8 @@ from hsp_control.visualization.viewer.appearance import (
     MEASURED_OPACITY,
     OBSTACLE,
     ZONE_OPACITY,
+    LegendEntry,
+    translucent,
 )
 from hsp_control.visualization.viewer.arrows import bar_tracks, unit_bar
 from hsp_control.visualization.viewer.clip import Track
@@ -36,7 +38,6 @@ from hsp_control.visualization.viewer.commands import (
     set_transform,
 )
 from hsp_control.visualization.viewer.controller_analysis import terms_of_type
-from hsp_control.visualization.viewer.legend import LegendEntry, translucent
 from hsp_control.visualization.viewer.motion import Motion
 from hsp_control.visualization.viewer.obstacle_layer import obstacle_tracks
 from hsp_control.visualization.viewer.obstacle_shapes import facets, triangles_of

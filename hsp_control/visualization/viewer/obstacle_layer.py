@@ -10,10 +10,9 @@ from hsp_control.common.arrays import Array
 from hsp_control.geometry.scene import Scene
 from hsp_control.geometry.shapes import Shape, shape_from_log
 from hsp_control.simulation.plants.mujoco.mjcf import Solid
-from hsp_control.visualization.viewer.appearance import OBSTACLE, SOLID
+from hsp_control.visualization.viewer.appearance import OBSTACLE, SOLID, LegendEntry
 from hsp_control.visualization.viewer.clip import Track
 from hsp_control.visualization.viewer.commands import Command, set_object, set_transform
-from hsp_control.visualization.viewer.legend import LegendEntry
 from hsp_control.visualization.viewer.motion import Motion
 from hsp_control.visualization.viewer.obstacle_shapes import logged_shape, obstacle
 from hsp_control.visualization.viewer.robot_drawing import robot_entry

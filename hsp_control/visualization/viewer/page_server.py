@@ -7,7 +7,7 @@ Pinocchio nor modules that do.
 
 Pages and their connections must name the server's own host, against DNS rebinding, and
 connections must come from one of its own pages. With a key, pages and connections need
-it in their address, and one page at a time may steer the program; see `steering`.
+it in their address, and one page at a time may steer the program; see `Steering`.
 """
 
 import asyncio

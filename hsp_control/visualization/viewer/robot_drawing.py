@@ -9,7 +9,7 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array
 from hsp_control.robot import Robot
 from hsp_control.visualization.viewer import threejs
-from hsp_control.visualization.viewer.appearance import JOINT, LINK
+from hsp_control.visualization.viewer.appearance import JOINT, LINK, LegendEntry
 from hsp_control.visualization.viewer.clip import Track
 from hsp_control.visualization.viewer.commands import (
     Command,
@@ -17,7 +17,6 @@ from hsp_control.visualization.viewer.commands import (
     set_object,
     set_transform,
 )
-from hsp_control.visualization.viewer.legend import LegendEntry
 from hsp_control.visualization.viewer.mesh_files import collada_object, mesh_geometry
 from hsp_control.visualization.viewer.motion import Motion
 from hsp_control.visualization.viewer.obstacle_shapes import facets

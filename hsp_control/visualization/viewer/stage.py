@@ -12,7 +12,12 @@ from hsp_control.robot import Robot
 from hsp_control.robot.matrix_view import matrix_view
 from hsp_control.visualization import palette
 from hsp_control.visualization.viewer import threejs
-from hsp_control.visualization.viewer.appearance import GRID, HAZE
+from hsp_control.visualization.viewer.appearance import (
+    GRID,
+    HAZE,
+    LegendEntry,
+    translucent,
+)
 from hsp_control.visualization.viewer.commands import (
     Command,
     Json,
@@ -21,7 +26,6 @@ from hsp_control.visualization.viewer.commands import (
     set_property,
     set_transform,
 )
-from hsp_control.visualization.viewer.legend import LegendEntry, translucent
 from hsp_control.visualization.viewer.threejs import pose_at
 
 _LIGHT_FROM = np.array([0.5, -0.45, 1.6])

@@ -16,8 +16,7 @@ from hsp_control.geometry.scene import Scene
 from hsp_control.robot import Robot, RobotState
 from hsp_control.simulation import Rollout
 from hsp_control.visualization.viewer import browser
-from hsp_control.visualization.viewer.bands import bands_of
-from hsp_control.visualization.viewer.clip import remove_clip, set_clip
+from hsp_control.visualization.viewer.clip import bands_of, remove_clip, set_clip
 from hsp_control.visualization.viewer.commands import (
     Command,
     delete,

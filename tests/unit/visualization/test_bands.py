@@ -12,7 +12,7 @@ from hsp_control.visualization.viewer import (
     Viewer,
     live,
 )
-from hsp_control.visualization.viewer.bands import CLOSED_SHARE, bands_of, spans_of
+from hsp_control.visualization.viewer.clip import CLOSED_SHARE, bands_of, spans_of
 
 FAST = (
     "simulation.control_period=null",

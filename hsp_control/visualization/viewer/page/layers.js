@@ -1,7 +1,7 @@
 // The legend, whose rows are switches: each shows and hides the nodes of what it names.
 //
 //   const layers = new Layers(viewer, caption);   // the element with title and legend
-//   layers.show(entries);                         // of a caption: see viewer/legend.py
+//   layers.show(entries);                         // of a caption: see viewer/appearance.py
 //   layers.apply();                               // after the scene has changed
 //
 // A row says what is in the scene: it is pressed while its nodes are visible. What the user
