@@ -211,10 +211,10 @@ weight: the ramp's rate without its duration | ramp_and_its_rate
 @ null_space/fields/cost.py | unit/null_space/test_every_field.py
 g' without W' | target_posture
   g_dot[i] += W_dot[i, j] * g[j] => g_dot[i] += 0.0 * W_dot[i, j] * g[j]
-@ null_space/metrics/mass_matrix.py | unit/law/test_law_on_robots.py
+@ null_space/metrics/metric.py | unit/law/test_law_on_robots.py
 M' without Cᵀ | applies_the_short_form
   W_dot[i, j] = (C[i, j] + C[j, i]) / unit => W_dot[i, j] = C[i, j] / unit
-@ null_space/metrics/fixed.py | unit/law/test_law_on_robots.py
+@ null_space/metrics/metric.py | unit/law/test_law_on_robots.py
 metric of coordinates: A Aᵀ for AᵀA | coordinates_metric
   return np.asarray(A.T @ A) => return np.asarray(A @ A.T)
 # constraints
@@ -633,10 +633,10 @@ frozen: a robot that stands is frozen | at_rest
 play: Khatib's law with J'v added | operational
 -active.rows.acceleration - J_dot @ state.v
 +active.rows.acceleration + J_dot @ state.v
-@ play/grips.py | integration/test_play.py
+@ play/handles.py | integration/test_play.py
 play: its own path comes back at once | jolt
   self._refer(self._own, t, BACK) => self._refer(self._own, t, 0.0)
-@ play/grips.py | integration/test_play.py
+@ play/handles.py | integration/test_play.py
 play: the hand of the posture runs away | elbow
   _HOLDING * lost, np.zeros => -_HOLDING * lost, np.zeros
 @ play/handles.py | integration/test_play.py
