@@ -1,7 +1,7 @@
 """What a biped does about a push: another step, or none.
 
 What the sole of the standing foot cannot bring back moves the next step, in place and
-in time (`plans/step_adjustment.py`). Across the standing foot no leg can step: a
+in time (`step_adjustment.py`). Across the standing foot no leg can step: a
 divergent component that is still within the soles is brought back where it is.
 """
 

@@ -60,8 +60,8 @@ class Walk(BipedPlan, type="walk"):
 
     It stands, walks with the given velocity, and stands again when that is zero or the
     steps are done. The centre of mass follows the pendulum with feedback within the
-    sole (`plans/pendulum.py`); a push that the sole cannot hold moves the next step,
-    in place and in time (`plans/step_adjustment.py`). A swing foot starts from where it
+    sole (`pendulum.py`); a push that the sole cannot hold moves the next step,
+    in place and in time (`step_adjustment.py`). A swing foot starts from where it
     is and becomes a contact when it is felt on the ground, early or late.
 
     It has the tasks ``center_of_mass`` and ``trunk``, and one for each foot with the
