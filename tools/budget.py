@@ -25,7 +25,7 @@ _PARTS = {
 
 
 def counted(root: Path) -> dict[str, int]:
-    """Return the lines of the package's rooms, of all of it, and of what is beside.
+    """Return the lines of the rooms, of the package, its core, and what is beside.
 
     What a checkout does not contain, such as an installed site, does not count.
     """
@@ -37,6 +37,7 @@ def counted(root: Path) -> dict[str, int]:
         if room.name not in _NOT_WRITTEN
     }
     found["package"] = _lines(package, "*.py")
+    found["core"] = found["package"] - found.get("companions", 0)
     return found | {
         name: _lines(root / of, kind) for name, (of, kind) in _PARTS.items()
     }
@@ -76,7 +77,10 @@ def main() -> int:
     for message in messages:
         print(message, file=sys.stderr)
     if not messages:
-        print(f"{found['package']} lines in the package, {found['tests']} of tests.")
+        print(
+            f"{found['core']} lines in the core, {found['companions']} in companions, "
+            f"{found['tests']} of tests."
+        )
     return bool(messages)
 
 
