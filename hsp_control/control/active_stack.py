@@ -122,7 +122,7 @@ class ActiveStack:
             spring = impedance_of(each.task) is not None
             self.resolution.problem.springs[here] = spring
             if spring:
-                ends = each.task.part_ends
+                ends = each.task.part_ends()
                 away = partial(slipped, in_force.numbers, ends)
                 self.bounds.append((each.task.name, here, away))
             elif len(in_force.feedback.largest):

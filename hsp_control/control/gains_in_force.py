@@ -97,7 +97,7 @@ class GainsInForce:
         following = next_numbers(
             in_force.numbers,
             planned.gains,
-            planned.task.part_ends,
+            planned.task.part_ends(),
             in_force.mobility,
             active.rows.error[rows],
             active.rows.error_rate[rows],

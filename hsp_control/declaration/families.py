@@ -93,7 +93,10 @@ class Family:
                 f"type {type_name!r} of {self.name} is declared twice: by "
                 f"{full_name(other)} and by {full_name(member)}"
             )
-        self.members[type_name] = member
+        # By name: messages and schemas do not depend on the order of imports.
+        found = sorted({**self.members, type_name: member}.items())
+        self.members.clear()
+        self.members.update(found)
 
     def load(self, type_name: Any) -> None:
         """Import the class of a companion or an installed package, if it is not known.

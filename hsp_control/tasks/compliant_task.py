@@ -103,7 +103,7 @@ class CompliantTask(SecondOrderTask):
             *matrices,
             self._rotating(state),
             in_force.numbers,
-            self.part_ends,
+            self.part_ends(),
             out,
             Scratch.allocate(self.rows, state.robot.nv),
             in_force.mobility,

@@ -170,9 +170,8 @@ class Task(Part, ABC, family="tasks", error=TaskError):
         """Number of rows m."""
         return sum(part.size for part in self.error_parts)
 
-    @property
     def part_ends(self) -> Indices:
-        """Where each part of the error ends, shape (parts,)."""
+        """Return where each part of the error ends, shape (parts,)."""
         return np.cumsum([part.size for part in self.error_parts])
 
     @abstractmethod

@@ -478,7 +478,7 @@ def test_a_configuration_without_a_period_gets_one() -> None:
     ("source", "message"),
     [
         ("talos", "talos has a free-flyer root, which needs contacts: give a "
-                  "configuration, for example .*, whole_body/"),
+                  "configuration, for example forces/"),
         ("pandaa", "no configuration 'pandaa'"),
     ],
 )  # fmt: skip

@@ -256,7 +256,7 @@ def test_a_singular_mass_matrix_is_not_a_number() -> None:
     numbers, scratch = in_force.numbers, Scratch.allocate(3, 3)
     mobility, feedback = in_force.mobility, in_force.feedback
     impedance_gains(
-        flat, flat, none, numbers, task.part_ends, sample, scratch, mobility, feedback
+        flat, flat, none, numbers, task.part_ends(), sample, scratch, mobility, feedback
     )
     assert np.isnan(in_force.feedback.Kp[0, 0])
     assert np.isnan(in_force.feedback.Kv[0, 0])
