@@ -536,7 +536,7 @@ sweeps: the last integer is never drawn
   fraction * (self.high - self.low + 1) => fraction * (self.high - self.low)
 sweeps: choices miss the last
   int(fraction * len(self.values)) => int(fraction * (len(self.values) - 1))
-@ companions/sweeps/sensitivity.py | companions/sweeps/test_sweep_designs.py
+@ companions/sweeps/sensitivities.py | companions/sweeps/test_sweep_designs.py
 sweeps: classes begin at rank one
   (order - 1.0) * count => order * count
 sweeps: failed runs count for sensitivity
@@ -607,7 +607,7 @@ clock: a jump stays in the time | each_fault
 reckoning: explicit Euler | reckoning
 -self._robot.integrate(state.q, h * v), v)
 +self._robot.integrate(state.q, h * state.v), v)
-@ live/bearing_feet.py | unit/live/test_live_on_feet.py
+@ live/bearing_feet.py | companions/walking/test_live_on_feet.py
 feet: arms of points backwards | joints_and_feet
   linear - np.cross(arm, angular, axis=0) => linear + np.cross(arm, angular, axis=0)
 feet: a foot pulls | not_pressed
@@ -619,7 +619,7 @@ link: the window of ages never moves on | age_is
 faults: late packets come a packet early | each_fault
 -for left, late in self._waiting if left <= 1]
 +for left, late in self._waiting if left <= 2]
-@ live/sensor_layout.py | unit/live/test_live_on_feet.py
+@ live/sensor_layout.py | companions/walking/test_live_on_feet.py
 sensors: wrenches in the order of names | comes_back
 -Inertial(self.inertial, rest[-3], rest[-2])
 +Inertial(self.inertial, rest[-2], rest[-3])

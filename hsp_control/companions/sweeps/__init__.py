@@ -14,8 +14,8 @@ if TYPE_CHECKING:  # for type checkers; a help text must not import what is slow
     from .figure import save_sweep_figure as save_sweep_figure
     from .figure import sweep_figure as sweep_figure
     from .results import Sweep as Sweep
-    from .sensitivity import Sensitivity as Sensitivity
-    from .sensitivity import sensitivity as sensitivity
+    from .sensitivities import Sensitivity as Sensitivity
+    from .sensitivities import sensitivity as sensitivity
     from .sweeping import sweep as sweep
 
 __getattr__, __dir__ = at_first_use(
@@ -24,7 +24,7 @@ __getattr__, __dir__ = at_first_use(
         "distributions": "Choices Distribution Integers LogUniform Normal Uniform",
         "figure": "save_sweep_figure sweep_figure",
         "results": "Sweep",
-        "sensitivity": "Sensitivity sensitivity",
+        "sensitivities": "Sensitivity sensitivity",
         "sweeping": "sweep",
     },
 )

@@ -13,7 +13,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocato
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import PlotError
 from hsp_control.companions.sweeps import Sensitivity, Sweep, sensitivity
-from hsp_control.companions.sweeps.sensitivity import has_order
+from hsp_control.companions.sweeps.sensitivities import has_order
 from hsp_control.visualization import palette
 from hsp_control.visualization.plots.figures import save_figure
 from hsp_control.visualization.plots.lines import literal_text

@@ -256,6 +256,6 @@ def test_a_missing_engine_is_found_before_anything_is_compiled(
 
     monkeypatch.setattr(adapters, "adapter", compile_none)
     monkeypatch.setitem(sys.modules, "mujoco", None)
-    message = "walking/talos_walk.yaml:23: plant: the plant cannot be made: a MuJoCo"
+    message = "forces/panda_wipe.yaml:41: plant: the plant cannot be made: a MuJoCo"
     with pytest.raises(HspControlError, match=re.escape(message)):
-        load_experiment("walking/talos_walk")
+        load_experiment("forces/panda_wipe")
