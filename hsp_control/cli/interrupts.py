@@ -22,14 +22,11 @@ class DeferredInterrupt:
     If `check` is not called within `PATIENCE`, the first Ctrl-C acts then, except after
     `ignore_first`. The context does nothing outside the main thread, which
     alone receives signals, and in a process that ignores Ctrl-C.
-
-    Attributes:
-        requested: Whether a Ctrl-C has come that `check` has not raised.
     """
 
     def __init__(self) -> None:
         """Create the context; entering it installs the signal handler."""
-        self.requested = False
+        self.requested = False  # whether a Ctrl-C has come that `check` has not raised
         self._before: Any = None
         self._first_ignored = False
         self._patience = threading.Timer(PATIENCE, _thread.interrupt_main)

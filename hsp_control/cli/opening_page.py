@@ -18,9 +18,6 @@ class OpeningPage:
     """Opens a page once: at the first kernel that has to be compiled, or when told to.
 
     A mistake in a configuration is then said before, unless the cache is empty.
-
-    Attributes:
-        opened: Whether it was opened in a browser.
     """
 
     def __init__(
@@ -32,7 +29,7 @@ class OpeningPage:
     ) -> None:
         """Keep what it takes."""
         assert url is not None
-        self.opened = False
+        self.opened = False  # whether it was opened in a browser
         self._url, self._browser = url, options.browser
         self._announce, self._say = announce, say
         self._done = self._told = self._ready = False

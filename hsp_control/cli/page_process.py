@@ -21,19 +21,13 @@ START = 60.0
 
 
 class PageProcess:
-    """The process of a page that shows and steers a live loop; a context manager.
-
-    Attributes:
-        channel: The way to it.
-        url: The page's address, with its key.
-        held: Whether somebody must hold a key.
-    """
+    """The process of a page that shows and steers a live loop; a context manager."""
 
     def __init__(self, *, port: int | None, host: str, held: bool) -> None:
         """Prepare the process; entering the context starts it."""
-        self.held = held
-        self.channel, self._there = channel_pair()
-        self.url = ""
+        self.held = held  # whether somebody must hold a key
+        self.channel, self._there = channel_pair()  # way to it
+        self.url = ""  # page's address, with its key
         self._settings = {
             "channel": self._there.fileno(),
             "port": port,

@@ -31,11 +31,6 @@ class RobotProcess:
     own session, so that Ctrl-C in a terminal reaches the loop only. If this process
     dies, the robot's standard input is closed; then the robot stops itself, writes its
     log and ends.
-
-    Attributes:
-        hardware: The robot, for `run_loop`.
-        process: The process; None if it does not run.
-        report: The robot's report (a dictionary), once it has ended by itself.
     """
 
     def __init__(
@@ -66,7 +61,9 @@ class RobotProcess:
             "peer": self.hardware.address,
             "session": self.hardware.session,
         }
+        # process; None if it does not run
         self.process: subprocess.Popen[bytes] | None = None
+        # robot's report (a dictionary), once it has ended by itself
         self.report: dict[str, Any] | None = None
 
     def __enter__(self) -> Self:

@@ -26,15 +26,10 @@ _POLL = 0.02
 
 
 class SteeringPage(NamedTuple):
-    """A page that shows a live loop.
-
-    Attributes:
-        process: Its process.
-        opening: What opens it.
-    """
+    """A page that shows a live loop."""
 
     process: PageProcess
-    opening: OpeningPage
+    opening: OpeningPage  # what opens it
 
 
 @contextmanager

@@ -32,29 +32,9 @@ class ActiveStack:
     With a floating base the first level keeps the contacts at rest, and requires zero
     effort along base motions that neither motors nor contacts can drive. The levels of
     the tasks follow, then the field.
-
-    Attributes:
-        contacts: The active contacts.
-        levels: The tasks of each level.
-        support: The contacts' forces and their bounds.
-        resolution: The law.
-        task_rows: The rows of each task in the stack, by name.
-        contact_rows: The rows of each contact, by name.
-        first_task_row: Index of the first row that belongs to a task.
-        rows: All rows stacked: J, J', e, e', a_x.
-        row_count: Number of rows.
-        level_names: The names of each level's tasks; ``contacts`` for those at the top.
-        has_forces: Whether contacts exert forces.
-        memory: The rows, the field and the law's results, in one block: see `Record`.
-        acceleration: The law's acceleration, shape (nv,).
-        streamed: Whether a task follows a stream.
-        bounds: The tasks with a largest error: the name, the first row, and
-            `Feedback.largest`.
-        term_samples: The weighted sample of each term of the field.
-        share: How much it counts in the mixture that was resolved last, in (0, 1].
     """
 
-    share = 1.0
+    share = 1.0  # how much it counts in the mixture that was resolved last, in (0, 1]
 
     def __init__(
         self,
@@ -70,9 +50,10 @@ class ActiveStack:
     ) -> None:
         """Stack the rows; the state decides which base motions the contacts permit."""
         robot: Robot = state.robot
-        self.support = support
-        self.contacts = support.contacts
+        self.support = support  # contacts' forces and their bounds
+        self.contacts = support.contacts  # active contacts
         planned = [level for level in levels if level]
+        # tasks of each level
         self.levels = tuple(tuple(each.task for each in level) for level in planned)
         held = sum(contact.rows for contact in self.contacts)
         free = (
@@ -80,6 +61,7 @@ class ActiveStack:
         )
         first = [held + free] if held + free else []
         sizes = [sum(task.rows for task in level) for level in self.levels]
+        # law
         self.resolution = Resolution(
             first + sizes,
             robot.nv,
@@ -88,20 +70,27 @@ class ActiveStack:
             threshold,
             Following.of(robot.size, on_legs=bool(robot.unactuated)),
         )
-        self.rows = self.resolution.problem.task
-        self.row_count = len(self.rows.error)
+        self.rows = self.resolution.problem.task  # all rows stacked: J, J', e, e', a_x
+        self.row_count = len(self.rows.error)  # number of rows
+        # whether a task follows a stream
         self.streamed = any(
             isinstance(task.followed, Streamed)
             for level in self.levels
             for task in level
         )
+        # whether contacts exert forces
         self.forces, self.has_forces = support.forces, support.size > 0
+        # rows, the field and the law's results, in one block: see `Record`
         self.memory = self.resolution.problem.record.memory
+        # law's acceleration, shape (nv,)
         self.acceleration = self.resolution.acceleration
-        self.contact_rows = _places(self.contacts, 0)
+        self.contact_rows = _places(self.contacts, 0)  # rows of each contact, by name
+        # index of the first row that belongs to a task
         self.first_task_row = held + free
         tasks = [each for level in planned for each in level]
+        # rows of each task in the stack, by name
         self.task_rows = _places([each.task for each in tasks], self.first_task_row)
+        # tasks with a largest error: the name, the first row, and `Feedback.largest`
         self.bounds: list[tuple[str, slice, Callable[[Array], float]]] = []
         self._parts: list[tuple[Task | Contact, TaskSample]] = []
         plans: list[Callable[[], StepPlan]] = []
@@ -133,6 +122,7 @@ class ActiveStack:
                     plans.append(partial(_asked, in_force.feedback, sample, asked))
             row += each.task.rows
         self._plans = plans
+        # names of each level's tasks; ``contacts`` for those at the top
         self.level_names = [
             *(["contacts"] if first else []),
             *(", ".join(task.name for task in level) for level in self.levels),
@@ -142,6 +132,7 @@ class ActiveStack:
             self._rest = UnactuatedRows(robot, base, free)
         self._held = held
         self._state, self._metric, self._field = state, metric, field
+        # weighted sample of each term of the field
         self.term_samples: tuple[FieldSample, ...] = ()
 
     def resolve(self, t: float) -> Outcome:

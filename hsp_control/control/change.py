@@ -37,17 +37,8 @@ class Change(Part, ABC, family="changes", error=ControllerError):
 
     @abstractmethod
     def apply(self, setup: Setup) -> Setup:
-        """Return the setup with this change, after all earlier ones.
-
-        Raises:
-            ControllerError: If it names something that does not exist then.
-        """
+        """Return the setup with this change, after all earlier ones."""
 
     def placed(self, start: Start, setup: Setup) -> Self:
-        """Return the change with its parts placed; see `Task.placed`.
-
-        Args:
-            start: Where the robot is when the change is made.
-            setup: The setup with all earlier changes.
-        """
+        """Return the change with its parts placed; see `Task.placed`."""
         return self

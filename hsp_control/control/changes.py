@@ -103,11 +103,7 @@ class ChangeGains(Change, type="gains"):
     """The new gains."""
 
     def apply(self, setup: Setup) -> Setup:
-        """Return the setup with the gains; see `Change.apply`.
-
-        Raises:
-            GainError: If the gains do not fit the task.
-        """
+        """Return the setup with the gains; see `Change.apply`."""
         planned = setup.task(self.task)
         if planned.task.order != 2:
             raise ControllerError(
@@ -145,12 +141,7 @@ class ChangeImpedance(Change, type="impedance"):
         return replace(self, impedance=impedance)
 
     def apply(self, setup: Setup) -> Setup:
-        """Return the setup with the impedance; see `Change.apply`.
-
-        Raises:
-            ControllerError: If the task has no impedance.
-            GainError: If the impedance does not fit the task, or what it was.
-        """
+        """Return the setup with the impedance; see `Change.apply`."""
         planned = setup.task(self.task)
         if impedance_of(planned.task) is None:
             raise ControllerError(
@@ -300,11 +291,7 @@ class ChangeLimits(Change, type="limits"):
     old ones."""
 
     def apply(self, setup: Setup) -> Setup:
-        """Return the setup with the limits; see `Change.apply`.
-
-        Raises:
-            LimitError: If they do not fit the robot.
-        """
+        """Return the setup with the limits; see `Change.apply`."""
         with within("limits"):
             new, old = self.limits, setup.limits.last
             if new is not None and new.bandwidth is None and old is not None:

@@ -188,11 +188,7 @@ class Controller:
         return Start(here, self._setup.start.scene)
 
     def _begin(self) -> None:
-        """Look at the first state, and place there what is relative, without a start.
-
-        Raises:
-            ConfigurationError: If an angle looks like degrees.
-        """
+        """Look at the first state, and without a start place there what is relative."""
         check_angles(self._declared.robot, self._state.q)
         if self._declared.start is None:
             here = self._here()._replace(scene=self._declared.scene)
@@ -202,11 +198,7 @@ class Controller:
         self._begun = True
 
     def _resolve(self) -> str:
-        """Resolve the law for what counts now; return what is damped.
-
-        Raises:
-            NonFiniteError: If it contains NaN or inf.
-        """
+        """Resolve the law for what counts now; return what is damped."""
         t, whole = self._state.t, self._whole
         if whole is not None:  # nothing changes
             active, _, _ = whole

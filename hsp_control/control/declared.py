@@ -42,33 +42,20 @@ from hsp_control.trajectories.streams.stream import Streamed
 
 @dataclass(frozen=True)
 class Declared:
-    """What a controller is made of before anything relative in it is placed.
-
-    Attributes:
-        robot: The robot.
-        tasks: The tasks.
-        field: The null-space field.
-        gain: K_N: a scalar, shape (nv,) or (nv, nv) [1/s].
-        metric: The metric.
-        threshold: Singular value below which an inverse is bounded.
-        limits: The limits, if any.
-        contacts: The contacts.
-        base: What else than contacts acts on a floating base.
-        scene: The obstacles.
-        start: The configuration that relative parts refer to, shape (nq,); None: that
-            of the first step.
-    """
+    """What a controller is made of before anything relative in it is placed."""
 
     robot: Robot
     tasks: tuple[Task, ...]
     field: NullSpaceField
-    gain: Array
+    gain: Array  # K_N: a scalar, shape (nv,) or (nv, nv) [1/s]
     metric: Metric
-    threshold: float
+    threshold: float  # singular value below which an inverse is bounded
     limits: Limits | None
     contacts: tuple[Contact, ...]
-    base: Base | None
+    base: Base | None  # what else than contacts acts on a floating base
     scene: Scene
+    # configuration that relative parts refer to, shape (nq,); None: that of the first
+    # step
     start: Array | None
 
     @classmethod

@@ -71,11 +71,7 @@ def begun(
     controller: Controller,
     inertial: Inertial | None,
 ) -> list[RunningEstimator]:
-    """Return what runs, in order; see `Estimator.begin`.
-
-    Raises:
-        EstimationError: If one does not fit; with its type.
-    """
+    """Return what runs, in order; see `Estimator.begin`."""
     running = []
     for each in estimators:
         with within("estimators", each.yaml_type or type(each).__name__):

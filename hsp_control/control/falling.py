@@ -15,11 +15,7 @@ MIN_HEIGHT = 0.65
 
 
 class FallDetector:
-    """Compares tilt and height with those of the start.
-
-    Attributes:
-        trunk: The frame that tilts.
-    """
+    """Compares tilt and height with those of the start."""
 
     def __init__(self, trunk: str, feet: tuple[str, ...], state: RobotState) -> None:
         """Set what to compare with."""

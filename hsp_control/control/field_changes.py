@@ -87,11 +87,7 @@ class ExchangeField(Change, type="exchange_field"):
 
 
 def _find_field(setup: Setup, name: str) -> int:
-    """Return the index of the term that has a name and is to stay.
-
-    Raises:
-        ControllerError: If there is none.
-    """
+    """Return the index of the term that has a name and is to stay."""
     there = {
         each.field.name: k
         for k, each in enumerate(setup.terms)

@@ -20,17 +20,13 @@ class GainsMemory(NamedTuple):
 
 
 class GainsInForce:
-    """Gains and impedances of the tasks, their offsets, and K_N, at the present time.
-
-    Attributes:
-        feedback: The feedback of each task, by key; the arrays stay where they are.
-        null_space: K_N, shape (nv, nv) [1/s].
-    """
+    """Gains and impedances of the tasks, their offsets, and K_N, now."""
 
     def __init__(self, nv: int) -> None:
         """Allocate, without tasks."""
+        # feedback of each task, by key; the arrays stay where they are
         self.feedback: dict[int, InForce] = {}
-        self.null_space = np.zeros((nv, nv))
+        self.null_space = np.zeros((nv, nv))  # K_N, shape (nv, nv) [1/s]
         self._tasks: dict[int, Task] = {}
         self._waiting: dict[int, Array] = {}
 

@@ -40,19 +40,12 @@ class Mixture:
     which are affine in one another. The rows of the tasks in all sets are linear in the
     acceleration, so that these tasks keep their exact error equation throughout where
     no limit binds.
-
-    Attributes:
-        active: The stack that was resolved last, with the most tasks of a mixture;
-            None before.
-        damped: The tasks of the first level with a bounded inverse in the last
-            `resolve`, by name; empty: none.
-        steady: Whether it is the same at all times.
-        levels: The tasks of each level, the highest priority first.
-        field: The field, placed.
     """
 
+    # stack that was resolved last, with the most tasks of a mixture; None before
     active: ActiveStack | None
-    steady: bool
+    steady: bool  # whether it is the same at all times
+    # tasks of each level, the highest priority first
     levels: tuple[tuple[PlannedTask, ...], ...]
 
     def __init__(
@@ -70,6 +63,8 @@ class Mixture:
         nv = state.robot.nv
         self._modified, self._acceleration = np.zeros(nv), np.zeros(nv)
         self._parts: list[ActiveStack] = []
+        # tasks of the first level with a bounded inverse in the last `resolve`, by
+        # name; empty: none
         self.damped = ""
         self.field = setup.field
         self.plan(setup, exchanged=False)

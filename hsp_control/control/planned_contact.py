@@ -15,17 +15,12 @@ while it bears; with 0, its motion would be set free, or stopped, with a jump.""
 
 @dataclass(frozen=True)
 class PlannedContact:
-    """A contact, and when it is part of the controller.
-
-    Attributes:
-        contact: The contact.
-        presence: 1 while it bears, 0 while it is lifted.
-        force_offset: What a compensator adds to the commanded normal force, shape (1,)
-            [N]; every step reads this array.
-    """
+    """A contact, and when it is part of the controller."""
 
     contact: Contact
-    presence: Evolution[float]
+    presence: Evolution[float]  # 1 while it bears, 0 while it is lifted
+    # what a compensator adds to the commanded normal force, shape (1,) [N]; every step
+    # reads this array
     force_offset: Array = field(default_factory=lambda: np.zeros(1), compare=False)
 
     @property

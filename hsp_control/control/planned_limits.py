@@ -18,12 +18,10 @@ class PlannedLimits:
 
     While one follows another, both count, and what each delivers is mixed; see
     `Mixture.deliver`. So a limit can go to infinity, or come from there.
-
-    Attributes:
-        sets: Each set of limits, None for none, in order of time; and its share, in
-            [0, 1]. The sum of the shares is 1.
     """
 
+    # each set of limits, None for none, in order of time; and its share, in [0, 1]. The
+    # sum of the shares is 1.
     sets: tuple[tuple[RobotLimits | None, Evolution[float]], ...]
 
     @classmethod

@@ -22,19 +22,13 @@ from hsp_control.tasks import Task
 
 @dataclass(frozen=True)
 class PlannedTask:
-    """A task, when it counts, and its gains.
+    """A task, when it counts, and its gains."""
 
-    Attributes:
-        key: Tells it from every other task of the controller, also of the same name.
-        task: The task, placed.
-        presence: 1 while it is part of the controller, 0 while not.
-        gains: The numbers of its feedback: Kp and Kv, shape (2, m, m) [1/s², 1/s], or
-            those of an impedance; see `Task.in_force`.
-    """
-
-    key: int
-    task: Task
-    presence: Evolution[float]
+    key: int  # tells it from every other task of the controller, also of the same name
+    task: Task  # placed
+    presence: Evolution[float]  # 1 while it is part of the controller, 0 while not
+    # numbers of its feedback: Kp and Kv, shape (2, m, m) [1/s², 1/s], or those of an
+    # impedance; see `Task.in_force`
     gains: Evolution[Array]
 
     def weight(self, t: float) -> float:
@@ -67,15 +61,10 @@ class PlannedTask:
 
 @dataclass(frozen=True)
 class PlannedTerm:
-    """A term of the field, and when it counts.
+    """A term of the field, and when it counts."""
 
-    Attributes:
-        field: The term, placed, with its own weight.
-        presence: The factor of its weight.
-    """
-
-    field: NullSpaceField
-    presence: Evolution[float]
+    field: NullSpaceField  # placed, with its own weight
+    presence: Evolution[float]  # factor of its weight
 
     @property
     def weighted(self) -> NullSpaceField:
@@ -88,27 +77,16 @@ class PlannedTerm:
 
 @dataclass(frozen=True)
 class Setup:
-    """All parts of a controller, as a function of time.
+    """All parts of a controller, as a function of time."""
 
-    Attributes:
-        start: Where the parts were placed.
-        metric: The metric.
-        tasks: The tasks.
-        terms: The terms of the field; their sum is the field.
-        gain: K_N, shape (nv, nv) [1/s].
-        contacts: The contacts.
-        limits: The limits.
-        count: How many tasks there have ever been; the next one has this key.
-    """
-
-    start: Start
+    start: Start  # where the parts were placed
     metric: Metric
     tasks: tuple[PlannedTask, ...]
-    terms: tuple[PlannedTerm, ...]
-    gain: Evolution[Array]
+    terms: tuple[PlannedTerm, ...]  # terms of the field; their sum is the field
+    gain: Evolution[Array]  # K_N, shape (nv, nv) [1/s]
     contacts: tuple[PlannedContact, ...]
     limits: PlannedLimits
-    count: int
+    count: int  # how many tasks there have ever been; the next one has this key
 
     @property
     def field(self) -> NullSpaceField:

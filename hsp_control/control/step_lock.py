@@ -13,17 +13,13 @@ class StepLock:
 
     Whether it is the same thread is looked for when the lock is taken, among the
     functions that this thread runs: a step that gets it at once pays nothing for it.
-
-    Attributes:
-        acquire: Takes the lock; that of `threading.Lock`.
-        release: Gives it back.
-        holders: The code of the methods that hold the lock of their ``self._lock``.
     """
 
     def __init__(self, holders: Collection[CodeType]) -> None:
         """Set which methods hold it."""
         lock = Lock()
         self.acquire, self.release = lock.acquire, lock.release
+        # code of the methods that hold the lock of their ``self._lock``
         self.holders = holders
 
     def wait(self) -> None:

@@ -9,14 +9,10 @@ class Switched:
 
     Each begins where the other ends, so that the law goes over from one to the other
     while the force fades or rises; see `PlannedTask.weight_beyond`.
-
-    Attributes:
-        contact: Switches the contact.
-        task: Switches the task that moves its link, if any.
     """
 
     contact: Switch
-    task: Switch | None
+    task: Switch | None  # that moves its link
 
     def reset(self) -> None:
         """Return to the state before the first switch."""

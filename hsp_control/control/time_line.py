@@ -12,19 +12,13 @@ from hsp_control.geometry.start import Start
 
 @dataclass(frozen=True)
 class TimeLine:
-    """What counts at each time.
+    """What counts at each time."""
 
-    Attributes:
-        start: Where the parts were placed.
-        made: All changes: those made while running placed, others as they were given.
-        settled: The setup with all changes that are over.
-        open: The changes that are not, placed, in order of time.
-    """
-
-    start: Start
+    start: Start  # where the parts were placed
+    # all changes: those made while running placed, others as they were given
     made: tuple[Change, ...]
-    settled: Setup
-    open: tuple[Change, ...]
+    settled: Setup  # setup with all changes that are over
+    open: tuple[Change, ...]  # changes that are not, placed, in order of time
 
     @classmethod
     def of(cls, setup: Setup, made: Sequence[Change]) -> "TimeLine":

@@ -26,8 +26,4 @@ class AdaptingHardware(LocatedHardware, Protocol):
         """The fault, or None."""
 
     def adapted(self, settings: LiveSettings) -> LiveSettings:
-        """Return the settings with what is fixed on this robot.
-
-        Raises:
-            LiveError: If a setting contradicts the robot.
-        """
+        """Return the settings with what is fixed on this robot."""

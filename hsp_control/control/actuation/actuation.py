@@ -62,19 +62,12 @@ m/s²]."""
 
 
 class Kept(NamedTuple):
-    """One set of limits, and what is made for it.
-
-    Attributes:
-        limits: The limits; None: there are none.
-        steps: The QP of each law.
-        box: Whether there are but bounds on accelerations and efforts.
-        rate: Whether the effort's rate is limited.
-    """
+    """One set of limits, and what is made for it."""
 
     limits: RobotLimits | None
-    steps: WeakKeyDictionary[Resolution, LimitedStep]
-    box: bool
-    rate: bool
+    steps: WeakKeyDictionary[Resolution, LimitedStep]  # QP of each law
+    box: bool  # whether there are but bounds on accelerations and efforts
+    rate: bool  # whether the effort's rate is limited
 
     @classmethod
     def of(cls, limits: RobotLimits | None) -> "Kept":
@@ -95,12 +88,6 @@ class Actuation:
     Its only memory is of the last efforts, used where the effort rate or the speed is
     limited: see `applied`. While one set of limits follows another it keeps the one
     that was enforced last: see `Mixture.deliver`.
-
-    Attributes:
-        sets: The sets of limits in force, each with its share.
-        base: Indices of the degrees of freedom without a motor.
-        delivered: The acceleration of the last step, shape (nv,).
-        limited: What the last step delivers that was limited within a call of `checks`.
     """
 
     def __init__(
@@ -109,7 +96,7 @@ class Actuation:
         """Allocate."""
         nv = robot.nv
         self._robot = robot
-        self.base: Indices = np.array(base, dtype=np.int64)
+        self.base: Indices = np.array(base, dtype=np.int64)  # those without a motor
         self._floating = bool(self.base.size)
         self._motors: Indices = np.setdiff1d(np.arange(nv), self.base)
         self._weight = 9.81 * sum(inertia.mass for inertia in robot.model.inertias)
@@ -122,6 +109,7 @@ class Actuation:
         self._found = np.zeros(2)  # what a check returned, and its flags
         self._resolution: Resolution | None = None
         self._step: LimitedStep | None = None
+        # what the last step delivers that was limited within a call of `checks`
         self.limited: Delivered
         self.delivered: Array = np.zeros(nv)
         self.period = 0.0

@@ -18,11 +18,7 @@ cheaper than a miss of the tasks."""
 
 
 class CommandedForces:
-    """Writes f_ref for the points of one contact, and how dear other forces are.
-
-    Attributes:
-        mask: The commanded entries of the contact's forces, shape (3 k,).
-    """
+    """Writes f_ref for the points of one contact, and how dear other forces are."""
 
     def __init__(self, planned: PlannedContact) -> None:
         """Follow the command of a contact."""
@@ -38,6 +34,7 @@ class CommandedForces:
         if not self._varies:
             self._shares[:] = shares(n, np.zeros((k, 3)))
         only_normal = n == NORMAL and not contact.slides
+        # commanded entries of the contact's forces, shape (3 k,)
         self.mask = np.tile([not only_normal, not only_normal, True], k)
         self._normal = 0 if n == NORMAL else 2
 

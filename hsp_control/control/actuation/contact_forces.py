@@ -34,14 +34,8 @@ def force_map(
 
     A force s at an arm r has the wrench (s, r × s): column Jᵀ(s, r × s).
 
-    Args:
-        frame: Motion of the contact's frame, in world axes.
-        points: The points in the frame, shape (k, 3) [m].
-        shift: From them to where forces act, in world axes, shape (3,) [m].
-        axes: Tangents and normal as columns, world axes, shape (3, 3).
-        first: Index of the first of these points among all.
-        positions: Written: the points in the world, shape (all, 3) [m].
-        out: Written: one column per axis, point after point, shape (nv, 3 all).
+    ``first`` is the index of the first of these points among all.
+    Shapes: points (k, 3), shift (3,), axes (3, 3), positions (all, 3), out (nv, 3 all).
     """
     J, _, R, origin, _ = frame
     for k in range(points.shape[0]):
@@ -83,18 +77,8 @@ def minimum_norm_forces(
     directions without support are left out. The effort of the base, which has no
     motor, is zero.
 
-    Args:
-        F: Generalised forces of unit forces, shape (nv, size).
-        base: Indices of the degrees of freedom without a motor.
-        inverse_cost: e, shape (size,).
-        reference: r, shape (size,) [N].
-        wanted: The effort without contacts, shape (nv,) [N·m or N].
-        A: Scratch, shape (len(base), size).
-        G: Scratch, shape (len(base), len(base)).
-        U: Scratch, shape (len(base), len(base)).
-        scratch: Scratch, shape (2, len(base)).
-        forces: Written: f, shape (size,) [N].
-        tau: Written: the effort that remains for the motors, shape (nv,) [N·m or N].
+    Shapes: F (nv, size), inverse_cost, reference (r) and forces (f) (size,), wanted and
+    tau (nv,), A (nb, size), G and U (nb, nb), scratch (2, nb), nb = len(base).
     """
     n, size = base.shape[0], inverse_cost.shape[0]
     w, scaled = scratch[0], scratch[1]
@@ -162,11 +146,7 @@ def _least_squares(G: Array, U: Array, w: Array, out: Array) -> None:
 def within_cones(cone: Array, forces: Array, lower: Array, upper: Array) -> bool:
     """Return whether forces are within friction cones, cone f ≥ 0, and bounds.
 
-    Args:
-        cone: Four rows per point, shape (4 size/3, size).
-        forces: f, shape (size,) [N].
-        lower: Lower bounds, shape (size,) [N].
-        upper: Upper bounds, shape (size,) [N].
+    Shapes: cone (4 size/3, size), forces, lower and upper (size,).
     """
     inside = True
     for k in range(forces.shape[0]):

@@ -60,54 +60,32 @@ class Directions(NamedTuple):
     Away from singularities each share is a projector, and each n_k belongs to one
     level. Near one the law leaves a part of a direction to the levels below, and so it
     does here: H is a continuous function of the law's own projectors.
-
-    Attributes:
-        jacobian: Jacobian of all tasks, level after level, shape (m, nv).
-        L: Cholesky factor of the metric, shape (nv, nv).
-        form: The metric's form.
-        ends: Where each level's rows end in the stack.
-        error: Error e of all tasks, shape (m,).
-        springs: Whether a row is that of a spring, shape (m,).
-        size: The robot's size [m].
-        first: The first level that may deviate: 1 below contacts, else 0.
-        least: Least cost of a level relative to the one above it.
-        thresholds: Singular value of each level below which a direction belongs to it
-            in part, shape (levels,).
-        factors: The law's pseudo-inverse of the stack.
-        projectors: What its levels left, where it went level by level.
-        code: The law's outcome, see `Resolution.code`.
-        alone: Whether it never goes level by level.
-        wide: Scratch, shape (m, nv).
-        square: Scratch, shape (m, m).
-        inner: Scratch, shape (3, nv, max(nv, m)).
-        scratch: Scratch, shape (2, max(nv, m)).
-        N: The directions n_k as rows, shape (nv, nv).
-        kept: How many of the first belong to the first level alone, shape (1,).
-        root: 1/√ρ of each, shape (nv,).
-        costs: t_k and 1/√ρ of each level and of the null space, shape (2, levels + 1).
     """
 
-    jacobian: Array
-    L: Array
-    form: int
-    ends: Indices
-    error: Array
-    springs: Flags
-    size: float
-    first: int
-    least: float
+    jacobian: Array  # Jacobian of all tasks, level after level, shape (m, nv)
+    L: Array  # Cholesky factor of the metric, shape (nv, nv)
+    form: int  # metric's form
+    ends: Indices  # where each level's rows end in the stack
+    error: Array  # error e of all tasks, shape (m,)
+    springs: Flags  # whether a row is that of a spring, shape (m,)
+    size: float  # robot's size [m]
+    first: int  # first level that may deviate: 1 below contacts, else 0
+    least: float  # least cost of a level relative to the one above it
+    # singular value of each level below which a direction belongs to it in part, shape
+    # (levels,)
     thresholds: Array
-    factors: Factors
-    projectors: Projectors
-    code: Indices
-    alone: bool
-    wide: Array
-    square: Array
-    inner: Array
-    scratch: Array
-    N: Array
-    kept: Indices
-    root: Array
+    factors: Factors  # law's pseudo-inverse of the stack
+    projectors: Projectors  # what its levels left, where it went level by level
+    code: Indices  # law's outcome, see `Resolution.code`
+    alone: bool  # whether it never goes level by level
+    wide: Array  # scratch, shape (m, nv)
+    square: Array  # scratch, shape (m, m)
+    inner: Array  # scratch, shape (3, nv, max(nv, m))
+    scratch: Array  # scratch, shape (2, max(nv, m))
+    N: Array  # directions n_k as rows, shape (nv, nv)
+    kept: Indices  # how many of the first belong to the first level alone, shape (1,)
+    root: Array  # 1/√ρ of each, shape (nv,)
+    # t_k and 1/√ρ of each level and of the null space, shape (2, levels + 1)
     costs: Array
 
     @classmethod
@@ -404,13 +382,7 @@ def _project_out(N: Array, x: Array) -> None:
 def write_inverse_root(directions: Directions, first: int, JT: Array) -> int:
     """Write Jᵀ, J Jᵀ = H⁻¹, without the levels before the first that may move.
 
-    Args:
-        directions: The directions, which `write_directions` wrote.
-        first: The first level that may move.
-        JT: Written: Jᵀ, shape (nv, at least nv).
-
-    Returns:
-        The number of its rows.
+    It returns the number of its rows. JT has shape (nv, at least nv).
     """
     N, root, L = directions.N, directions.root, directions.L
     n, rows = N.shape[0], 0

@@ -68,64 +68,42 @@ class Problem(NamedTuple):
 
     The cost couples the first n₁ unknowns; of the others, each has a cost of its own:
     J is block-diagonal.
-
-    Attributes:
-        JT: Jᵀ of the first unknowns, J Jᵀ = H⁻¹, shape (nz, n₁), nz ≤ n₁. What its rows
-            do not span does not move.
-        own: J of the others, 1/√cost of each, shape (n - n₁,).
-        A: Shape (k, n).
-        begin: First non-zero entry of each row of A, shape (k,).
-        end: After the last non-zero entry of each row of A, shape (k,).
-        lower: Lower bounds of the rows and then those of x, shape (k + n,).
-        upper: Upper bounds of the rows and then those of x, shape (k + n,).
-        softness: σ of each constraint, shape (k + n,), zero if it is hard; shape (0,)
-            if all are.
-        equalities: How many of the first rows are equalities, lower = upper.
     """
 
+    # Jᵀ of the first unknowns, J Jᵀ = H⁻¹, shape (nz, n₁), nz ≤ n₁. What its rows do
+    # not span does not move.
     JT: Array
-    own: Array
-    A: Array
-    begin: Indices
-    end: Indices
-    lower: Array
-    upper: Array
+    own: Array  # J of the others, 1/√cost of each, shape (n - n₁,)
+    A: Array  # shape (k, n)
+    begin: Indices  # first non-zero entry of each row of A, shape (k,)
+    end: Indices  # after the last non-zero entry of each row of A, shape (k,)
+    lower: Array  # lower bounds of the rows and then those of x, shape (k + n,)
+    upper: Array  # upper bounds of the rows and then those of x, shape (k + n,)
+    # σ of each constraint, shape (k + n,), zero if it is hard; shape (0,) if all are
     softness: Array
-    equalities: int
+    equalities: int  # how many of the first rows are equalities, lower = upper
 
 
 class Workspace(NamedTuple):
-    """The solver's memory; m is the largest number of active constraints.
+    """The solver's memory; m is the largest number of active constraints."""
 
-    Attributes:
-        held: For each constraint 1 if its lower bound is active, -1 if the upper, else
-            0, shape (k + n,). A warm start begins with what it contains.
-        counts: Number of active constraints and of iterations, shape (2,).
-        active: The active constraints, shape (m,).
-        multipliers: Theirs, in that order, shape (m,): H (x - x0) = Σ multiplier a;
-            positive at lower bounds.
-        origin: x0, shape (n,).
-        rounding: The square of a remainder of Jᵀ a that is rounding, for a of length 1,
-            shape (1,).
-        B: Its active rows, and then that of an entering constraint, shape
-            (m + 1, width).
-        L: Shape (m, m).
-        Q: Shape (m, width).
-        vectors: y, and the remainder of a row of B, shape (2, width).
-        steps: Three vectors of the active constraints, shape (3, m).
-    """
-
+    # for each constraint 1 if its lower bound is active, -1 if the upper, else 0, shape
+    # (k + n,). A warm start begins with what it contains.
     held: Indices
-    counts: Indices
-    active: Indices
+    counts: Indices  # number of active constraints and of iterations, shape (2,)
+    active: Indices  # active constraints, shape (m,)
+    # Theirs, in that order, shape (m,): H (x - x0) = Σ multiplier a; positive at lower
+    # bounds
     multipliers: Array
-    origin: Array
+    origin: Array  # x0, shape (n,)
+    # square of a remainder of Jᵀ a that is rounding, for a of length 1, shape (1,)
     rounding: Array
+    # its active rows, and then that of an entering constraint, shape (m + 1, width)
     B: Array
-    L: Array
-    Q: Array
-    vectors: Array
-    steps: Array
+    L: Array  # shape (m, m)
+    Q: Array  # shape (m, width)
+    vectors: Array  # y, and the remainder of a row of B, shape (2, width)
+    steps: Array  # three vectors of the active constraints, shape (3, m)
 
     @classmethod
     def of(cls, n: int, k: int, soft: bool = False) -> Self:
@@ -156,11 +134,7 @@ def minimise(problem: Problem, warm: bool, x: Array, work: Workspace) -> int:
     that x does not depend on the way there, not even in its last bit: a step is the
     same whether it began with the active constraints of the last one or not.
 
-    Args:
-        problem: The QP.
-        warm: Whether to begin with the active constraints of the last call.
-        x: x0, shape (n,); overwritten.
-        work: Memory; its active constraints, multipliers, counts and y are results.
+    A warm start begins with the active constraints of the last call.
     """
     if not _prepare(problem, warm, x, work):
         return INFEASIBLE
@@ -188,8 +162,7 @@ def minimise(problem: Problem, warm: bool, x: Array, work: Workspace) -> int:
 def _begin(problem: Problem, x: Array, work: Workspace) -> bool:
     """Hold the marked constraints, in their order, and make x their optimum.
 
-    Returns:
-        Whether all could be held: none depends on others, none has the wrong sign.
+    Not all can be held where one depends on others, or has the wrong sign: False.
     """
     count = 0
     work.counts[0] = 0

@@ -19,25 +19,16 @@ _MEMORY = 0.1
 
 
 class Held(NamedTuple):
-    """The memory of a `HeldEffort`, as kernels read it.
+    """The memory of a `HeldEffort`, as kernels read it."""
 
-    Attributes:
-        timing: When the period ends, NaN once that was looked at, and its length [s].
-        expected: The velocity that is expected then, shape (nv,).
-        stray: Differences from it, summed over about `_WINDOW`, shape (nv,).
-        error: The largest error of late, shape (nv,).
-        drift: The mean error of late, shape (nv,).
-        steady: What mean and present error have in common, shape (nv,).
-        disturbance: Acceleration that something else causes, shape (nv,).
-    """
-
+    # when the period ends, NaN once that was looked at, and its length [s]
     timing: Array
-    expected: Array
-    stray: Array
-    error: Array
-    drift: Array
-    steady: Array
-    disturbance: Array
+    expected: Array  # velocity that is expected then, shape (nv,)
+    stray: Array  # differences from it, summed over about `_WINDOW`, shape (nv,)
+    error: Array  # largest error of late, shape (nv,)
+    drift: Array  # mean error of late, shape (nv,)
+    steady: Array  # what mean and present error have in common, shape (nv,)
+    disturbance: Array  # acceleration that something else causes, shape (nv,)
 
 
 class HeldEffort:
@@ -50,21 +41,19 @@ class HeldEffort:
     observed: it is the difference between the speed at the end of a period and what was
     expected. So it includes whatever else the model lacks. A position limit is exceeded
     by an error only while it lasts: by its mean over the bandwidth's square.
-
-    Attributes:
-        error: The largest error of late, shape (nv,) [rad/s² or m/s²].
-        drift: The mean error of late, shape (nv,) [rad/s² or m/s²].
-        steady: What the mean error and that of the last hundredth of a second have in
-            common, shape (nv,) [rad/s² or m/s²]: a force that has ended does not count.
-        disturbance: Acceleration that something else than the effort is known to cause,
-            shape (nv,) [rad/s² or m/s²].
     """
 
     def __init__(self, nv: int) -> None:
         """Begin without an error."""
+        # largest error of late, shape (nv,) [rad/s² or m/s²]
         self.error: Array = np.zeros(nv)
+        # mean error of late, shape (nv,) [rad/s² or m/s²]
         self.drift: Array = np.zeros(nv)
+        # what the mean error and that of the last hundredth of a second have in common,
+        # shape (nv,) [rad/s² or m/s²]: a force that has ended does not count
         self.steady: Array = np.zeros(nv)
+        # acceleration that something else than the effort is known to cause, shape
+        # (nv,) [rad/s² or m/s²]
         self.disturbance: Array = np.zeros(nv)
         self._expected, self._stray = np.zeros(nv), np.zeros(nv)
         self._timing = np.full(2, np.nan)
@@ -132,13 +121,7 @@ def _expect(
 
 @kernel
 def observe(v: Array, held: Held, t: float) -> None:
-    """Add a period to the differences of velocity, and update the largest error.
-
-    Args:
-        v: Velocity, shape (nv,).
-        held: The memory; updated at the end of a period, once.
-        t: Time [s].
-    """
+    """Add a period to the differences of velocity, and update the largest error."""
     timing, expected, stray, error, drift, steady, _ = held
     period = timing[1]
     if not abs(t - timing[0]) < 0.01 * period:
@@ -161,12 +144,7 @@ def effort_window(
 ) -> None:
     """Write the range of the next effort, where the effort's rate is limited.
 
-    Args:
-        sent: The last effort, and then how long it is held [s], shape (nv + 1,).
-        effort: Maximum effort, shape (nv,).
-        rate: Maximum rate of the effort, shape (nv,).
-        lower: Written: lower bound, shape (nv,).
-        upper: Written: upper bound, shape (nv,).
+    Shapes: sent (nv + 1,), see `Actuation`, the others (nv,).
     """
     period = sent[effort.shape[0]]
     for i in range(effort.shape[0]):

@@ -53,12 +53,7 @@ Barriers = Mapping[str, tuple[Array, Array]]
 
 
 class LimitedStep:
-    """The QP of one set of contacts and one stack of tasks, and what relaxes it.
-
-    Attributes:
-        result: Effort, acceleration and forces of the last step.
-        capacity: How many rows of barriers there is room for.
-    """
+    """The QP of one set of contacts and one stack of tasks, and what relaxes it."""
 
     def __init__(
         self,
@@ -74,7 +69,7 @@ class LimitedStep:
         """Allocate."""
         n, p = state.robot.nv, support.size
         held = sum(contact.rows for contact in support.contacts)
-        self.capacity = capacity
+        self.capacity = capacity  # how many rows of barriers there is room for
         counts = [len(base) + len(limited), len(support.cone), capacity]
         ends = np.cumsum([0, *counts, held])
         cones, barriers, contacts, k = map(int, ends[1:])
@@ -114,6 +109,7 @@ class LimitedStep:
             soft_memory=Workspace.of(width, k, soft=True),
         )
         self._x = programmes.x
+        # Effort, acceleration and forces of the last step
         self.result = Result(zeros(n), zeros(n), zeros(p))
         self._wanted = Wanted(state.mass_matrix, zeros(n), zeros(n))
         arguments = (

@@ -48,72 +48,44 @@ the contacts too; or the least violation of the soft rows."""
 
 
 class Wanted(NamedTuple):
-    """What the law wants.
+    """What the law wants."""
 
-    Attributes:
-        mass_matrix: M, shape (nv, nv).
-        acceleration: a, shape (nv,).
-        effort: M a + N and friction, without contact forces, shape (nv,) [N·m or N].
-    """
-
-    mass_matrix: Array
-    acceleration: Array
+    mass_matrix: Array  # M, shape (nv, nv)
+    acceleration: Array  # a, shape (nv,)
+    # M a + N and friction, without contact forces, shape (nv,) [N·m or N]
     effort: Array
 
 
 class Forces(NamedTuple):
-    """The contact forces f that are possible, see `Support`; size 0: none.
+    """The contact forces f that are possible, see `Support`; size 0: none."""
 
-    Attributes:
-        map: F, shape (nv, p).
-        first: The forces nearest to the commanded ones, shape (p,) [N].
-        lower: Lower bounds, shape (p,) [N].
-        upper: Upper bounds, shape (p,) [N].
-        inverse_cost: e, shape (p,): the cost is Σ (f - f_ref)²/e.
-        weight: The robot's weight [N].
-    """
-
-    map: Array
-    first: Array
-    lower: Array
-    upper: Array
-    inverse_cost: Array
-    weight: float
+    map: Array  # F, shape (nv, p)
+    first: Array  # forces nearest to the commanded ones, shape (p,) [N]
+    lower: Array  # lower bounds, shape (p,) [N]
+    upper: Array  # upper bounds, shape (p,) [N]
+    inverse_cost: Array  # e, shape (p,): the cost is Σ (f - f_ref)²/e
+    weight: float  # robot's weight [N]
 
 
 class Places(NamedTuple):
-    """Where the rows are.
+    """Where the rows are."""
 
-    Attributes:
-        dofs: Degrees of freedom of the first rows: those without a motor, then those
-            with a limit on their effort.
-        base: How many have no motor.
-    """
-
+    # degrees of freedom of the first rows: those without a motor, then those with a
+    # limit on their effort
     dofs: Indices
-    base: int
+    base: int  # how many have no motor
 
 
 class Programmes(NamedTuple):
-    """The QPs of a step, on the same rows and unknowns, and their memories.
+    """The QPs of a step, on the same rows and unknowns, and their memories."""
 
-    Attributes:
-        forces: Of the forces alone.
-        nearest: Of deviation and forces, at the law's cost.
-        soft: Of deviation and forces, all at the same cost, with soft rows.
-        x: The unknowns, shape (nv + p,).
-        force_memory: Of the first.
-        memory: Of the second.
-        soft_memory: Of the third.
-    """
-
-    forces: Problem
-    nearest: Problem
-    soft: Problem
-    x: Array
-    force_memory: Workspace
-    memory: Workspace
-    soft_memory: Workspace
+    forces: Problem  # of the forces alone
+    nearest: Problem  # of deviation and forces, at the law's cost
+    soft: Problem  # of deviation and forces, all at the same cost, with soft rows
+    x: Array  # unknowns, shape (nv + p,)
+    force_memory: Workspace  # of the first
+    memory: Workspace  # of the second
+    soft_memory: Workspace  # of the third
 
 
 class Result(NamedTuple):
@@ -135,20 +107,9 @@ def solve_step(
     programmes: Programmes,
     result: Result,
 ) -> int:
-    """Assemble the QP, solve it, and write what is delivered.
+    """Assemble the QP, solve it, and write what is delivered; return a `Status`.
 
-    Args:
-        what: What to find.
-        wanted: What the law wants.
-        forces: The possible contact forces.
-        directions: The directions of the law's levels.
-        bounds: Bounds on acceleration and effort.
-        places: Where the rows are.
-        programmes: The QPs.
-        result: Written.
-
-    Returns:
-        A `Status`, or `UNSOLVED`, and then nothing is written to ``result``.
+    Or `UNSOLVED`, and then nothing is written to ``result``.
     """
     qp, x = programmes, programmes.x
     if what == LEAST_VIOLATION:
@@ -239,11 +200,7 @@ def _write_result(
     x: Array,
     result: Result,
 ) -> bool:
-    """Write efforts, accelerations and forces, without the solver's violations.
-
-    Returns:
-        Whether the efforts are finite.
-    """
+    """Write the result without the solver's violations; return whether it is finite."""
     M, a, effort = wanted
     F, _, f_lower, f_upper, _, weight = forces
     n, p = F.shape

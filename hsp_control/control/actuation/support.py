@@ -31,23 +31,7 @@ weights."""
 
 
 class Support:
-    """Forces f at the points of some contacts, in the axes (tangents, normal) of each.
-
-    Attributes:
-        contacts: The active contacts.
-        size: Length of f: three per point.
-        map: The generalised force of f is ``map @ f``, shape (nv, size).
-        points: Where the points of each contact are in arrays of points.
-        positions: Positions of the points in the world, shape (size/3, 3) [m].
-        cone: Rows with cone f ≥ 0, four per point, shape (4 size/3, size).
-        lower: Lower bounds of the forces, shape (size,) [N].
-        upper: Upper bounds of the forces, shape (size,) [N].
-        supporting_dofs: Degrees of freedom between the root and a contact, whose
-            efforts depend on the forces.
-        inverse_cost: e, shape (size,): the closed form minimises Σ (f - f_ref)²/e.
-        reference: f_ref, shape (size,): the commanded forces, zero where none is.
-        forces: What `minimum_norm_forces` wrote last, shape (size,) [N].
-    """
+    """Forces f at the points of contacts, in the axes (tangents, normal) of each."""
 
     def __init__(
         self, contacts: Sequence[PlannedContact], robot: Robot, weight: float
@@ -57,13 +41,17 @@ class Support:
         self.contacts = tuple(each.contact for each in contacts)
         counts = [len(contact.points) for contact in self.contacts]
         points = sum(counts)
-        self.size = 3 * points
+        self.size = 3 * points  # length of f: three per point
+        # generalised force of f is ``map @ f``, shape (nv, size)
         self.map: Array = np.zeros((nv, self.size))
         self.positions: Array = np.zeros((points, 3))
+        # rows with cone f ≥ 0, four per point, shape (4 size/3, size)
         self.cone: Array = np.zeros((4 * points, self.size))
         self.lower = np.full(self.size, -np.inf)
+        # upper bounds of the forces, shape (size,) [N]
         self.upper = np.full(self.size, np.inf)
         self.lower[2::3] = 0.0
+        # e, shape (size,): the closed form minimises Σ (f - f_ref)²/e
         self.inverse_cost = np.ones(self.size)
         self._weight = weight
         self.supporting_dofs = _supporting_dofs(robot, self.contacts)
@@ -77,6 +65,7 @@ class Support:
                     self.cone[4 * k + row, 3 * k + axis] = sign
                     self.cone[4 * k + row, 3 * k + 2] = contact.side
 
+        # f_ref, shape (size,): the commanded forces, zero where none is
         self.reference = np.zeros(self.size)
         self._scheduled: list[tuple[PlannedContact, slice, Array]] = []
         self._commanded: list[tuple[PlannedContact, CommandedForces, Array]] = []
@@ -92,6 +81,7 @@ class Support:
             if not planned.always:
                 self._scheduled.append((planned, columns, full))
         self._wanted, self._tau = np.zeros(nv), np.zeros(nv)
+        # what `minimum_norm_forces` wrote last, shape (size,) [N]
         self.forces, self._asked = np.zeros(self.size), np.zeros(self.size)
         self._maps = IdentityCache(self._bind_maps)
         self._solve = IdentityCache(self._bind_solve)

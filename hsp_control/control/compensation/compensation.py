@@ -62,12 +62,7 @@ class Compensation(Part, error=CompensationError):
         tasks: Sequence[Task],
         contacts: Sequence[Contact] = (),
     ) -> None:
-        """Check that the compensators fit a robot, its tasks and contacts.
-
-        Raises:
-            CompensationError: Names the compensator, the setting, and what it must be.
-            GainError: If errors would not decay with the integral action.
-        """
+        """Check that the compensators fit a robot, its tasks and contacts."""
         parts = {
             "predictor": self.predictor,
             "momentum_observer": self.momentum_observer,

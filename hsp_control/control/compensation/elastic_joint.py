@@ -17,30 +17,21 @@ from hsp_control.common.arrays import Array
 
 @dataclass(frozen=True)
 class ElasticJoint:
-    """An elastic joint whose model is rigid.
+    """An elastic joint whose model is rigid."""
 
-    Attributes:
-        link: λ, the link's inertia over that of the model [-].
-        motor: μ, the motor's inertia over that of the model [-]; a model that is right
-            but for the spring has λ + μ = 1.
-        stiffness: κ, the spring's stiffness over the model's inertia [1/s²].
-        damping: δ, its damping over the model's inertia [1/s].
-        measured: Where position and velocity are measured.
-    """
-
-    link: float
+    link: float  # λ, the link's inertia over that of the model [-]
+    # μ, the motor's inertia over that of the model [-]; a model that is right but for
+    # the spring has λ + μ = 1
     motor: float
-    stiffness: float
-    damping: float = 0.0
+    stiffness: float  # κ, the spring's stiffness over the model's inertia [1/s²]
+    damping: float = 0.0  # δ, its damping over the model's inertia [1/s]
+    # where position and velocity are measured
     measured: Literal["motor", "link"] = "motor"
 
     def transition(self, period: float) -> tuple[Array, Array]:
         """Return Φ, shape (4, 4), and Γ, shape (4,), of (x, x', θ, θ') over a period.
 
         The acceleration u is held: the state becomes Φ s + Γ u.
-
-        Args:
-            period: The period h [s].
         """
         spring = np.array(
             [-self.stiffness, -self.damping, self.stiffness, self.damping]

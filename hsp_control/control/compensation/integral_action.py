@@ -50,22 +50,11 @@ class IntegralAction(Part, error=CompensationError):
             raise CompensationError("integral action needs a rate [1/s], or ki by task")
 
     def check(self, tasks: Sequence[Task]) -> None:
-        """Check that the gains fit the tasks, and that errors decay.
-
-        Raises:
-            CompensationError: If a task does not exist, or cannot have integral action.
-            GainError: If a gain does not fit its task, or e''' + Kv e'' + Kp e' + Ki e
-                = 0 has a mode that does not decay (for scalars: if Ki ≥ Kv Kp).
-        """
+        """Check that the gains fit the tasks, and that errors decay."""
         self.gains(tasks)
 
     def gains(self, tasks: Sequence[Task]) -> dict[str, Array]:
-        """Return Ki, shape (m, m), of each task that has integral action.
-
-        Raises:
-            CompensationError: As `check` does.
-            GainError: As `check` does.
-        """
+        """Return Ki, shape (m, m), of each task that has integral action."""
         names = [task.name for task in tasks]
         named = [("ki", name) for name in self.ki]
         named += [("tasks", name) for name in self.tasks or ()]
@@ -102,26 +91,19 @@ class IntegralAction(Part, error=CompensationError):
         return gains
 
     def begin(self, controller: Controller) -> "RunningIntegral":
-        """Return the integral action of a controller for one run; it begins at zero.
-
-        Args:
-            controller: The controller, in whose feedback the action is written.
-        """
+        """Return the integral action of a controller for one run; it begins at zero."""
         return RunningIntegral(self, controller)
 
 
 class RunningIntegral:
-    """Integral action in one run: it keeps the integrals.
-
-    Attributes:
-        integrals: ∫e by task, shape (m,) [m·s or rad·s].
-    """
+    """Integral action in one run: it keeps the integrals."""
 
     def __init__(self, declared: IntegralAction, controller: Controller) -> None:
         """Set all integrals to zero."""
         self._limit = np.inf if declared.limit is None else declared.limit
         self._gains = declared.gains(controller.tasks)
         self._feedback = {name: controller.feedback(name) for name in self._gains}
+        # ∫e by task, shape (m,) [m·s or rad·s]
         self.integrals: dict[str, Array] = {
             name: np.zeros(len(Ki)) for name, Ki in self._gains.items()
         }
@@ -129,13 +111,7 @@ class RunningIntegral:
     def advance(
         self, errors: Mapping[str, Array | None], period: float, saturated: bool
     ) -> None:
-        """Integrate the errors over one period, for the next effort.
-
-        Args:
-            errors: e by task, shape (m,); None: the task is not fully active.
-            period: The period [s].
-            saturated: Whether the law was not delivered exactly.
-        """
+        """Integrate the errors over one period, for the next effort."""
         for name, feedback in self._feedback.items():
             integral, e = self.integrals[name], errors.get(name)
             if e is None:

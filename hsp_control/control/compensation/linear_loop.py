@@ -16,29 +16,20 @@ class LinearLoop:
     x is the error of a task, or that of the null space, with Kp = K_N A, Kv = K_N + A
     for a field g of slope -A. The loop includes delays and compensators, in the order
     of `Command`. The robot equals its model, or performs a part of each acceleration.
-
-    Attributes:
-        kp: Kp, shape (m, m) [1/s²].
-        kv: Kv, shape (m, m) [1/s].
-        ki: Ki, shape (m, m) [1/s³].
-        period: h [s].
-        effort_delay: Delay of efforts, in periods.
-        sensor_delay: Delay of measurements, in periods.
-        compensation: The compensators. Those that act on a linear loop are the velocity
-            filter, the predictor and the momentum observer; integral action is ``ki``.
-        share: The part of u that the robot performs: below 1 where it is heavier than
-            its model; a matrix, shape (m, m), where that differs with the direction.
-        joint: The elastic joint that performs u; None: a rigid one.
     """
 
-    kp: Array
-    kv: Array
-    ki: Array
-    period: float
-    effort_delay: int = 0
-    sensor_delay: int = 0
+    kp: Array  # Kp, shape (m, m) [1/s²]
+    kv: Array  # Kv, shape (m, m) [1/s]
+    ki: Array  # Ki, shape (m, m) [1/s³]
+    period: float  # h [s]
+    effort_delay: int = 0  # delay of efforts, in periods
+    sensor_delay: int = 0  # delay of measurements, in periods
+    # what counts: velocity filter, predictor, momentum observer; integral action is ki
     compensation: Compensation = field(default_factory=Compensation)
+    # part of u that the robot performs: below 1 where it is heavier than its model; a
+    # matrix, shape (m, m), where that differs with the direction
     share: float | Array = 1.0
+    # elastic joint that performs u; None: a rigid one
     joint: ElasticJoint | None = None
 
     def transition(self) -> Array:

@@ -31,17 +31,13 @@ from hsp_control.robot import Robot, RobotState
 
 
 class LoadedLoop(NamedTuple):
-    """The loop of a whole robot, for any part of its difference from the model.
+    """The loop of a whole robot, for any part of its difference from the model."""
 
-    Attributes:
-        loop: The loop of a robot that equals its model.
-        difference: M̃ - M in the loop's coordinates, relative to M: T M⁻¹ (M̃ - M) T⁻¹.
-        heavier: How many times as heavy as its model the robot is at the tasks, in the
-            heaviest direction: 1/β with the smallest eigenvalue β of J M̃⁻¹ M J#.
-    """
-
-    loop: LinearLoop
+    loop: LinearLoop  # loop of a robot that equals its model
+    # M̃ - M in the loop's coordinates, relative to M: T M⁻¹ (M̃ - M) T⁻¹
     difference: Array
+    # how many times as heavy as its model the robot is at the tasks, in the heaviest
+    # direction: 1/β with the smallest eigenvalue β of J M̃⁻¹ M J#
     heavier: float
 
     def largest_part(self, wanted: float) -> float:

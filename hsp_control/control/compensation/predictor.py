@@ -40,11 +40,7 @@ class Predictor(Part, error=CompensationError):
         return self.effort_delay + self.sensor_delay
 
     def check(self, robot: Robot) -> None:
-        """Check that the efforts alone determine the robot's motion.
-
-        Raises:
-            CompensationError: If the robot has a free-flyer root.
-        """
+        """Check that the efforts alone determine the robot's motion."""
         check_fixed_base(robot)
 
     def begin(self, robot: Robot) -> "RunningPredictor":
@@ -69,14 +65,7 @@ class RunningPredictor:
     def predict(
         self, q: Array, v: Array, efforts: Iterable[Array], period: float
     ) -> tuple[Array, Array]:
-        """Return (q, v) after the efforts have acted, each for one period.
-
-        Args:
-            q: Configuration as measured, shape (nq,).
-            v: Velocity as measured, shape (nv,).
-            efforts: The efforts on the model in order of time, shape (nv,) each.
-            period: How long each effort acts [s].
-        """
+        """Return (q, v) after the efforts on the model, in order, each for one period."""
         if period != self._period:
             self._period = period
             self._advance = Rk4(period).begin(self._robot, self._bind)

@@ -175,16 +175,11 @@ def _findings_of(
 
 
 class _Speed(NamedTuple):
-    """How fast a loop is to be, and what makes it slower.
+    """How fast a loop is to be, and what makes it slower."""
 
-    Attributes:
-        what: The setting that decides.
-        rate: Its rate [1/s].
-        at_most: Which settings make the rate another one: a function of this [1/s].
-    """
-
-    what: str
-    rate: float
+    what: str  # setting that decides
+    rate: float  # its rate [1/s]
+    # which settings make the rate another one: a function of this [1/s]
     at_most: Callable[[float], str]
 
 

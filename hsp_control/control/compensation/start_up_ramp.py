@@ -26,11 +26,7 @@ class StartUpRamp(Part, error=CompensationError):
     pure gravity compensation."""
 
     def check(self, robot: Robot) -> None:
-        """Check that the motors alone can hold the robot still.
-
-        Raises:
-            CompensationError: If the robot has a free-flyer root.
-        """
+        """Check that the motors alone can hold the robot still."""
         check_fixed_base(robot)
 
     def begin(self, state: RobotState) -> "RunningRamp":
