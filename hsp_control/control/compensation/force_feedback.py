@@ -90,7 +90,7 @@ class RunningForceFeedback:
             controller.force_offset(name)[0] = 0.0
 
     def measure(self, wrenches: Mapping[str, Array], pressed: bool) -> None:
-        """Read the wrenches of sensors by frame; none counts before an effort has acted."""
+        """Read the sensors' wrenches by frame; none counts before an effort acted."""
         for contact in self._fed:
             if contact.frame not in wrenches:
                 with within("compensation", "force_feedback", "force"):

@@ -82,7 +82,7 @@ class RunningObserver:
         self._drift: Array = np.zeros(len(clip))
 
     def update(self, state: RobotState, tau: Array, period: float) -> Array:
-        """Return r, from now's state and the effort on the model in the period that ends."""
+        """Return r; ``tau`` is the effort on the model in the period that ends."""
         momentum, drift = state.mass_matrix @ state.v, _drift(state)
         if self._momentum is not None:
             mean = 0.5 * (drift + self._drift)

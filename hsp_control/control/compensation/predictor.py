@@ -65,7 +65,7 @@ class RunningPredictor:
     def predict(
         self, q: Array, v: Array, efforts: Iterable[Array], period: float
     ) -> tuple[Array, Array]:
-        """Return (q, v) after the efforts on the model, in order, each for one period."""
+        """Return (q, v) after the efforts on the model, each for one period."""
         if period != self._period:
             self._period = period
             self._advance = Rk4(period).begin(self._robot, self._bind)

@@ -36,7 +36,7 @@ class VelocityFilter(Part, error=CompensationError):
     def step(
         self, v: Array, past: tuple[Array, ...], period: float
     ) -> tuple[Array, tuple[Array, ...]]:
-        """Return the output for an input of any shape, and ``past`` for the next step."""
+        """Return the output for an input, and ``past`` for the next step."""
         b, a = self.coefficients(period)
         in1, in2, out1, out2 = past
         out = b[0] * v + b[1] * in1 + b[2] * in2 - a[0] * out1 - a[1] * out2
