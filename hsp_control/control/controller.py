@@ -18,21 +18,19 @@ from hsp_control.common.exceptions import (
 from hsp_control.common.identity_cache import IdentityCache
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits, RobotLimits
-from hsp_control.control.active_stack import ActiveStack
+from hsp_control.control.active_stack import ActiveStack, flow_of, raise_not_finite
 from hsp_control.control.actuation import Actuation
 from hsp_control.control.actuation.actuation import CODES, FLAGS
 from hsp_control.control.actuation.status import EXACT, RELAXED
 from hsp_control.control.changes import Change, Changes
 from hsp_control.control.composition import Base, priority_of
 from hsp_control.control.declared import Declared
-from hsp_control.control.explanation import flow_of, raise_not_finite
 from hsp_control.control.first_state import check_angles, warn_of_jump
 from hsp_control.control.gains_in_force import GainsInForce
+from hsp_control.control.guards import StepLock, read_only
 from hsp_control.control.held_gains import check_held
 from hsp_control.control.mixture import AccelerationModifier, Mixture
 from hsp_control.control.output import ControlOutput, Diagnostics
-from hsp_control.control.read_only import read_only
-from hsp_control.control.step_lock import StepLock
 from hsp_control.control.time_line import TimeLine
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.start import Start

@@ -9,8 +9,7 @@ from pydantic import AfterValidator
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import EstimationError
 from hsp_control.control.controller import Controller
-from hsp_control.control.log_channel import LogChannel
-from hsp_control.control.measurement import Inertial, Measurement
+from hsp_control.control.measurement import Inertial, LogChannel, Measurement
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.by_type import ByType
 

@@ -110,7 +110,7 @@ angular momentum: the error grows | angular_momentum
 gains: Kv is not ramped
 -self.feedback[each.key].numbers[:] = numbers
 +self.feedback[each.key].numbers[0] = numbers[0]
-@ control/stiffening.py | integration/test_compliance.py
+@ control/gains_in_force.py | integration/test_compliance.py
 impedance: a change waits for nothing | adds_no_energy
   return np.asarray(now + given / needed * step) => return np.asarray(now + step)
 @ control/held_gains.py | integration/test_compliance.py
@@ -314,7 +314,7 @@ limits: rows of a spectrum as directions | levels_share
   return bool(found) => return True
 limits: a damped level shares nothing | levels_share
   own * (free / own) ** (lost * lost) => own
-@ control/actuation/step_qp.py | unit/control/test_limited_step.py
+@ control/actuation/limited_step.py | unit/control/test_limited_step.py
 limited step: contacts may move | optimum
   1 if contacts_held else 0 => 0
 @ control/actuation/dual_active_set.py | unit/control/test_dual_active_set.py
@@ -325,10 +325,10 @@ QP: a multiplier of the wrong sign stays | any_warm_start
 friction cone with 2μ | friction_cone
 -return self.friction / float(np.sqrt(2.0))
 +return 2.0 * self.friction / float(np.sqrt(2.0))
-@ control/actuation/contact_forces.py | unit/control/test_commanded_forces.py
+@ control/actuation/support.py | unit/control/test_commanded_forces.py
 commanded force: nothing balances it | closed_form
   w[i] -= A[i, k] * reference[k] => w[i] -= 0.0 * A[i, k] * reference[k]
-@ control/actuation/commanded_forces.py | unit/control/test_commanded_forces.py
+@ control/actuation/support.py | unit/control/test_commanded_forces.py
 commanded force: friction along the motion | sliding_point
   out[:2] = -contact.friction => out[:2] = contact.friction
 @ control/compensation/force_feedback.py | unit/control/test_force_feedback.py
@@ -587,7 +587,7 @@ live: the robot accepts any rate | beyond_its_limits
 @ simulation/journal.py | unit/live/test_live_journal.py
 journal: a frame that Ctrl-C cuts stays | ctrl_c
   os.ftruncate(self._file, self._size) => os.fsync(self._file)
-@ control/compensation/loaded_loop.py | unit/control/test_loaded_loop.py
+@ control/compensation/linear_loop.py | unit/control/test_loaded_loop.py
 rate check: the load couples nothing | grows_and_decays
 -np.linalg.inv(one + s * self.difference)
 +np.diag(np.diag(np.linalg.inv(one + s * self.difference)))

@@ -7,7 +7,7 @@ Minimise ½ δᵀH δ over a = a* + δ, with a* the law's acceleration and
 in whitened coordinates, N_k the directions of the tasks of level k in the null space of
 those above, and ρ_N the cost of motion in the null space of all tasks. So the null
 space deviates first, then the tasks, the lowest priority first. The constraints are
-affine in δ and the contact forces, see `step_qp`.
+affine in δ and the contact forces, see `limited_step`.
 
 If a* violates no constraint it is the optimum, and no QP is solved. ``docs/law.md``,
 Contacts and floating bases, and Limits.

@@ -17,6 +17,7 @@ from itertools import islice
 import numpy as np
 
 from hsp_control.common.arrays import Array
+from hsp_control.common.linalg import cholesky
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation.status import Status
 from hsp_control.control.compensation.compensation import Compensation
@@ -26,13 +27,17 @@ from hsp_control.control.compensation.integral_action import RunningIntegral
 from hsp_control.control.compensation.momentum_observer import RunningObserver
 from hsp_control.control.compensation.predictor import Predictor, RunningPredictor
 from hsp_control.control.compensation.start_up_ramp import RunningRamp
-from hsp_control.control.compensation.task_wrench import task_wrench
 from hsp_control.control.compensation.velocity_filter import RunningFilter
 from hsp_control.control.controller import Controller
-from hsp_control.control.log_channel import LogChannel
-from hsp_control.control.measurement import NO_WRENCHES
+from hsp_control.control.measurement import NO_WRENCHES, LogChannel
 from hsp_control.control.output import ControlOutput
+from hsp_control.law import VARYING
+from hsp_control.law.pseudo_inverse import (
+    apply_pseudo_inverse_transpose,
+    weighted_pseudo_inverse,
+)
 from hsp_control.robot import RobotState
+from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import CompliantTask
 
 
@@ -321,3 +326,23 @@ class Command:
             if controller.weight_of(name, t) >= 1.0:
                 errors[name] = output.task.error[rows]
         integral.advance(errors, period, saturated)
+
+
+def task_wrench(
+    task: Task, state: RobotState, disturbance: Array, threshold: float
+) -> Array:
+    """Return f = Λ J M⁻¹ r = J̄ᵀ r, shape (m,): the force at the rows of a task.
+
+    If r = Jᵀf then this is f. Whatever else r is, f is the force that moves the task as
+    r does. J̄ = M⁻¹JᵀΛ is bounded near singularities as the law's own pseudo-inverse is:
+    a force along a lost direction, which the joints do not feel, is taken for zero.
+    """
+    J = task.evaluate(state, feedback=task.feedback()).jacobian
+    m, nv = J.shape
+    L, B, Q = np.zeros((nv, nv)), np.zeros((m, nv)), np.zeros((m, nv))
+    X, part, force = np.zeros((m, m)), np.zeros(m), np.zeros(m)
+    if not cholesky(state.mass_matrix, L):
+        return np.full(m, np.nan)
+    weighted_pseudo_inverse(J, L, VARYING, threshold, B, Q, X)
+    apply_pseudo_inverse_transpose(Q, X, L, VARYING, disturbance.copy(), part, force)
+    return force

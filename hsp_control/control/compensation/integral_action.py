@@ -1,6 +1,6 @@
 """Integral action: e'' + Kv e' + Kp e + Ki ∫e = 0."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY
 from typing import Annotated
 
@@ -10,13 +10,45 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError, GainError
 from hsp_control.common.suggestions import did_you_mean, listing
-from hsp_control.control.compensation.gains_by_task import GainsByTask
 from hsp_control.control.controller import Controller
 from hsp_control.declaration import Part, within
+from hsp_control.declaration.equality import same
 from hsp_control.declaration.quantities import ArrayField, Gain, Names, Positive
 from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.gains import as_gain, as_matrix
+
+
+class GainsByTask(Mapping[str, Array]):
+    """Gains by task name; they never change."""
+
+    def __init__(self, gains: Mapping[str, Array] | None = None) -> None:
+        """Copy the mapping, not its arrays, which are read-only."""
+        self._gains = dict(gains or {})
+
+    def __getitem__(self, task: str) -> Array:
+        return self._gains[task]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._gains)
+
+    def __len__(self) -> int:
+        return len(self._gains)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Mapping) and same(self._gains, dict(other))
+
+    def __hash__(self) -> int:
+        gains = self._gains.items()
+        return hash(frozenset((k, g.shape, (g + 0.0).tobytes()) for k, g in gains))
+
+    def __repr__(self) -> str:
+        return repr({k: np.asarray(g).tolist() for k, g in self._gains.items()})
+
+    def __setstate__(self, state: dict[str, dict[str, Array]]) -> None:
+        for gain in state["_gains"].values():
+            gain.setflags(write=False)  # pickle forgets it
+        vars(self).update(state)
 
 
 class IntegralAction(Part, error=CompensationError):

@@ -14,9 +14,12 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError, UnstableRateError
 from hsp_control.control.compensation.compensation import Compensation
-from hsp_control.control.compensation.linear_loop import LinearLoop
-from hsp_control.control.compensation.loaded_loop import LoadedLoop, loaded_loop
-from hsp_control.control.compensation.null_space_rates import null_space_rates
+from hsp_control.control.compensation.linear_loop import (
+    LinearLoop,
+    LoadedLoop,
+    loaded_loop,
+    null_space_rates,
+)
 from hsp_control.control.controller import Controller
 from hsp_control.control.held_gains import rounded_down
 from hsp_control.declaration import within
