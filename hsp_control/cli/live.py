@@ -14,11 +14,7 @@ from rich.table import Table
 
 from hsp_control.cli.consoles import out
 from hsp_control.cli.limit_rows import excess_rows
-from hsp_control.cli.live_experiment import (
-    check_live,
-    live_period,
-    simulated_robot,
-)
+from hsp_control.cli.live_experiment import check_live, live_period, simulated_robot
 from hsp_control.cli.loading import read
 from hsp_control.cli.robot_process import RobotProcess
 from hsp_control.cli.robot_start import begun_where_it_is

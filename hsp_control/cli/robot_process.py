@@ -11,11 +11,7 @@ from select import select
 from time import monotonic
 from typing import Any, Self
 
-from hsp_control.cli.live_experiment import (
-    check_live,
-    live_period,
-    simulated_robot,
-)
+from hsp_control.cli.live_experiment import check_live, live_period, simulated_robot
 from hsp_control.common.exceptions import HardwareError
 from hsp_control.config import Experiment
 from hsp_control.config.streams import without_sources

@@ -187,13 +187,41 @@ class ActiveStack:
         """The call that returns the field's value at the state; see `bind_value`."""
         return self._field.bind_value(self._state)
 
-    def not_finite(self) -> str | None:
-        """Return the first task or contact whose sample contains NaN or inf, if any."""
+    def flow(self) -> Array:
+        """Return J# x_d' + P g, shape (nv,), where it was resolved, at rest."""
+        law, state = self.resolution, self._state
+        # At rest, without drift and with unit gain the law's acceleration is the flow.
+        nv, form = state.robot.nv, min(self._metric.form, CONSTANT)
+        sizes = np.diff(law.ends, prepend=0).tolist()
+        flow = Resolution(sizes, nv, form, np.eye(nv), law.threshold)
+        flow.problem.task.jacobian[:] = self.rows.jacobian
+        for level in self.levels:
+            for task in level:
+                rate = task.reference_rate(state)
+                flow.problem.task.acceleration[self.task_rows[task.name]] = rate
+        flow.problem.field.g[:] = law.problem.field.g
+        flow.problem.metric.W[:], flow.problem.metric.L[:] = law.problem.metric[:2]
+        return flow.resolve(state.v).acceleration
+
+    def raise_not_finite(self) -> NoReturn:
+        """Say what made a step's effort NaN or infinite."""
+        state, problem = self._state, self.resolution.problem
         for part, sample in self._parts:
             if not all(np.isfinite(array).all() for array in sample):
                 kind = "task" if isinstance(part, Task) else "contact"
-                return f"{kind} {part.name!r}"
-        return None
+                raise NonFiniteError(
+                    f"{kind} {part.name!r} is not finite at t = {state.t:.6g} s; "
+                    "does its trajectory return NaN or infinity there?"
+                )
+        if not all(np.isfinite(array).all() for array in problem.field):
+            raise NonFiniteError(
+                f"field {self._field.name!r} is not finite at t = {state.t:.6g} s"
+            )
+        self._metric.evaluate(state, problem.metric)  # may say what is wrong
+        raise NonFiniteError(
+            f"the effort is not finite at t = {state.t:.6g} s, "
+            f"q = {state.q.tolist()}, v = {state.v.tolist()}"
+        )
 
 
 def _places(parts: Sequence[Task] | Sequence[Contact], start: int) -> dict[str, slice]:
@@ -218,48 +246,3 @@ def _asked(feedback: Feedback, sample: TaskSample, asked: Array) -> StepPlan:
     rest = np.zeros_like(asked)  # what damps is not lost, however fast the robot moves
     call = bind(write_asked, feedback, sample.error, rest, asked)
     return StepPlan(write=(call,))
-
-
-def flow_of(
-    active: ActiveStack, state: RobotState, metric: Metric, threshold: float
-) -> Array:
-    """Return J# x_d' + P g, shape (nv,), of a stack resolved at a state at rest."""
-    problem, nv = active.resolution.problem, state.robot.nv
-    # At rest, without drift and with unit gain the law's acceleration is the flow.
-    flow = Resolution(
-        np.diff(active.resolution.ends, prepend=0).tolist(),
-        nv,
-        min(metric.form, CONSTANT),
-        np.eye(nv),
-        threshold,
-    )
-    flow.problem.task.jacobian[:] = active.rows.jacobian
-    for level in active.levels:
-        for task in level:
-            rate = task.reference_rate(state)
-            flow.problem.task.acceleration[active.task_rows[task.name]] = rate
-    flow.problem.field.g[:] = problem.field.g
-    flow.problem.metric.W[:], flow.problem.metric.L[:] = problem.metric[:2]
-    return flow.resolve(state.v).acceleration
-
-
-def raise_not_finite(
-    active: ActiveStack, state: RobotState, field: NullSpaceField, metric: Metric
-) -> NoReturn:
-    """Say what made a step's effort NaN or infinite."""
-    part = active.not_finite()
-    if part is not None:
-        raise NonFiniteError(
-            f"{part} is not finite at t = {state.t:.6g} s; "
-            "does its trajectory return NaN or infinity there?"
-        )
-    problem = active.resolution.problem
-    if not all(np.isfinite(array).all() for array in problem.field):
-        raise NonFiniteError(
-            f"field {field.name!r} is not finite at t = {state.t:.6g} s"
-        )
-    metric.evaluate(state, problem.metric)  # may say what is wrong
-    raise NonFiniteError(
-        f"the effort is not finite at t = {state.t:.6g} s, "
-        f"q = {state.q.tolist()}, v = {state.v.tolist()}"
-    )

@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import replace
 from math import isfinite
-from typing import TYPE_CHECKING, Any, NoReturn, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,7 +18,7 @@ from hsp_control.common.exceptions import (
 from hsp_control.common.identity_cache import IdentityCache
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits, RobotLimits
-from hsp_control.control.active_stack import ActiveStack, flow_of, raise_not_finite
+from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation import Actuation
 from hsp_control.control.actuation.actuation import CODES, FLAGS
 from hsp_control.control.actuation.status import EXACT, RELAXED
@@ -201,7 +201,7 @@ class Controller:
         if whole is not None:  # nothing changes
             active, _, _ = whole
             if active.resolve(t) is NOT_FINITE:
-                self._raise_not_finite()
+                self.active_stack.raise_not_finite()
             return active.damped
         if not self._begun:
             self._begin()
@@ -214,7 +214,7 @@ class Controller:
             self._actuation.update_limits(t)
         mixture = self._mixture
         if mixture.resolve(t) is NOT_FINITE:
-            self._raise_not_finite()
+            self.active_stack.raise_not_finite()
         if mixture.steady:
             self._bind()
         return mixture.damped
@@ -297,7 +297,7 @@ class Controller:
                 if value != 0.0:
                     code, violated = divmod(int(value), CODES)
                     if code == BEYOND_ANY_LEVEL:
-                        self._raise_not_finite()
+                        self.active_stack.raise_not_finite()
                     if code:
                         damped = active.damped
                     direct = direct and not violated
@@ -315,7 +315,7 @@ class Controller:
                 if (status is RELAXED or modifier is not None) and not isfinite(
                     tau @ tau
                 ):
-                    self._raise_not_finite()
+                    self.active_stack.raise_not_finite()
             # Not on the controller itself: its own attributes cost 0.4 µs to set.
             self._actuation.delivered = a
             # By name, and without a call of nine arguments, which costs 1 µs.
@@ -700,12 +700,7 @@ class Controller:
         start with this velocity has no transient.
         """
         self.compute(t, q, np.zeros(self.robot.nv))
-        return flow_of(
-            self.active_stack, self._state, self.metric, self.singularity_threshold
-        )
-
-    def _raise_not_finite(self) -> NoReturn:
-        raise_not_finite(self.active_stack, self._state, self.field, self.metric)
+        return self.active_stack.flow()
 
     def __setattr__(self, name: str, value: object) -> None:
         if not name.startswith("_") and not hasattr(type(self), name):

@@ -28,11 +28,7 @@ from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields import NullSpaceField, Rest
 from hsp_control.null_space.fields.field import terms_of
-from hsp_control.null_space.metrics import (
-    IdentityMetric,
-    MassMatrixMetric,
-    Metric,
-)
+from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric, Metric
 from hsp_control.robot import Robot
 from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
