@@ -4,7 +4,7 @@ import argparse
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
-from hsp_control.cli.compiling import compiling_told
+from hsp_control.cli.consoles import compiling_told
 from hsp_control.common.exceptions import HspControlError, ViewerError
 from hsp_control.config.loaded_scenario import LoadedScenario
 from hsp_control.config.view_settings import ViewSettings
