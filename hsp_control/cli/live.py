@@ -37,9 +37,9 @@ from hsp_control.live import (
     publish,
     run_loop,
 )
-from hsp_control.live.adapting import AdaptingHardware, LocatedHardware
-from hsp_control.live.deadlines import Quantiles
-from hsp_control.live.stop_signals import stop_signals
+from hsp_control.live.hardware import AdaptingHardware, LocatedHardware
+from hsp_control.live.operator_requests import stop_signals
+from hsp_control.live.report import Quantiles
 from hsp_control.simulation import Rollout
 
 _DRY_RUN = 0.5

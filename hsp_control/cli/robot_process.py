@@ -15,9 +15,8 @@ from hsp_control.cli.live_experiment import check_live, live_period, simulated_r
 from hsp_control.common.exceptions import HardwareError
 from hsp_control.config import Experiment
 from hsp_control.config.streams import without_sources
-from hsp_control.live.faults import Faults
-from hsp_control.live.sensor_layout import SensorLayout
-from hsp_control.live.udp_hardware import UdpHardware
+from hsp_control.live.link import Faults
+from hsp_control.live.udp import SensorLayout, UdpHardware
 
 
 class RobotProcess:

@@ -22,13 +22,12 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.config import Experiment, load_experiment
 from hsp_control.control.output import ControlOutput
-from hsp_control.live.faults import Faults
-from hsp_control.live.link import Link
+from hsp_control.live.link import Faults, Link
 from hsp_control.live.live_log import LiveLog, Row, live_channels
 from hsp_control.live.packets import Kind
 from hsp_control.live.settings import LiveSettings
 from hsp_control.live.simulated_robot import SimulatedRobot
-from hsp_control.live.udp_robot import CLOSED_BY_LOOP, serve
+from hsp_control.live.udp import CLOSED_BY_LOOP, serve
 from hsp_control.robot import RobotState
 from hsp_control.simulation.limit_excess import LimitExcess
 from hsp_control.simulation.plants import differing_bodies

@@ -7,9 +7,9 @@ from typing import Protocol
 from hsp_control.common.entry_points import entry_points
 from hsp_control.common.exceptions import LiveError
 from hsp_control.common.suggestions import did_you_mean, listing
-from hsp_control.live.effort_source import EffortSource
 from hsp_control.live.hardware import Hardware
 from hsp_control.robot import Robot
+from hsp_control.simulation.control_chain import EffortSource
 
 
 class Connect(Protocol):

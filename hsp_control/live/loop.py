@@ -1,35 +1,37 @@
 """Run a live loop: check, compile and allocate, then control the robot."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from itertools import islice
+from math import inf
 from pathlib import Path
 from time import monotonic
 from typing import Any
 
 import numpy as np
 
-from hsp_control.common.exceptions import LiveError
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import HspControlError, LiveError
+from hsp_control.control.compensation import Command
 from hsp_control.control.controller import Controller
 from hsp_control.control.estimator import Estimator
 from hsp_control.control.first_state import warn_of_slow_efforts
 from hsp_control.control.plan import Plan
+from hsp_control.declaration.nested import parts_within
 from hsp_control.geometry.scene import Scene
-from hsp_control.live.balance import balance_of
-from hsp_control.live.bearing_feet import BearingFeet
+from hsp_control.live.bearing_feet import BearingFeet, balance_of
 from hsp_control.live.effort_limiter import EffortLimiter
-from hsp_control.live.effort_source import EffortSource, as_effort_source
 from hsp_control.live.hardware import Hardware
 from hsp_control.live.live_log import LoopLog
 from hsp_control.live.one_run import OneRun
-from hsp_control.live.operator_requests import OperatorRequests
+from hsp_control.live.operator_requests import OperatorRequests, stop_signals
 from hsp_control.live.real_time import no_garbage_collection, real_time_priority
-from hsp_control.live.rehearsal import rehearse
 from hsp_control.live.report import LoopReport
 from hsp_control.live.safe_stop import SafeStop
 from hsp_control.live.settings import LiveSettings, check_held
 from hsp_control.live.state_reader import StateReader
-from hsp_control.live.stop_signals import stop_signals
-from hsp_control.simulation.control_chain import ControlChain
+from hsp_control.simulation.control_chain import ControlChain, EffortSource
+from hsp_control.trajectories.schedule import Schedule
 
 _WARM_UP = 20
 """Steps before real-time operation: they compile kernels and touch all memory."""
@@ -97,9 +99,10 @@ def run_loop(
         HspControlError: If the controller, the plan or an estimator raises at the first
             state: what it needs may not be measured.
     """
-    effort_source, settings = as_effort_source(controller), settings or LiveSettings()
-    chain = ControlChain(effort_source, plan, estimators)
-    controller = effort_source.controller
+    source = Command(controller) if isinstance(controller, Controller) else controller
+    settings = settings or LiveSettings()
+    chain = ControlChain(source, plan, estimators)
+    controller = source.controller
     robot, period = controller.robot, hardware.period
     requests = requests or OperatorRequests()
     with stop_signals(requests):
@@ -161,3 +164,39 @@ def _check(period: float, duration: float | None, log_period: float) -> None:
         raise LiveError(
             f"log_period is {log_period:g} s; must be a period, {period:g} s, or longer"
         )
+
+
+_MOST = 200
+"""Most instants that are rehearsed: a schedule may repeat itself for hours."""
+
+
+def rehearse(
+    controller: Controller, start: float, end: float, q: Array, v: Array
+) -> None:
+    """Evaluate a copy of a controller wherever its tasks or contacts change.
+
+    Their native calls are compiled then, not in the loop: a robot waits no seconds.
+    """
+    times = sorted({t for t in _instants(controller) if start < t <= end and t < inf})
+    if not times:
+        return
+    preview = controller.preview()
+    for t in islice(times, _MOST):
+        with suppress(HspControlError):  # the robot will be elsewhere then
+            preview.compute(t, q, v)
+
+
+def _instants(controller: Controller) -> Iterator[float]:
+    """Yield when sets of tasks and contacts begin: amid ramps, and after them [s]."""
+    declared = controller.tasks, controller.contacts, controller.changes
+    for schedule in parts_within(declared, Schedule):
+        for begin, end in schedule.windows:
+            yield begin
+            yield begin + 0.5 * schedule.ramp
+            yield begin + schedule.ramp
+            yield end - 0.5 * schedule.ramp
+            yield end
+    for change in controller.changes:
+        yield change.at
+        yield change.at + 0.5 * change.ramp
+        yield change.end

@@ -6,7 +6,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FallError
-from hsp_control.live.balance import Balance
+from hsp_control.live.bearing_feet import Balance
 from hsp_control.live.effort_limiter import EffortLimiter
 from hsp_control.live.hardware import Hardware, described
 from hsp_control.live.live_log import LoopLog

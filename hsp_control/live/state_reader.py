@@ -5,7 +5,6 @@ from collections.abc import Callable
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HardwareError
 from hsp_control.constraints.limits import RobotLimits
-from hsp_control.live.deadlines import Deadlines
 from hsp_control.live.hardware import Hardware, Measurement, described
 from hsp_control.live.measurement_checks import (
     DeadReckoning,
@@ -13,6 +12,7 @@ from hsp_control.live.measurement_checks import (
     MeasurementMonitor,
     valid_measurement,
 )
+from hsp_control.live.report import Deadlines
 from hsp_control.live.settings import LiveSettings
 from hsp_control.robot import Robot, RobotState
 

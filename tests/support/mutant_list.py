@@ -615,11 +615,11 @@ feet: a foot pulls | not_pressed
 @ live/link.py | unit/live/test_live_udp.py
 link: the window of ages never moves on | age_is
   self._end = arrival + self._window => self._end = np.inf
-@ live/faults.py | unit/live/test_live_udp.py
+@ live/link.py | unit/live/test_live_udp.py
 faults: late packets come a packet early | each_fault
 -for left, late in self._waiting if left <= 1]
 +for left, late in self._waiting if left <= 2]
-@ live/sensor_layout.py | unit/live/test_live_on_feet.py
+@ live/udp.py | unit/live/test_live_on_feet.py
 sensors: wrenches in the order of names | comes_back
 -Inertial(self.inertial, rest[-3], rest[-2])
 +Inertial(self.inertial, rest[-2], rest[-3])

@@ -10,7 +10,7 @@ from hsp_control import Robot, Rollout, load_experiment
 from hsp_control.cli import main
 from hsp_control.cli.live_experiment import simulated_robot
 from hsp_control.live import InProcessRobot, backends
-from hsp_control.live.adapting import AdaptingHardware, LocatedHardware
+from hsp_control.live.hardware import AdaptingHardware, LocatedHardware
 
 AWAY = 0.1
 

@@ -31,7 +31,7 @@ from hsp_control.live import (
 )
 from hsp_control.live.bearing_feet import BearingFeet
 from hsp_control.live.measurement_checks import DeadReckoning, valid_measurement
-from hsp_control.live.sensor_layout import SensorLayout
+from hsp_control.live.udp import SensorLayout
 
 pytest.importorskip("example_robot_data")
 pytest.importorskip("mujoco")
