@@ -32,7 +32,7 @@ from hsp_control.simulation.measures import measures
 from hsp_control.simulation.recorder import Recorder
 
 if TYPE_CHECKING:
-    from hsp_control.cli.screen import Screen
+    from hsp_control.cli.pages import Screen
 
 
 def run(options: argparse.Namespace) -> int:
@@ -43,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
     tell = _tell_json if options.json else _tell
     if not options.view:
         return _run_and_save(_built(loaded), log, tell, None)
-    from hsp_control.cli.screen import Screen
+    from hsp_control.cli.pages import Screen
 
     said = _errors if options.json else _out
     with Screen.open(loaded, options, lambda url: said.print(f"View: {url}")) as screen:
@@ -135,7 +135,7 @@ def _saved_elsewhere(rollout: Rollout, log: Path, error: LogError) -> Path:
 
 def view(options: argparse.Namespace) -> int:
     """Show logs in the browser."""
-    from hsp_control.cli.screen import show_logs
+    from hsp_control.cli.pages import show_logs
 
     show_logs(options)
     return 0

@@ -18,7 +18,7 @@ from time import monotonic, sleep
 from typing import Any
 
 from hsp_control.cli.consoles import compiling_told
-from hsp_control.cli.opening_page import draw_before, draw_empty, status_line
+from hsp_control.cli.pages import draw_before, draw_empty, status_line
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.config import load_experiment
 from hsp_control.config.document import Document

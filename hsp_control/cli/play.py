@@ -8,7 +8,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from types import FrameType
 
 from hsp_control.cli.consoles import out
-from hsp_control.cli.opening_page import (
+from hsp_control.cli.pages import (
     OpeningPage,
     draw_before,
     draw_empty,

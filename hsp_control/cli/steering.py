@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, Self
 
 from hsp_control.cli.consoles import out
 from hsp_control.cli.live_experiment import live_period
-from hsp_control.cli.opening_page import OpeningPage
+from hsp_control.cli.pages import OpeningPage
 from hsp_control.common.exceptions import ViewerError
 from hsp_control.config import Experiment, Scenario
 from hsp_control.config.streams import without_sources

@@ -12,10 +12,16 @@ from hsp_control.common.exceptions import ContactError, ControllerError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.constraints.contacts import CommandedForce
 from hsp_control.constraints.limits import LimitsOrNone, RobotLimits
-from hsp_control.control.composition import check_tasks, checked_gain
 from hsp_control.control.evolution import ABSENT
-from hsp_control.control.planned_limits import PlannedLimits
-from hsp_control.control.setup import PlannedTerm, Setup, planned_task, planned_terms
+from hsp_control.control.planned import PlannedLimits
+from hsp_control.control.setup import (
+    PlannedTerm,
+    Setup,
+    check_tasks,
+    checked_gain,
+    planned_task,
+    planned_terms,
+)
 from hsp_control.declaration import AnyOf, Part, within
 from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.quantities import Flag, Gain, NonNegative, Number

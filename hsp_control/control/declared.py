@@ -11,17 +11,18 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ControllerError, FieldError
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits, RobotLimits
-from hsp_control.control.composition import (
+from hsp_control.control.evolution import PRESENT, Evolution
+from hsp_control.control.planned import PlannedContact, PlannedLimits
+from hsp_control.control.setup import (
     Base,
+    PlannedTerm,
+    Setup,
     check_kind,
     check_support,
     check_tasks,
     checked_gain,
+    planned_task,
 )
-from hsp_control.control.evolution import PRESENT, Evolution
-from hsp_control.control.planned_contact import PlannedContact
-from hsp_control.control.planned_limits import PlannedLimits
-from hsp_control.control.setup import PlannedTerm, Setup, planned_task
 from hsp_control.declaration import within
 from hsp_control.declaration.nested import parts_within, with_parts_replaced
 from hsp_control.geometry.scene import Obstacle, Scene

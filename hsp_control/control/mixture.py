@@ -10,7 +10,7 @@ from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation import Actuation, Delivered
 from hsp_control.control.actuation.support import Support
 from hsp_control.control.gains_in_force import GainsInForce
-from hsp_control.control.planned_contact import PlannedContact
+from hsp_control.control.planned import PlannedContact
 from hsp_control.control.setup import PlannedTask, Setup, levels_of
 from hsp_control.law import Outcome
 from hsp_control.law.outcome import DAMPED, EXACT

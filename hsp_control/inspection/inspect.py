@@ -18,9 +18,9 @@ from hsp_control.inspection.checks import (
     check_mass_matrix,
     check_meshes,
     check_self_collisions,
+    check_strength,
     worst_condition,
 )
-from hsp_control.inspection.strength import check_strength
 from hsp_control.robot import Robot, RobotDescription
 from hsp_control.robot.description.loading import load_model
 from hsp_control.robot.description.sources import RobotSource

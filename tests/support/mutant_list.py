@@ -289,7 +289,7 @@ effort rate ignored | effort_rate_needs
 @ control/actuation/limited_step.py | unit/control/test_limited_step.py
 distances give way before motion | distances_are_relaxed_less
   "distances": 30.0 => "distances": 0.03
-@ control/planned_contact.py | unit/control/test_changes_where_limits_bind.py
+@ control/planned.py | unit/control/test_changes_where_limits_bind.py
 contact with a schedule ends with a jump | schedule
   x = min(self.weight(t) / HELD, 1.0) => x = min(self.presence.at(t) / HELD, 1.0)
 @ control/setup.py | unit/control/test_changes_where_limits_bind.py

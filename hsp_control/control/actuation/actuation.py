@@ -42,8 +42,7 @@ from hsp_control.control.actuation.held_effort import (
 from hsp_control.control.actuation.limited_step import Barriers, LimitedStep
 from hsp_control.control.actuation.status import EXACT, LIMITED, Status
 from hsp_control.control.actuation.support import Support
-from hsp_control.control.planned_contact import PlannedContact
-from hsp_control.control.planned_limits import PlannedLimits, mean_of
+from hsp_control.control.planned import PlannedContact, PlannedLimits, mean_of
 from hsp_control.law import Resolution
 from hsp_control.robot import Robot, RobotState
 

@@ -63,13 +63,17 @@ class Compensation(Part, error=CompensationError):
         contacts: Sequence[Contact] = (),
     ) -> None:
         """Check that the compensators fit a robot, its tasks and contacts."""
-        parts = {
-            "predictor": self.predictor,
-            "momentum_observer": self.momentum_observer,
-            "friction_feed_forward": self.friction(robot),
-            "start_up_ramp": self.start_up_ramp,
-        }
-        for name, part in parts.items():
+        for name in ("predictor", "momentum_observer", "start_up_ramp"):
+            if robot.unactuated and getattr(self, name) is not None:
+                with within(name):
+                    raise CompensationError(
+                        f"{robot.name} has a free-flyer root, and its contact forces "
+                        "are not measured; needs a robot with a fixed base"
+                    )
+        for name, part in (
+            ("momentum_observer", self.momentum_observer),
+            ("friction_feed_forward", self.friction(robot)),
+        ):
             if part is not None:
                 with within(name):
                     part.check(robot)
@@ -77,7 +81,7 @@ class Compensation(Part, error=CompensationError):
         self._check_forces(contacts)
         if self.integral_action is not None:
             with within("integral_action"):
-                self.integral_action.check(tasks)
+                self.integral_action.gains(tasks)
 
     def _check_forces(self, contacts: Sequence[Contact]) -> None:
         """Check that there are forces to feed back, and that none is cancelled."""

@@ -81,10 +81,6 @@ class IntegralAction(Part, error=CompensationError):
         if self.rate is None and not self.ki:
             raise CompensationError("integral action needs a rate [1/s], or ki by task")
 
-    def check(self, tasks: Sequence[Task]) -> None:
-        """Check that the gains fit the tasks, and that errors decay."""
-        self.gains(tasks)
-
     def gains(self, tasks: Sequence[Task]) -> dict[str, Array]:
         """Return Ki, shape (m, m), of each task that has integral action."""
         names = [task.name for task in tasks]

@@ -16,7 +16,6 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError
 from hsp_control.constraints.limits.joint_numbers import Positives, by_dof
-from hsp_control.control.compensation.checks import check_fixed_base
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import Flag, Positive
 from hsp_control.robot import Robot, RobotState
@@ -54,7 +53,6 @@ class MomentumObserver(Part, error=CompensationError):
 
     def check(self, robot: Robot) -> None:
         """Check that the observer fits the robot."""
-        check_fixed_base(robot)
         self._bounds(robot)
 
     def begin(self, robot: Robot) -> "RunningObserver":

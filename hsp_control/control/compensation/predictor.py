@@ -7,7 +7,6 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError
-from hsp_control.control.compensation.checks import check_fixed_base
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Count
 from hsp_control.robot import Robot
@@ -38,10 +37,6 @@ class Predictor(Part, error=CompensationError):
     def periods(self) -> int:
         """The total delay from a measurement to its effort, in control periods."""
         return self.effort_delay + self.sensor_delay
-
-    def check(self, robot: Robot) -> None:
-        """Check that the efforts alone determine the robot's motion."""
-        check_fixed_base(robot)
 
     def begin(self, robot: Robot) -> "RunningPredictor":
         """Return the predictor of one run."""

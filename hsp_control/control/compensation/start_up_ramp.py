@@ -4,10 +4,9 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError
-from hsp_control.control.compensation.checks import check_fixed_base
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import NonNegative, Positive
-from hsp_control.robot import Robot, RobotState
+from hsp_control.robot import RobotState
 from hsp_control.trajectories.schedule import Schedule
 
 
@@ -24,10 +23,6 @@ class StartUpRamp(Part, error=CompensationError):
     natural_frequency: NonNegative = 0.0
     """Natural frequency ω of the spring that holds the robot meanwhile [rad/s]; 0 is
     pure gravity compensation."""
-
-    def check(self, robot: Robot) -> None:
-        """Check that the motors alone can hold the robot still."""
-        check_fixed_base(robot)
 
     def begin(self, state: RobotState) -> "RunningRamp":
         """Return the ramp that begins at a state: at its time and configuration."""

@@ -376,10 +376,10 @@ def test_matrix_gains_are_judged_by_their_modes() -> None:
     for scale, fits in ((8000.0, True), (9000.0, False)):  # 1.9 · 8421 = Kv Kp
         action = IntegralAction(ki={"hand": scale * coupled})
         if fits:
-            action.check([circle()])
+            action.gains([circle()])
             continue
         with pytest.raises(GainError, match="does not decay"):
-            action.check([circle()])
+            action.gains([circle()])
 
 
 def test_an_integral_only_unwinds_while_the_law_is_not_delivered() -> None:
