@@ -66,9 +66,7 @@ class RunningEstimator(ABC):
 
 
 def begun(
-    estimators: Sequence[Estimator],
-    controller: Controller,
-    inertial: Inertial | None,
+    estimators: Sequence[Estimator], controller: Controller, inertial: Inertial | None
 ) -> list[RunningEstimator]:
     """Return what runs, in order; see `Estimator.begin`."""
     running = []

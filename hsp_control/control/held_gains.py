@@ -65,10 +65,7 @@ def held_radius(Kp: Array, Kv: Array, period: float) -> float:
     """Return the spectral radius of x'' = -Kp x - Kv x', held for a period."""
     one, h = np.eye(len(Kp)), period
     transition = np.block(
-        [
-            [one - 0.5 * h * h * Kp, h * one - 0.5 * h * h * Kv],
-            [-h * Kp, one - h * Kv],
-        ]
+        [[one - 0.5 * h * h * Kp, h * one - 0.5 * h * h * Kv], [-h * Kp, one - h * Kv]]
     )
     return float(np.abs(np.linalg.eigvals(transition)).max())
 

@@ -127,12 +127,7 @@ def command_line() -> argparse.ArgumentParser:
     add_strict(view)
 
     plot = _command(commands, "plot", "draw the figures of a log")
-    plot.add_argument(
-        "log",
-        type=Path,
-        metavar="LOG",
-        help="written by hsp run",
-    )
+    plot.add_argument("log", type=Path, metavar="LOG", help="written by hsp run")
     plot.add_argument("--out", type=Path, metavar="DIR", help="default: beside the log")
     plot.add_argument(
         "--format",

@@ -304,10 +304,7 @@ def _value(i: int, problem: Problem, x: Array, y: Array) -> float:
 
 @kernel
 def _most_violated(
-    tolerance: float,
-    problem: Problem,
-    x: Array,
-    work: Workspace,
+    tolerance: float, problem: Problem, x: Array, work: Workspace
 ) -> tuple[int, float]:
     """Return the constraint that x is farthest from, marked as held, and its violation.
 

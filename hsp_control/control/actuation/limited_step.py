@@ -229,12 +229,7 @@ def _write_result(
     return bool(np.isfinite(sum_of_efforts))
 
 
-_RELAXATION_COST = {
-    "contacts": 1e3,
-    "distances": 30.0,
-    "motion": 1.0,
-    "holding": 0.1,
-}
+_RELAXATION_COST = {"contacts": 1e3, "distances": 30.0, "motion": 1.0, "holding": 0.1}
 """Cost of a violation, where limits contradict each other: the most expensive kind is
 relaxed last."""
 _REGULARISATION, _ROUNDS = 1e-6, 4
@@ -362,11 +357,7 @@ class LimitedStep:
         return _one_call(*first, self._forces), _one_call(*first, self._nearest)
 
     def solve(
-        self,
-        acceleration: Array,
-        effort: Array,
-        redistribute: bool,
-        barriers: Barriers,
+        self, acceleration: Array, effort: Array, redistribute: bool, barriers: Barriers
     ) -> tuple[Status | None, float]:
         """Write the nearest to what the law wants to `result`."""
         by_forces, nearest = self._calls.get(acceleration, effort)

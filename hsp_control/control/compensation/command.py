@@ -311,10 +311,7 @@ class Command:
             self._under_way.popleft()
 
     def _integrate(
-        self,
-        integral: RunningIntegral,
-        output: ControlOutput,
-        period: float,
+        self, integral: RunningIntegral, output: ControlOutput, period: float
     ) -> None:
         """Integrate the errors of the fully active tasks over this period."""
         t, controller = self.state.t, self.controller

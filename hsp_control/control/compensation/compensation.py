@@ -57,10 +57,7 @@ class Compensation(Part, error=CompensationError):
         return given
 
     def check(
-        self,
-        robot: Robot,
-        tasks: Sequence[Task],
-        contacts: Sequence[Contact] = (),
+        self, robot: Robot, tasks: Sequence[Task], contacts: Sequence[Contact] = ()
     ) -> None:
         """Check that the compensators fit a robot, its tasks and contacts."""
         for name in ("predictor", "momentum_observer", "start_up_ramp"):

@@ -337,10 +337,7 @@ def _finding(
 
 
 def _stabilising_changes(
-    loop: LinearLoop,
-    speed: _Speed,
-    rule: float,
-    null_space: tuple[Array, Array] | None,
+    loop: LinearLoop, speed: _Speed, rule: float, null_space: tuple[Array, Array] | None
 ) -> tuple[list[str], list[str]]:
     """Return changes of single settings, each of which makes the loop stable."""
 
