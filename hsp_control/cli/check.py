@@ -173,10 +173,8 @@ def robot_advice(robot: Robot) -> Iterator[str]:
 
 
 def start_advice(experiment: Experiment, damped: str = "") -> Iterator[str]:
-    """Yield lines about a start that is singular, in collision or cannot be held.
-
-    Where it is singular or in collision, a better one follows.
-    """
+    """Yield lines about a start that is singular, in collision or cannot be held."""
+    # Where it is singular or in collision, a better one follows.
     robot, null_space = experiment.robot, experiment.scenario.null_space
     if damped:
         yield (

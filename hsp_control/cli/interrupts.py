@@ -34,7 +34,6 @@ class DeferredInterrupt:
     """
 
     def __init__(self) -> None:
-        """Create the context; entering it installs the signal handler."""
         self.requested = False  # whether a Ctrl-C has come that `check` has not raised
         self._before: Any = None
         self._first_ignored = False

@@ -57,10 +57,8 @@ As near as one guides an arm by hand; from there, what was rehearsed is what hap
 def begun_where_it_is(
     experiment: Experiment, options: argparse.Namespace, q: Array
 ) -> Experiment:
-    """Return the experiment with the robot's configuration as its start.
-
-    What is relative to the start (``origin: start``) then does not pull at the robot.
-    """
+    """Return the experiment with the robot's configuration as its start."""
+    # What is relative to the start (``origin: start``) then does not pull at the robot.
     distances = np.abs(experiment.robot.difference(experiment.q0, q))
     worst = int(np.argmax(distances))
     start = f"start={{configuration: [{', '.join(f'{each:.6f}' for each in q)}]}}"

@@ -33,7 +33,6 @@ class OpeningPage:
         announce: Callable[[str], object],
         say: Callable[[str], object],
     ) -> None:
-        """Keep what it takes."""
         assert url is not None
         self.opened = False  # whether it was opened in a browser
         self._url, self._browser = url, options.browser
@@ -58,11 +57,9 @@ class OpeningPage:
 
     @contextmanager
     def compiling(self) -> Iterator[None]:
-        """Say on the page how many kernels are compiled; the first one opens it.
-
-        Where what is done then fails, an open page says why: it stays, and would count
-        kernels for ever.
-        """
+        """Say on the page how many kernels are compiled; the first one opens it."""
+        # Where what is done then fails, an open page says why: it stays, and would
+        # count kernels for ever.
 
         def tell(text: str) -> None:
             if self._ready:
@@ -110,7 +107,6 @@ class Screen:
     """Shows a run: before it, while kernels are compiled, while it runs, and after."""
 
     def __init__(self, viewer: Viewer, page: OpeningPage) -> None:
-        """Keep a viewer that shows the robot, and its page."""
         self._viewer, self._page = viewer, page
         self._live: LiveView | None = None
 
@@ -122,11 +118,9 @@ class Screen:
         options: argparse.Namespace,
         announce: Callable[[str], None],
     ) -> Iterator[Self | None]:
-        """Yield a screen that shows the robot and the scene.
-
-        The page opens when a kernel has to be compiled, or when `begin` is called. If
-        that fails, print why and yield None.
-        """
+        """Yield a screen that shows the robot and the scene."""
+        # The page opens when a kernel has to be compiled, or when `begin` is called. If
+        # that fails, print why and yield None.
         view = loaded.scenario.view.all_fields()
         with ExitStack() as stack:
             try:
@@ -194,11 +188,9 @@ def show_logs(options: argparse.Namespace) -> None:
 
 
 def attend(viewer: Viewer, *, opened: bool) -> None:
-    """Keep a view open until the user closes it.
-
-    In a terminal: until Enter or Ctrl-C. Without a terminal: until the page is closed,
-    if a browser was opened; otherwise return at once.
-    """
+    """Keep a view open until the user closes it."""
+    # In a terminal: until Enter or Ctrl-C. Without a terminal: until the page is
+    # closed, if a browser was opened; otherwise return at once.
     with suppress(KeyboardInterrupt):
         if sys.stdin is not None and sys.stdin.isatty():
             with suppress(EOFError):

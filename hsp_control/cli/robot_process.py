@@ -36,7 +36,6 @@ class RobotProcess:
         log: str | Path | None = None,
         log_period: float = 0.01,
     ) -> None:
-        """Prepare the process; entering the context starts it."""
         check_live(experiment)
         faults = faults or Faults()
         period = live_period(experiment)

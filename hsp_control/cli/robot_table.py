@@ -148,10 +148,8 @@ def _line(name: str, nv: str, end_effector: str, position: str, pose: str) -> st
 
 
 def task(row: Row, rank: int, full: int) -> str:
-    """Return rank and redundancy of a task, such as ``3 + 4``; ``-`` if impossible.
-
-    A position task may omit axes, so any rank is enough; a pose task needs rank 6.
-    """
+    """Return rank and redundancy of a task, such as ``3 + 4``; ``-`` if impossible."""
+    # A position task may omit axes, so any rank is enough; a pose task needs rank 6.
     if rank == 0 or (full == 6 and rank < full):
         return "-"
     return f"{rank} + {row.joints - rank}"

@@ -85,7 +85,6 @@ class Stopwatch:
     """Measures the wall time from the first row on: kernels are compiled before."""
 
     def __init__(self) -> None:
-        """Create it; the first `lap` starts it."""
         self._first: float | None = None
         self._last = 0.0
 

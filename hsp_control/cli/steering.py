@@ -34,7 +34,6 @@ class PageProcess:
     """The process of a page that shows and steers a live loop; a context manager."""
 
     def __init__(self, *, port: int | None, host: str, held: bool) -> None:
-        """Prepare the process; entering the context starts it."""
         self.held = held  # whether somebody must hold a key
         self.channel, self._there = channel_pair()  # way to it
         self.url = ""  # page's address, with its key
@@ -127,10 +126,8 @@ class SteeringPage(NamedTuple):
 def steering_page(
     options: argparse.Namespace, scenario: Scenario
 ) -> Iterator[SteeringPage | None]:
-    """Yield the page, if there is to be one; it shows the robot and the scene.
-
-    It opens when a kernel has to be compiled, or when `let_steer` is called.
-    """
+    """Yield the page, if there is to be one; it shows the robot and the scene."""
+    # It opens when a kernel has to be compiled, or when `let_steer` is called.
     if options.steer is None:
         yield None
         return
@@ -153,11 +150,9 @@ def let_steer(
     requests: OperatorRequests,
     journal: Path,
 ) -> Callable[[float], object]:
-    """Return what the loop does in the rest of each period, so that the page steers.
-
-    With a dead-man's key it returns when the key is held for the first time, or when
-    the operator stops.
-    """
+    """Return what the loop does in the rest of each period, so that the page steers."""
+    # With a dead-man's key it returns when the key is held for the first time, or when
+    # the operator stops.
     controller, period = experiment.controller, live_period(experiment)
     controller.compute(0.0, experiment.q0, experiment.v0)
     _rehearse(controller, period, experiment)

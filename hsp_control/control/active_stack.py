@@ -49,8 +49,7 @@ class ActiveStack:
         gain: Array,
         threshold: float,
     ) -> None:
-        """Stack the rows; the state decides which base motions the contacts permit."""
-        robot: Robot = state.robot
+        robot: Robot = state.robot  # its state says which base motions contacts permit
         self.support = support  # contacts' forces and their bounds
         self.contacts = support.contacts  # active contacts
         planned = [level for level in levels if level]

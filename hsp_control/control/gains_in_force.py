@@ -37,7 +37,6 @@ class GainsInForce:
     """Gains and impedances of the tasks, their offsets, and K_N, now."""
 
     def __init__(self, nv: int) -> None:
-        """Allocate, without tasks."""
         # feedback of each task, by key; the arrays stay where they are
         self.feedback: dict[int, InForce] = {}
         self.null_space = np.zeros((nv, nv))  # K_N, shape (nv, nv) [1/s]

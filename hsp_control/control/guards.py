@@ -17,7 +17,6 @@ class StepLock:
     """
 
     def __init__(self, holders: Collection[CodeType]) -> None:
-        """Set which methods hold it."""
         lock = Lock()
         self.acquire, self.release = lock.acquire, lock.release
         # code of the methods that hold the lock of their ``self._lock``
@@ -60,7 +59,6 @@ class ReadOnly(Generic[Value]):
     """A property that refuses assignment; made by the decorator `read_only`."""
 
     def __init__(self, get: Callable[[Any], Value], instead: str) -> None:
-        """Set how to get the value, and what to do instead of assigning it."""
         self._get, self._instead = get, instead
         self.__doc__ = get.__doc__
 

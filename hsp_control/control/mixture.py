@@ -56,7 +56,6 @@ class Mixture:
         setup: Setup,
         threshold: float,
     ) -> None:
-        """Allocate."""
         self._state, self._actuation = state, actuation
         self._gains, self._threshold = gains, threshold
         self._stacks: dict[tuple[frozenset[int], frozenset[int]], ActiveStack] = {}
@@ -121,11 +120,9 @@ class Mixture:
         return outcome
 
     def deliver(self, modifier: AccelerationModifier | None) -> Delivered:
-        """Return what is delivered of the law that was resolved last.
-
-        While one set of limits follows another, it is the mixture of the steps within
-        each of them.
-        """
+        """Return what is delivered of the law that was resolved last."""
+        # While one set of limits follows another, it is the mixture of the steps within
+        # each of them.
         actuation, sets = self._actuation, self._actuation.sets
         single = len(self._parts) == len(sets) == 1
         shares: list[float] = []

@@ -44,10 +44,8 @@ class PlannedContact:
         return self.contact.weight(t) * self.presence.at(t)
 
     def share(self, t: float) -> float:
-        """Return how much it is kept at rest at time t [s], in [0, 1].
-
-        It is 1 - (1 - x)³ with x the weight over `HELD`: C² in time, as the weight.
-        """
+        """Return how much it is kept at rest at time t [s], in [0, 1]."""
+        # It is 1 - (1 - x)³ with x the weight over `HELD`: C² in time, as the weight.
         if not self.active(t):
             return 0.0
         x = min(self.weight(t) / HELD, 1.0)
@@ -140,11 +138,9 @@ class PlannedLimits:
 def mean_of(
     sets: Sequence[tuple[RobotLimits | None, float]], robot: Robot
 ) -> RobotLimits | None:
-    """Return the limits that a mixture keeps: the weighted mean of the numbers.
-
-    The bounds on efforts and accelerations are linear in them. Where one of them is
-    inf, so is the mean. Distances are those of all sets.
-    """
+    """Return the limits that a mixture keeps: the weighted mean of the numbers."""
+    # The bounds on efforts and accelerations are linear in them. Where one of them is
+    # inf, so is the mean. Distances are those of all sets.
     if len(sets) == 1:
         return sets[0][0]
     numbers = np.sum([w * _numbers(each, robot.nv) for each, w in sets], axis=0)

@@ -62,11 +62,9 @@ def check_tasks(tasks: Sequence[Task], robot: Robot) -> None:
 
 
 def priority_of(task: Task, robot: Robot) -> int:
-    """Return the priority of a placed task, 1 the highest.
-
-    Without one of its own it is 1; on a floating base 1 for what keeps the balance, and
-    2 for all else, so that no hand that reaches too far makes the robot fall.
-    """
+    """Return the priority of a placed task, 1 the highest."""
+    # Without one of its own it is 1; on a floating base 1 for what keeps the balance,
+    # and 2 for all else, so that no hand that reaches too far makes the robot fall.
     if task.priority is not None:
         return task.priority
     return 2 if robot.unactuated and not task.keeps_balance(robot) else 1

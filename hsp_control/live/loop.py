@@ -173,10 +173,8 @@ _MOST = 200
 def rehearse(
     controller: Controller, start: float, end: float, q: Array, v: Array
 ) -> None:
-    """Evaluate a copy of a controller wherever its tasks or contacts change.
-
-    Their native calls are compiled then, not in the loop: a robot waits no seconds.
-    """
+    """Evaluate a copy of a controller wherever its tasks or contacts change."""
+    # Their native calls are compiled then, not in the loop: a robot waits no seconds.
     times = sorted({t for t in _instants(controller) if start < t <= end and t < inf})
     if not times:
         return

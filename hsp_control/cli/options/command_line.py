@@ -23,7 +23,7 @@ class Parser(argparse.ArgumentParser):
     """An `argparse.ArgumentParser` for commands and for their options."""
 
     def __init__(self, *args: Any, **options: Any) -> None:
-        """Take options by their full names: ``--st`` is no ``--strict``."""
+        # By their full names: ``--st`` is no ``--strict``.
         super().__init__(*args, **{"allow_abbrev": False, **options})
 
     def parse_known_args(  # type: ignore[override]

@@ -92,7 +92,6 @@ class Actuation:
     def __init__(
         self, robot: Robot, planned: PlannedLimits, base: Sequence[int] = ()
     ) -> None:
-        """Allocate."""
         nv = robot.nv
         self._robot = robot
         self.base: Indices = np.array(base, dtype=np.int64)  # those without a motor
@@ -314,20 +313,16 @@ class Actuation:
     def _limit_if_violated(
         self, state: RobotState, resolution: Resolution, support: Support
     ) -> Callable[[], float] | None:
-        """Return the call that solves the QP if a bound is violated.
-
-        It is None where a step may need more: forces, or barriers.
-        """
+        """Return the call that solves the QP if a bound is violated."""
+        # It is None where a step may need more: forces, or barriers.
         if self._kept.limits is None or not self.is_direct(support):
             return None
         step = self._step_of(state, resolution, support)
         return step.nearest_if(resolution.acceleration, state.effort, self._found)
 
     def violated(self, state: RobotState, a: Array, code: Indices) -> int:
-        """Write M a + N and the bounds on a; return which of them are violated.
-
-        See `checks` for arguments and result, which is without the law's code.
-        """
+        """Write M a + N and the bounds on a; return which of them are violated."""
+        # See `checks` for arguments and result, which is without the law's code.
         # By identity: the calls keep these arrays alive.
         key = id(a), id(code), self._kept.limits is None
         if key not in self._checks:
@@ -465,11 +460,9 @@ def _check(
     found: Array,
     t: float,
 ) -> float:
-    """Observe the last period's effort, and return which limits the next violates.
-
-    And the law's code, see `CODES`; `observe` and `violated_limits`. It writes what it
-    returns, and the flags, to ``found``.
-    """
+    """Observe the last period's effort, and return which limits the next violates."""
+    # And the law's code, see `CODES`; `observe` and `violated_limits`. It writes what
+    # it returns, and the flags, to ``found``.
     observe(v, held, t)
     flags = violated_limits(
         q,

@@ -151,11 +151,9 @@ def _write_costs(directions: Directions) -> None:
 
 @kernel
 def write_directions(directions: Directions) -> None:
-    """Write the directions of all levels, and then those of the null space.
-
-    Where no singular value is small, the law has made the rows of all levels
-    orthonormal, one after the other; else they are found here.
-    """
+    """Write the directions of all levels, and then those of the null space."""
+    # Where no singular value is small, the law has made the rows of all levels
+    # orthonormal, one after the other; else they are found here.
     Q, N, ends = directions.factors.Q, directions.N, directions.ends
     root, costs = directions.root, directions.costs
     _write_costs(directions)
@@ -188,11 +186,9 @@ def write_directions(directions: Directions) -> None:
 
 @kernel
 def _orthonormalised(factors: Factors) -> bool:
-    """Return whether Q = X B has orthonormal rows, and X is lower triangular.
-
-    Both hold unless the law needed the spectrum: then the rows of Q are orthogonal, but
-    not of length 1, or X combines each row with those after it.
-    """
+    """Return whether Q = X B has orthonormal rows, and X is lower triangular."""
+    # Both hold unless the law needed the spectrum: then the rows of Q are orthogonal,
+    # but not of length 1, or X combines each row with those after it.
     Q, X = factors
     found = True
     for r in range(Q.shape[0]):
@@ -237,11 +233,9 @@ def _write_levels(directions: Directions, levels: int) -> int:
 
 @kernel
 def _write_damped_level(directions: Directions) -> int:
-    """Write the directions of the only level, where the law has found its spectrum.
-
-    First those that it has for itself. Of a direction with the singular value s below
-    the threshold the null space has the share (1 - s²/threshold²)². Returns how many.
-    """
+    """Write the directions of the only level, where the law has found its spectrum."""
+    # First those that it has for itself. Of a direction with the singular value s below
+    # the threshold the null space has the share (1 - s²/threshold²)². Returns how many.
     Q, N, threshold = directions.factors.Q, directions.N, directions.thresholds[0]
     costs, n, count = directions.costs, directions.N.shape[0], 0
     own, free = costs[1, 0], costs[1, costs.shape[1] - 1]
@@ -262,11 +256,9 @@ def _write_damped_level(directions: Directions) -> int:
 
 @kernel
 def _write_shared(directions: Directions, count: int) -> None:
-    """Overwrite the directions after the first ones, which levels share.
-
-    These are the eigenvectors of T = Σ t_k (P_{k-1} - P_k) + P_K in the rows of N from
-    ``count`` on, and their costs ρ_N^t for the eigenvalues t.
-    """
+    """Overwrite the directions after the first ones, which levels share."""
+    # These are the eigenvectors of T = Σ t_k (P_{k-1} - P_k) + P_K in the rows of N
+    # from ``count`` on, and their costs ρ_N^t for the eigenvalues t.
     Q, QJ, G_inverse = directions.projectors
     L, ends, costs = directions.L, directions.ends, directions.costs
     N, n = directions.N[count:], directions.N.shape[0]
@@ -380,10 +372,8 @@ def _project_out(N: Array, x: Array) -> None:
 
 @kernel
 def write_inverse_root(directions: Directions, first: int, JT: Array) -> int:
-    """Write Jᵀ, J Jᵀ = H⁻¹, without the levels before the first that may move.
-
-    It returns the number of its rows. JT has shape (nv, at least nv).
-    """
+    """Write Jᵀ, J Jᵀ = H⁻¹, without the levels before the first that may move."""
+    # It returns the number of its rows. JT has shape (nv, at least nv).
     N, root, L = directions.N, directions.root, directions.L
     n, rows = N.shape[0], 0
     for k in range(directions.kept[0] if first > 0 else 0, n):

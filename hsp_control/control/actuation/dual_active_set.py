@@ -160,10 +160,8 @@ def minimise(problem: Problem, warm: bool, x: Array, work: Workspace) -> int:
 
 @kernel
 def _begin(problem: Problem, x: Array, work: Workspace) -> bool:
-    """Hold the marked constraints, in their order, and make x their optimum.
-
-    Not all can be held where one depends on others, or has the wrong sign: False.
-    """
+    """Hold the marked constraints, in their order, and make x their optimum."""
+    # Not all can be held where one depends on others, or has the wrong sign: False.
     count = 0
     work.counts[0] = 0
     for i in range(work.held.shape[0]):
@@ -384,11 +382,10 @@ def _enter(entering: int, violation: float, problem: Problem, work: Workspace) -
 
 @kernel
 def _remainder(i: int, problem: Problem, work: Workspace) -> float:
-    """Write b = Jᵀ a of constraint i, Q b, and what remains of b; return its square.
-
-    b goes to the row of B after the active ones. If nine tenths of the length cancel,
-    the components are subtracted a second time ("twice is enough", Giraud et al. 2005).
-    """
+    """Write b = Jᵀ a of constraint i, Q b, and what remains of b; return its square."""
+    # b goes to the row of B after the active ones. If nine tenths of the length cancel,
+    # the components are subtracted a second time ("twice is enough", Giraud et al.
+    # 2005).
     count, remainder = work.counts[0], work.vectors[1]
     components, again = work.steps[0, :count], work.steps[2, :count]
     _write_row(i, problem, work.B[count])
@@ -445,10 +442,8 @@ def _write_row(i: int, problem: Problem, b: Array) -> None:
 
 @kernel
 def _extend(i: int, square: float, work: Workspace) -> None:
-    """Add constraint i to the active ones: one more row of L and of Q.
-
-    Its row of B is there already.
-    """
+    """Add constraint i to the active ones: one more row of L and of Q."""
+    # Its row of B is there already.
     count = work.counts[0]
     size = np.sqrt(square)
     row, q = work.L[count], work.Q[count]
@@ -464,11 +459,9 @@ def _extend(i: int, square: float, work: Workspace) -> None:
 
 @kernel
 def _release(leaving: int, work: Workspace) -> None:
-    """Remove an active constraint: rotations make L lower triangular again.
-
-    They leave the direction that is freed in the row of Q after the last, and rotate
-    the components Q b too.
-    """
+    """Remove an active constraint: rotations make L lower triangular again."""
+    # They leave the direction that is freed in the row of Q after the last, and rotate
+    # the components Q b too.
     B, L, Q, components = work.B, work.L, work.Q, work.steps[0]
     count = work.counts[0] - 1
     work.held[work.active[leaving]] = 0

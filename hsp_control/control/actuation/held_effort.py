@@ -44,7 +44,6 @@ class HeldEffort:
     """
 
     def __init__(self, nv: int) -> None:
-        """Begin without an error."""
         # largest error of late, shape (nv,) [rad/s² or m/s²]
         self.error: Array = np.zeros(nv)
         # mean error of late, shape (nv,) [rad/s² or m/s²]
@@ -69,10 +68,8 @@ class HeldEffort:
         observe(v, self.memory_of_kernels, t)
 
     def expect(self, v: Array, a: Array) -> Callable[[float], float]:
-        """Return `sent` of what these arrays then hold, as a call of the time.
-
-        The period is that of the last `sent`.
-        """
+        """Return `sent` of what these arrays then hold, as a call of the time."""
+        # The period is that of the last `sent`.
         arrays = v, a, self.disturbance, self._timing, self._expected
         return bind(_expect, *arrays, timed=True)
 
@@ -142,10 +139,8 @@ def observe(v: Array, held: Held, t: float) -> None:
 def effort_window(
     sent: Array, effort: Array, rate: Array, lower: Array, upper: Array
 ) -> None:
-    """Write the range of the next effort, where the effort's rate is limited.
-
-    Shapes: sent (nv + 1,), see `Actuation`, the others (nv,).
-    """
+    """Write the range of the next effort, where the effort's rate is limited."""
+    # Shapes: sent (nv + 1,), see `Actuation`, the others (nv,).
     period = sent[effort.shape[0]]
     for i in range(effort.shape[0]):
         # The last effort may lie outside the limits: then move towards them.

@@ -115,10 +115,8 @@ def solve_step(
     programmes: Programmes,
     result: Result,
 ) -> int:
-    """Assemble the QP, solve it, and write what is delivered; return a `Status`.
-
-    Or `UNSOLVED`, and then nothing is written to ``result``.
-    """
+    """Assemble the QP, solve it, and write what is delivered; return a `Status`."""
+    # Or `UNSOLVED`, and then nothing is written to ``result``.
     qp, x = programmes, programmes.x
     if what == LEAST_VIOLATION:
         code = minimise(qp.soft, False, x, qp.soft_memory)
@@ -258,7 +256,6 @@ class LimitedStep:
         weight: float,
         capacity: int,
     ) -> None:
-        """Allocate."""
         n, p = state.robot.nv, support.size
         held = sum(contact.rows for contact in support.contacts)
         self.capacity = capacity  # how many rows of barriers there is room for
@@ -341,10 +338,8 @@ class LimitedStep:
         return only_if([*self._input(acceleration, effort), self._nearest], found)
 
     def _input(self, acceleration: Array, effort: Array) -> list[Callable[[], Any]]:
-        """Return the calls that write what the QP reads.
-
-        To bind the copies of two arrays takes a fiftieth of the time of binding all.
-        """
+        """Return the calls that write what the QP reads."""
+        # To bind the copies of two arrays takes a fiftieth of the time of binding all.
         _, own, own_effort = self._wanted
         copies = bind(_copy_both, acceleration, own, effort, own_effort)
         return [self._write_mass_matrix, copies]
@@ -388,11 +383,9 @@ class LimitedStep:
         return where
 
     def _relax(self, barriers: dict[str, Indices]) -> tuple[Status | None, float]:
-        """Relax the limits as little as possible, and solve again.
-
-        Contacts are kept longest, then distances, then joint motion, see
-        `_RELAXATION_COST`.
-        """
+        """Relax the limits as little as possible, and solve again."""
+        # Contacts are kept longest, then distances, then joint motion, see
+        # `_RELAXATION_COST`.
         A, end = self._rows.A, self._rows.end
         lower, upper = self._rows.lower, self._rows.upper
         contacts = self._contacts

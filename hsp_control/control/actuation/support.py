@@ -39,7 +39,6 @@ class Support:
     def __init__(
         self, contacts: Sequence[PlannedContact], robot: Robot, weight: float
     ) -> None:
-        """Allocate for contacts of a robot."""
         nv = robot.nv
         self.contacts = tuple(each.contact for each in contacts)
         counts = [len(contact.points) for contact in self.contacts]
@@ -212,10 +211,9 @@ def _slip(contact: Contact, state: RobotState, v: Array) -> Array:
 
 
 def intended_velocity(state: RobotState, resolution: Resolution) -> Array:
-    """Return v + e_N + J# e', shape (nv,): the velocity once both errors are zero.
-
-    Measurement noise cancels in it, and a hand that sticks is pushed where it is to go.
-    """
+    """Return v + e_N + J# e', shape (nv,): the velocity once both errors are zero."""
+    # Measurement noise cancels in it, and a hand that sticks is pushed where it is to
+    # go.
     problem = resolution.problem
     L, J = problem.metric.L, problem.task.jacobian
     whitened = np.linalg.solve(L, J.T)
@@ -354,10 +352,8 @@ def _least_squares(G: Array, U: Array, w: Array, out: Array) -> None:
 
 @kernel
 def within_cones(cone: Array, forces: Array, lower: Array, upper: Array) -> bool:
-    """Return whether forces are within friction cones, cone f ≥ 0, and bounds.
-
-    Shapes: cone (4 size/3, size), forces, lower and upper (size,).
-    """
+    """Return whether forces are within friction cones, cone f ≥ 0, and bounds."""
+    # Shapes: cone (4 size/3, size), forces, lower and upper (size,).
     inside = True
     for k in range(forces.shape[0]):
         inside = inside and lower[k] <= forces[k] <= upper[k]

@@ -76,7 +76,6 @@ class RunningForceFeedback:
     """Force feedback in one run: it keeps the integrals."""
 
     def __init__(self, declared: ForceFeedback, controller: Controller) -> None:
-        """Begin with no offset."""
         self._declared, self._controller = declared, controller
         names = [
             contact.name

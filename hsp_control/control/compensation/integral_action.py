@@ -23,7 +23,6 @@ class GainsByTask(Mapping[str, Array]):
     """Gains by task name; they never change."""
 
     def __init__(self, gains: Mapping[str, Array] | None = None) -> None:
-        """Copy the mapping, not its arrays, which are read-only."""
         self._gains = dict(gains or {})
 
     def __getitem__(self, task: str) -> Array:
@@ -127,7 +126,6 @@ class RunningIntegral:
     """Integral action in one run: it keeps the integrals."""
 
     def __init__(self, declared: IntegralAction, controller: Controller) -> None:
-        """Set all integrals to zero."""
         self._limit = np.inf if declared.limit is None else declared.limit
         self._gains = declared.gains(controller.tasks)
         self._feedback = {name: controller.feedback(name) for name in self._gains}

@@ -147,11 +147,9 @@ def _moved(x: Array, v: Array, u: Array, h: float) -> tuple[Array, Array]:
 
 
 def _coupled(A: Array) -> Array:
-    """Return the matrix without states that are never written or never read.
-
-    Such states only add eigenvalues of 0. A loop without compensators and delays uses a
-    sixth of all states.
-    """
+    """Return the matrix without states that are never written or never read."""
+    # Such states only add eigenvalues of 0. A loop without compensators and delays uses
+    # a sixth of all states.
     while not (used := A.any(axis=0) & A.any(axis=1)).all():
         A = A[np.ix_(used, used)]
     return A
@@ -162,11 +160,9 @@ _STEP = 1e-5
 
 
 def null_space_rates(controller: Controller, state: RobotState) -> tuple[Array, Array]:
-    """Return K_N and the field's slope A ≥ 0 in the null space, shape (k, k) each.
-
-    Both are in coordinates that are orthonormal in the metric. A is the symmetric part
-    of -∂g/∂q, by central differences, `without_saddles`.
-    """
+    """Return K_N and the field's slope A ≥ 0 in the null space, shape (k, k) each."""
+    # Both are in coordinates that are orthonormal in the metric. A is the symmetric
+    # part of -∂g/∂q, by central differences, `without_saddles`.
     nothing = np.zeros((0, 0))
     if not controller.field.controls:
         return nothing, nothing
@@ -185,11 +181,9 @@ def null_space_rates(controller: Controller, state: RobotState) -> tuple[Array, 
 
 
 def without_saddles(A: Array) -> Array:
-    """Return the symmetric part of a slope, with 0 for its negative eigenvalues.
-
-    There the field drives the robot away from a point (a saddle of its cost), which is
-    intended, and no control rate changes it.
-    """
+    """Return the symmetric part of a slope, with 0 for its negative eigenvalues."""
+    # There the field drives the robot away from a point (a saddle of its cost), which
+    # is intended, and no control rate changes it.
     values, U = np.linalg.eigh(0.5 * (A + A.T))
     stable: Array = (U * np.maximum(values, 0.0)) @ U.T
     return stable

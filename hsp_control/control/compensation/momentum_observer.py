@@ -71,8 +71,8 @@ class RunningObserver:
     """A momentum observer in one run: it keeps the estimate and the last momentum."""
 
     def __init__(self, bandwidth: float, clip: Array) -> None:
-        """Set K_O [1/s], and the maximum of |r| that is cancelled, shape (nv,)."""
         self._bandwidth, self._clip = bandwidth, clip
+        # K_O [1/s], and the maximum of |r| that is cancelled, shape (nv,)
         self.disturbance: Array = np.zeros(len(clip))  # r, shape (nv,) [N·m or N]
         # r, clipped, shape (nv,) [N·m or N]
         self.cancelled: Array = np.zeros(len(clip))

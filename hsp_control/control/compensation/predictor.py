@@ -47,7 +47,6 @@ class RunningPredictor:
     """Integrates the model under the efforts that are under way."""
 
     def __init__(self, robot: Robot) -> None:
-        """Allocate."""
         self._robot, self._period = robot, 0.0
         self._tau = np.zeros(robot.nv)
 

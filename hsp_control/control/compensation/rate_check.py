@@ -395,10 +395,8 @@ def _stabilising_changes(
 def _largest(
     of_scale: Callable[[float], LinearLoop], smallest: float = 1e-3
 ) -> float | None:
-    """Return the largest scale below 1 at which a loop is stable, or None.
-
-    The loop is also stable at all scales tried between ``smallest`` and the result.
-    """
+    """Return the largest scale below 1 at which a loop is stable, or None."""
+    # The loop is also stable at all scales tried between ``smallest`` and the result.
 
     def stable(s: float) -> bool:
         try:

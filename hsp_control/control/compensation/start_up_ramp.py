@@ -33,7 +33,6 @@ class RunningRamp:
     """A start-up ramp in one run: it knows when and where it began."""
 
     def __init__(self, declared: StartUpRamp, state: RobotState) -> None:
-        """Set the ramp, and the state at which it begins."""
         self._frequency = declared.natural_frequency
         self._schedule = Schedule([(state.t, None)], ramp=declared.duration)
         self._q0 = state.q.copy()

@@ -45,11 +45,9 @@ class VelocityFilter(Part, error=CompensationError):
     def coefficients(
         self, period: float
     ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Return b_0..b_2 and a_1, a_2 of y_k = Σ b_i v_(k-i) - Σ a_i y_(k-i).
-
-        The first order is exact for a piecewise constant velocity. The second is the
-        bilinear transform of 1/(1 + √2 s + s²), prewarped to keep the cut-off.
-        """
+        """Return b_0..b_2 and a_1, a_2 of y_k = Σ b_i v_(k-i) - Σ a_i y_(k-i)."""
+        # The first order is exact for a piecewise constant velocity. The second is the
+        # bilinear transform of 1/(1 + √2 s + s²), prewarped to keep the cut-off.
         if self.order == 1:
             pole = exp(-2.0 * pi * self.cutoff * period)
             return (1.0 - pole, 0.0, 0.0), (-pole, 0.0)
@@ -69,7 +67,6 @@ class RunningFilter:
     """A velocity filter in one run: it keeps the last inputs and outputs."""
 
     def __init__(self, declared: VelocityFilter) -> None:
-        """Set the filter."""
         self._filter = declared
         self._past: tuple[Array, ...] | None = None
 
