@@ -16,7 +16,7 @@ from hsp_control.common.suggestions import listing
 from hsp_control.config import Experiment
 from hsp_control.control import Controller, ControlOutput, Diagnostics
 from hsp_control.control.first_state import warn_of_jump, warn_of_slow_efforts
-from hsp_control.inspection.checks import too_weak
+from hsp_control.inspection.inspect import too_weak
 from hsp_control.robot import Robot
 from hsp_control.robot.description.inertias import impossible_inertias
 from hsp_control.robot.description.urdf_checks import read_urdf

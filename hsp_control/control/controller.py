@@ -23,14 +23,13 @@ from hsp_control.control.actuation import Actuation
 from hsp_control.control.actuation.actuation import CODES, FLAGS
 from hsp_control.control.actuation.status import EXACT, RELAXED
 from hsp_control.control.changes import Change, Changes, TimeLine
-from hsp_control.control.declared import Declared
 from hsp_control.control.first_state import check_angles, warn_of_jump
 from hsp_control.control.gains_in_force import GainsInForce
 from hsp_control.control.guards import StepLock, read_only
 from hsp_control.control.held_gains import check_held
 from hsp_control.control.mixture import AccelerationModifier, Mixture
 from hsp_control.control.output import ControlOutput, Diagnostics
-from hsp_control.control.setup import Base, priority_of
+from hsp_control.control.setup import Base, Declared, priority_of
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.start import Start
 from hsp_control.law import TaskSample

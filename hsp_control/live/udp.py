@@ -11,8 +11,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.measurement import Inertial, Measurement
-from hsp_control.live.link import LOOPBACK, Address, AgeEstimator, Faults, Link
-from hsp_control.live.packets import Kind
+from hsp_control.live.link import LOOPBACK, Address, AgeEstimator, Faults, Kind, Link
 from hsp_control.live.real_time import no_garbage_collection
 from hsp_control.live.safe_stop import Phase
 from hsp_control.live.simulated_robot import SimulatedRobot

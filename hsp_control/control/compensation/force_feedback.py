@@ -10,7 +10,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.constraints.contacts import Contact
-from hsp_control.constraints.contacts.commanded_force import NORMAL
+from hsp_control.constraints.contacts.contact import NORMAL
 from hsp_control.control.controller import Controller
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import Names, Positive

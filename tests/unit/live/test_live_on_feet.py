@@ -30,7 +30,7 @@ from hsp_control.live import (
     run_loop,
 )
 from hsp_control.live.bearing_feet import BearingFeet
-from hsp_control.live.measurement_checks import DeadReckoning, valid_measurement
+from hsp_control.live.state_reader import DeadReckoning, valid_measurement
 from hsp_control.live.udp import SensorLayout
 
 pytest.importorskip("example_robot_data")
