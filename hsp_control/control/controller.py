@@ -24,12 +24,11 @@ from hsp_control.control.actuation.actuation import CODES, FLAGS
 from hsp_control.control.actuation.status import EXACT, RELAXED
 from hsp_control.control.changes import Change, Changes, TimeLine
 from hsp_control.control.first_state import check_angles, warn_of_jump
-from hsp_control.control.gains_in_force import GainsInForce
+from hsp_control.control.gains_in_force import GainsInForce, check_held
 from hsp_control.control.guards import StepLock, read_only
-from hsp_control.control.held_gains import check_held
 from hsp_control.control.mixture import AccelerationModifier, Mixture
 from hsp_control.control.output import ControlOutput, Diagnostics
-from hsp_control.control.setup import Base, Declared, priority_of
+from hsp_control.control.setup import Base, Declared
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.start import Start
 from hsp_control.law import TaskSample
@@ -647,14 +646,6 @@ class Controller:
             ControllerError: If there is no such contact.
         """
         return self._setup.contact(contact).force_offset
-
-    def priority_of(self, task: str) -> int:
-        """Return the priority of a task, 1 the highest.
-
-        Raises:
-            ControllerError: If there is no such task.
-        """
-        return priority_of(self._setup.task(task).task, self._declared.robot)
 
     # -- what explains it -------------------------------------------------------------
 

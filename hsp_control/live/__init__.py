@@ -2,10 +2,10 @@
 
 from hsp_control.simulation.control_chain import EffortSource as EffortSource
 
-from .backends import connect as connect
-from .backends import publish as publish
 from .hardware import Hardware as Hardware
 from .hardware import Measurement as Measurement
+from .hardware import connect as connect
+from .hardware import publish as publish
 from .link import Faults as Faults
 from .link import Link as Link
 from .loop import run_loop as run_loop

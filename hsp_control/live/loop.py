@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from itertools import islice
 from math import inf
 from pathlib import Path
@@ -199,37 +200,31 @@ def _instants(controller: Controller) -> Iterator[float]:
         yield change.end
 
 
+@dataclass(eq=False)
 class OneRun:
     """One run of a loop whose parts are ready: `run`, then `finish`; none raises."""
 
-    def __init__(
-        self,
-        chain: ControlChain[EffortSource],
-        hardware: Hardware,
-        reader: StateReader,
-        limiter: EffortLimiter,
-        safe_stop: SafeStop,
-        log: LoopLog,
-        requests: OperatorRequests,
-        settings: LiveSettings,
-        end: float,
-        balance: Balance | None = None,
-    ) -> None:
-        self.chain, self.hardware, self.reader = chain, hardware, reader
-        self.balance = balance
-        self.limiter, self.safe_stop, self.log = limiter, safe_stop, log
-        self.requests, self.settings, self.end = requests, settings, end
-        self.period = hardware.period
-        self.phase = Phase.RUNNING  # running, damping or holding
-        self.ended: Ended = "completed"
-        self.reason = ""
-        self.error: Exception | None = None
-        # how it will end, and why, once the plan has brought the robot to rest
-        self.ending: tuple[Ended, str] | None = None
-        self.asked_at = 0.0  # when that was asked for [s]
-        # whether it stopped sending efforts
-        self.silent = self.done = self.abandoned = False
-        self.later = ""  # the first fault in the safe stop, "" without one
+    chain: ControlChain[EffortSource]
+    hardware: Hardware
+    reader: StateReader
+    limiter: EffortLimiter
+    safe_stop: SafeStop
+    log: LoopLog
+    requests: OperatorRequests
+    settings: LiveSettings
+    end: float  # when the duration is over [s]
+    balance: Balance | None = None
+    phase: Phase = Phase.RUNNING  # running, damping or holding
+    ended: Ended = "completed"
+    reason: str = ""
+    error: Exception | None = None
+    # how it will end, and why, once the plan has brought the robot to rest
+    ending: tuple[Ended, str] | None = None
+    asked_at: float = 0.0  # when that was asked for [s]
+    silent: bool = False  # whether it stopped sending efforts
+    done: bool = False
+    abandoned: bool = False
+    later: str = ""  # the first fault in the safe stop, "" without one
 
     def run(self, on_period: Callable[[float], object] | None) -> None:
         """Run period after period until the safe stop is complete."""
@@ -306,7 +301,8 @@ class OneRun:
             # What the motors have counts, with the gravity that the robot adds.
             has = None if measurement.applied is None else self.limiter.applied.copy()
             measured = measurement._replace(t=t, applied=has)
-            tau = np.asarray(self.chain.effort(measured, self.period), dtype=float)
+            effort = self.chain.effort(measured, self.hardware.period)
+            tau = np.asarray(effort, dtype=float)
             if tau.shape != measurement.v.shape:
                 raise ValueError(
                     f"the effort has shape {tau.shape}; needs {measurement.v.shape}"
@@ -379,7 +375,7 @@ class OneRun:
         if self.log.controller_failed:
             return
         try:
-            self.chain.command.applied(self.limiter.applied, self.period)
+            self.chain.command.applied(self.limiter.applied, self.hardware.period)
         except Exception as error:
             self.fail(error)
 

@@ -71,14 +71,9 @@ class Kept(NamedTuple):
     @classmethod
     def of(cls, limits: RobotLimits | None) -> "Kept":
         """Return what keeps a set of limits."""
-        if limits is None:
-            return cls(None, WeakKeyDictionary(), box=True, rate=False)
-        return cls(
-            limits,
-            WeakKeyDictionary(),
-            box=not limits.distances and limits.static_effort is None,
-            rate=bool(np.isfinite(limits.effort_rate).any()),
-        )
+        barriers = limits is not None and (limits.distances or limits.static_effort)
+        rate = limits is not None and bool(np.isfinite(limits.effort_rate).any())
+        return cls(limits, WeakKeyDictionary(), box=not barriers, rate=rate)
 
 
 class Actuation:
@@ -238,7 +233,7 @@ class Actuation:
 
     def disturbed(self, acceleration: Array) -> None:
         """Expect an acceleration that something else than the efforts causes, (nv,)."""
-        self._held.disturbance[:] = acceleration
+        self._held.held.disturbance[:] = acceleration
 
     def forget(self) -> None:
         """Forget the last efforts: the rate limit does not apply to the next one."""
@@ -351,7 +346,7 @@ class Actuation:
                 state.effort,
                 self._robot.dof_indices,
                 self._motion,
-                self._held.memory_of_kernels,
+                self._held.held,
                 self._bounds,
                 code,
                 self._found,

@@ -19,16 +19,18 @@ _MEMORY = 0.1
 
 
 class Held(NamedTuple):
-    """The memory of a `HeldEffort`, as kernels read it."""
+    """The memory of a `HeldEffort`, as kernels read it, shape (nv,) each."""
 
     # when the period ends, NaN once that was looked at, and its length [s]
     timing: Array
-    expected: Array  # velocity that is expected then, shape (nv,)
-    stray: Array  # differences from it, summed over about `_WINDOW`, shape (nv,)
-    error: Array  # largest error of late, shape (nv,)
-    drift: Array  # mean error of late, shape (nv,)
-    steady: Array  # what mean and present error have in common, shape (nv,)
-    disturbance: Array  # acceleration that something else causes, shape (nv,)
+    expected: Array  # velocity that is expected then [rad/s or m/s]
+    stray: Array  # differences from it, summed over about `_WINDOW`
+    error: Array  # largest error of late [rad/s² or m/s²]
+    drift: Array  # mean error of late
+    # what the mean error and that of the last hundredth of a second have in common: a
+    # force that has ended does not count
+    steady: Array
+    disturbance: Array  # acceleration that something else than the effort causes
 
 
 class HeldEffort:
@@ -44,40 +46,20 @@ class HeldEffort:
     """
 
     def __init__(self, nv: int) -> None:
-        # largest error of late, shape (nv,) [rad/s² or m/s²]
-        self.error: Array = np.zeros(nv)
-        # mean error of late, shape (nv,) [rad/s² or m/s²]
-        self.drift: Array = np.zeros(nv)
-        # what the mean error and that of the last hundredth of a second have in common,
-        # shape (nv,) [rad/s² or m/s²]: a force that has ended does not count
-        self.steady: Array = np.zeros(nv)
-        # acceleration that something else than the effort is known to cause, shape
-        # (nv,) [rad/s² or m/s²]
-        self.disturbance: Array = np.zeros(nv)
-        self._expected, self._stray = np.zeros(nv), np.zeros(nv)
-        self._timing = np.full(2, np.nan)
+        self.held = Held(np.full(2, np.nan), *(np.zeros(nv) for _ in range(6)))
         self._expect = IdentityCache(self.expect)
 
     def sent(self, t: float, v: Array, a: Array, period: float) -> None:
         """Record that the effort of an acceleration is held from now on."""
-        self._timing[1] = period
+        self.held.timing[1] = period
         self._expect.get(v, a)(t)
-
-    def observe(self, t: float, v: Array) -> None:
-        """Look at the velocity (nv,) at time t [s]; it counts at a period's end."""
-        observe(v, self.memory_of_kernels, t)
 
     def expect(self, v: Array, a: Array) -> Callable[[float], float]:
         """Return `sent` of what these arrays then hold, as a call of the time."""
         # The period is that of the last `sent`.
-        arrays = v, a, self.disturbance, self._timing, self._expected
+        held = self.held
+        arrays = v, a, held.disturbance, held.timing, held.expected
         return bind(_expect, *arrays, timed=True)
-
-    @property
-    def memory_of_kernels(self) -> "Held":
-        """What `observe` reads and writes."""
-        observed = self._stray, self.error, self.drift, self.steady
-        return Held(self._timing, self._expected, *observed, self.disturbance)
 
     def prepare(self, v: Array, a: Array) -> None:
         """Compile what `sent` calls, for these arrays."""
@@ -85,24 +67,17 @@ class HeldEffort:
 
     def forget(self) -> None:
         """Begin anew."""
-        self.error[:] = self.disturbance[:] = 0.0
-        self._stray[:] = self.drift[:] = self.steady[:] = 0.0
-        self._timing[:] = np.nan
-
-    @property
-    def _memories(self) -> tuple[Array, ...]:
-        kept = self._stray, self._expected, self._timing
-        return (self.error, self.drift, self.steady, self.disturbance, *kept)
+        for each in self.held:
+            each[:] = 0.0
+        self.held.timing[:] = np.nan
 
     def memory(self) -> tuple[Array, ...]:
         """Return a copy of what it remembers."""
-        own = self._memories
-        return tuple(each.copy() for each in own)
+        return tuple(each.copy() for each in self.held)
 
     def remember(self, memory: tuple[Array, ...]) -> None:
         """Set what `memory` returned."""
-        own = self._memories
-        for each, value in zip(own, memory, strict=True):
+        for each, value in zip(self.held, memory, strict=True):
             each[:] = value
 
 

@@ -21,7 +21,7 @@ from hsp_control.control.compensation.linear_loop import (
     null_space_rates,
 )
 from hsp_control.control.controller import Controller
-from hsp_control.control.held_gains import rounded_down
+from hsp_control.control.gains_in_force import rounded_down
 from hsp_control.declaration import within
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import Task
