@@ -30,6 +30,19 @@ from hsp_control.simulation.limit_excess import LimitExcess
 from hsp_control.simulation.plants import differing_bodies
 
 
+def end_process(process: subprocess.Popen[bytes], patience: float) -> None:
+    """Close a process's pipes, so that it ends; kill it if that takes too long [s]."""
+    for pipe in (process.stdin, process.stdout):
+        if pipe is not None:
+            with suppress(OSError):  # the process has ended before reading all
+                pipe.close()
+    try:
+        process.wait(patience)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+
+
 class RobotProcess:
     """A simulated robot in its own process, and the `Hardware` that connects to it.
 
@@ -137,15 +150,7 @@ class RobotProcess:
         self.hardware.close()
         process, self.process = self.process, None
         if process is not None:
-            for pipe in (process.stdin, process.stdout):
-                if pipe is not None:
-                    with suppress(OSError):  # the process has ended before reading all
-                        pipe.close()
-            try:
-                process.wait(10.0)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
+            end_process(process, 10.0)
         self.hardware.drain()
 
 

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple, Self
 from hsp_control.cli.consoles import compiling_told, out
 from hsp_control.cli.live_experiment import live_period
 from hsp_control.cli.pages import OpeningPage, draw_before, draw_empty, status_line
+from hsp_control.cli.robot_process import end_process
 from hsp_control.common.exceptions import HspControlError, ViewerError
 from hsp_control.config import Experiment, Scenario, load_experiment
 from hsp_control.config.document import Document
@@ -102,15 +103,7 @@ class PageProcess:
     def close(self) -> None:
         """End the process; a second call does nothing."""
         self.channel.close()
-        for pipe in (self._process.stdin, self._process.stdout):
-            if pipe is not None:
-                with suppress(OSError):
-                    pipe.close()
-        try:
-            self._process.wait(5.0)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+        end_process(self._process, 5.0)
 
     def _say(self, message: dict[str, Any]) -> None:
         assert self._process.stdin is not None

@@ -95,17 +95,19 @@ class Command:
         self.controller.restart()
         self._filter: RunningFilter | None = None
         if own.velocity_filter is not None:
-            self._filter = own.velocity_filter.begin()
+            self._filter = RunningFilter(own.velocity_filter)
         self._observer: RunningObserver | None = None
         if own.momentum_observer is not None:
             self._observer = own.momentum_observer.begin(robot)
         self._feed_forward: FrictionFeedForward | None = own.friction(robot)
         self._integral: RunningIntegral | None = None
         if own.integral_action is not None:
-            self._integral = own.integral_action.begin(self.controller)
+            self._integral = RunningIntegral(own.integral_action, self.controller)
         self._force_feedback: RunningForceFeedback | None = None
         if own.force_feedback is not None:
-            self._force_feedback = own.force_feedback.begin(self.controller)
+            self._force_feedback = RunningForceFeedback(
+                own.force_feedback, self.controller
+            )
         self._ramp: RunningRamp | None = None  # begins at the first state
         self._predictor: RunningPredictor | None = None
         self._period = 0.0
@@ -275,7 +277,7 @@ class Command:
         disturbance = self._zero if observer is None else observer.disturbance
         efforts = (tau + disturbance for tau in islice(self._under_way, 1, None))
         if self._predictor is None:
-            self._predictor = predictor.begin(self.controller.robot)
+            self._predictor = RunningPredictor(self.controller.robot)
         q, v = self._predictor.predict(q, v, efforts, period)
         return t + predictor.effort_delay * period, q, v
 
@@ -289,7 +291,7 @@ class Command:
     ) -> tuple[Array, Array | None]:
         """Return the acceleration to deliver, and the effort besides M a + N."""
         if self._ramp is None and self.compensation.start_up_ramp is not None:
-            self._ramp = self.compensation.start_up_ramp.begin(state)
+            self._ramp = RunningRamp(self.compensation.start_up_ramp, state)
         if self._ramp is not None:
             a = self._ramp.blend(state, a)
         offset = self._zero

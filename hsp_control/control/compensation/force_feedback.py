@@ -67,10 +67,6 @@ class ForceFeedback(Part, error=CompensationError):
                     "false"
                 )
 
-    def begin(self, controller: Controller) -> "RunningForceFeedback":
-        """Return the feedback of a controller for one run; it begins at zero."""
-        return RunningForceFeedback(self, controller)
-
 
 class RunningForceFeedback:
     """Force feedback in one run: it keeps the integrals."""

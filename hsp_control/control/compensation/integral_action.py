@@ -117,10 +117,6 @@ class IntegralAction(Part, error=CompensationError):
             gains[task.name] = Ki
         return gains
 
-    def begin(self, controller: Controller) -> "RunningIntegral":
-        """Return the integral action of a controller for one run; it begins at zero."""
-        return RunningIntegral(self, controller)
-
 
 class RunningIntegral:
     """Integral action in one run: it keeps the integrals."""

@@ -38,10 +38,6 @@ class Predictor(Part, error=CompensationError):
         """The total delay from a measurement to its effort, in control periods."""
         return self.effort_delay + self.sensor_delay
 
-    def begin(self, robot: Robot) -> "RunningPredictor":
-        """Return the predictor of one run."""
-        return RunningPredictor(robot)
-
 
 class RunningPredictor:
     """Integrates the model under the efforts that are under way."""

@@ -24,10 +24,6 @@ class StartUpRamp(Part, error=CompensationError):
     """Natural frequency ω of the spring that holds the robot meanwhile [rad/s]; 0 is
     pure gravity compensation."""
 
-    def begin(self, state: RobotState) -> "RunningRamp":
-        """Return the ramp that begins at a state: at its time and configuration."""
-        return RunningRamp(self, state)
-
 
 class RunningRamp:
     """A start-up ramp in one run: it knows when and where it began."""

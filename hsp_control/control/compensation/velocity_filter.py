@@ -29,10 +29,6 @@ class VelocityFilter(Part, error=CompensationError):
         """The delay of slow motion [s]."""
         return (1.0 if self.order == 1 else sqrt(2.0)) / (2.0 * pi * self.cutoff)
 
-    def begin(self) -> "RunningFilter":
-        """Return the filter for one run; it knows no measurement yet."""
-        return RunningFilter(self)
-
     def step(
         self, v: Array, past: tuple[Array, ...], period: float
     ) -> tuple[Array, tuple[Array, ...]]:
