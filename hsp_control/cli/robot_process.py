@@ -79,7 +79,6 @@ class RobotProcess:
             "peer": self.hardware.address,
             "session": self.hardware.session,
         }
-        # process; None if it does not run
         self.process: subprocess.Popen[bytes] | None = None
         # robot's report (a dictionary), once it has ended by itself
         self.report: dict[str, Any] | None = None

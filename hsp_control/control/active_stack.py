@@ -51,9 +51,8 @@ class ActiveStack:
     ) -> None:
         robot: Robot = state.robot  # its state says which base motions contacts permit
         self.support = support  # contacts' forces and their bounds
-        self.contacts = support.contacts  # active contacts
+        self.contacts = support.contacts
         planned = [level for level in levels if level]
-        # tasks of each level
         self.levels = tuple(tuple(each.task for each in level) for level in planned)
         held = sum(contact.rows for contact in self.contacts)
         free = (
@@ -61,7 +60,6 @@ class ActiveStack:
         )
         first = [held + free] if held + free else []
         sizes = [sum(task.rows for task in level) for level in self.levels]
-        # law
         self.resolution = Resolution(
             first + sizes,
             robot.nv,
@@ -71,24 +69,19 @@ class ActiveStack:
             Following.of(robot.size, on_legs=bool(robot.unactuated)),
         )
         self.rows = self.resolution.problem.task  # all rows stacked: J, J', e, e', a_x
-        self.row_count = len(self.rows.error)  # number of rows
-        # whether a task follows a stream
+        self.row_count = len(self.rows.error)
         self.streamed = any(
             isinstance(task.followed, Streamed)
             for level in self.levels
             for task in level
         )
-        # whether contacts exert forces
         self.forces, self.has_forces = support.forces, support.size > 0
         # rows, the field and the law's results, in one block: see `Record`
         self.memory = self.resolution.problem.record.memory
-        # law's acceleration, shape (nv,)
         self.acceleration = self.resolution.acceleration
         self.contact_rows = _places(self.contacts, 0)  # rows of each contact, by name
-        # index of the first row that belongs to a task
         self.first_task_row = held + free
         tasks = [each for level in planned for each in level]
-        # rows of each task in the stack, by name
         self.task_rows = _places([each.task for each in tasks], self.first_task_row)
         # tasks with a largest error: the name, the first row, and `Feedback.largest`
         self.bounds: list[tuple[str, slice, Callable[[Array], float]]] = []

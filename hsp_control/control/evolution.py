@@ -48,8 +48,7 @@ class Evolution(Generic[Value]):
     """
 
     initial: Value  # value before all transitions
-    # transitions, in order of their start
-    transitions: tuple[Transition[Value], ...] = ()
+    transitions: tuple[Transition[Value], ...] = ()  # in order of their start
 
     def then(self, start: float, ramp: float, target: Value) -> "Evolution[Value]":
         """Return the evolution with one more transition."""

@@ -174,7 +174,6 @@ class FaultInjector:
         self._rng = np.random.default_rng((faults.seed, stream))
         self._cumulative = np.cumsum([getattr(faults, kind) for kind in _KINDS])
         self._waiting: list[tuple[int, bytes]] = []
-        # number of injected faults of each kind
         self.injected: Counter[str] = Counter(dict.fromkeys(_KINDS, 0))
 
     def apply(self, data: bytes) -> list[bytes]:

@@ -115,7 +115,6 @@ class LoopLog:
         self._next, self._phase = -inf, Phase.WAITING
         self._failed = False
         self._excess = LimitExcess(chain.command.controller.robot)
-        # the journal; None without a log
         self.path = None if path is None else Path(path)
         # whether the controller has raised; it is not called again
         self.controller_failed = False

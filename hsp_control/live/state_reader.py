@@ -384,7 +384,6 @@ class StateReader:
         self.connection_lost = False  # whether no state can arrive any more
         # when this period's state arrived, by the loop's clock [s]
         self.arrival = self._last_arrival = self._due = clock()
-        # response times and deadline misses
         self.deadlines = Deadlines(hardware.period)
 
     @property

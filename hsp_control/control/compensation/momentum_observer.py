@@ -74,7 +74,6 @@ class RunningObserver:
         self._bandwidth, self._clip = bandwidth, clip
         # K_O [1/s], and the maximum of |r| that is cancelled, shape (nv,)
         self.disturbance: Array = np.zeros(len(clip))  # r, shape (nv,) [N·m or N]
-        # r, clipped, shape (nv,) [N·m or N]
         self.cancelled: Array = np.zeros(len(clip))
         self._momentum: Array | None = None
         self._drift: Array = np.zeros(len(clip))
