@@ -9,8 +9,7 @@ tests/unit/control/test_elastic_joint.py compares it with simulations.
 import numpy as np
 from marked_sections import DOCS, replace_section
 
-from hsp_control.control.compensation.elastic_joint import ElasticJoint
-from hsp_control.control.compensation.linear_loop import LinearLoop
+from hsp_control.control.compensation.linear_loop import ElasticJoint, LinearLoop
 
 PERIOD, OMEGA, RATE = 0.001, 20.0, 5.0
 LINK, MOTOR, DAMPING = 1.0, 0.5, 0.02  # kg·m², kg·m²; of the critical damping

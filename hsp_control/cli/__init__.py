@@ -1,5 +1,5 @@
 """The command line: ``hsp``."""
 
-from . import startup as startup  # isort: skip: before the slow imports
+from . import interrupts as interrupts  # isort: skip: before the slow imports
 
 from .main import main as main

@@ -1,4 +1,4 @@
-"""The commands of ``hsp``."""
+"""The commands of ``hsp`` that have no file of their own."""
 
 import argparse
 import json
@@ -10,13 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from rich.progress import (
-    BarColumn,
-    Progress,
-    TextColumn,
-    TimeRemainingColumn,
-    track,
-)
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn, track
 from rich.table import Table
 
 from hsp_control.cli import check as checks
@@ -24,11 +18,9 @@ from hsp_control.cli import robot_table
 from hsp_control.cli.consoles import errors as _errors
 from hsp_control.cli.consoles import message_of, working
 from hsp_control.cli.consoles import out as _out
-from hsp_control.cli.interrupts import DeferredInterrupt
-from hsp_control.cli.limit_rows import limit_rows
+from hsp_control.cli.interrupts import INTERRUPTED, DeferredInterrupt
 from hsp_control.cli.loading import read
-from hsp_control.cli.startup import INTERRUPTED
-from hsp_control.cli.stopwatch import Stopwatch
+from hsp_control.cli.run_summary import Stopwatch, summary
 from hsp_control.common.entry_points import entry_points
 from hsp_control.common.exceptions import LogError, SimulationError
 from hsp_control.config import Experiment, json_schema
@@ -38,10 +30,9 @@ from hsp_control.robot.description.sources import example_robots
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.measures import measures
 from hsp_control.simulation.recorder import Recorder
-from hsp_control.simulation.unreached import FAR, OUT, unreached
 
 if TYPE_CHECKING:
-    from hsp_control.cli.screen import Screen
+    from hsp_control.cli.pages import Screen
 
 
 def run(options: argparse.Namespace) -> int:
@@ -52,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
     tell = _tell_json if options.json else _tell
     if not options.view:
         return _run_and_save(_built(loaded), log, tell, None)
-    from hsp_control.cli.screen import Screen
+    from hsp_control.cli.pages import Screen
 
     said = _errors if options.json else _out
     with Screen.open(loaded, options, lambda url: said.print(f"View: {url}")) as screen:
@@ -117,10 +108,10 @@ def _run_and_save(
 
 def _tell(rollout: Rollout, log: Path, stopwatch: Stopwatch) -> None:
     """Print what a run did, as a table."""
-    summary = _summary(rollout)
+    table = summary(rollout)
     for line in stopwatch.table_rows(rollout):
-        summary.add_row(*line)
-    _out.print(summary)
+        table.add_row(*line)
+    _out.print(table)
     _out.print(f"Log: {log}")
 
 
@@ -144,15 +135,10 @@ def _saved_elsewhere(rollout: Rollout, log: Path, error: LogError) -> Path:
 
 def view(options: argparse.Namespace) -> int:
     """Show logs in the browser."""
-    from hsp_control.cli.screen import show_logs
+    from hsp_control.cli.pages import show_logs
 
     show_logs(options)
     return 0
-
-
-def check(options: argparse.Namespace) -> int:
-    """Build all objects, evaluate the law once, and print a summary."""
-    return checks.check(options)
 
 
 def plot(options: argparse.Namespace) -> int:
@@ -175,41 +161,6 @@ def plot(options: argparse.Namespace) -> int:
     for file in files:
         _out.print(f"Figure: {file}")
     return 0
-
-
-def export(options: argparse.Namespace) -> int:
-    """Write a log as a page or as films."""
-    from hsp_control.cli import export as exports
-
-    return exports.export(options)
-
-
-def play(options: argparse.Namespace) -> int:
-    """Let a page steer a simulated robot in real time."""
-    from hsp_control.cli import play as plays
-
-    return plays.play(options)
-
-
-def live(options: argparse.Namespace) -> int:
-    """Control a simulated robot in another process in real time."""
-    from hsp_control.cli import live as lives
-
-    return lives.live(options)
-
-
-def inspect(options: argparse.Namespace) -> int:
-    """Print what is odd about a robot's description."""
-    from hsp_control.cli import inspect as inspections
-
-    return inspections.inspect(options)
-
-
-def doctor(options: argparse.Namespace) -> int:
-    """Print what this machine lacks."""
-    from hsp_control.cli import doctor as doctors
-
-    return doctors.doctor(options)
 
 
 def robots(options: argparse.Namespace) -> int:
@@ -269,44 +220,6 @@ def _run_with_progress(
             progress.update(bar, completed=done)
 
         return experiment.run(show, on_row)
-
-
-def _summary(rollout: Rollout) -> Table:
-    table = Table(show_header=False, box=None, pad_edge=False)
-    table.add_row(
-        "run", f"{len(rollout)} rows to t = {rollout.t[-1]:g} s, {rollout.status}"
-    )
-    tasks = rollout.meta["tasks"]
-    away = {each.task: each for each in unreached(rollout.columns, tasks)}
-    for task in tasks:
-        error = np.linalg.norm(rollout[f"task.{task}.error"], axis=1)
-        tracked = error[np.isfinite(error)]  # a task may be off for a while
-        if not len(tracked):
-            table.add_row(f"task {task}", "was never active")
-            continue
-        rms, last = float(np.sqrt(np.mean(tracked**2))), tracked[-1]
-        table.add_row(f"task {task}", f"|e| rms {rms:.3g}, at the end {last:.3g}")
-        for words, rows in ((FAR, away[task].far), (OUT, away[task].out > 0.0)):
-            if count := int(rows.sum()):
-                text = f"{count} rows: {words}"
-                if words == OUT and rows[-1]:
-                    text += f", {away[task].length(-1)} at the end"
-                table.add_row("", text)
-    norm = rollout["null_space_norm"]
-    table.add_row(
-        "null space", f"|e_N| {norm[0]:.3g} at the start, {norm[-1]:.3g} at the end"
-    )
-    table.add_row(
-        "det(J W⁻¹ Jᵀ)",
-        f"minimum {np.nanmin(rollout['manipulability']):.4g}, "
-        f"smallest singular value {np.nanmin(rollout['singular_values']):.3g}",
-    )
-    table.add_row("effort", f"largest {np.abs(rollout.tau).max():.3g}")
-    for row in limit_rows(rollout):
-        table.add_row("limits", row)
-    if damped := int((rollout["damped"] > 0.0).sum()):
-        table.add_row("singular", f"{damped} rows: the law was damped there, not exact")
-    return table
 
 
 def _describe(robot: Robot) -> None:

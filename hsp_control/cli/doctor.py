@@ -24,20 +24,14 @@ _OURS = {"test", "dev", "docs"}
 
 
 class Check(NamedTuple):
-    """What was looked at, and what was found.
+    """What was looked at, and what was found."""
 
-    Attributes:
-        topic: What was looked at.
-        state: ``ok``; ``note``: something is slower, later or absent; ``bad``:
-            something does not work.
-        found: What was found.
-        advice: What would change it.
-    """
-
-    topic: str
+    topic: str  # what was looked at
+    # ``ok``; ``note``: something is slower, later or absent; ``bad``: something does
+    # not work
     state: Literal["ok", "note", "bad"]
-    found: str
-    advice: str = ""
+    found: str  # what was found
+    advice: str = ""  # what would change it
 
 
 def doctor(options: argparse.Namespace) -> int:

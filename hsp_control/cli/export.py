@@ -56,11 +56,9 @@ def export(options: argparse.Namespace) -> int:
 
 
 def _titled(runs: list["ComparedRun"]) -> list["ComparedRun"]:
-    """Return several runs by the titles of their logs, if those can be their names.
-
-    They cannot if two have the same one, as runs of one configuration have, or if one
-    is too long for a switch.
-    """
+    """Return several runs by the titles of their logs, if those can be their names."""
+    # They cannot if two have the same one, as runs of one configuration have, or if one
+    # is too long for a switch.
     titles = [str(run.rollout.meta.get("title") or "") for run in runs]
     if len(set(titles)) < len(titles):
         return runs

@@ -13,15 +13,15 @@ from typing import Any
 from rich.table import Table
 
 from hsp_control.cli.consoles import out
-from hsp_control.cli.limit_rows import excess_rows
 from hsp_control.cli.live_experiment import (
+    begun_where_it_is,
     check_live,
     live_period,
     simulated_robot,
 )
 from hsp_control.cli.loading import read
 from hsp_control.cli.robot_process import RobotProcess
-from hsp_control.cli.robot_start import begun_where_it_is
+from hsp_control.cli.run_summary import excess_rows
 from hsp_control.cli.steering import let_steer, steering_page
 from hsp_control.common.exceptions import LiveError, LogError
 from hsp_control.config import Experiment
@@ -37,9 +37,9 @@ from hsp_control.live import (
     publish,
     run_loop,
 )
-from hsp_control.live.adapting import AdaptingHardware, LocatedHardware
-from hsp_control.live.deadlines import Quantiles
-from hsp_control.live.stop_signals import stop_signals
+from hsp_control.live.hardware import AdaptingHardware, LocatedHardware
+from hsp_control.live.operator_requests import stop_signals
+from hsp_control.live.report import Quantiles
 from hsp_control.simulation import Rollout
 
 _DRY_RUN = 0.5

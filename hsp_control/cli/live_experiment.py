@@ -1,7 +1,16 @@
-"""What a live run needs of an experiment: its period, and its plant as a robot."""
+"""What a live run needs of an experiment: its period, its start, its plant as a robot.
 
+A live run begins where the robot is, not where the configuration thinks it is.
+"""
+
+import argparse
 from dataclasses import replace
 
+import numpy as np
+
+from hsp_control.cli.loading import load
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import HardwareError
 from hsp_control.config import Experiment
 from hsp_control.declaration import within
 from hsp_control.live import SimulatedRobot
@@ -37,3 +46,26 @@ def simulated_robot(experiment: Experiment) -> SimulatedRobot:
         limits=experiment.controller.limits,
         contacts=experiment.controller.contacts,
     )
+
+
+_FARTHEST = 0.2
+"""Largest distance of a joint from the configuration's start [rad or m].
+
+As near as one guides an arm by hand; from there, what was rehearsed is what happens."""
+
+
+def begun_where_it_is(
+    experiment: Experiment, options: argparse.Namespace, q: Array
+) -> Experiment:
+    """Return the experiment with the robot's configuration as its start."""
+    # What is relative to the start (``origin: start``) then does not pull at the robot.
+    distances = np.abs(experiment.robot.difference(experiment.q0, q))
+    worst = int(np.argmax(distances))
+    start = f"start={{configuration: [{', '.join(f'{each:.6f}' for each in q)}]}}"
+    if not distances[worst] <= _FARTHEST:  # also of a state that is NaN
+        raise HardwareError(
+            f"{experiment.robot.dof_names[worst]} is {distances[worst]:.3g} from the "
+            f"configuration's start; {_FARTHEST:g} is allowed. Move the robot there, "
+            f"or begin where it is, after a rehearsal: --set '{start}'"
+        )
+    return load(options, start)

@@ -4,14 +4,18 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
+from importlib import import_module
+from typing import Any
 
+from hsp_control.cli.interrupts import INTERRUPTED, end_quietly, is_command
 from hsp_control.cli.options.command_line import command_line
 from hsp_control.cli.options.companions import AddedCommand
-from hsp_control.cli.startup import INTERRUPTED, end_quietly, is_command
 from hsp_control.common.exceptions import HspControlError
 
 _OWN_INTERRUPTS = {"export", "play", "view"}
 """Commands that must close processes and pages, or save rows, at Ctrl-C."""
+_OWN_FILES = {"check", "doctor", "export", "inspect", "live", "play"}
+"""Commands with a file of their own; `commands` has the others."""
 _PACKAGES = {"libgomp.so.1": "libgomp1 (Debian, Ubuntu) or libgomp (Fedora)"}
 """What has a library that the wheels of our dependencies expect."""
 FAILURE = 2
@@ -39,8 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         os.environ["NUMBA_DISABLE_JIT"] = "1"
     try:
         # Commands are imported only when needed, so that `hsp --help` answers at once.
-        from hsp_control.cli import commands, consoles
-        from hsp_control.cli.compiling import compiling_shown
+        from hsp_control.cli import consoles
 
         # With other commands Ctrl-C ends the process at once, as during start-up: there
         # is nothing to save, and an exception may get lost in callbacks of libraries.
@@ -52,8 +55,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         )
         if ends_in_order and signal.getsignal(signal.SIGINT) is end_quietly:
             signal.signal(signal.SIGINT, signal.default_int_handler)
-        run = getattr(commands, options.command) if added is None else added.run
-        with compiling_shown(consoles.errors), consoles.warnings_printed():
+        run = _function_of(options.command) if added is None else added.run
+        with consoles.compiling_shown(consoles.errors), consoles.warnings_printed():
             return int(run(options))
     except HspControlError as error:
         print(f"hsp: {consoles.message_of(error)}", file=sys.stderr)
@@ -81,3 +84,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("hsp: stopped by the user", file=sys.stderr)
         return INTERRUPTED
     return FAILURE
+
+
+def _function_of(command: str) -> Any:
+    """Return the function that runs a command; nothing else is imported."""
+    file = command if command in _OWN_FILES else "commands"
+    return getattr(import_module(f"hsp_control.cli.{file}"), command)

@@ -8,12 +8,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from types import FrameType
 
 from hsp_control.cli.consoles import out
-from hsp_control.cli.opening_page import (
-    OpeningPage,
-    draw_before,
-    draw_empty,
-    status_line,
-)
+from hsp_control.cli.pages import OpeningPage, draw_before, draw_empty, status_line
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.config import Experiment
 from hsp_control.config.loaded_scenario import load_scenario

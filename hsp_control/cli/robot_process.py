@@ -5,23 +5,42 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 from contextlib import suppress
 from pathlib import Path
 from select import select
 from time import monotonic
-from typing import Any, Self
+from typing import Any, BinaryIO, Self
 
-from hsp_control.cli.live_experiment import (
-    check_live,
-    live_period,
-    simulated_robot,
-)
-from hsp_control.common.exceptions import HardwareError
-from hsp_control.config import Experiment
+import numpy as np
+
+from hsp_control.cli.live_experiment import check_live, live_period, simulated_robot
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import HardwareError, HspControlError
+from hsp_control.config import Experiment, load_experiment
 from hsp_control.config.streams import without_sources
-from hsp_control.live.faults import Faults
-from hsp_control.live.sensor_layout import SensorLayout
-from hsp_control.live.udp_hardware import UdpHardware
+from hsp_control.control.output import ControlOutput
+from hsp_control.live.link import Faults, Kind, Link
+from hsp_control.live.live_log import LiveLog, Row, live_channels
+from hsp_control.live.settings import LiveSettings
+from hsp_control.live.simulated_robot import SimulatedRobot
+from hsp_control.live.udp import CLOSED_BY_LOOP, SensorLayout, UdpHardware, serve
+from hsp_control.robot import RobotState
+from hsp_control.simulation.limit_excess import LimitExcess
+from hsp_control.simulation.plants import differing_bodies
+
+
+def end_process(process: subprocess.Popen[bytes], patience: float) -> None:
+    """Close a process's pipes, so that it ends; kill it if that takes too long [s]."""
+    for pipe in (process.stdin, process.stdout):
+        if pipe is not None:
+            with suppress(OSError):  # the process has ended before reading all
+                pipe.close()
+    try:
+        process.wait(patience)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
 
 
 class RobotProcess:
@@ -31,11 +50,6 @@ class RobotProcess:
     own session, so that Ctrl-C in a terminal reaches the loop only. If this process
     dies, the robot's standard input is closed; then the robot stops itself, writes its
     log and ends.
-
-    Attributes:
-        hardware: The robot, for `run_loop`.
-        process: The process; None if it does not run.
-        report: The robot's report (a dictionary), once it has ended by itself.
     """
 
     def __init__(
@@ -46,7 +60,6 @@ class RobotProcess:
         log: str | Path | None = None,
         log_period: float = 0.01,
     ) -> None:
-        """Prepare the process; entering the context starts it."""
         check_live(experiment)
         faults = faults or Faults()
         period = live_period(experiment)
@@ -67,6 +80,7 @@ class RobotProcess:
             "session": self.hardware.session,
         }
         self.process: subprocess.Popen[bytes] | None = None
+        # robot's report (a dictionary), once it has ended by itself
         self.report: dict[str, Any] | None = None
 
     def __enter__(self) -> Self:
@@ -78,7 +92,7 @@ class RobotProcess:
 
     def start(self, timeout: float = 180.0) -> None:
         """Start the process, and wait until it is ready."""
-        command = [sys.executable, "-m", "hsp_control.cli.simulated_robot"]
+        command = [sys.executable, "-m", "hsp_control.cli.robot_process"]
         self.process = subprocess.Popen(
             command,
             stdin=subprocess.PIPE,
@@ -135,13 +149,160 @@ class RobotProcess:
         self.hardware.close()
         process, self.process = self.process, None
         if process is not None:
-            for pipe in (process.stdin, process.stdout):
-                if pipe is not None:
-                    with suppress(OSError):  # the process has ended before reading all
-                        pipe.close()
-            try:
-                process.wait(10.0)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
+            end_process(process, 10.0)
         self.hardware.drain()
+
+
+READY = "ready"
+
+
+def main() -> int:
+    """Run the robot until it has stopped; return 0, or 2 after one error message.
+
+    This is the robot's process. It reads its settings from its standard input, one line
+    of JSON. The input then stays open; when the parent process dies it is closed, and
+    the robot stops itself, completes its log and ends. It writes two lines to its
+    standard output: ``ready``, and at the end its report, as JSON.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C stops the loop only
+    terminated = threading.Event()
+    signal.signal(signal.SIGTERM, lambda *_: terminated.set())
+    settings = json.loads(sys.stdin.buffer.readline())
+    parent_died = threading.Event()
+    watch = threading.Thread(
+        target=_wait_for_end, args=(sys.stdin.buffer, parent_died), daemon=True
+    )
+    watch.start()
+
+    def stop_reason() -> str | None:
+        if parent_died.is_set():
+            return "the process that started the robot has ended"
+        return "the robot's process was terminated" if terminated.is_set() else None
+
+    try:
+        report = _run(settings, stop_reason)
+    except HspControlError as error:
+        print(f"hsp: the simulated robot: {error}", file=sys.stderr)
+        return 2
+    _print(json.dumps(report))
+    return 0
+
+
+def _run(settings: dict[str, Any], stop_reason: Any) -> dict[str, Any]:
+    experiment = load_experiment(settings["config"])
+    robot = simulated_robot(experiment)
+    _warm_up(robot, experiment)
+    link = Link(
+        settings["session"],
+        peer=tuple(settings["peer"]),
+        faults=Faults(**settings["faults"]),
+        stream=2,
+    )
+    log = _RobotLog(experiment, robot, settings) if settings["log"] else None
+    _print(READY)
+    served = serve(
+        robot, link, stop_reason=stop_reason, on_row=log.row if log else None
+    )
+    link.send(Kind.BYE)  # its sequence number tells the loop how many packets it lost
+    reason = robot.reason or "no effort arrived"
+    report: dict[str, Any] = {
+        "phase": robot.phase.name.lower(),
+        "reason": reason,
+        "t": robot.t,
+        "speed": float(np.abs(robot.v).max()),
+        "outdated": served.outdated,
+        "slipped": served.overrun,
+        "link": {**link.counts, "lost": link.lost},
+        "injected": link.injected,
+    }
+    if log is not None:
+        status = "completed" if reason == CLOSED_BY_LOOP else "stopped"
+        log.log.end(status, reason, robot_process=report)
+    link.close()
+    return report
+
+
+class _RobotLog:
+    """The robot's own log: its true states, to the end of its safe stop.
+
+    The controller's columns are computed with the configuration's controller: the robot
+    does not know the changes that the loop makes while it runs.
+    """
+
+    def __init__(
+        self, experiment: Experiment, robot: SimulatedRobot, settings: dict[str, Any]
+    ) -> None:
+        self._controller, self._robot = experiment.controller, robot
+        self._every = settings["log_period"]
+        self._next, self._phase = -np.inf, robot.phase
+        self._state = RobotState(experiment.robot)
+        self._excess = LimitExcess(experiment.robot)
+        meta = {
+            **settings["meta"],
+            "plant": {
+                **robot.plant.describe(),
+                **differing_bodies(robot.plant, experiment.robot),
+            },
+            "config": settings["config"],
+        }
+        path = Path(settings["log"])
+        self.log = LiveLog(path, experiment.controller, experiment.scene, meta)
+        self.log.warm_up(self._row(0.0, robot.q, robot.v))
+
+    def row(self, t: float, q: Array, v: Array, last: bool) -> None:
+        """Write the row of a period, if one is due."""
+        robot = self._robot
+        self._excess.see(self._controller.limits, q, v)
+        if t < self._next and robot.phase == self._phase and not last:
+            return
+        self._next = (np.floor(t / self._every + 1e-6) + 1.0 - 1e-6) * self._every
+        self._phase = robot.phase
+        self.log.add(self._row(t, q, v))
+
+    def _row(self, t: float, q: Array, v: Array) -> Row:
+        robot, state = self._robot, self._state.update(t, q, v)
+        output: ControlOutput | None = None
+        with suppress(HspControlError):  # then its columns are empty
+            output = self._controller.compute(state)
+        log_channels = {
+            **live_channels(phase=float(robot.phase)),
+            **robot.plant.log_channels(t, q, v, robot.tau),
+            **self._excess.take(self._controller.limits),
+        }
+        return Row(state, output, robot.tau, log_channels)
+
+
+def _warm_up(robot: SimulatedRobot, experiment: Experiment) -> None:
+    """Execute each real-time operation once, so that none is compiled later."""
+    experiment.controller.compute(0.0, experiment.q0, experiment.v0)
+    trial = SimulatedRobot(
+        robot.plant,
+        robot.q,
+        robot.v,
+        robot.period,
+        settings=LiveSettings(watchdog=1),
+        contacts=experiment.controller.contacts,
+    )
+    trial.advance([robot.tau])
+    for _ in range(10):
+        trial.advance([])
+        trial.measured()
+    robot.plant.reset(0.0, robot.q, robot.v)
+
+
+def _wait_for_end(stream: BinaryIO, ended: threading.Event) -> None:
+    # Not stream.read: a thread that holds its lock at exit aborts the interpreter.
+    while os.read(stream.fileno(), 4096):
+        pass
+    ended.set()
+
+
+def _print(line: str) -> None:
+    try:
+        print(line, flush=True)
+    except BrokenPipeError:  # the parent has ended
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -66,33 +66,19 @@ need contacts, are simulated there with `root: fixed`.
 
 @dataclass(frozen=True)
 class Row:
-    """A robot in the table.
-
-    Attributes:
-        name: Its name.
-        origin: ``bundled`` or ``example-robot-data``.
-        root: Connection of its root to the world.
-        nq: Numbers in a configuration; None if it does not load.
-        nv: Degrees of freedom.
-        frames: Number of frames.
-        end_effector: Name of its end effector's frame.
-        joints: Number of degrees of freedom that move the end effector.
-        position: Rank of a position task (3 rows).
-        pose: Rank of a pose task (6 rows).
-        note: A remark, or why the controller cannot be used.
-    """
+    """A robot in the table."""
 
     name: str
-    origin: str
-    root: str
-    nq: int | None = None
-    nv: int | None = None
+    origin: str  # ``bundled`` or ``example-robot-data``
+    root: str  # connection of its root to the world
+    nq: int | None = None  # numbers in a configuration; None if it does not load
+    nv: int | None = None  # degrees of freedom
     frames: int | None = None
-    end_effector: str = ""
-    joints: int = 0
-    position: int = 0
-    pose: int = 0
-    note: str = ""
+    end_effector: str = ""  # name of its end effector's frame
+    joints: int = 0  # number of degrees of freedom that move the end effector
+    position: int = 0  # rank of a position task (3 rows)
+    pose: int = 0  # rank of a pose task (6 rows)
+    note: str = ""  # a remark, or why the controller cannot be used
 
 
 def count() -> int:
@@ -162,10 +148,8 @@ def _line(name: str, nv: str, end_effector: str, position: str, pose: str) -> st
 
 
 def task(row: Row, rank: int, full: int) -> str:
-    """Return rank and redundancy of a task, such as ``3 + 4``; ``-`` if impossible.
-
-    A position task may omit axes, so any rank is enough; a pose task needs rank 6.
-    """
+    """Return rank and redundancy of a task, such as ``3 + 4``; ``-`` if impossible."""
+    # A position task may omit axes, so any rank is enough; a pose task needs rank 6.
     if rank == 0 or (full == 6 and rank < full):
         return "-"
     return f"{rank} + {row.joints - rank}"

@@ -1,24 +1,116 @@
-"""``hsp live --steer``: a page that shows a live loop, and steers it."""
+"""``hsp live --steer``: a page that shows a live loop, and steers it; its process."""
 
 import argparse
+import json
+import os
+import select
+import signal
+import socket
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from copy import deepcopy
 from pathlib import Path
-from time import sleep
-from typing import Any, NamedTuple
+from time import monotonic, sleep
+from typing import Any, NamedTuple, Self
 
-from hsp_control.cli.consoles import out
+from hsp_control.cli.consoles import compiling_told, out
 from hsp_control.cli.live_experiment import live_period
-from hsp_control.cli.opening_page import OpeningPage
-from hsp_control.cli.page_process import PageProcess
-from hsp_control.common.exceptions import ViewerError
-from hsp_control.config import Experiment, Scenario
+from hsp_control.cli.pages import OpeningPage, draw_before, draw_empty, status_line
+from hsp_control.cli.robot_process import end_process
+from hsp_control.common.exceptions import HspControlError, ViewerError
+from hsp_control.config import Experiment, Scenario, load_experiment
+from hsp_control.config.document import Document
+from hsp_control.config.loaded_scenario import LoadedScenario, load_scenario
+from hsp_control.config.streams import without_sources
 from hsp_control.control.controller import Controller
+from hsp_control.declaration.plain_data import plain_data
 from hsp_control.live import OperatorRequests
+from hsp_control.play.channel import Channel, channel_pair
 from hsp_control.play.dead_mans_key import DeadMansKey
 from hsp_control.play.handles import Handles
+from hsp_control.play.mirror import Mirror
+from hsp_control.play.picture import FRAME, Picture
 from hsp_control.play.steered_loop import SteeredLoop
+from hsp_control.visualization.viewer import Viewer
+from hsp_control.visualization.viewer.server import Server
+
+START = 60.0
+"""Time in which the page's process must say its address [s]."""
+
+
+class PageProcess:
+    """The process of a page that shows and steers a live loop; a context manager."""
+
+    def __init__(self, *, port: int | None, host: str, held: bool) -> None:
+        self.held = held  # whether somebody must hold a key
+        self.channel, self._there = channel_pair()  # way to it
+        self.url = ""  # page's address, with its key
+        self._settings = {
+            "channel": self._there.fileno(),
+            "port": port,
+            "host": host,
+            "held": held,
+        }
+
+    def __enter__(self) -> Self:
+        """Start the process, and wait for the page's address."""
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "hsp_control.cli.steering"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            pass_fds=[self._there.fileno()],
+            start_new_session=True,  # Ctrl-C reaches the loop only
+        )
+        self._there.close()
+        assert self._process.stdout is not None
+        self._say(self._settings)
+        ready, _, _ = select.select([self._process.stdout], [], [], START)
+        if not ready:
+            self._process.kill()
+            self.close()
+            raise ViewerError(f"the loop's page did not start within {START:g} s")
+        self.url = self._process.stdout.readline().decode().strip()
+        if not self.url:
+            self.close()
+            raise ViewerError("the loop's page did not start")
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def prepare(self, scenario: Scenario) -> None:
+        """Let it draw the robot and the scene of a configuration."""
+        config = plain_data(scenario, defaults=True)
+        self._say({"prepare": without_sources(config)})
+
+    def say(self, text: str) -> None:
+        """Set its status line."""
+        self._say({"status": text})
+
+    def begin(self, experiment: Experiment, journal: Path) -> None:
+        """Let it draw the loop: what it needs is compiled."""
+        journal.unlink(missing_ok=True)  # of another run
+        self._say(
+            {
+                "begin": without_sources(experiment.config),
+                "journal": str(journal.absolute()),
+                "period": live_period(experiment),
+            }
+        )
+
+    def close(self) -> None:
+        """End the process; a second call does nothing."""
+        self.channel.close()
+        end_process(self._process, 5.0)
+
+    def _say(self, message: dict[str, Any]) -> None:
+        assert self._process.stdin is not None
+        with suppress(OSError):  # it has ended, and said why
+            self._process.stdin.write(json.dumps(message).encode() + b"\n")
+            self._process.stdin.flush()
+
 
 _REHEARSAL = 0.5
 """Time of a rehearsal [s]: beyond the ramps of changes."""
@@ -26,25 +118,18 @@ _POLL = 0.02
 
 
 class SteeringPage(NamedTuple):
-    """A page that shows a live loop.
-
-    Attributes:
-        process: Its process.
-        opening: What opens it.
-    """
+    """A page that shows a live loop."""
 
     process: PageProcess
-    opening: OpeningPage
+    opening: OpeningPage  # what opens it
 
 
 @contextmanager
 def steering_page(
     options: argparse.Namespace, scenario: Scenario
 ) -> Iterator[SteeringPage | None]:
-    """Yield the page, if there is to be one; it shows the robot and the scene.
-
-    It opens when a kernel has to be compiled, or when `let_steer` is called.
-    """
+    """Yield the page, if there is to be one; it shows the robot and the scene."""
+    # It opens when a kernel has to be compiled, or when `let_steer` is called.
     if options.steer is None:
         yield None
         return
@@ -67,11 +152,9 @@ def let_steer(
     requests: OperatorRequests,
     journal: Path,
 ) -> Callable[[float], object]:
-    """Return what the loop does in the rest of each period, so that the page steers.
-
-    With a dead-man's key it returns when the key is held for the first time, or when
-    the operator stops.
-    """
+    """Return what the loop does in the rest of each period, so that the page steers."""
+    # With a dead-man's key it returns when the key is held for the first time, or when
+    # the operator stops.
     controller, period = experiment.controller, live_period(experiment)
     controller.compute(0.0, experiment.q0, experiment.v0)
     _rehearse(controller, period, experiment)
@@ -105,3 +188,95 @@ def _rehearse(controller: Controller, period: float, experiment: Experiment) -> 
     for k in range(round(_REHEARSAL / period)):
         copy.compute(k * period, experiment.q0, experiment.v0)
         handles.turn_knobs()
+
+
+_PAGE_POLL = 0.005
+"""Time between two looks at what has come [s]."""
+_NICENESS = 5
+"""The loop comes first where processes are many."""
+_RATE_WINDOW = 1.0
+"""Time over which the loop's rate is measured [s]."""
+
+
+def main() -> int:
+    """Show the loop until it has ended; return 0, or 2 after one error message.
+
+    This is the page's process. It draws what the loop writes into its journal, and
+    passes on what the page says. It reads lines of JSON from its standard input. The
+    first has its settings; then it writes the page's address. ``prepare`` lets it draw
+    the robot and the scene, ``status`` sets the status line, ``begin`` lets it draw the
+    loop: until then the loop's process compiles what both need. When its input is
+    closed, the loop has ended, and so does it.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C stops the loop only
+    os.nice(_NICENESS)
+    try:
+        if line := sys.stdin.readline():  # else the loop ended at once
+            _run(json.loads(line))
+    except HspControlError as error:
+        print(f"hsp: the loop's page: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+def _run(settings: dict[str, Any]) -> None:
+    server = Server(settings["port"], host=settings["host"], steerable=True)
+    try:
+        print(server.url, flush=True)
+        draw_empty(server, "")
+        say = status_line(server)
+        say("preparing the loop …")
+        viewer: Viewer | None = None
+        for line in iter(sys.stdin.readline, ""):
+            match json.loads(line):
+                case {"status": str(text)}:
+                    say(text)
+                case {"prepare": dict(config)}:
+                    viewer = _drawn(
+                        load_scenario(Document(config, {}, "configuration")), server
+                    )
+                case {"begin": dict(config), "journal": str(file), "period": period}:
+                    assert viewer is not None
+                    with compiling_told(say):
+                        experiment = load_experiment(config)
+                        channel = Channel(socket.socket(fileno=settings["channel"]))
+                        journal, held = Path(file), settings["held"]
+                        mirror = Mirror(experiment, period, journal, channel, held=held)
+                        picture = Picture(mirror, viewer)
+                    _show(mirror, picture, server)
+                    return
+    finally:
+        server.close()
+
+
+def _drawn(loaded: LoadedScenario, server: Server) -> Viewer:
+    viewer = Viewer(loaded.robot, transport=server, **loaded.scenario.view.all_fields())
+    draw_before(viewer, loaded)
+    return viewer
+
+
+def _show(mirror: Mirror, picture: Picture, server: Server) -> None:
+    due = marked = monotonic()
+    marked_at, rate, ended = mirror.t, 0.0, False
+    while not ended:
+        ended = _ended()  # then once more: the last row is drawn
+        for message in server.messages():
+            mirror.say(message)
+        mirror.read()
+        now = monotonic()
+        if now - marked >= _RATE_WINDOW:
+            rate = (mirror.t - marked_at) / (now - marked)
+            marked, marked_at = now, mirror.t
+        if now >= due or ended:
+            picture.draw(running=not mirror.over, rate=rate)
+            due = now + FRAME
+        sleep(_PAGE_POLL)
+
+
+def _ended() -> bool:
+    ready, _, _ = select.select([sys.stdin], [], [], 0.0)
+    return bool(ready) and not os.read(sys.stdin.fileno(), 4096)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

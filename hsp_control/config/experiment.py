@@ -22,10 +22,10 @@ from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits
 from hsp_control.control.changes import Change
 from hsp_control.control.compensation import Compensation, RateFinding
-from hsp_control.control.composition import Base
 from hsp_control.control.controller import Controller
 from hsp_control.control.estimator import Estimator, begun
 from hsp_control.control.plan import Plan
+from hsp_control.control.setup import Base
 from hsp_control.declaration.named import keyed
 from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.plain_data import plain_data

@@ -2,18 +2,19 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.exceptions import NonFiniteError
 from hsp_control.common.native import bind
 from hsp_control.common.step_plan import StepPlan, steps
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.contacts.contact import UnactuatedRows, unactuated_count
 from hsp_control.control.actuation.support import Support
 from hsp_control.control.setup import PlannedTask
-from hsp_control.law import FieldSample, Outcome, Resolution, TaskSample
+from hsp_control.law import CONSTANT, FieldSample, Outcome, Resolution, TaskSample
 from hsp_control.law.outcome import outcome_of
 from hsp_control.law.threshold import Following
 from hsp_control.null_space.fields import FieldSum, NullSpaceField
@@ -32,29 +33,9 @@ class ActiveStack:
     With a floating base the first level keeps the contacts at rest, and requires zero
     effort along base motions that neither motors nor contacts can drive. The levels of
     the tasks follow, then the field.
-
-    Attributes:
-        contacts: The active contacts.
-        levels: The tasks of each level.
-        support: The contacts' forces and their bounds.
-        resolution: The law.
-        task_rows: The rows of each task in the stack, by name.
-        contact_rows: The rows of each contact, by name.
-        first_task_row: Index of the first row that belongs to a task.
-        rows: All rows stacked: J, J', e, e', a_x.
-        row_count: Number of rows.
-        level_names: The names of each level's tasks; ``contacts`` for those at the top.
-        has_forces: Whether contacts exert forces.
-        memory: The rows, the field and the law's results, in one block: see `Record`.
-        acceleration: The law's acceleration, shape (nv,).
-        streamed: Whether a task follows a stream.
-        bounds: The tasks with a largest error: the name, the first row, and
-            `Feedback.largest`.
-        term_samples: The weighted sample of each term of the field.
-        share: How much it counts in the mixture that was resolved last, in (0, 1].
     """
 
-    share = 1.0
+    share = 1.0  # how much it counts in the mixture that was resolved last, in (0, 1]
 
     def __init__(
         self,
@@ -68,9 +49,8 @@ class ActiveStack:
         gain: Array,
         threshold: float,
     ) -> None:
-        """Stack the rows; the state decides which base motions the contacts permit."""
-        robot: Robot = state.robot
-        self.support = support
+        robot: Robot = state.robot  # its state says which base motions contacts permit
+        self.support = support  # contacts' forces and their bounds
         self.contacts = support.contacts
         planned = [level for level in levels if level]
         self.levels = tuple(tuple(each.task for each in level) for level in planned)
@@ -88,7 +68,7 @@ class ActiveStack:
             threshold,
             Following.of(robot.size, on_legs=bool(robot.unactuated)),
         )
-        self.rows = self.resolution.problem.task
+        self.rows = self.resolution.problem.task  # all rows stacked: J, J', e, e', a_x
         self.row_count = len(self.rows.error)
         self.streamed = any(
             isinstance(task.followed, Streamed)
@@ -96,12 +76,14 @@ class ActiveStack:
             for task in level
         )
         self.forces, self.has_forces = support.forces, support.size > 0
+        # rows, the field and the law's results, in one block: see `Record`
         self.memory = self.resolution.problem.record.memory
         self.acceleration = self.resolution.acceleration
-        self.contact_rows = _places(self.contacts, 0)
+        self.contact_rows = _places(self.contacts, 0)  # rows of each contact, by name
         self.first_task_row = held + free
         tasks = [each for level in planned for each in level]
         self.task_rows = _places([each.task for each in tasks], self.first_task_row)
+        # tasks with a largest error: the name, the first row, and `Feedback.largest`
         self.bounds: list[tuple[str, slice, Callable[[Array], float]]] = []
         self._parts: list[tuple[Task | Contact, TaskSample]] = []
         plans: list[Callable[[], StepPlan]] = []
@@ -133,6 +115,7 @@ class ActiveStack:
                     plans.append(partial(_asked, in_force.feedback, sample, asked))
             row += each.task.rows
         self._plans = plans
+        # names of each level's tasks; ``contacts`` for those at the top
         self.level_names = [
             *(["contacts"] if first else []),
             *(", ".join(task.name for task in level) for level in self.levels),
@@ -142,6 +125,7 @@ class ActiveStack:
             self._rest = UnactuatedRows(robot, base, free)
         self._held = held
         self._state, self._metric, self._field = state, metric, field
+        # weighted sample of each term of the field
         self.term_samples: tuple[FieldSample, ...] = ()
 
     def resolve(self, t: float) -> Outcome:
@@ -195,13 +179,41 @@ class ActiveStack:
         """The call that returns the field's value at the state; see `bind_value`."""
         return self._field.bind_value(self._state)
 
-    def not_finite(self) -> str | None:
-        """Return the first task or contact whose sample contains NaN or inf, if any."""
+    def flow(self) -> Array:
+        """Return J# x_d' + P g, shape (nv,), where it was resolved, at rest."""
+        law, state = self.resolution, self._state
+        # At rest, without drift and with unit gain the law's acceleration is the flow.
+        nv, form = state.robot.nv, min(self._metric.form, CONSTANT)
+        sizes = np.diff(law.ends, prepend=0).tolist()
+        flow = Resolution(sizes, nv, form, np.eye(nv), law.threshold)
+        flow.problem.task.jacobian[:] = self.rows.jacobian
+        for level in self.levels:
+            for task in level:
+                rate = task.reference_rate(state)
+                flow.problem.task.acceleration[self.task_rows[task.name]] = rate
+        flow.problem.field.g[:] = law.problem.field.g
+        flow.problem.metric.W[:], flow.problem.metric.L[:] = law.problem.metric[:2]
+        return flow.resolve(state.v).acceleration
+
+    def raise_not_finite(self) -> NoReturn:
+        """Say what made a step's effort NaN or infinite."""
+        state, problem = self._state, self.resolution.problem
         for part, sample in self._parts:
             if not all(np.isfinite(array).all() for array in sample):
                 kind = "task" if isinstance(part, Task) else "contact"
-                return f"{kind} {part.name!r}"
-        return None
+                raise NonFiniteError(
+                    f"{kind} {part.name!r} is not finite at t = {state.t:.6g} s; "
+                    "does its trajectory return NaN or infinity there?"
+                )
+        if not all(np.isfinite(array).all() for array in problem.field):
+            raise NonFiniteError(
+                f"field {self._field.name!r} is not finite at t = {state.t:.6g} s"
+            )
+        self._metric.evaluate(state, problem.metric)  # may say what is wrong
+        raise NonFiniteError(
+            f"the effort is not finite at t = {state.t:.6g} s, "
+            f"q = {state.q.tolist()}, v = {state.v.tolist()}"
+        )
 
 
 def _places(parts: Sequence[Task] | Sequence[Contact], start: int) -> dict[str, slice]:

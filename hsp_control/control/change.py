@@ -1,15 +1,45 @@
-"""The base class of changes of a controller while it runs."""
+"""Changes of a controller while it runs: the base class, and each kind of change."""
 
 from abc import ABC, abstractmethod
-from dataclasses import KW_ONLY
-from typing import Any, Self
+from collections.abc import Sequence
+from dataclasses import KW_ONLY, replace
+from typing import Annotated, Any, Self, TypeVar
 
-from hsp_control.common.exceptions import ControllerError
-from hsp_control.control.setup import Setup
-from hsp_control.declaration import Part
-from hsp_control.declaration.quantities import NonNegative, Number
+import numpy as np
+from pydantic import AfterValidator
+
+from hsp_control.common.exceptions import ContactError, ControllerError
+from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.constraints.contacts import CommandedForce
+from hsp_control.constraints.limits import LimitsOrNone, RobotLimits
+from hsp_control.control.evolution import ABSENT
+from hsp_control.control.planned import PlannedLimits
+from hsp_control.control.setup import (
+    PlannedTerm,
+    Setup,
+    check_tasks,
+    checked_gain,
+    planned_task,
+    planned_terms,
+)
+from hsp_control.declaration import AnyOf, Part, within
+from hsp_control.declaration.nested import parts_within
+from hsp_control.declaration.quantities import Flag, Gain, NonNegative, Number
+from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.start import Start
+from hsp_control.null_space.fields import FieldSum, NullSpaceField, Rest
+from hsp_control.tasks import Gains, Impedance, Task
+from hsp_control.tasks.compliant_task import impedance_of
+from hsp_control.tasks.impedance import check_bounded, parts_of
+from hsp_control.trajectories import (
+    Crossfade,
+    OrientationTrajectory,
+    PoseTrajectory,
+    Trajectory,
+    crossfade,
+)
 from hsp_control.trajectories.remembering import with_memories_copied
+from hsp_control.trajectories.streams.stream import Streamed, stream_for
 
 
 class Change(Part, ABC, family="changes", error=ControllerError):
@@ -37,17 +67,398 @@ class Change(Part, ABC, family="changes", error=ControllerError):
 
     @abstractmethod
     def apply(self, setup: Setup) -> Setup:
-        """Return the setup with this change, after all earlier ones.
-
-        Raises:
-            ControllerError: If it names something that does not exist then.
-        """
+        """Return the setup with this change, after all earlier ones."""
 
     def placed(self, start: Start, setup: Setup) -> Self:
-        """Return the change with its parts placed; see `Task.placed`.
-
-        Args:
-            start: Where the robot is when the change is made.
-            setup: The setup with all earlier changes.
-        """
+        """Return the change with its parts placed; see `Task.placed`."""
         return self
+
+
+class ChangeContact(Change, type="contact"):
+    """A contact is lifted, or set down again; its force fades.
+
+    While the force is less than a tenth, the motion that the contact stops is set free,
+    or stopped, in proportion.
+    """
+
+    contact: str
+    """Name of the contact."""
+    bears: Flag
+    """Whether it bears from then on."""
+
+    def apply(self, setup: Setup) -> Setup:
+        """Return the setup with the contact; see `Change.apply`."""
+        planned = setup.contact(self.contact)
+        presence = planned.presence.then(self.at, self.ramp, float(self.bears))
+        return setup.with_contact(planned, presence=presence)
+
+
+class ChangeForce(Change, type="force"):
+    """The commanded force of a contact changes to another one; C² if both are."""
+
+    contact: str
+    """Name of the contact."""
+    force: CommandedForce
+    """The new command, with as many coordinates as the old one."""
+
+    def placed(self, start: Start, setup: Setup) -> Self:
+        """Return the change, checked where the robot is."""
+        contact = setup.contact(self.contact).contact
+        replace(contact, force=self.force).placed(start)
+        return self
+
+    def apply(self, setup: Setup) -> Setup:
+        """Return the setup with the force; see `Change.apply`."""
+        planned = setup.contact(self.contact)
+        contact = planned.contact
+        old, new = contact.force, self.force
+        with within("force"):
+            if old is None:
+                raise ContactError(
+                    f"contact {self.contact!r} has no commanded force from the start, "
+                    "so none can follow; give it one, for example {value: 0}"
+                )
+            if old.dimension != new.dimension:
+                raise ContactError(
+                    f"it has {new.dimension} coordinates; the force of contact "
+                    f"{self.contact!r} has {old.dimension}"
+                )
+        changed = Crossfade(
+            old.followed, new.followed, start_time=self.at, duration=self.ramp
+        )
+        following = replace(contact, force=CommandedForce(trajectory=changed))
+        return setup.with_contact(planned, contact=following)
+
+
+class ChangeField(Change, type="field"):
+    """The null-space field changes to another one; Proposition 2 holds throughout."""
+
+    fields: Annotated[Sequence[NullSpaceField], AfterValidator(tuple)]
+    """The new fields; their sum is used. Without fields, self-motion comes to rest."""
+
+    def placed(self, start: Start, setup: Setup) -> Self:
+        """Return the change with its fields placed."""
+        placed = []
+        for k, field in enumerate(self.fields):
+            with within("fields", k):
+                placed.append(field.placed(start))
+        return replace(self, fields=placed)
+
+    def apply(self, setup: Setup) -> Setup:
+        """Return the setup with the field; see `Change.apply`."""
+        old = [
+            PlannedTerm(each.field, each.presence.then(self.at, self.ramp, 0.0))
+            for each in setup.terms
+        ]
+        fields = self.fields or (Rest(),)
+        sum_of = fields[0] if len(fields) == 1 else FieldSum(fields)
+        new = planned_terms(sum_of, ABSENT.then(self.at, self.ramp, 1.0))
+        if not all(each.field.controls for each in (*old, *new)):
+            raise ControllerError(
+                "an uncontrolled null space cannot be blended with a controlled one"
+            )
+        return replace(setup, terms=(*old, *new))
+
+
+class ChangeWeight(Change, type="weight"):
+    """The weight of one field changes."""
+
+    field: str
+    """Name of the field."""
+    weight: NonNegative
+    """The new weight [-]."""
+
+    def apply(self, setup: Setup) -> Setup:
+        """Return the setup with the weight; see `Change.apply`."""
+        k = _find_field(setup, self.field)
+        # The old weight fades out, and the same field fades in with the new weight:
+        # so weights that are ramps or functions of the state work alike.
+        new = replace(setup.terms[k].field, weight=self.weight)
+        return _with_field(setup, k, new, self)
+
+
+class ExchangeField(Change, type="exchange_field"):
+    """One field is replaced by another one, which keeps its weight; the others stay."""
+
+    field: str
+    """Name of the field that goes."""
+    by: NullSpaceField
+    """The field that comes; its own weight does not count."""
+
+    def placed(self, start: Start, setup: Setup) -> Self:
+        """Return the change with its field placed."""
+        with within("by"):
+            return replace(self, by=self.by.placed(start))
+
+    def apply(self, setup: Setup) -> Setup:
+        """Return the setup with the other field; see `Change.apply`."""
+        k = _find_field(setup, self.field)
+        if not self.by.controls:
+            raise ControllerError("an uncontrolled null space replaces no other field")
+        new = replace(self.by, weight=setup.terms[k].field.weight)
+        return _with_field(setup, k, new, self)
+
+
+def _find_field(setup: Setup, name: str) -> int:
+    """Return the index of the term that has a name and is to stay."""
+    there = {
+        each.field.name: k
+        for k, each in enumerate(setup.terms)
+        if each.presence.target > 0.0
+    }
+    if name not in there:
+        raise ControllerError(
+            f"there is no field {name!r}{did_you_mean(name, there)} "
+            f"(there are {listing(there) or 'none'})"
+        )
+    return there[name]
+
+
+def _with_field(setup: Setup, index: int, new: NullSpaceField, change: Change) -> Setup:
+    """Return the setup in which a term fades out while another one fades in."""
+    terms, at, ramp = list(setup.terms), change.at, change.ramp
+    old = terms[index]
+    terms[index] = PlannedTerm(old.field, old.presence.then(at, ramp, 0.0))
+    terms.append(PlannedTerm(new, ABSENT.then(at, ramp, 1.0)))
+    return replace(setup, terms=tuple(terms))
+
+
+class AddTask(Change, type="add_task"):
+    """A task is added; it fades in."""
+
+    task: Task
+    """The task; what is relative in it counts from where the robot is when the change
+    is made."""
+
+    def placed(self, start: Start, setup: Setup) -> Self:
+        """Return the change with its task placed."""
+        with within("task"):
+            return replace(self, task=self.task.placed(start))
+
+    def apply(self, setup: Setup) -> Setup:
+        """Return the setup with the task; see `Change.apply`."""
+        there = [each.task for each in setup.tasks if each.presence.target == 1.0]
+        check_tasks([*there, self.task], setup.start.state.robot)
+        presence = ABSENT.then(self.at, self.ramp, 1.0)
+        added = planned_task(setup.count, self.task, presence)
+        return replace(setup, tasks=(*setup.tasks, added), count=setup.count + 1)
+
+
+class RemoveTask(Change, type="remove_task"):
+    """A task is removed; it fades out."""
+
+    task: str
+    """Name of the task."""
+
+    def apply(self, setup: Setup) -> Setup:
+        """Return the setup without the task; see `Change.apply`."""
+        planned = setup.task(self.task)
+        gone = planned.presence.then(self.at, self.ramp, 0.0)
+        return setup.with_task(planned, presence=gone)
+
+
+class ChangeGains(Change, type="gains"):
+    """The gains of a task change; its error equation holds throughout."""
+
+    task: str
+    """Name of the task."""
+    gains: Gains
+    """The new gains."""
+
+    def apply(self, setup: Setup) -> Setup:
+        """Return the setup with the gains; see `Change.apply`."""
+        planned = setup.task(self.task)
+        if planned.task.order != 2:
+            raise ControllerError(
+                f"task {self.task!r} has no gains: its error equation is of first order"
+            )
+        if impedance_of(planned.task) is not None:
+            raise ControllerError(
+                f"task {self.task!r} has an impedance instead of gains; a change of "
+                "type impedance changes it"
+            )
+        with within("gains"):
+            target = np.stack(self.gains.matrices(planned.task.rows))
+        gains = planned.gains.then(self.at, self.ramp, target)
+        return setup.with_task(planned, gains=gains)
+
+
+class ChangeImpedance(Change, type="impedance"):
+    """The impedance of a task changes; its equation holds throughout.
+
+    While the stiffness K changes, it adds the power ½ eᵀK'e to the motion. Where
+    efforts are held for a period, the change waits while that is more than the damping
+    takes out: a hand that is held away from its target becomes stiffer when it moves.
+    """
+
+    task: str
+    """Name of the task."""
+    impedance: Impedance
+    """The new impedance."""
+
+    def placed(self, start: Start, setup: Setup) -> Self:
+        """Return the change with the spring's largest force in numbers."""
+        task = setup.task(self.task).task
+        with within("impedance"):
+            impedance = self.impedance.placed(task.error_parts, start.state.robot)
+        return replace(self, impedance=impedance)
+
+    def apply(self, setup: Setup) -> Setup:
+        """Return the setup with the impedance; see `Change.apply`."""
+        planned = setup.task(self.task)
+        if impedance_of(planned.task) is None:
+            raise ControllerError(
+                f"task {self.task!r} has no impedance from the start, so none can "
+                "follow; give it one"
+            )
+        with within("impedance"):
+            target = self.impedance.numbers(planned.task.error_parts)
+            numbers = planned.gains.then(self.at, self.ramp, target)
+            values = [numbers.initial, *(each.target for each in numbers.transitions)]
+            # In between, the stiffness of one meets the bounds of another.
+            if any(parts_of(each)[3].any() for each in values):
+                for each in values:
+                    check_bounded(parts_of(each)[0])
+        return setup.with_task(planned, gains=numbers)
+
+
+class ChangeReference(Change, type="reference"):
+    """The trajectory of a task changes to another one; C² if both are."""
+
+    task: str
+    """Name of the task."""
+    trajectory: Annotated[
+        Trajectory | OrientationTrajectory | PoseTrajectory,
+        AnyOf(PoseTrajectory, Trajectory, OrientationTrajectory),
+    ]
+    """The new trajectory, in the task's unit; what is relative in it counts from where
+    the robot is when the change is made."""
+
+    def placed(self, start: Start, setup: Setup) -> Self:
+        """Return the change with its trajectory in the world."""
+        task = setup.task(self.task).task
+        trajectory = self.trajectory
+        if isinstance(trajectory, Streamed):  # YAML has one word for all kinds
+            with within("trajectory"):
+                trajectory = stream_for(task.followed, trajectory)
+        followed = task.following(trajectory).placed(start).followed
+        assert followed is not None
+        return replace(self, trajectory=followed)
+
+    def apply(self, setup: Setup) -> Setup:
+        """Return the setup with the trajectory; see `Change.apply`."""
+        planned = setup.task(self.task)
+        task = planned.task
+        assert task.followed is not None
+        changed = crossfade(
+            task.followed, self.trajectory, start_time=self.at, duration=self.ramp
+        )
+        return setup.with_task(planned, task=task.following(changed))
+
+
+class ChangeNullSpaceGain(Change, type="null_space_gain"):
+    """The null-space gain K_N changes; V decays throughout."""
+
+    gain: Gain
+    """The new gain [1/s]: a number, nv numbers, or a matrix; over a metric that changes
+    with q, one number."""
+
+    def apply(self, setup: Setup) -> Setup:
+        """Return the setup with the gain; see `Change.apply`."""
+        with within("gain"):
+            target = checked_gain(self.gain, setup.start.state.robot, setup.metric)
+        return replace(setup, gain=setup.gain.then(self.at, self.ramp, target))
+
+
+class MoveObstacle(Change, type="obstacle"):
+    """An obstacle leaves its trajectory for another one; C² if both are."""
+
+    obstacle: str
+    """Name of the obstacle in the scene."""
+    center: Trajectory
+    """The new trajectory of its frame's origin in the world [m]; a stream begins where
+    the obstacle is."""
+
+    def placed(self, start: Start, setup: Setup) -> Self:
+        """Return the change with a stream that begins where the obstacle is."""
+        if not any(True for _ in parts_within(self.center, Streamed)):
+            return self
+        with within("obstacle"):
+            old = setup.start.scene[self.obstacle]
+        here = old.center.sample(max(self.at, start.state.t)).position
+        return replace(self, center=self.center.anchored(here))
+
+    def apply(self, setup: Setup) -> Setup:
+        """Return the setup with the obstacle wherever it counts; see `Change.apply`."""
+        scene = setup.start.scene
+        with within("obstacle"):
+            old = scene[self.obstacle]
+        center = Crossfade(
+            old.center, self.center, start_time=self.at, duration=self.ramp
+        )
+        new = replace(old, center=center)
+        moved = Scene([new if each == old else each for each in scene.values()])
+        terms = tuple(
+            replace(each, field=_exchanged(each.field, old, new))
+            for each in setup.terms
+        )
+        sets = tuple(
+            (limits and _elsewhere(limits, old, new), share)
+            for limits, share in setup.limits.sets
+        )
+        return replace(
+            setup,
+            start=setup.start._replace(scene=moved),
+            terms=terms,
+            limits=PlannedLimits(sets),
+        )
+
+
+Holder = TypeVar("Holder", bound=Part)
+
+
+def _exchanged(part: Holder, old: Obstacle, new: Obstacle) -> Holder:
+    """Return a part in which one obstacle is replaced by another one."""
+    changes: dict[str, Any] = {}
+    for name, value in part.all_fields().items():
+        if _is(value, old):
+            changes[name] = new
+        elif isinstance(value, tuple) and any(_is(each, old) for each in value):
+            changes[name] = tuple(new if _is(each, old) else each for each in value)
+    return replace(part, **changes) if changes else part  # type: ignore[type-var]
+
+
+def _elsewhere(limits: RobotLimits, old: Obstacle, new: Obstacle) -> RobotLimits:
+    """Return limits in which one obstacle is replaced by another one."""
+    if not limits.distances:
+        return limits
+    moved = tuple(_exchanged(each, old, new) for each in limits.distances)
+    return replace(limits, distances=moved)
+
+
+def _is(value: object, obstacle: Obstacle) -> bool:
+    # Not `==` alone: values that hold arrays have no truth of being equal.
+    return isinstance(value, Obstacle) and value == obstacle
+
+
+class ChangeLimits(Change, type="limits"):
+    """The limits change to other ones.
+
+    Meanwhile efforts are (1 - s) times those within the old limits plus s times those
+    within the new ones, s from 0 to 1 and C² in time. So no effort jumps where a limit
+    goes, or one comes that the robot violates.
+    """
+
+    limits: LimitsOrNone
+    """The new limits; none: the old ones go. Without a bandwidth they keep that of the
+    old ones."""
+
+    def apply(self, setup: Setup) -> Setup:
+        """Return the setup with the limits; see `Change.apply`."""
+        with within("limits"):
+            new, old = self.limits, setup.limits.last
+            if new is not None and new.bandwidth is None and old is not None:
+                new = replace(new, bandwidth=old.bandwidth)
+            numbers = None if new is None else new.placed(setup.start)
+            limits = setup.limits.then(self.at, self.ramp, numbers)
+        return replace(setup, limits=limits)

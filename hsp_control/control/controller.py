@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import replace
 from math import isfinite
-from typing import TYPE_CHECKING, Any, NoReturn, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,18 +22,13 @@ from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation import Actuation
 from hsp_control.control.actuation.actuation import CODES, FLAGS
 from hsp_control.control.actuation.status import EXACT, RELAXED
-from hsp_control.control.changes import Change, Changes
-from hsp_control.control.composition import Base, priority_of
-from hsp_control.control.declared import Declared
-from hsp_control.control.explanation import flow_of, raise_not_finite
+from hsp_control.control.changes import Change, Changes, TimeLine
 from hsp_control.control.first_state import check_angles, warn_of_jump
-from hsp_control.control.gains_in_force import GainsInForce
-from hsp_control.control.held_gains import check_held
+from hsp_control.control.gains_in_force import GainsInForce, check_held
+from hsp_control.control.guards import StepLock, read_only
 from hsp_control.control.mixture import AccelerationModifier, Mixture
 from hsp_control.control.output import ControlOutput, Diagnostics
-from hsp_control.control.read_only import read_only
-from hsp_control.control.step_lock import StepLock
-from hsp_control.control.time_line import TimeLine
+from hsp_control.control.setup import Base, Declared
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.start import Start
 from hsp_control.law import TaskSample
@@ -188,11 +183,7 @@ class Controller:
         return Start(here, self._setup.start.scene)
 
     def _begin(self) -> None:
-        """Look at the first state, and place there what is relative, without a start.
-
-        Raises:
-            ConfigurationError: If an angle looks like degrees.
-        """
+        """Look at the first state, and without a start place there what is relative."""
         check_angles(self._declared.robot, self._state.q)
         if self._declared.start is None:
             here = self._here()._replace(scene=self._declared.scene)
@@ -202,16 +193,12 @@ class Controller:
         self._begun = True
 
     def _resolve(self) -> str:
-        """Resolve the law for what counts now; return what is damped.
-
-        Raises:
-            NonFiniteError: If it contains NaN or inf.
-        """
+        """Resolve the law for what counts now; return what is damped."""
         t, whole = self._state.t, self._whole
         if whole is not None:  # nothing changes
             active, _, _ = whole
             if active.resolve(t) is NOT_FINITE:
-                self._raise_not_finite()
+                self.active_stack.raise_not_finite()
             return active.damped
         if not self._begun:
             self._begin()
@@ -224,7 +211,7 @@ class Controller:
             self._actuation.update_limits(t)
         mixture = self._mixture
         if mixture.resolve(t) is NOT_FINITE:
-            self._raise_not_finite()
+            self.active_stack.raise_not_finite()
         if mixture.steady:
             self._bind()
         return mixture.damped
@@ -307,7 +294,7 @@ class Controller:
                 if value != 0.0:
                     code, violated = divmod(int(value), CODES)
                     if code == BEYOND_ANY_LEVEL:
-                        self._raise_not_finite()
+                        self.active_stack.raise_not_finite()
                     if code:
                         damped = active.damped
                     direct = direct and not violated
@@ -325,7 +312,7 @@ class Controller:
                 if (status is RELAXED or modifier is not None) and not isfinite(
                     tau @ tau
                 ):
-                    self._raise_not_finite()
+                    self.active_stack.raise_not_finite()
             # Not on the controller itself: its own attributes cost 0.4 µs to set.
             self._actuation.delivered = a
             # By name, and without a call of nine arguments, which costs 1 µs.
@@ -660,14 +647,6 @@ class Controller:
         """
         return self._setup.contact(contact).force_offset
 
-    def priority_of(self, task: str) -> int:
-        """Return the priority of a task, 1 the highest.
-
-        Raises:
-            ControllerError: If there is no such task.
-        """
-        return priority_of(self._setup.task(task).task, self._declared.robot)
-
     # -- what explains it -------------------------------------------------------------
 
     @read_only("call compute")
@@ -710,12 +689,7 @@ class Controller:
         start with this velocity has no transient.
         """
         self.compute(t, q, np.zeros(self.robot.nv))
-        return flow_of(
-            self.active_stack, self._state, self.metric, self.singularity_threshold
-        )
-
-    def _raise_not_finite(self) -> NoReturn:
-        raise_not_finite(self.active_stack, self._state, self.field, self.metric)
+        return self.active_stack.flow()
 
     def __setattr__(self, name: str, value: object) -> None:
         if not name.startswith("_") and not hasattr(type(self), name):

@@ -9,8 +9,7 @@ from pydantic import AfterValidator
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import EstimationError
 from hsp_control.control.controller import Controller
-from hsp_control.control.log_channel import LogChannel
-from hsp_control.control.measurement import Inertial, Measurement
+from hsp_control.control.measurement import Inertial, LogChannel, Measurement
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.by_type import ByType
 
@@ -67,15 +66,9 @@ class RunningEstimator(ABC):
 
 
 def begun(
-    estimators: Sequence[Estimator],
-    controller: Controller,
-    inertial: Inertial | None,
+    estimators: Sequence[Estimator], controller: Controller, inertial: Inertial | None
 ) -> list[RunningEstimator]:
-    """Return what runs, in order; see `Estimator.begin`.
-
-    Raises:
-        EstimationError: If one does not fit; with its type.
-    """
+    """Return what runs, in order; see `Estimator.begin`."""
     running = []
     for each in estimators:
         with within("estimators", each.yaml_type or type(each).__name__):

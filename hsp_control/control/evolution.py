@@ -16,17 +16,11 @@ Value = TypeVar("Value", float, Array)
 
 @dataclass(frozen=True)
 class Transition(Generic[Value]):
-    """A smooth change to a value.
+    """A smooth change to a value."""
 
-    Attributes:
-        start: When it begins [s].
-        ramp: How long it takes [s]; 0 is a jump.
-        target: The new value.
-    """
-
-    start: float
-    ramp: float
-    target: Value
+    start: float  # when it begins [s]
+    ramp: float  # how long it takes [s]; 0 is a jump
+    target: Value  # new value
 
     @property
     def end(self) -> float:
@@ -51,14 +45,10 @@ class Evolution(Generic[Value]):
 
     So a transition that begins while another is under way continues its motion, and x
     is C² however they overlap. x depends on time alone, not on when it is asked for.
-
-    Attributes:
-        initial: The value before all transitions.
-        transitions: The transitions, in order of their start.
     """
 
-    initial: Value
-    transitions: tuple[Transition[Value], ...] = ()
+    initial: Value  # value before all transitions
+    transitions: tuple[Transition[Value], ...] = ()  # in order of their start
 
     def then(self, start: float, ramp: float, target: Value) -> "Evolution[Value]":
         """Return the evolution with one more transition."""

@@ -15,14 +15,9 @@ MIN_HEIGHT = 0.65
 
 
 class FallDetector:
-    """Compares tilt and height with those of the start.
-
-    Attributes:
-        trunk: The frame that tilts.
-    """
+    """Compares tilt and height with those of the start."""
 
     def __init__(self, trunk: str, feet: tuple[str, ...], state: RobotState) -> None:
-        """Set what to compare with."""
         self.trunk, self._feet = trunk, feet
         self._up: Array = state.frame(trunk).rotation.T @ np.array([0.0, 0.0, 1.0])
         self._height = self._height_of(state)

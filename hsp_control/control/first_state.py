@@ -26,10 +26,8 @@ class StartWarning(UserWarning):
 
 
 def check_angles(robot: Robot, q: Array) -> None:
-    """Check that no angle is so far beyond its joint's range that it is in degrees.
-
-    Joints without limits, continuous ones and sliding ones are not looked at.
-    """
+    """Check that no angle is so far beyond its joint's range that it is in degrees."""
+    # Joints without limits, continuous ones and sliding ones are not looked at.
     lower, upper = robot.position_limits()
     angles = robot.joint_positions(q)
     for name, unit, low, high, angle in zip(
@@ -72,11 +70,9 @@ def warn_of_jump(robot: Robot, q: Array, v: Array, tau: Array) -> None:
 
 
 def warn_of_slow_efforts(robot: Robot, q: Array, limits: RobotLimits | None) -> None:
-    """Warn if gravity may change a joint's effort faster than its rate permits.
-
-    A joint alone, that turns at its speed limit from where the robot starts, feels a
-    sine of gravity. A floating base is not looked at.
-    """
+    """Warn if gravity may change a joint's effort faster than its rate permits."""
+    # A joint alone, that turns at its speed limit from where the robot starts, feels a
+    # sine of gravity. A floating base is not looked at.
     if limits is None or robot.unactuated:
         return
     rest, turn = np.zeros(robot.nv), 0.5 * np.pi * np.eye(robot.nv)

@@ -13,18 +13,14 @@ from hsp_control.robot.robot import Move
 
 
 class FreeStep(NamedTuple):
-    """What `Controller.compute` and `Controller.applied` do where no limit is violated.
+    """What `compute` and `applied` of a controller do where no limit is violated."""
 
-    Attributes:
-        move: (t, q, v) ↦ a number that `is_free` understands; the effort and the
-            acceleration are written.
-        effort: M a + N, shape (nv,) [N·m or N].
-        sending: Calls of the time that record that this effort is held from now on, for
-            the period of the last `Controller.applied`.
-    """
-
+    # (t, q, v) ↦ a number that `is_free` understands; the effort and the acceleration
+    # are written
     move: NativeMove
-    effort: Array
+    effort: Array  # M a + N, shape (nv,) [N·m or N]
+    # calls of the time that record that this effort is held from now on, for the period
+    # of the last `Controller.applied`
     sending: Sequence[NativeCall]
 
 
@@ -39,9 +35,5 @@ def free_step(
 
 @kernel
 def is_free(value: float) -> bool:
-    """Return whether a state is valid, the law finite, and no limit violated.
-
-    Args:
-        value: What the move returned, see `Actuation.checks`; negative: refused.
-    """
+    """Return whether what a move returned means: valid, finite, no limit violated."""
     return 0.0 <= value < CODES * BEYOND_ANY_LEVEL and value % CODES == 0.0

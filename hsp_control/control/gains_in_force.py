@@ -1,15 +1,44 @@
-"""The gains in force: the arrays that every step reads, as changes make them."""
+"""The gains in force: the arrays that every step reads, as changes make them.
+
+Changes of an impedance add no energy: they wait where they would. With
+E = ½ e'ᵀΛe' + U(e), U the energy of the spring, and an external force f,
+
+    E' = fᵀx' - e'ᵀ(D + D_ζ) e' + ∂U/∂t.
+
+A spring that becomes stiffer while it is stretched stores energy that nobody gave. So
+the numbers in force follow those that were planned only as fast as ∂U/∂t is no more
+than what the damping takes out: E' <= fᵀx', to first order in the period. Where they
+are behind, they catch up in half of the change's ramp, so that no effort jumps.
+
+Nor may a change make the running loop unstable. `check_rate` looks at a loop with its
+delays and compensators before it runs. Where a change is made while it runs, the period
+is known, and the robot's present state; the error of a task, x'' = -Kp x - Kv x', held
+for the period h, then has the transition
+
+    x(h) = x + h x' + ½ h² x'',     x'(h) = x' + h x''.
+"""
 
 from typing import NamedTuple
 
 import numpy as np
 
-from hsp_control.common.arrays import Array
+from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.exceptions import UnstableRateError
 from hsp_control.control.active_stack import ActiveStack
+from hsp_control.control.evolution import Evolution
 from hsp_control.control.setup import PlannedTask, Setup
-from hsp_control.control.stiffening import changes_impedance, next_numbers
+from hsp_control.declaration import within
+from hsp_control.robot import RobotState
 from hsp_control.tasks import Task
+from hsp_control.tasks.compliant_task import impedance_of
+from hsp_control.tasks.impedance import parts_of
+from hsp_control.tasks.slipping import spring_force
 from hsp_control.tasks.task import InForce
+
+_SMALLEST = 1e-15
+"""Smallest scale of gains that is tried."""
+_ROUNDING = 1e-7
+"""Of the radius: a double eigenvalue of 1 has an error of the root of its rounding."""
 
 
 class GainsMemory(NamedTuple):
@@ -20,17 +49,12 @@ class GainsMemory(NamedTuple):
 
 
 class GainsInForce:
-    """Gains and impedances of the tasks, their offsets, and K_N, at the present time.
-
-    Attributes:
-        feedback: The feedback of each task, by key; the arrays stay where they are.
-        null_space: K_N, shape (nv, nv) [1/s].
-    """
+    """Gains and impedances of the tasks, their offsets, and K_N, now."""
 
     def __init__(self, nv: int) -> None:
-        """Allocate, without tasks."""
+        # feedback of each task, by key; the arrays stay where they are
         self.feedback: dict[int, InForce] = {}
-        self.null_space = np.zeros((nv, nv))
+        self.null_space = np.zeros((nv, nv))  # K_N, shape (nv, nv) [1/s]
         self._tasks: dict[int, Task] = {}
         self._waiting: dict[int, Array] = {}
 
@@ -131,3 +155,112 @@ class GainsInForce:
             self.feedback[key].numbers[:] = numbers
         for key, offset in memory.offsets.items():
             self.feedback[key].feedback.offset[:] = offset
+
+
+def changes_impedance(task: Task, numbers: Evolution[Array]) -> bool:
+    """Return whether a task has an impedance that changes."""
+    return impedance_of(task) is not None and not numbers.constant
+
+
+def next_numbers(
+    now: Array,
+    planned: Evolution[Array],
+    ends: Indices,
+    mobility: Array,
+    e: Array,
+    e_dot: Array,
+    t: float,
+    period: float,
+) -> Array | None:
+    """Return the numbers of an impedance for the next period."""
+    then = planned.at(t + period)
+    step = then - now
+    if not np.allclose(now, planned.at(t), rtol=1e-4, atol=1e-9):  # it has waited
+        begun = [each.ramp for each in planned.transitions if each.start <= t]
+        step *= min(2.0 * period / max(begun[-1] if begun else 0.3, period), 1.0)
+    needed = spring_energy(now + step, ends, e) - spring_energy(now, ends, e)
+    if needed > 0.0:
+        given = period * dissipated(now, mobility, e_dot)
+        if needed > given:
+            return np.asarray(now + given / needed * step)
+    return None if np.array_equal(now + step, then) else now + step
+
+
+def spring_energy(numbers: Array, ends: Indices, e: Array) -> float:
+    """Return U(e) = sᵀe - ½ sᵀK⁻¹s: ½ eᵀK e, and linear where s is at its bound."""
+    force = spring_force(numbers, ends, e)
+    return float(force @ e - 0.5 * force @ np.linalg.solve(parts_of(numbers)[0], force))
+
+
+def dissipated(numbers: Array, mobility: Array, e_dot: Array) -> float:
+    """Return e'ᵀ(D + D_ζ) e' [W], with D_ζ = 2 ζ C S⁻¹ Cᵀ, K = C Cᵀ, S² = Cᵀ Λ⁻¹ C."""
+    K, D, ratio, *_ = parts_of(numbers)
+    power = float(e_dot @ D @ e_dot)
+    if ratio[0] > 0.0:
+        C = np.linalg.cholesky(K)
+        squares, modes = np.linalg.eigh(C.T @ mobility @ C)
+        along = modes.T @ C.T @ e_dot
+        frequencies = np.sqrt(np.maximum(squares, np.finfo(float).tiny))
+        # Where the arm has no mobility it does not move.
+        power += float(2.0 * ratio[0] * (along**2 / frequencies).sum())
+    return power
+
+
+def check_held(old: Setup, new: Setup, state: RobotState, period: float) -> None:
+    """Check what a change of the setup makes of gains, where the robot is now."""
+    before = {each.key: each.gains.target for each in old.tasks}
+    for each in new.tasks:
+        if not np.array_equal(each.gains.target, before.get(each.key, ())):
+            _check_task(each, state, period)
+    if not np.array_equal(new.gain.target, old.gain.target):
+        rate = float(np.abs(np.linalg.eigvals(new.gain.target)).max())
+        if rate * period >= 2.0:
+            with within("gain"):
+                raise UnstableRateError(
+                    f"K_N = {rate:.4g} 1/s held for {period:g} s makes the loop "
+                    f"unstable; needs less than {rounded_down(2.0 / period)} 1/s"
+                )
+
+
+def _check_task(planned: PlannedTask, state: RobotState, period: float) -> None:
+    task, in_force = planned.task, planned.task.in_force()
+    in_force.numbers[:] = planned.gains.target
+    Kp, Kv, *_ = task.linear_feedback(state, in_force)
+    compliant = impedance_of(task) is not None
+    if task.order == 1:  # e' + K e = 0, with K in the place of Kp
+        Kp, Kv = np.zeros_like(Kp), Kp
+    if held_radius(Kp, Kv, period) < 1.0 + _ROUNDING:
+        return
+    least, most = _SMALLEST, 1.0
+    for _ in range(50):
+        scale = float(np.sqrt(least * most))
+        stable = held_radius(scale**2 * Kp, scale * Kv, period) < 1.0 + _ROUNDING
+        least, most = (scale, most) if stable else (least, scale)
+    what = "this impedance" if compliant else "these gains"
+    square, factor = rounded_down(least**2), rounded_down(least)
+    advice = (
+        f"at most {square} times this stiffness and {factor} times this damping"
+        if compliant
+        else f"at most {factor} times these rates"
+    )
+    with within("impedance" if compliant else "gains"):
+        raise UnstableRateError(
+            f"{what} of task {task.name!r}, held for {period:g} s, would make the loop "
+            f"unstable where the robot is; needs {advice}"
+        )
+
+
+def held_radius(Kp: Array, Kv: Array, period: float) -> float:
+    """Return the spectral radius of x'' = -Kp x - Kv x', held for a period."""
+    one, h = np.eye(len(Kp)), period
+    transition = np.block(
+        [[one - 0.5 * h * h * Kp, h * one - 0.5 * h * h * Kv], [-h * Kp, one - h * Kv]]
+    )
+    return float(np.abs(np.linalg.eigvals(transition)).max())
+
+
+def rounded_down(value: float) -> str:
+    """Return a number rounded down to three digits, so that advice is safe."""
+    exponent = int(np.floor(np.log10(value))) - 2
+    unit = 10.0**exponent
+    return f"{np.floor(value / unit + 1e-6) * unit:.10g}"

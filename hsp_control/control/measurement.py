@@ -1,4 +1,4 @@
-"""What is measured of a robot at one time."""
+"""What is measured of a robot at one time, and what a run's parts report to the log."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -72,3 +72,17 @@ class Measurement(NamedTuple):
         """
         wrench = self.wrenches.get(frame)
         return None if wrench is None else float(normal @ wrench[:3])
+
+
+class LogChannel(NamedTuple):
+    """A value that a plant or a compensator reports; it becomes a column of the log.
+
+    Attributes:
+        value: A number, or an array of constant shape.
+        unit: Its SI unit.
+        meaning: A short description.
+    """
+
+    value: Array | float
+    unit: str
+    meaning: str

@@ -10,7 +10,7 @@ from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation import Actuation, Delivered
 from hsp_control.control.actuation.support import Support
 from hsp_control.control.gains_in_force import GainsInForce
-from hsp_control.control.planned_contact import PlannedContact
+from hsp_control.control.planned import PlannedContact
 from hsp_control.control.setup import PlannedTask, Setup, levels_of
 from hsp_control.law import Outcome
 from hsp_control.law.outcome import DAMPED, EXACT
@@ -40,19 +40,12 @@ class Mixture:
     which are affine in one another. The rows of the tasks in all sets are linear in the
     acceleration, so that these tasks keep their exact error equation throughout where
     no limit binds.
-
-    Attributes:
-        active: The stack that was resolved last, with the most tasks of a mixture;
-            None before.
-        damped: The tasks of the first level with a bounded inverse in the last
-            `resolve`, by name; empty: none.
-        steady: Whether it is the same at all times.
-        levels: The tasks of each level, the highest priority first.
-        field: The field, placed.
     """
 
+    # stack that was resolved last, with the most tasks of a mixture; None before
     active: ActiveStack | None
-    steady: bool
+    steady: bool  # whether it is the same at all times
+    # tasks of each level, the highest priority first
     levels: tuple[tuple[PlannedTask, ...], ...]
 
     def __init__(
@@ -63,13 +56,14 @@ class Mixture:
         setup: Setup,
         threshold: float,
     ) -> None:
-        """Allocate."""
         self._state, self._actuation = state, actuation
         self._gains, self._threshold = gains, threshold
         self._stacks: dict[tuple[frozenset[int], frozenset[int]], ActiveStack] = {}
         nv = state.robot.nv
         self._modified, self._acceleration = np.zeros(nv), np.zeros(nv)
         self._parts: list[ActiveStack] = []
+        # tasks of the first level with a bounded inverse in the last `resolve`, by
+        # name; empty: none
         self.damped = ""
         self.field = setup.field
         self.plan(setup, exchanged=False)
@@ -126,11 +120,9 @@ class Mixture:
         return outcome
 
     def deliver(self, modifier: AccelerationModifier | None) -> Delivered:
-        """Return what is delivered of the law that was resolved last.
-
-        While one set of limits follows another, it is the mixture of the steps within
-        each of them.
-        """
+        """Return what is delivered of the law that was resolved last."""
+        # While one set of limits follows another, it is the mixture of the steps within
+        # each of them.
         actuation, sets = self._actuation, self._actuation.sets
         single = len(self._parts) == len(sets) == 1
         shares: list[float] = []

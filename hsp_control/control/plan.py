@@ -8,8 +8,7 @@ from hsp_control.common.exceptions import PlanError
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits
 from hsp_control.control.controller import Controller
-from hsp_control.control.log_channel import LogChannel
-from hsp_control.control.measurement import Measurement
+from hsp_control.control.measurement import LogChannel, Measurement
 from hsp_control.declaration import Part
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import Task

@@ -1,40 +1,155 @@
-"""What a controller is made of, and how that evolves: a function of time."""
+"""What a controller is made of, how that evolves, and whether it fits together."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import Any, Literal, Self, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ControllerError
+from hsp_control.common.exceptions import (
+    ContactError,
+    ControllerError,
+    FieldError,
+    GainError,
+)
 from hsp_control.common.suggestions import did_you_mean, listing
-from hsp_control.control.composition import priority_of
+from hsp_control.constraints.contacts import Contact
+from hsp_control.constraints.limits import Limits, RobotLimits
 from hsp_control.control.evolution import ABSENT, PRESENT, Evolution, EvolvingWeight
-from hsp_control.control.planned_contact import PlannedContact
-from hsp_control.control.planned_limits import PlannedLimits
+from hsp_control.control.planned import PlannedContact, PlannedLimits
+from hsp_control.declaration import within
+from hsp_control.declaration.nested import parts_within, with_parts_replaced
+from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.start import Start
-from hsp_control.null_space.fields import FieldSum, NullSpaceField
+from hsp_control.law import VARYING, MetricSample
+from hsp_control.null_space.fields import FieldSum, NullSpaceField, Rest
 from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.fields.weight import product
-from hsp_control.null_space.metrics import Metric
+from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric, Metric
 from hsp_control.robot import Robot
 from hsp_control.tasks import Task
+from hsp_control.tasks.compliant_task import impedance_of
+from hsp_control.tasks.gains import as_gain, as_matrix
+from hsp_control.trajectories.streams.stream import Streamed
+
+Base = Literal["flying", "driven"]
+"""What else than contacts acts on a free-flyer root: nothing, or an outside device."""
+
+
+def check_kind(what: str, value: object, kind: type) -> None:
+    """Check that an argument is of the right kind."""
+    if isinstance(value, kind):
+        return
+    if kind is Task and isinstance(value, list | tuple):
+        raise ControllerError(
+            "tasks contains lists; write the level as priority=1, 2, ... of each task"
+        )
+    raise ControllerError(f"{what} {value!r}, which is not a {kind.__name__}")
+
+
+def check_tasks(tasks: Sequence[Task], robot: Robot) -> None:
+    """Check that there are tasks of different names, and that no level is large."""
+    if not tasks:
+        raise ControllerError("a controller needs at least one task")
+    names = [task.name for task in tasks]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise ControllerError(
+            f"two tasks are called {twice[0]!r}; give them distinct names"
+        )
+    for priority in sorted({priority_of(task, robot) for task in tasks}):
+        level = [task for task in tasks if priority_of(task, robot) == priority]
+        rows = sum(task.rows for task in level)
+        if rows > robot.nv:
+            each_of = ", ".join(f"{task.name}: {task.rows}" for task in level)
+            where = "" if len(level) == len(tasks) else f" of priority {priority}"
+            raise ControllerError(
+                f"the tasks{where} have {rows} rows ({each_of}); "
+                f"{robot.name} has only {robot.nv} degrees of freedom"
+            )
+
+
+def priority_of(task: Task, robot: Robot) -> int:
+    """Return the priority of a placed task, 1 the highest."""
+    # Without one of its own it is 1; on a floating base 1 for what keeps the balance,
+    # and 2 for all else, so that no hand that reaches too far makes the robot fall.
+    if task.priority is not None:
+        return task.priority
+    return 2 if robot.unactuated and not task.keeps_balance(robot) else 1
+
+
+def checked_gain(gain: ArrayLike, robot: Robot, metric: Metric) -> Array:
+    """Return K_N as a matrix, checked for V' = -e_NᵀW K_N e_N < 0.
+
+    So W K_N + K_NᵀW must be positive definite. Where W is constant that is looked at.
+    Where W changes with q it must hold for every W(q): for multiples of the identity it
+    does, since then V' = -2 K_N V, and other gains are refused. A diagonal of positive
+    numbers is not enough: over the mass matrix some let e_N grow at some
+    configurations.
+    """
+    K_N = as_matrix(as_gain(gain, "null_space_gain"), robot.nv, "null_space_gain")
+    if metric.form == VARYING:
+        if not np.array_equal(K_N, K_N[0, 0] * np.eye(robot.nv)):
+            raise GainError(
+                "null_space_gain is no multiple of the identity, and the metric "
+                f"({type(metric).__name__}) changes with the configuration: at some "
+                "configurations the null-space error could grow instead of decay; "
+                f"needs one number, for example {np.diag(K_N).min():g}, or a metric "
+                "that does not change"
+            )
+        return K_N
+    state = robot.state(0.0, robot.neutral(), np.zeros(robot.nv))
+    W = metric.evaluate(state, MetricSample.allocate(robot.nv)).W
+    decay = W @ K_N
+    smallest = float(np.linalg.eigvalsh(0.5 * (decay + decay.T))[0])
+    if smallest <= 0.0:
+        raise GainError(
+            "null_space_gain does not make the null-space error decay: the smallest "
+            f"eigenvalue of W K_N is {smallest:.3g}; must be greater than 0"
+        )
+    return K_N
+
+
+def check_support(robot: Robot, contacts: Sequence[Contact], base: Base | None) -> None:
+    """Check that contacts and ``base`` are given exactly where the robot needs them."""
+    if base not in {None, "flying", "driven"}:
+        raise ContactError(f"base is {base!r}; needs 'flying', 'driven' or None")
+    if not robot.unactuated and base is not None:
+        with within("base"):
+            raise ContactError(
+                f"{robot.name} has no free-flyer root: base is only for robots with a "
+                "floating base"
+            )
+    if robot.unactuated and not contacts and base is None:
+        raise ContactError(
+            f"no motor moves the free-flyer root of {robot.name}: declare contacts, or "
+            "base='flying' (nothing acts on it), or base='driven' (something else "
+            "moves it)"
+        )
+    if contacts and base == "driven":
+        with within("base"):
+            raise ContactError(
+                "base='driven' needs no contacts, but contacts are given"
+            )
+    names = [contact.name for contact in contacts]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise ContactError(
+            f"two contacts are called {twice[0]!r}; give them distinct names"
+        )
 
 
 @dataclass(frozen=True)
 class PlannedTask:
-    """A task, when it counts, and its gains.
+    """A task, when it counts, and its gains."""
 
-    Attributes:
-        key: Tells it from every other task of the controller, also of the same name.
-        task: The task, placed.
-        presence: 1 while it is part of the controller, 0 while not.
-        gains: The numbers of its feedback: Kp and Kv, shape (2, m, m) [1/s², 1/s], or
-            those of an impedance; see `Task.in_force`.
-    """
-
-    key: int
-    task: Task
-    presence: Evolution[float]
+    key: int  # tells it from every other task of the controller, also of the same name
+    task: Task  # placed
+    presence: Evolution[float]  # 1 while it is part of the controller, 0 while not
+    # numbers of its feedback: Kp and Kv, shape (2, m, m) [1/s², 1/s], or those of an
+    # impedance; see `Task.in_force`
     gains: Evolution[Array]
 
     def weight(self, t: float) -> float:
@@ -67,15 +182,10 @@ class PlannedTask:
 
 @dataclass(frozen=True)
 class PlannedTerm:
-    """A term of the field, and when it counts.
+    """A term of the field, and when it counts."""
 
-    Attributes:
-        field: The term, placed, with its own weight.
-        presence: The factor of its weight.
-    """
-
-    field: NullSpaceField
-    presence: Evolution[float]
+    field: NullSpaceField  # placed, with its own weight
+    presence: Evolution[float]  # factor of its weight
 
     @property
     def weighted(self) -> NullSpaceField:
@@ -88,27 +198,16 @@ class PlannedTerm:
 
 @dataclass(frozen=True)
 class Setup:
-    """All parts of a controller, as a function of time.
+    """All parts of a controller, as a function of time."""
 
-    Attributes:
-        start: Where the parts were placed.
-        metric: The metric.
-        tasks: The tasks.
-        terms: The terms of the field; their sum is the field.
-        gain: K_N, shape (nv, nv) [1/s].
-        contacts: The contacts.
-        limits: The limits.
-        count: How many tasks there have ever been; the next one has this key.
-    """
-
-    start: Start
+    start: Start  # where the parts were placed
     metric: Metric
     tasks: tuple[PlannedTask, ...]
-    terms: tuple[PlannedTerm, ...]
-    gain: Evolution[Array]
+    terms: tuple[PlannedTerm, ...]  # terms of the field; their sum is the field
+    gain: Evolution[Array]  # K_N, shape (nv, nv) [1/s]
     contacts: tuple[PlannedContact, ...]
     limits: PlannedLimits
-    count: int
+    count: int  # how many tasks there have ever been; the next one has this key
 
     @property
     def field(self) -> NullSpaceField:
@@ -233,3 +332,130 @@ def levels_of(
     for each in tasks:
         levels.setdefault(priority_of(each.task, robot), []).append(each)
     return tuple(tuple(levels[priority]) for priority in sorted(levels))
+
+
+@dataclass(frozen=True)
+class Declared:
+    """What a controller is made of before anything relative in it is placed."""
+
+    robot: Robot
+    tasks: tuple[Task, ...]
+    field: NullSpaceField
+    gain: Array  # K_N: a scalar, shape (nv,) or (nv, nv) [1/s]
+    metric: Metric
+    threshold: float  # singular value below which an inverse is bounded
+    limits: Limits | None
+    contacts: tuple[Contact, ...]
+    base: Base | None  # what else than contacts acts on a floating base
+    scene: Scene
+    # configuration that relative parts refer to, shape (nq,); None: that of the first
+    # step
+    start: Array | None
+
+    @classmethod
+    def checked(
+        cls,
+        robot: Robot,
+        tasks: Sequence[Task],
+        field: NullSpaceField | None,
+        null_space_gain: ArrayLike,
+        metric: Metric | None,
+        singularity_threshold: float,
+        limits: Limits | None,
+        contacts: Sequence[Contact],
+        base: Base | None,
+        scene: Scene | Iterable[Obstacle],
+        start: ArrayLike | None,
+    ) -> Self:
+        """Check each part by itself; see `Controller` for what they mean."""
+        if not 0.0 < singularity_threshold < np.inf:
+            raise ControllerError(
+                f"singularity_threshold is {singularity_threshold}; must be positive"
+            )
+        field = Rest() if field is None else field
+        for task in tasks:
+            check_kind("tasks contains", task, Task)
+        if metric is None:
+            yields = any(impedance_of(task) is not None for task in tasks)
+            own = MassMatrixMetric(inertia="robot")
+            metric = own if yields else IdentityMetric()
+        for contact in contacts:
+            check_kind("contacts contains", contact, Contact)
+        check_kind("field is", field, NullSpaceField)
+        check_kind("metric is", metric, Metric)
+        if limits is not None:
+            check_kind("limits is", limits, Limits)
+        scene = scene if isinstance(scene, Scene) else Scene(scene)
+        known = None if start is None else robot.check_configuration(start).copy()
+        check_support(robot, contacts, base)
+        with within("null_space", "gain"):
+            gain = as_gain(null_space_gain, "null_space_gain")
+        return cls(
+            robot,
+            tuple(tasks),
+            field,
+            gain,
+            metric,
+            float(singularity_threshold),
+            limits,
+            tuple(contacts),
+            base,
+            scene,
+            known,
+        )
+
+    def placed(self, start: Start) -> Setup:
+        """Return the setup with all parts placed where the robot starts."""
+        robot = self.robot
+        tasks = []
+        for task in self.tasks:
+            with within("tasks", task.name):
+                tasks.append(task.placed(start))
+        with within("tasks"):
+            check_tasks(tasks, robot)
+        with within("null_space", "metric"):
+            metric = self.metric.placed(start)
+        with within("null_space", "gain"):
+            gain = checked_gain(self.gain, robot, metric)
+        fields = []
+        for k, term in enumerate(terms_of(self.field)):
+            with within("null_space", "fields", k):
+                _refuse_streams(term)
+                fields.append(PlannedTerm(term.placed(start), PRESENT))
+        contacts = []
+        for contact in self.contacts:
+            with within("contacts", contact.name):
+                contacts.append(PlannedContact(contact.placed(start), PRESENT))
+        limits: RobotLimits | None = None
+        if self.limits is not None:
+            with within("limits"):
+                limits = self.limits.placed(start)
+        return Setup(
+            start,
+            metric,
+            tuple(planned_task(k, task, PRESENT) for k, task in enumerate(tasks)),
+            tuple(fields),
+            Evolution(gain),
+            tuple(contacts),
+            PlannedLimits.of(limits),
+            len(tasks),
+        )
+
+    def preview(self) -> "Declared":
+        """Return the same parts with streams that begin anew."""
+        return replace(
+            self,
+            tasks=tuple(
+                with_parts_replaced(task, Streamed, Streamed.preview)
+                for task in self.tasks
+            ),
+        )
+
+
+def _refuse_streams(field: NullSpaceField) -> None:
+    """Raise for a field that a stream leads: only that of a change is logged."""
+    if any(True for _ in parts_within(field, Streamed)):
+        raise FieldError(
+            "a stream cannot lead a field from the start; while the controller runs, "
+            "controller.at(t).field(...) with a stream does"
+        )

@@ -1,17 +1,207 @@
-"""One end of a UDP connection: send packets, and check those received."""
+"""One end of a UDP connection: send packets, check those received, inject faults.
+
+Datagrams have a fixed binary layout with a checksum. All numbers are little-endian:
+
+    magic     4 bytes   HSPC
+    version   1 byte    1
+    kind      1 byte    1 state, 2 effort, 3 bye
+    phase     1 byte    the robot's phase, see `Phase`
+    (zero)    1 byte
+    count     4 bytes   number of doubles in the payload
+    session   8 bytes   number of the session; packets of others are ignored
+    sequence  8 bytes   number of the packet at this sender, from 1
+    acks      8 bytes   sequence of the newest packet that the sender has received
+    stamp     8 bytes   when it was sent, on the sender's monotonic clock [ns]
+    t         8 bytes   time of the payload [s], a double
+    payload   8 count   doubles: q and v of a state, what its other sensors measure
+                        (`SensorLayout`), and the effort that the robot has, if it has
+                        one; tau of an effort
+    check     4 bytes   CRC-32 of all bytes before
+"""
 
 import socket
+import struct
+import zlib
 from collections import Counter
 from contextlib import suppress
+from dataclasses import asdict, dataclass, fields
+from enum import IntEnum
 from select import select
 from time import monotonic, monotonic_ns
+from typing import NamedTuple
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import HardwareError
-from hsp_control.live.faults import FaultInjector, Faults
-from hsp_control.live.packets import Kind, Packet, decode, encode
+from hsp_control.common.exceptions import HardwareError, LiveError
+from hsp_control.common.suggestions import did_you_mean
+
+MAGIC, VERSION = b"HSPC", 1
+_HEAD = struct.Struct("<4sBBBxIQQQqd")
+_CHECK = struct.Struct("<I")
+
+
+class Kind(IntEnum):
+    """Kind of a packet: a state, an effort, or the end of the session."""
+
+    STATE = 1
+    EFFORT = 2
+    BYE = 3
+
+
+class Packet(NamedTuple):
+    """The content of a datagram."""
+
+    kind: Kind  # state, effort or end of the session
+    phase: int  # the robot's phase
+    session: int  # number of the session
+    sequence: int  # number of the packet at its sender
+    acks: int  # sequence of the newest packet that the sender has received
+    stamp: int  # when it was sent, on the sender's clock [ns]
+    t: float  # time of the payload [s]
+    payload: Array  # the doubles, shape (count,)
+
+
+def encode(packet: Packet) -> bytes:
+    """Encode a packet as bytes."""
+    numbers = np.asarray(packet.payload, dtype="<f8").tobytes()
+    head = _HEAD.pack(
+        MAGIC,
+        VERSION,
+        packet.kind,
+        packet.phase,
+        len(packet.payload),
+        packet.session,
+        packet.sequence,
+        packet.acks,
+        packet.stamp,
+        packet.t,
+    )
+    body = head + numbers
+    return body + _CHECK.pack(zlib.crc32(body))
+
+
+def decode(data: bytes) -> Packet | None:
+    """Decode bytes; return None if they are not a complete, unchanged packet."""
+    if len(data) < _HEAD.size + _CHECK.size:
+        return None
+    body = data[: -_CHECK.size]
+    if _CHECK.unpack(data[-_CHECK.size :])[0] != zlib.crc32(body):
+        return None
+    head = _HEAD.unpack_from(body)
+    magic, version, kind, phase, count = head[:5]
+    if magic != MAGIC or version != VERSION or kind not in _PACKET_KINDS:
+        return None
+    if len(body) != _HEAD.size + 8 * count:
+        return None
+    session, sequence, acks, stamp, t = head[5:]
+    payload = np.frombuffer(body, "<f8", offset=_HEAD.size)
+    return Packet(Kind(kind), phase, session, sequence, acks, stamp, t, payload)
+
+
+_PACKET_KINDS = frozenset(Kind)
+
+
+@dataclass(frozen=True)
+class Faults:
+    """Probabilities of packet faults; a packet has one fault at most.
+
+    Attributes:
+        late: Probability that a packet is sent after some later ones.
+        lost: Probability that it is not sent.
+        duplicated: Probability that it is sent twice.
+        corrupted: Probability that one of its bits is inverted.
+        delay: Number of packets that are sent before a late one.
+        seed: Seed of the random numbers.
+    """
+
+    late: float = 0.0
+    lost: float = 0.0
+    duplicated: float = 0.0
+    corrupted: float = 0.0
+    delay: int = 3
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in _KINDS:
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise LiveError(
+                    f"{name} is {getattr(self, name)}; needs a probability, 0 to 1"
+                )
+        if sum(getattr(self, name) for name in _KINDS) > 1.0 + 1e-12:
+            raise LiveError("the probabilities of the faults add up to more than 1")
+        if self.delay < 1:
+            raise LiveError(f"delay is {self.delay}; needs at least 1 packet")
+
+    @classmethod
+    def parse(cls, text: str) -> "Faults":
+        """Parse a text such as ``late=0.01,lost=0.02,seed=3``.
+
+        Raises:
+            LiveError: If a name is unknown, or a value is not a valid number.
+        """
+        known = {field.name: field.type for field in fields(cls)}
+        values: dict[str, float | int] = {}
+        for part in filter(None, text.split(",")):
+            name, _, number = (piece.strip() for piece in part.partition("="))
+            if name not in known:
+                raise LiveError(
+                    f"no fault {name!r}{did_you_mean(name, known)} "
+                    f"(there are {', '.join(known)})"
+                )
+            try:
+                kind = int if name in {"delay", "seed"} else float
+                values[name] = kind(number)
+            except ValueError:
+                raise LiveError(
+                    f"fault {name} is {number!r}; needs a number, as {name}=0.01"
+                ) from None
+        return cls(**values)  # type: ignore[arg-type]
+
+    def as_json(self) -> dict[str, float]:
+        """Return the settings as JSON data."""
+        return asdict(self)
+
+
+_KINDS = ("late", "lost", "duplicated", "corrupted")
+
+
+class FaultInjector:
+    """Applies `Faults` to packets."""
+
+    def __init__(self, faults: Faults, stream: int = 0) -> None:
+        self._faults = faults
+        self._rng = np.random.default_rng((faults.seed, stream))
+        self._cumulative = np.cumsum([getattr(faults, kind) for kind in _KINDS])
+        self._waiting: list[tuple[int, bytes]] = []
+        self.injected: Counter[str] = Counter(dict.fromkeys(_KINDS, 0))
+
+    def apply(self, data: bytes) -> list[bytes]:
+        """Return the packets to send now in place of this one, in order."""
+        released = [late for left, late in self._waiting if left <= 1]
+        self._waiting = [(left - 1, late) for left, late in self._waiting if left > 1]
+        which = int(np.searchsorted(self._cumulative, self._rng.random(), side="right"))
+        if which == len(_KINDS):
+            return [data, *released]
+        kind = _KINDS[which]
+        self.injected[kind] += 1
+        if kind == "late":
+            self._waiting.append((self._faults.delay, data))
+            return released
+        if kind == "lost":
+            return released
+        if kind == "duplicated":
+            return [data, data, *released]
+        corrupted = bytearray(data)
+        bit = int(self._rng.integers(8 * len(data)))
+        corrupted[bit // 8] ^= 1 << (bit % 8)
+        return [bytes(corrupted), *released]
+
+    def flush(self) -> list[bytes]:
+        """Return the late packets that still wait, before the last packet is sent."""
+        waiting, self._waiting = self._waiting, []
+        return [data for _, data in waiting]
+
 
 Address = tuple[str, int]
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.controller import Controller
-from hsp_control.control.log_channel import LogChannel
+from hsp_control.control.measurement import LogChannel
 from hsp_control.control.output import ControlOutput
 from hsp_control.control.plan import RunningPlan
 from hsp_control.geometry.scene import Scene
@@ -115,7 +115,6 @@ class LoopLog:
         self._next, self._phase = -inf, Phase.WAITING
         self._failed = False
         self._excess = LimitExcess(chain.command.controller.robot)
-        # the journal; None without a log
         self.path = None if path is None else Path(path)
         # whether the controller has raised; it is not called again
         self.controller_failed = False

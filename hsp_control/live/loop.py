@@ -1,35 +1,37 @@
-"""Run a live loop: check, compile and allocate, then control the robot."""
+"""A live loop: check, compile and allocate; then read, send, and stop safely."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
+from itertools import islice
+from math import inf
 from pathlib import Path
 from time import monotonic
 from typing import Any
 
 import numpy as np
 
-from hsp_control.common.exceptions import LiveError
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import FallError, HspControlError, LiveError
+from hsp_control.control.compensation import Command
 from hsp_control.control.controller import Controller
 from hsp_control.control.estimator import Estimator
 from hsp_control.control.first_state import warn_of_slow_efforts
 from hsp_control.control.plan import Plan
+from hsp_control.declaration.nested import parts_within
 from hsp_control.geometry.scene import Scene
-from hsp_control.live.balance import balance_of
-from hsp_control.live.bearing_feet import BearingFeet
+from hsp_control.live.bearing_feet import Balance, BearingFeet, balance_of
 from hsp_control.live.effort_limiter import EffortLimiter
-from hsp_control.live.effort_source import EffortSource, as_effort_source
-from hsp_control.live.hardware import Hardware
+from hsp_control.live.hardware import Hardware, described
 from hsp_control.live.live_log import LoopLog
-from hsp_control.live.one_run import OneRun
-from hsp_control.live.operator_requests import OperatorRequests
+from hsp_control.live.operator_requests import OperatorRequests, stop_signals
 from hsp_control.live.real_time import no_garbage_collection, real_time_priority
-from hsp_control.live.rehearsal import rehearse
-from hsp_control.live.report import LoopReport
-from hsp_control.live.safe_stop import SafeStop
+from hsp_control.live.report import Ended, LoopReport
+from hsp_control.live.safe_stop import Phase, SafeStop
 from hsp_control.live.settings import LiveSettings, check_held
 from hsp_control.live.state_reader import StateReader
-from hsp_control.live.stop_signals import stop_signals
-from hsp_control.simulation.control_chain import ControlChain
+from hsp_control.simulation.control_chain import ControlChain, EffortSource
+from hsp_control.trajectories.schedule import Schedule
 
 _WARM_UP = 20
 """Steps before real-time operation: they compile kernels and touch all memory."""
@@ -97,9 +99,10 @@ def run_loop(
         HspControlError: If the controller, the plan or an estimator raises at the first
             state: what it needs may not be measured.
     """
-    effort_source, settings = as_effort_source(controller), settings or LiveSettings()
-    chain = ControlChain(effort_source, plan, estimators)
-    controller = effort_source.controller
+    source = Command(controller) if isinstance(controller, Controller) else controller
+    settings = settings or LiveSettings()
+    chain = ControlChain(source, plan, estimators)
+    controller = source.controller
     robot, period = controller.robot, hardware.period
     requests = requests or OperatorRequests()
     with stop_signals(requests):
@@ -161,3 +164,301 @@ def _check(period: float, duration: float | None, log_period: float) -> None:
         raise LiveError(
             f"log_period is {log_period:g} s; must be a period, {period:g} s, or longer"
         )
+
+
+_MOST = 200
+"""Most instants that are rehearsed: a schedule may repeat itself for hours."""
+
+
+def rehearse(
+    controller: Controller, start: float, end: float, q: Array, v: Array
+) -> None:
+    """Evaluate a copy of a controller wherever its tasks or contacts change."""
+    # Their native calls are compiled then, not in the loop: a robot waits no seconds.
+    times = sorted({t for t in _instants(controller) if start < t <= end and t < inf})
+    if not times:
+        return
+    preview = controller.preview()
+    for t in islice(times, _MOST):
+        with suppress(HspControlError):  # the robot will be elsewhere then
+            preview.compute(t, q, v)
+
+
+def _instants(controller: Controller) -> Iterator[float]:
+    """Yield when sets of tasks and contacts begin: amid ramps, and after them [s]."""
+    declared = controller.tasks, controller.contacts, controller.changes
+    for schedule in parts_within(declared, Schedule):
+        for begin, end in schedule.windows:
+            yield begin
+            yield begin + 0.5 * schedule.ramp
+            yield begin + schedule.ramp
+            yield end - 0.5 * schedule.ramp
+            yield end
+    for change in controller.changes:
+        yield change.at
+        yield change.at + 0.5 * change.ramp
+        yield change.end
+
+
+@dataclass(eq=False)
+class OneRun:
+    """One run of a loop whose parts are ready: `run`, then `finish`; none raises."""
+
+    chain: ControlChain[EffortSource]
+    hardware: Hardware
+    reader: StateReader
+    limiter: EffortLimiter
+    safe_stop: SafeStop
+    log: LoopLog
+    requests: OperatorRequests
+    settings: LiveSettings
+    end: float  # when the duration is over [s]
+    balance: Balance | None = None
+    phase: Phase = Phase.RUNNING  # running, damping or holding
+    ended: Ended = "completed"
+    reason: str = ""
+    error: Exception | None = None
+    # how it will end, and why, once the plan has brought the robot to rest
+    ending: tuple[Ended, str] | None = None
+    asked_at: float = 0.0  # when that was asked for [s]
+    silent: bool = False  # whether it stopped sending efforts
+    done: bool = False
+    abandoned: bool = False
+    later: str = ""  # the first fault in the safe stop, "" without one
+
+    def run(self, on_period: Callable[[float], object] | None) -> None:
+        """Run period after period until the safe stop is complete."""
+        self.reader.start()
+        self.limiter.reset(self.reader.state.q)
+        while not self.done:
+            try:
+                self.one_period(on_period)
+            except (KeyboardInterrupt, SystemExit) as request:
+                if self.phase != Phase.RUNNING:  # the second: the robot must stop
+                    self.silent = self.done = self.abandoned = True
+                name = "Ctrl-C" if isinstance(request, KeyboardInterrupt) else "exit"
+                reason = f"stopped by the operator ({name})"
+                if self.ending is None:
+                    self.end_regularly("operator", reason)
+                else:
+                    self.stop("operator", reason)
+            except Exception as error:  # nobody knows what to send now
+                self.silent = self.done = True
+                self.fail(error)
+
+    def one_period(self, on_period: Callable[[float], object] | None) -> None:
+        """Read a state, send an effort, then log and make the requested changes."""
+        reader, limiter = self.reader, self.limiter
+        reader.read(limiter.applied, self.chain.command.controller.limits)
+        if reader.fault is not None:
+            self.stop("fault", reader.fault, reader.error)
+        elif self.requests.reason is not None:
+            self.end_regularly("operator", self.requests.reason)
+        elif reader.state.t >= self.end:
+            self.end_regularly("completed", "the duration is over")
+        elif self.ending is not None:
+            self.end_regularly(*self.ending)
+        self.feel_ground()
+        self.hear_applied()
+        tau = self.controller_effort() if self.phase == Phase.RUNNING else None
+        if self.phase != Phase.RUNNING:
+            tau = self.stop_effort()
+        limiter.follow(self.chain.command.controller.limits)
+        before = limiter.sent.copy()
+        if tau is not None and not limiter.apply(tau, reader.state.q):
+            self.stop("fault", f"the effort is not finite: {tau.tolist()}")
+        self.send(before)
+        response = reader.effort_sent()
+        self.tell_applied()
+        self.log_row(response)
+        if self.phase == Phase.RUNNING:
+            self.rest_of_period(on_period)
+
+    def feel_ground(self) -> None:
+        """Find which feet bear, and stop if the robot falls."""
+        measurement, state = self.reader.measurement, self.reader.state
+        if self.balance is None or measurement is None:
+            return
+        if not self.balance.lost:
+            self.safe_stop.feet.feel(measurement._replace(t=state.t))
+            fallen = self.balance.fault(state)
+            if fallen is not None:
+                self.fall(fallen)
+
+    def fall(self, reason: str, error: Exception | None = None) -> None:
+        """Stop a robot that falls: its feet hold it no more."""
+        if self.balance is not None:
+            self.balance.lost = True
+        self.safe_stop.feet.lose()
+        self.stop("fault", reason, error)
+
+    def controller_effort(self) -> Array | None:
+        """Return the controller's effort; None without a measurement: hold the last."""
+        measurement, t = self.reader.measurement, self.reader.state.t
+        if measurement is None:
+            return None
+        try:
+            # What the motors have counts, with the gravity that the robot adds.
+            has = None if measurement.applied is None else self.limiter.applied.copy()
+            measured = measurement._replace(t=t, applied=has)
+            effort = self.chain.effort(measured, self.hardware.period)
+            tau = np.asarray(effort, dtype=float)
+            if tau.shape != measurement.v.shape:
+                raise ValueError(
+                    f"the effort has shape {tau.shape}; needs {measurement.v.shape}"
+                )
+        except FallError as error:
+            self.log.controller_failed = True
+            self.fall(str(error), error)
+            return None
+        except Exception as error:  # a user's task or field may raise anything
+            self.log.controller_failed = True
+            self.fail(error)
+            return None
+        return tau
+
+    def stop_effort(self) -> Array:
+        """Return the safe stop's effort at the measured or predicted state."""
+        tau = self.safe_stop.effort(self.reader.state)
+        self.phase = self.safe_stop.phase
+        too_long = self.reader.predicted_for > self.settings.prediction_time
+        unknown = self.reader.connection_lost or too_long
+        self.silent = unknown or not np.isfinite(tau).all()
+        self.done = self.silent or self.safe_stop.done
+        return tau
+
+    def end_regularly(self, ended: Ended, reason: str) -> None:
+        """Stop once the plan, if there is one, has brought the robot to rest."""
+        plan, state = self.chain.plan, self.reader.state
+        if plan is None or self.phase != Phase.RUNNING:
+            self.stop(ended, reason)
+            return
+        if self.ending is None:
+            self.ending, self.asked_at = (ended, reason), state.t
+            plan.stop()
+        still = float(np.abs(state.v).max()) <= self.settings.stop.standstill
+        waited = state.t - self.asked_at >= self.settings.stop.coming_to_rest
+        if waited or (plan.rests and still):
+            self.stop(*self.ending)
+
+    def stop(self, ended: Ended, reason: str, error: Exception | None = None) -> None:
+        """Start the safe stop; later calls change neither it nor the reason."""
+        if self.phase != Phase.RUNNING:
+            if ended == "fault":
+                self.later = self.later or reason
+            return
+        self.phase = Phase.DAMPING
+        self.ended, self.reason, self.error = ended, reason, error
+        self.safe_stop.begin()
+
+    def fail(self, error: Exception) -> None:
+        """Stop because of what a user's code or the law raised."""
+        name = type(error).__name__
+        text = described(error)
+        told = text if text.startswith(name) else f"{name}: {text}"
+        self.stop("fault", told, error)
+
+    def hear_applied(self) -> None:
+        """Tell the controller which effort the robot has: one may be lost."""
+        if (measurement := self.reader.measurement) is None:
+            self.limiter.nothing_heard()
+            return
+        has = measurement.applied
+        if has is not None and not self.limiter.believes(has):
+            self.stop("fault", f"the robot says it has an effort of {has.tolist()}")
+            has = None
+        if self.limiter.robot_has(has):
+            self.tell_applied()
+
+    def tell_applied(self) -> None:
+        """Tell the controller which effort the motors apply."""
+        if self.log.controller_failed:
+            return
+        try:
+            self.chain.command.applied(self.limiter.applied, self.hardware.period)
+        except Exception as error:
+            self.fail(error)
+
+    def send(self, before: Array) -> None:
+        """Send the limited effort, unless the state is unknown (fail-silent)."""
+        if self.silent:
+            return
+        try:
+            self.hardware.write(self.limiter.sent.copy())
+        except Exception as error:  # a driver may raise anything
+            self.limiter.replace_sent(before)
+            reason = f"the effort cannot be sent: {described(error)}"
+            self.stop("fault", reason, error)
+
+    def log_row(self, response: float) -> None:
+        """Write a row if one is due; if Ctrl-C cuts it short, once more."""
+
+        def write() -> None:
+            self.log.row(
+                self.phase, self.reader, self.limiter, response, last=self.done
+            )
+
+        try:
+            try:
+                write()
+            except KeyboardInterrupt:
+                write()
+                raise
+        except Exception as error:  # the disk is full, or a user's task raises
+            self.fail(error)
+
+    def rest_of_period(self, on_period: Callable[[float], object] | None) -> None:
+        """Make the operator's changes, and call the user's function."""
+        try:
+            self.requests.run_pending()
+            if on_period is not None:
+                on_period(self.reader.state.t)
+        except Exception as error:
+            self.fail(error)
+
+    def finish(self) -> LoopReport:
+        """Close the hardware, end the log, and return the report."""
+        self._close("the robot cannot be closed", self.hardware.close)
+        self._close("the log cannot be ended", lambda: self.log.end(self.report()))
+        return self.report()
+
+    def report(self) -> LoopReport:
+        """Return how the run ended."""
+        state = self.reader.state
+        speed = float(np.abs(state.v).max())
+        standing = speed <= self.settings.stop.standstill
+        at_rest = standing and self.safe_stop.done and not self.silent
+        ended, reason = self.ended, self.reason
+        if ended != "fault" and not self.abandoned and (self.later or not at_rest):
+            ended = "fault"
+            reason += f"; then {self.later or f'the robot still moved at {speed:.3g}'}"
+        return LoopReport(
+            ended=ended,
+            reason=reason,
+            phase=self.phase,
+            silent=self.silent,
+            speed=speed,
+            at_rest=at_rest,
+            t=state.t,
+            deadlines=self.reader.deadlines,
+            error=self.error,
+            log=self.log.path,
+        )
+
+    def _close(self, what: str, close: Callable[[], object]) -> None:
+        """Close something; if Ctrl-C cuts it short, once more."""
+        for last in (False, True):
+            try:
+                close()
+            except KeyboardInterrupt as interrupt:
+                if last:
+                    self._add(f"{what}: {described(interrupt)}")
+                continue
+            except Exception as error:
+                self._add(f"{what}: {described(error)}")
+                self.error = self.error or error
+            return
+
+    def _add(self, fault: str) -> None:
+        """Report a fault after the end."""
+        self.ended, self.reason = "fault", f"{self.reason}; {fault}"

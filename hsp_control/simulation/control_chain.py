@@ -6,8 +6,7 @@ from typing import Generic, Protocol, TypeVar
 from hsp_control.common.arrays import Array
 from hsp_control.control.controller import Controller
 from hsp_control.control.estimator import Estimator, RunningEstimator, begun
-from hsp_control.control.log_channel import LogChannel
-from hsp_control.control.measurement import Inertial, Measurement
+from hsp_control.control.measurement import Inertial, LogChannel, Measurement
 from hsp_control.control.output import ControlOutput
 from hsp_control.control.plan import Plan, RunningPlan
 from hsp_control.robot import RobotState

@@ -8,7 +8,7 @@ from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
 from hsp_control.constraints.limits import RobotLimits
-from hsp_control.control.log_channel import LogChannel
+from hsp_control.control.measurement import LogChannel
 from hsp_control.robot import Robot
 
 POSITION, VELOCITY = "position_excess", "velocity_excess"

@@ -10,8 +10,7 @@ from hsp_control.common.exceptions import SimulationError
 from hsp_control.common.kernels import kernel
 from hsp_control.control.compensation import Command
 from hsp_control.control.controller import Controller
-from hsp_control.control.log_channel import LogChannel
-from hsp_control.control.measurement import Measurement
+from hsp_control.control.measurement import LogChannel, Measurement
 from hsp_control.control.output import ControlOutput
 from hsp_control.robot import RobotState
 from hsp_control.robot.integrators import Integrator, bound

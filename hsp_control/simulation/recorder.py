@@ -10,7 +10,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.identity_cache import IdentityCache
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.controller import Controller
-from hsp_control.control.log_channel import LogChannel
+from hsp_control.control.measurement import LogChannel
 from hsp_control.control.output import ControlOutput
 from hsp_control.control.plan import RunningPlan
 from hsp_control.geometry.scene import Scene

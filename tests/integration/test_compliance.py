@@ -19,8 +19,7 @@ from hsp_control import Controller, FramePose, FramePosition, Robot, Rollout
 from hsp_control.common.exceptions import ControllerError
 from hsp_control.control.compensation import Compensation, MomentumObserver, check_rate
 from hsp_control.control.compensation.linear_loop import LinearLoop
-from hsp_control.control.held_gains import held_radius
-from hsp_control.control.stiffening import dissipated, spring_energy
+from hsp_control.control.gains_in_force import dissipated, held_radius, spring_energy
 from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric, Metric
 from hsp_control.robot.integrators import Dop853, Rk4
 from hsp_control.simulation.plants import Push, RigidBody

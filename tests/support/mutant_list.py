@@ -110,10 +110,10 @@ angular momentum: the error grows | angular_momentum
 gains: Kv is not ramped
 -self.feedback[each.key].numbers[:] = numbers
 +self.feedback[each.key].numbers[0] = numbers[0]
-@ control/stiffening.py | integration/test_compliance.py
+@ control/gains_in_force.py | integration/test_compliance.py
 impedance: a change waits for nothing | adds_no_energy
   return np.asarray(now + given / needed * step) => return np.asarray(now + step)
-@ control/held_gains.py | integration/test_compliance.py
+@ control/gains_in_force.py | integration/test_compliance.py
 gains: a running loop bears any of them | period_does_not_bear
 -if held_radius(Kp, Kv, period) < 1.0 + _ROUNDING:
 +if held_radius(0.9 * Kp, 0.9 * Kv, period) < 1.0 + _ROUNDING:
@@ -237,7 +237,7 @@ position barrier: the drift moves no bound | drives_no_joint_beyond
 position barrier: damping drives | position_bounds
 -low = -bandwidth * bandwidth * (position - lower[i]) - damping
 +low = -bandwidth * bandwidth * (position - lower[i]) + damping
-@ constraints/limits/minimum_distance.py | unit/constraints/test_limits.py
+@ constraints/limits/limits.py | unit/constraints/test_limits.py
 minimum distance counted from contact | distance_rows
   h = d - self.minimum => h = d
 @ constraints/limits/limits.py | unit/control/test_deviation_cost.py
@@ -289,7 +289,7 @@ effort rate ignored | effort_rate_needs
 @ control/actuation/limited_step.py | unit/control/test_limited_step.py
 distances give way before motion | distances_are_relaxed_less
   "distances": 30.0 => "distances": 0.03
-@ control/planned_contact.py | unit/control/test_changes_where_limits_bind.py
+@ control/planned.py | unit/control/test_changes_where_limits_bind.py
 contact with a schedule ends with a jump | schedule
   x = min(self.weight(t) / HELD, 1.0) => x = min(self.presence.at(t) / HELD, 1.0)
 @ control/setup.py | unit/control/test_changes_where_limits_bind.py
@@ -314,7 +314,7 @@ limits: rows of a spectrum as directions | levels_share
   return bool(found) => return True
 limits: a damped level shares nothing | levels_share
   own * (free / own) ** (lost * lost) => own
-@ control/actuation/step_qp.py | unit/control/test_limited_step.py
+@ control/actuation/limited_step.py | unit/control/test_limited_step.py
 limited step: contacts may move | optimum
   1 if contacts_held else 0 => 0
 @ control/actuation/dual_active_set.py | unit/control/test_dual_active_set.py
@@ -325,10 +325,10 @@ QP: a multiplier of the wrong sign stays | any_warm_start
 friction cone with 2μ | friction_cone
 -return self.friction / float(np.sqrt(2.0))
 +return 2.0 * self.friction / float(np.sqrt(2.0))
-@ control/actuation/contact_forces.py | unit/control/test_commanded_forces.py
+@ control/actuation/support.py | unit/control/test_commanded_forces.py
 commanded force: nothing balances it | closed_form
   w[i] -= A[i, k] * reference[k] => w[i] -= 0.0 * A[i, k] * reference[k]
-@ control/actuation/commanded_forces.py | unit/control/test_commanded_forces.py
+@ control/actuation/support.py | unit/control/test_commanded_forces.py
 commanded force: friction along the motion | sliding_point
   out[:2] = -contact.friction => out[:2] = contact.friction
 @ control/compensation/force_feedback.py | unit/control/test_force_feedback.py
@@ -549,7 +549,7 @@ sweeps: chance falls with the runs, not root
 sweeps: rows in the order they finish
   ordered = sorted(rows, key=lambda row: row.run) => ordered = list(rows)
 # live
-@ live/packets.py | unit/live/test_live_udp.py
+@ live/link.py | unit/live/test_live_udp.py
 packets: checksum ignored | one_bit
   != zlib.crc32(body): => != zlib.crc32(body) and not body:
 @ live/simulated_robot.py | unit/live/test_safe_stop.py
@@ -563,7 +563,7 @@ safe stop: the hold pushes away | not_the_model
   w * w * displacement + 2.0 * w * v => -w * w * displacement + 2.0 * w * v
 safe stop: the hold is not damped | not_the_model
   w * w * displacement + 2.0 * w * v => w * w * displacement
-@ live/measurement_checks.py | unit/live/test_live_faults.py
+@ live/state_reader.py | unit/live/test_live_faults.py
 live: an age that is NaN passes | each_fault
 -    if not isfinite(value):
 +    if abs(value) > 1e308:
@@ -571,7 +571,7 @@ live: an age that is NaN passes | each_fault
 live: a frozen state is believed | each_fault
 -untrue = self._frozen.fault(new, applied) or self._monitor.jump(new)
 +untrue = self._monitor.jump(new)
-@ live/one_run.py | unit/live/test_live_faults.py
+@ live/loop.py | unit/live/test_live_faults.py
 live: completed while it moves | completed_means
   standing = speed <= self.settings.stop.standstill => standing = True
 @ live/effort_limiter.py | unit/live/test_live_robot.py
@@ -587,11 +587,11 @@ live: the robot accepts any rate | beyond_its_limits
 @ simulation/journal.py | unit/live/test_live_journal.py
 journal: a frame that Ctrl-C cuts stays | ctrl_c
   os.ftruncate(self._file, self._size) => os.fsync(self._file)
-@ control/compensation/loaded_loop.py | unit/control/test_loaded_loop.py
+@ control/compensation/linear_loop.py | unit/control/test_loaded_loop.py
 rate check: the load couples nothing | grows_and_decays
 -np.linalg.inv(one + s * self.difference)
 +np.diag(np.diag(np.linalg.inv(one + s * self.difference)))
-@ live/measurement_checks.py | unit/live/test_live_faults.py
+@ live/state_reader.py | unit/live/test_live_faults.py
 monitor: no jump is as long as the gap | a_jump
 -passed = max(passed, (measurement.sequence - last.sequence) * self._period)
 +passed = max(passed, self._period)
@@ -603,7 +603,7 @@ monitor: positions below are within | margin
 @ live/state_reader.py | unit/live/test_live_faults.py
 clock: a jump stays in the time | each_fault
   self._offset -= passed - period => self._offset += passed - period
-@ live/measurement_checks.py | unit/live/test_safe_stop.py
+@ live/state_reader.py | unit/live/test_safe_stop.py
 reckoning: explicit Euler | reckoning
 -self._robot.integrate(state.q, h * v), v)
 +self._robot.integrate(state.q, h * state.v), v)
@@ -615,15 +615,15 @@ feet: a foot pulls | not_pressed
 @ live/link.py | unit/live/test_live_udp.py
 link: the window of ages never moves on | age_is
   self._end = arrival + self._window => self._end = np.inf
-@ live/faults.py | unit/live/test_live_udp.py
+@ live/link.py | unit/live/test_live_udp.py
 faults: late packets come a packet early | each_fault
 -for left, late in self._waiting if left <= 1]
 +for left, late in self._waiting if left <= 2]
-@ live/sensor_layout.py | companions/walking/test_live_on_feet.py
+@ live/udp.py | companions/walking/test_live_on_feet.py
 sensors: wrenches in the order of names | comes_back
 -Inertial(self.inertial, rest[-3], rest[-2])
 +Inertial(self.inertial, rest[-2], rest[-3])
-@ live/measurement_checks.py | unit/live/test_live_faults.py
+@ live/state_reader.py | unit/live/test_live_faults.py
 frozen: a robot that stands is frozen | at_rest
 -            and measurement.v.any()
 -

@@ -1,13 +1,12 @@
 """All commands and their options; nothing slow is imported: help comes at once."""
 
 import argparse
+import re
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any, NoReturn
 
-from hsp_control.cli.options.companions import added_commands
-from hsp_control.cli.options.export import add_export
-from hsp_control.cli.options.inspect import add_inspect
-from hsp_control.cli.options.live import add_live
-from hsp_control.cli.options.parser import Parser
+from hsp_control.cli.options.companions import added_commands, export_formats
 from hsp_control.cli.options.shared import (
     add_configuration,
     add_host,
@@ -16,7 +15,45 @@ from hsp_control.cli.options.shared import (
     complete,
 )
 from hsp_control.common.resources import bundled_robots
+from hsp_control.common.suggestions import did_you_mean
 from hsp_control.common.version import __version__
+
+
+class Parser(argparse.ArgumentParser):
+    """An `argparse.ArgumentParser` for commands and for their options."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        # By their full names: ``--st`` is no ``--strict``.
+        super().__init__(*args, **{"allow_abbrev": False, **options})
+
+    def parse_known_args(  # type: ignore[override]
+        self, args: Sequence[str] | None = None, namespace: Any = None
+    ) -> tuple[Any, list[str]]:
+        """Parse, and refuse here what a command does not know."""
+        found, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            options = [name for name in unknown if name.startswith("-")]
+            name = (options or unknown)[0]
+            known = self._option_string_actions
+            hint = did_you_mean(name.split("=")[0], known) if options else ""
+            self.error(f"there is no {name!r} here{hint}")
+        return found, unknown
+
+    def error(self, message: str) -> NoReturn:
+        """Print the message and exit with 2; a mistyped command is guessed."""
+        mistyped = re.search(r"argument COMMAND: invalid choice: '(.*?)'", message)
+        if mistyped is not None:
+            commands = next(
+                action.choices
+                for action in self._actions
+                if isinstance(action, argparse._SubParsersAction)
+            )
+            name = mistyped[1]
+            message = (
+                f"there is no command {name!r}{did_you_mean(name, commands)}; "
+                "hsp --help lists all"
+            )
+        super().error(message)
 
 
 def command_line() -> argparse.ArgumentParser:
@@ -90,12 +127,7 @@ def command_line() -> argparse.ArgumentParser:
     add_strict(view)
 
     plot = _command(commands, "plot", "draw the figures of a log")
-    plot.add_argument(
-        "log",
-        type=Path,
-        metavar="LOG",
-        help="written by hsp run",
-    )
+    plot.add_argument("log", type=Path, metavar="LOG", help="written by hsp run")
     plot.add_argument("--out", type=Path, metavar="DIR", help="default: beside the log")
     plot.add_argument(
         "--format",
@@ -143,3 +175,93 @@ def _command(
     return commands.add_parser(
         name, help=text, description=text[:1].upper() + text[1:] + "."
     )
+
+
+def add_export(export: argparse.ArgumentParser) -> None:
+    """Add all options of `hsp export`."""
+    export.add_argument(
+        "logs",
+        type=Path,
+        nargs="+",
+        metavar="LOG",
+        help="written by hsp run; several logs make one page with a switch",
+    )
+    add_strict(export)
+    export.add_argument(
+        "--html",
+        type=Path,
+        metavar="FILE",
+        help="a page that plays offline, with the plots",
+    )
+    for added in export_formats():
+        for ending, text in added.files.items():
+            export.add_argument(f"--{ending}", type=Path, metavar="FILE", help=text)
+        added.add_options(export)
+
+
+def add_inspect(inspect: argparse.ArgumentParser) -> None:
+    """Add all options of `hsp inspect`."""
+    robot = inspect.add_argument(
+        "robot", metavar="ROBOT", help="a name, a URDF or a xacro file"
+    )
+    complete(robot, bundled_robots)
+    inspect.add_argument(
+        "args", nargs="*", metavar="NAME:=VALUE", help="arguments of a xacro file"
+    )
+    inspect.add_argument(
+        "--fix",
+        type=Path,
+        metavar="FILE",
+        help="write a URDF whose inertias are the nearest that a body can have",
+    )
+    inspect.add_argument("--json", action="store_true", help="print JSON")
+    add_strict(inspect)
+
+
+def add_live(live: argparse.ArgumentParser) -> None:
+    """Add all options of `hsp live`."""
+    add_configuration(live)
+    live.add_argument(
+        "--robot",
+        metavar="NAME://ADDRESS",
+        help="franka://ADDRESS, or another robot that an installed package can reach; "
+        "default: a simulated one",
+    )
+    live.add_argument("--publish", metavar="ros2://NAME", help="topics for watchers")
+    live.add_argument(
+        "--duration",
+        type=float,
+        metavar="S",
+        help="default: the configuration's; inf: until Ctrl-C",
+    )
+    live.add_argument(
+        "--faults",
+        default="",
+        metavar="KIND=P,...",
+        help="probabilities of late, lost, duplicated and corrupted packets, in both "
+        "directions; delay=PACKETS of late ones, and seed=N",
+    )
+    live.add_argument(
+        "--kill",
+        metavar="WHO=S",
+        help="kill the process of the robot or of the controller after so long",
+    )
+    live.add_argument(
+        "--out", type=Path, default=Path("out"), metavar="DIR", help="default: out"
+    )
+    live.add_argument(
+        "--priority",
+        type=int,
+        metavar="LEVEL",
+        help="real-time priority of the loop (SCHED_FIFO), 1 to 99",
+    )
+    live.add_argument(
+        "--steer",
+        nargs="?",
+        choices=("simulated", "hardware"),
+        const="simulated",
+        help="show a page that steers: drag targets and obstacles, turn settings; with "
+        "hardware, the robot moves only while a key is held on the page",
+    )
+    add_host(live)
+    add_page(live)

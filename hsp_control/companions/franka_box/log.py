@@ -7,7 +7,7 @@ from typing import Self
 from hsp_control.common.exceptions import LogError
 from hsp_control.companions.franka_box import Box
 from hsp_control.config import Experiment
-from hsp_control.control.log_channel import LogChannel
+from hsp_control.control.measurement import LogChannel
 from hsp_control.live.live_log import LiveLog, Row
 from hsp_control.robot import RobotState
 from hsp_control.simulation import Rollout

@@ -12,9 +12,9 @@ from hsp_control.companions.franka_box import Arm, Box, Server
 from hsp_control.companions.franka_box.log import BoxLog
 from hsp_control.config import Experiment, load_experiment
 from hsp_control.live import OperatorRequests
+from hsp_control.live.operator_requests import stop_signals
 from hsp_control.live.real_time import real_time_priority
 from hsp_control.live.simulated_robot import sampled
-from hsp_control.live.stop_signals import stop_signals
 from hsp_control.robot import Robot
 from hsp_control.robot.description.sources import is_robot
 

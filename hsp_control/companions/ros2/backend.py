@@ -3,9 +3,9 @@
 from collections.abc import Callable
 
 from hsp_control.companions.ros2.installed import check_installed
-from hsp_control.live.effort_source import EffortSource
 from hsp_control.live.hardware import Hardware
 from hsp_control.robot import Robot
+from hsp_control.simulation.control_chain import EffortSource
 
 
 def connect(address: str, robot: Robot, period: float) -> Hardware:

@@ -13,7 +13,7 @@ from hsp_control.common.exceptions import HspControlError
 from hsp_control.companions.ros2.installed import check_installed
 from hsp_control.config import load_experiment
 from hsp_control.live import OperatorRequests
-from hsp_control.live.stop_signals import stop_signals
+from hsp_control.live.operator_requests import stop_signals
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -16,7 +16,7 @@ from hsp_control.companions.ros2.node import Node
 from hsp_control.live.real_time import no_garbage_collection
 from hsp_control.live.safe_stop import Phase
 from hsp_control.live.simulated_robot import SimulatedRobot
-from hsp_control.live.udp_robot import CLOSED_BY_LOOP
+from hsp_control.live.udp import CLOSED_BY_LOOP
 from hsp_control.robot import Robot
 
 _CATCH_UP = 10

@@ -16,7 +16,7 @@ from hsp_control.companions.ros2.messages import (
     Time,
 )
 from hsp_control.companions.ros2.node import Node, Publisher
-from hsp_control.live.effort_source import EffortSource
+from hsp_control.simulation.control_chain import EffortSource
 from hsp_control.tasks import Task
 
 _RATE = 100.0

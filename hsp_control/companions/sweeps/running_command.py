@@ -19,7 +19,7 @@ from rich.progress import (
 from rich.table import Table
 
 from hsp_control.cli.consoles import errors, out
-from hsp_control.cli.startup import INTERRUPTED
+from hsp_control.cli.interrupts import INTERRUPTED
 from hsp_control.common.exceptions import SweepError
 from hsp_control.companions.sweeps import Sensitivity, Sweep, sensitivity
 from hsp_control.companions.sweeps import sweep as run_sweep

@@ -16,10 +16,9 @@ from hsp_control.companions.walking.quintic import at_rest, to_rest
 from hsp_control.companions.walking.swing import Swing, turned
 from hsp_control.control.controller import Controller
 from hsp_control.control.falling import FallDetector
-from hsp_control.control.log_channel import LogChannel
-from hsp_control.control.measurement import Measurement
+from hsp_control.control.measurement import LogChannel, Measurement
 from hsp_control.control.plan import RunningPlan
-from hsp_control.control.switched import Switched
+from hsp_control.control.planned import Switched
 from hsp_control.robot import RobotState
 from hsp_control.trajectories.fed import Fed, FedOrientation
 from hsp_control.trajectories.switch import Switch

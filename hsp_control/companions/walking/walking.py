@@ -30,8 +30,7 @@ from hsp_control.companions.walking.step_planner import StepPlanner, stance_of
 from hsp_control.companions.walking.swing import Swing, turned
 from hsp_control.control.controller import Controller
 from hsp_control.control.falling import FallDetector
-from hsp_control.control.log_channel import LogChannel
-from hsp_control.control.measurement import Measurement
+from hsp_control.control.measurement import LogChannel, Measurement
 from hsp_control.control.plan import RunningPlan
 from hsp_control.robot import RobotState
 from hsp_control.trajectories.fed import Fed, FedOrientation

@@ -1,6 +1,6 @@
 """Contacts: where a robot stands, and the forces that can act there."""
 
-from .commanded_force import CommandedForce as CommandedForce
+from .contact import CommandedForce as CommandedForce
 from .contact import Contact as Contact
 from .kinds import BallContact as BallContact
 from .kinds import PointContact as PointContact

@@ -13,8 +13,7 @@ from hsp_control.common.exceptions import ContactError
 from hsp_control.common.kernels import kernel
 from hsp_control.common.linalg import multiply_transposed
 from hsp_control.common.native import bind
-from hsp_control.constraints.contacts.commanded_force import NORMAL, WRENCH
-from hsp_control.constraints.contacts.contact import Contact
+from hsp_control.constraints.contacts.contact import NORMAL, WRENCH, Contact
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Points, Positive, Vector3, read_only
 from hsp_control.law import TaskSample

@@ -6,9 +6,9 @@ from .joint_numbers import PositionsByJoint as PositionsByJoint
 from .joint_numbers import Scaled as Scaled
 from .limits import Limits as Limits
 from .limits import LimitsOrNone as LimitsOrNone
+from .limits import MinimumDistance as MinimumDistance
+from .limits import ObstacleDistance as ObstacleDistance
 from .limits import RobotLimits as RobotLimits
+from .limits import SelfDistance as SelfDistance
 from .limits import StaticEffort as StaticEffort
 from .limits import own_limits as own_limits
-from .minimum_distance import MinimumDistance as MinimumDistance
-from .minimum_distance import ObstacleDistance as ObstacleDistance
-from .minimum_distance import SelfDistance as SelfDistance

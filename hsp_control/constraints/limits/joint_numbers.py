@@ -73,7 +73,6 @@ class OfJoints(Mapping[str, T]):
     """Values by joint name; they never change."""
 
     def __init__(self, values: Mapping[str, T]) -> None:
-        """Copy the values."""
         self._values = dict(values)
 
     def __getitem__(self, joint: str) -> T:

@@ -7,7 +7,7 @@ Minimise ½ δᵀH δ over a = a* + δ, with a* the law's acceleration and
 in whitened coordinates, N_k the directions of the tasks of level k in the null space of
 those above, and ρ_N the cost of motion in the null space of all tasks. So the null
 space deviates first, then the tasks, the lowest priority first. The constraints are
-affine in δ and the contact forces, see `step_qp`.
+affine in δ and the contact forces, see `limited_step`.
 
 If a* violates no constraint it is the optimum, and no QP is solved. ``docs/law.md``,
 Contacts and floating bases, and Limits.
@@ -42,8 +42,7 @@ from hsp_control.control.actuation.held_effort import (
 from hsp_control.control.actuation.limited_step import Barriers, LimitedStep
 from hsp_control.control.actuation.status import EXACT, LIMITED, Status
 from hsp_control.control.actuation.support import Support
-from hsp_control.control.planned_contact import PlannedContact
-from hsp_control.control.planned_limits import PlannedLimits, mean_of
+from hsp_control.control.planned import PlannedContact, PlannedLimits, mean_of
 from hsp_control.law import Resolution
 from hsp_control.robot import Robot, RobotState
 
@@ -62,31 +61,19 @@ m/s²]."""
 
 
 class Kept(NamedTuple):
-    """One set of limits, and what is made for it.
-
-    Attributes:
-        limits: The limits; None: there are none.
-        steps: The QP of each law.
-        box: Whether there are but bounds on accelerations and efforts.
-        rate: Whether the effort's rate is limited.
-    """
+    """One set of limits, and what is made for it."""
 
     limits: RobotLimits | None
-    steps: WeakKeyDictionary[Resolution, LimitedStep]
-    box: bool
-    rate: bool
+    steps: WeakKeyDictionary[Resolution, LimitedStep]  # QP of each law
+    box: bool  # whether there are but bounds on accelerations and efforts
+    rate: bool  # whether the effort's rate is limited
 
     @classmethod
     def of(cls, limits: RobotLimits | None) -> "Kept":
         """Return what keeps a set of limits."""
-        if limits is None:
-            return cls(None, WeakKeyDictionary(), box=True, rate=False)
-        return cls(
-            limits,
-            WeakKeyDictionary(),
-            box=not limits.distances and limits.static_effort is None,
-            rate=bool(np.isfinite(limits.effort_rate).any()),
-        )
+        barriers = limits is not None and (limits.distances or limits.static_effort)
+        rate = limits is not None and bool(np.isfinite(limits.effort_rate).any())
+        return cls(limits, WeakKeyDictionary(), box=not barriers, rate=rate)
 
 
 class Actuation:
@@ -95,21 +82,14 @@ class Actuation:
     Its only memory is of the last efforts, used where the effort rate or the speed is
     limited: see `applied`. While one set of limits follows another it keeps the one
     that was enforced last: see `Mixture.deliver`.
-
-    Attributes:
-        sets: The sets of limits in force, each with its share.
-        base: Indices of the degrees of freedom without a motor.
-        delivered: The acceleration of the last step, shape (nv,).
-        limited: What the last step delivers that was limited within a call of `checks`.
     """
 
     def __init__(
         self, robot: Robot, planned: PlannedLimits, base: Sequence[int] = ()
     ) -> None:
-        """Allocate."""
         nv = robot.nv
         self._robot = robot
-        self.base: Indices = np.array(base, dtype=np.int64)
+        self.base: Indices = np.array(base, dtype=np.int64)  # those without a motor
         self._floating = bool(self.base.size)
         self._motors: Indices = np.setdiff1d(np.arange(nv), self.base)
         self._weight = 9.81 * sum(inertia.mass for inertia in robot.model.inertias)
@@ -122,6 +102,7 @@ class Actuation:
         self._found = np.zeros(2)  # what a check returned, and its flags
         self._resolution: Resolution | None = None
         self._step: LimitedStep | None = None
+        # what the last step delivers that was limited within a call of `checks`
         self.limited: Delivered
         self.delivered: Array = np.zeros(nv)
         self.period = 0.0
@@ -252,7 +233,7 @@ class Actuation:
 
     def disturbed(self, acceleration: Array) -> None:
         """Expect an acceleration that something else than the efforts causes, (nv,)."""
-        self._held.disturbance[:] = acceleration
+        self._held.held.disturbance[:] = acceleration
 
     def forget(self) -> None:
         """Forget the last efforts: the rate limit does not apply to the next one."""
@@ -327,20 +308,16 @@ class Actuation:
     def _limit_if_violated(
         self, state: RobotState, resolution: Resolution, support: Support
     ) -> Callable[[], float] | None:
-        """Return the call that solves the QP if a bound is violated.
-
-        It is None where a step may need more: forces, or barriers.
-        """
+        """Return the call that solves the QP if a bound is violated."""
+        # It is None where a step may need more: forces, or barriers.
         if self._kept.limits is None or not self.is_direct(support):
             return None
         step = self._step_of(state, resolution, support)
         return step.nearest_if(resolution.acceleration, state.effort, self._found)
 
     def violated(self, state: RobotState, a: Array, code: Indices) -> int:
-        """Write M a + N and the bounds on a; return which of them are violated.
-
-        See `checks` for arguments and result, which is without the law's code.
-        """
+        """Write M a + N and the bounds on a; return which of them are violated."""
+        # See `checks` for arguments and result, which is without the law's code.
         # By identity: the calls keep these arrays alive.
         key = id(a), id(code), self._kept.limits is None
         if key not in self._checks:
@@ -369,7 +346,7 @@ class Actuation:
                 state.effort,
                 self._robot.dof_indices,
                 self._motion,
-                self._held.memory_of_kernels,
+                self._held.held,
                 self._bounds,
                 code,
                 self._found,
@@ -478,11 +455,9 @@ def _check(
     found: Array,
     t: float,
 ) -> float:
-    """Observe the last period's effort, and return which limits the next violates.
-
-    And the law's code, see `CODES`; `observe` and `violated_limits`. It writes what it
-    returns, and the flags, to ``found``.
-    """
+    """Observe the last period's effort, and return which limits the next violates."""
+    # And the law's code, see `CODES`; `observe` and `violated_limits`. It writes what
+    # it returns, and the flags, to ``found``.
     observe(v, held, t)
     flags = violated_limits(
         q,

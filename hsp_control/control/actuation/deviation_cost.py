@@ -60,54 +60,32 @@ class Directions(NamedTuple):
     Away from singularities each share is a projector, and each n_k belongs to one
     level. Near one the law leaves a part of a direction to the levels below, and so it
     does here: H is a continuous function of the law's own projectors.
-
-    Attributes:
-        jacobian: Jacobian of all tasks, level after level, shape (m, nv).
-        L: Cholesky factor of the metric, shape (nv, nv).
-        form: The metric's form.
-        ends: Where each level's rows end in the stack.
-        error: Error e of all tasks, shape (m,).
-        springs: Whether a row is that of a spring, shape (m,).
-        size: The robot's size [m].
-        first: The first level that may deviate: 1 below contacts, else 0.
-        least: Least cost of a level relative to the one above it.
-        thresholds: Singular value of each level below which a direction belongs to it
-            in part, shape (levels,).
-        factors: The law's pseudo-inverse of the stack.
-        projectors: What its levels left, where it went level by level.
-        code: The law's outcome, see `Resolution.code`.
-        alone: Whether it never goes level by level.
-        wide: Scratch, shape (m, nv).
-        square: Scratch, shape (m, m).
-        inner: Scratch, shape (3, nv, max(nv, m)).
-        scratch: Scratch, shape (2, max(nv, m)).
-        N: The directions n_k as rows, shape (nv, nv).
-        kept: How many of the first belong to the first level alone, shape (1,).
-        root: 1/√ρ of each, shape (nv,).
-        costs: t_k and 1/√ρ of each level and of the null space, shape (2, levels + 1).
     """
 
-    jacobian: Array
-    L: Array
-    form: int
-    ends: Indices
-    error: Array
-    springs: Flags
-    size: float
-    first: int
-    least: float
+    jacobian: Array  # Jacobian of all tasks, level after level, shape (m, nv)
+    L: Array  # Cholesky factor of the metric, shape (nv, nv)
+    form: int  # metric's form
+    ends: Indices  # where each level's rows end in the stack
+    error: Array  # error e of all tasks, shape (m,)
+    springs: Flags  # whether a row is that of a spring, shape (m,)
+    size: float  # robot's size [m]
+    first: int  # first level that may deviate: 1 below contacts, else 0
+    least: float  # least cost of a level relative to the one above it
+    # singular value of each level below which a direction belongs to it in part, shape
+    # (levels,)
     thresholds: Array
-    factors: Factors
-    projectors: Projectors
-    code: Indices
-    alone: bool
-    wide: Array
-    square: Array
-    inner: Array
-    scratch: Array
-    N: Array
-    kept: Indices
-    root: Array
+    factors: Factors  # law's pseudo-inverse of the stack
+    projectors: Projectors  # what its levels left, where it went level by level
+    code: Indices  # law's outcome, see `Resolution.code`
+    alone: bool  # whether it never goes level by level
+    wide: Array  # scratch, shape (m, nv)
+    square: Array  # scratch, shape (m, m)
+    inner: Array  # scratch, shape (3, nv, max(nv, m))
+    scratch: Array  # scratch, shape (2, max(nv, m))
+    N: Array  # directions n_k as rows, shape (nv, nv)
+    kept: Indices  # how many of the first belong to the first level alone, shape (1,)
+    root: Array  # 1/√ρ of each, shape (nv,)
+    # t_k and 1/√ρ of each level and of the null space, shape (2, levels + 1)
     costs: Array
 
     @classmethod
@@ -173,11 +151,9 @@ def _write_costs(directions: Directions) -> None:
 
 @kernel
 def write_directions(directions: Directions) -> None:
-    """Write the directions of all levels, and then those of the null space.
-
-    Where no singular value is small, the law has made the rows of all levels
-    orthonormal, one after the other; else they are found here.
-    """
+    """Write the directions of all levels, and then those of the null space."""
+    # Where no singular value is small, the law has made the rows of all levels
+    # orthonormal, one after the other; else they are found here.
     Q, N, ends = directions.factors.Q, directions.N, directions.ends
     root, costs = directions.root, directions.costs
     _write_costs(directions)
@@ -210,11 +186,9 @@ def write_directions(directions: Directions) -> None:
 
 @kernel
 def _orthonormalised(factors: Factors) -> bool:
-    """Return whether Q = X B has orthonormal rows, and X is lower triangular.
-
-    Both hold unless the law needed the spectrum: then the rows of Q are orthogonal, but
-    not of length 1, or X combines each row with those after it.
-    """
+    """Return whether Q = X B has orthonormal rows, and X is lower triangular."""
+    # Both hold unless the law needed the spectrum: then the rows of Q are orthogonal,
+    # but not of length 1, or X combines each row with those after it.
     Q, X = factors
     found = True
     for r in range(Q.shape[0]):
@@ -259,11 +233,9 @@ def _write_levels(directions: Directions, levels: int) -> int:
 
 @kernel
 def _write_damped_level(directions: Directions) -> int:
-    """Write the directions of the only level, where the law has found its spectrum.
-
-    First those that it has for itself. Of a direction with the singular value s below
-    the threshold the null space has the share (1 - s²/threshold²)². Returns how many.
-    """
+    """Write the directions of the only level, where the law has found its spectrum."""
+    # First those that it has for itself. Of a direction with the singular value s below
+    # the threshold the null space has the share (1 - s²/threshold²)². Returns how many.
     Q, N, threshold = directions.factors.Q, directions.N, directions.thresholds[0]
     costs, n, count = directions.costs, directions.N.shape[0], 0
     own, free = costs[1, 0], costs[1, costs.shape[1] - 1]
@@ -284,11 +256,9 @@ def _write_damped_level(directions: Directions) -> int:
 
 @kernel
 def _write_shared(directions: Directions, count: int) -> None:
-    """Overwrite the directions after the first ones, which levels share.
-
-    These are the eigenvectors of T = Σ t_k (P_{k-1} - P_k) + P_K in the rows of N from
-    ``count`` on, and their costs ρ_N^t for the eigenvalues t.
-    """
+    """Overwrite the directions after the first ones, which levels share."""
+    # These are the eigenvectors of T = Σ t_k (P_{k-1} - P_k) + P_K in the rows of N
+    # from ``count`` on, and their costs ρ_N^t for the eigenvalues t.
     Q, QJ, G_inverse = directions.projectors
     L, ends, costs = directions.L, directions.ends, directions.costs
     N, n = directions.N[count:], directions.N.shape[0]
@@ -402,16 +372,8 @@ def _project_out(N: Array, x: Array) -> None:
 
 @kernel
 def write_inverse_root(directions: Directions, first: int, JT: Array) -> int:
-    """Write Jᵀ, J Jᵀ = H⁻¹, without the levels before the first that may move.
-
-    Args:
-        directions: The directions, which `write_directions` wrote.
-        first: The first level that may move.
-        JT: Written: Jᵀ, shape (nv, at least nv).
-
-    Returns:
-        The number of its rows.
-    """
+    """Write Jᵀ, J Jᵀ = H⁻¹, without the levels before the first that may move."""
+    # It returns the number of its rows. JT has shape (nv, at least nv).
     N, root, L = directions.N, directions.root, directions.L
     n, rows = N.shape[0], 0
     for k in range(directions.kept[0] if first > 0 else 0, n):

@@ -68,64 +68,42 @@ class Problem(NamedTuple):
 
     The cost couples the first n₁ unknowns; of the others, each has a cost of its own:
     J is block-diagonal.
-
-    Attributes:
-        JT: Jᵀ of the first unknowns, J Jᵀ = H⁻¹, shape (nz, n₁), nz ≤ n₁. What its rows
-            do not span does not move.
-        own: J of the others, 1/√cost of each, shape (n - n₁,).
-        A: Shape (k, n).
-        begin: First non-zero entry of each row of A, shape (k,).
-        end: After the last non-zero entry of each row of A, shape (k,).
-        lower: Lower bounds of the rows and then those of x, shape (k + n,).
-        upper: Upper bounds of the rows and then those of x, shape (k + n,).
-        softness: σ of each constraint, shape (k + n,), zero if it is hard; shape (0,)
-            if all are.
-        equalities: How many of the first rows are equalities, lower = upper.
     """
 
+    # Jᵀ of the first unknowns, J Jᵀ = H⁻¹, shape (nz, n₁), nz ≤ n₁. What its rows do
+    # not span does not move.
     JT: Array
-    own: Array
-    A: Array
-    begin: Indices
-    end: Indices
-    lower: Array
-    upper: Array
+    own: Array  # J of the others, 1/√cost of each, shape (n - n₁,)
+    A: Array  # shape (k, n)
+    begin: Indices  # first non-zero entry of each row of A, shape (k,)
+    end: Indices  # after the last non-zero entry of each row of A, shape (k,)
+    lower: Array  # lower bounds of the rows and then those of x, shape (k + n,)
+    upper: Array  # upper bounds of the rows and then those of x, shape (k + n,)
+    # σ of each constraint, shape (k + n,), zero if it is hard; shape (0,) if all are
     softness: Array
-    equalities: int
+    equalities: int  # how many of the first rows are equalities, lower = upper
 
 
 class Workspace(NamedTuple):
-    """The solver's memory; m is the largest number of active constraints.
+    """The solver's memory; m is the largest number of active constraints."""
 
-    Attributes:
-        held: For each constraint 1 if its lower bound is active, -1 if the upper, else
-            0, shape (k + n,). A warm start begins with what it contains.
-        counts: Number of active constraints and of iterations, shape (2,).
-        active: The active constraints, shape (m,).
-        multipliers: Theirs, in that order, shape (m,): H (x - x0) = Σ multiplier a;
-            positive at lower bounds.
-        origin: x0, shape (n,).
-        rounding: The square of a remainder of Jᵀ a that is rounding, for a of length 1,
-            shape (1,).
-        B: Its active rows, and then that of an entering constraint, shape
-            (m + 1, width).
-        L: Shape (m, m).
-        Q: Shape (m, width).
-        vectors: y, and the remainder of a row of B, shape (2, width).
-        steps: Three vectors of the active constraints, shape (3, m).
-    """
-
+    # for each constraint 1 if its lower bound is active, -1 if the upper, else 0, shape
+    # (k + n,). A warm start begins with what it contains.
     held: Indices
-    counts: Indices
-    active: Indices
+    counts: Indices  # number of active constraints and of iterations, shape (2,)
+    active: Indices  # active constraints, shape (m,)
+    # Theirs, in that order, shape (m,): H (x - x0) = Σ multiplier a; positive at lower
+    # bounds
     multipliers: Array
-    origin: Array
+    origin: Array  # x0, shape (n,)
+    # square of a remainder of Jᵀ a that is rounding, for a of length 1, shape (1,)
     rounding: Array
+    # its active rows, and then that of an entering constraint, shape (m + 1, width)
     B: Array
-    L: Array
-    Q: Array
-    vectors: Array
-    steps: Array
+    L: Array  # shape (m, m)
+    Q: Array  # shape (m, width)
+    vectors: Array  # y, and the remainder of a row of B, shape (2, width)
+    steps: Array  # three vectors of the active constraints, shape (3, m)
 
     @classmethod
     def of(cls, n: int, k: int, soft: bool = False) -> Self:
@@ -156,11 +134,7 @@ def minimise(problem: Problem, warm: bool, x: Array, work: Workspace) -> int:
     that x does not depend on the way there, not even in its last bit: a step is the
     same whether it began with the active constraints of the last one or not.
 
-    Args:
-        problem: The QP.
-        warm: Whether to begin with the active constraints of the last call.
-        x: x0, shape (n,); overwritten.
-        work: Memory; its active constraints, multipliers, counts and y are results.
+    A warm start begins with the active constraints of the last call.
     """
     if not _prepare(problem, warm, x, work):
         return INFEASIBLE
@@ -186,11 +160,8 @@ def minimise(problem: Problem, warm: bool, x: Array, work: Workspace) -> int:
 
 @kernel
 def _begin(problem: Problem, x: Array, work: Workspace) -> bool:
-    """Hold the marked constraints, in their order, and make x their optimum.
-
-    Returns:
-        Whether all could be held: none depends on others, none has the wrong sign.
-    """
+    """Hold the marked constraints, in their order, and make x their optimum."""
+    # Not all can be held where one depends on others, or has the wrong sign: False.
     count = 0
     work.counts[0] = 0
     for i in range(work.held.shape[0]):
@@ -331,10 +302,7 @@ def _value(i: int, problem: Problem, x: Array, y: Array) -> float:
 
 @kernel
 def _most_violated(
-    tolerance: float,
-    problem: Problem,
-    x: Array,
-    work: Workspace,
+    tolerance: float, problem: Problem, x: Array, work: Workspace
 ) -> tuple[int, float]:
     """Return the constraint that x is farthest from, marked as held, and its violation.
 
@@ -414,11 +382,10 @@ def _enter(entering: int, violation: float, problem: Problem, work: Workspace) -
 
 @kernel
 def _remainder(i: int, problem: Problem, work: Workspace) -> float:
-    """Write b = Jᵀ a of constraint i, Q b, and what remains of b; return its square.
-
-    b goes to the row of B after the active ones. If nine tenths of the length cancel,
-    the components are subtracted a second time ("twice is enough", Giraud et al. 2005).
-    """
+    """Write b = Jᵀ a of constraint i, Q b, and what remains of b; return its square."""
+    # b goes to the row of B after the active ones. If nine tenths of the length cancel,
+    # the components are subtracted a second time ("twice is enough", Giraud et al.
+    # 2005).
     count, remainder = work.counts[0], work.vectors[1]
     components, again = work.steps[0, :count], work.steps[2, :count]
     _write_row(i, problem, work.B[count])
@@ -475,10 +442,8 @@ def _write_row(i: int, problem: Problem, b: Array) -> None:
 
 @kernel
 def _extend(i: int, square: float, work: Workspace) -> None:
-    """Add constraint i to the active ones: one more row of L and of Q.
-
-    Its row of B is there already.
-    """
+    """Add constraint i to the active ones: one more row of L and of Q."""
+    # Its row of B is there already.
     count = work.counts[0]
     size = np.sqrt(square)
     row, q = work.L[count], work.Q[count]
@@ -494,11 +459,9 @@ def _extend(i: int, square: float, work: Workspace) -> None:
 
 @kernel
 def _release(leaving: int, work: Workspace) -> None:
-    """Remove an active constraint: rotations make L lower triangular again.
-
-    They leave the direction that is freed in the row of Q after the last, and rotate
-    the components Q b too.
-    """
+    """Remove an active constraint: rotations make L lower triangular again."""
+    # They leave the direction that is freed in the row of Q after the last, and rotate
+    # the components Q b too.
     B, L, Q, components = work.B, work.L, work.Q, work.steps[0]
     count = work.counts[0] - 1
     work.held[work.active[leaving]] = 0

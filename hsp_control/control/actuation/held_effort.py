@@ -19,25 +19,18 @@ _MEMORY = 0.1
 
 
 class Held(NamedTuple):
-    """The memory of a `HeldEffort`, as kernels read it.
+    """The memory of a `HeldEffort`, as kernels read it, shape (nv,) each."""
 
-    Attributes:
-        timing: When the period ends, NaN once that was looked at, and its length [s].
-        expected: The velocity that is expected then, shape (nv,).
-        stray: Differences from it, summed over about `_WINDOW`, shape (nv,).
-        error: The largest error of late, shape (nv,).
-        drift: The mean error of late, shape (nv,).
-        steady: What mean and present error have in common, shape (nv,).
-        disturbance: Acceleration that something else causes, shape (nv,).
-    """
-
+    # when the period ends, NaN once that was looked at, and its length [s]
     timing: Array
-    expected: Array
-    stray: Array
-    error: Array
-    drift: Array
+    expected: Array  # velocity that is expected then [rad/s or m/s]
+    stray: Array  # differences from it, summed over about `_WINDOW`
+    error: Array  # largest error of late [rad/s² or m/s²]
+    drift: Array  # mean error of late
+    # what the mean error and that of the last hundredth of a second have in common: a
+    # force that has ended does not count
     steady: Array
-    disturbance: Array
+    disturbance: Array  # acceleration that something else than the effort causes
 
 
 class HeldEffort:
@@ -50,48 +43,23 @@ class HeldEffort:
     observed: it is the difference between the speed at the end of a period and what was
     expected. So it includes whatever else the model lacks. A position limit is exceeded
     by an error only while it lasts: by its mean over the bandwidth's square.
-
-    Attributes:
-        error: The largest error of late, shape (nv,) [rad/s² or m/s²].
-        drift: The mean error of late, shape (nv,) [rad/s² or m/s²].
-        steady: What the mean error and that of the last hundredth of a second have in
-            common, shape (nv,) [rad/s² or m/s²]: a force that has ended does not count.
-        disturbance: Acceleration that something else than the effort is known to cause,
-            shape (nv,) [rad/s² or m/s²].
     """
 
     def __init__(self, nv: int) -> None:
-        """Begin without an error."""
-        self.error: Array = np.zeros(nv)
-        self.drift: Array = np.zeros(nv)
-        self.steady: Array = np.zeros(nv)
-        self.disturbance: Array = np.zeros(nv)
-        self._expected, self._stray = np.zeros(nv), np.zeros(nv)
-        self._timing = np.full(2, np.nan)
+        self.held = Held(np.full(2, np.nan), *(np.zeros(nv) for _ in range(6)))
         self._expect = IdentityCache(self.expect)
 
     def sent(self, t: float, v: Array, a: Array, period: float) -> None:
         """Record that the effort of an acceleration is held from now on."""
-        self._timing[1] = period
+        self.held.timing[1] = period
         self._expect.get(v, a)(t)
 
-    def observe(self, t: float, v: Array) -> None:
-        """Look at the velocity (nv,) at time t [s]; it counts at a period's end."""
-        observe(v, self.memory_of_kernels, t)
-
     def expect(self, v: Array, a: Array) -> Callable[[float], float]:
-        """Return `sent` of what these arrays then hold, as a call of the time.
-
-        The period is that of the last `sent`.
-        """
-        arrays = v, a, self.disturbance, self._timing, self._expected
+        """Return `sent` of what these arrays then hold, as a call of the time."""
+        # The period is that of the last `sent`.
+        held = self.held
+        arrays = v, a, held.disturbance, held.timing, held.expected
         return bind(_expect, *arrays, timed=True)
-
-    @property
-    def memory_of_kernels(self) -> "Held":
-        """What `observe` reads and writes."""
-        observed = self._stray, self.error, self.drift, self.steady
-        return Held(self._timing, self._expected, *observed, self.disturbance)
 
     def prepare(self, v: Array, a: Array) -> None:
         """Compile what `sent` calls, for these arrays."""
@@ -99,24 +67,17 @@ class HeldEffort:
 
     def forget(self) -> None:
         """Begin anew."""
-        self.error[:] = self.disturbance[:] = 0.0
-        self._stray[:] = self.drift[:] = self.steady[:] = 0.0
-        self._timing[:] = np.nan
-
-    @property
-    def _memories(self) -> tuple[Array, ...]:
-        kept = self._stray, self._expected, self._timing
-        return (self.error, self.drift, self.steady, self.disturbance, *kept)
+        for each in self.held:
+            each[:] = 0.0
+        self.held.timing[:] = np.nan
 
     def memory(self) -> tuple[Array, ...]:
         """Return a copy of what it remembers."""
-        own = self._memories
-        return tuple(each.copy() for each in own)
+        return tuple(each.copy() for each in self.held)
 
     def remember(self, memory: tuple[Array, ...]) -> None:
         """Set what `memory` returned."""
-        own = self._memories
-        for each, value in zip(own, memory, strict=True):
+        for each, value in zip(self.held, memory, strict=True):
             each[:] = value
 
 
@@ -132,13 +93,7 @@ def _expect(
 
 @kernel
 def observe(v: Array, held: Held, t: float) -> None:
-    """Add a period to the differences of velocity, and update the largest error.
-
-    Args:
-        v: Velocity, shape (nv,).
-        held: The memory; updated at the end of a period, once.
-        t: Time [s].
-    """
+    """Add a period to the differences of velocity, and update the largest error."""
     timing, expected, stray, error, drift, steady, _ = held
     period = timing[1]
     if not abs(t - timing[0]) < 0.01 * period:
@@ -159,15 +114,8 @@ def observe(v: Array, held: Held, t: float) -> None:
 def effort_window(
     sent: Array, effort: Array, rate: Array, lower: Array, upper: Array
 ) -> None:
-    """Write the range of the next effort, where the effort's rate is limited.
-
-    Args:
-        sent: The last effort, and then how long it is held [s], shape (nv + 1,).
-        effort: Maximum effort, shape (nv,).
-        rate: Maximum rate of the effort, shape (nv,).
-        lower: Written: lower bound, shape (nv,).
-        upper: Written: upper bound, shape (nv,).
-    """
+    """Write the range of the next effort, where the effort's rate is limited."""
+    # Shapes: sent (nv + 1,), see `Actuation`, the others (nv,).
     period = sent[effort.shape[0]]
     for i in range(effort.shape[0]):
         # The last effort may lie outside the limits: then move towards them.

@@ -9,21 +9,24 @@ import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.identity_cache import IdentityCache
+from hsp_control.common.kernels import kernel
+from hsp_control.common.linalg import (
+    cholesky,
+    multiply,
+    multiply_transposed,
+    orthogonalise_rows,
+    solve_lower,
+    solve_lower_transposed,
+)
 from hsp_control.common.native import bind
 from hsp_control.common.step_plan import in_order
-from hsp_control.constraints.contacts import Contact
-from hsp_control.control.actuation.commanded_forces import (
-    COMMANDED_INVERSE_COST,
-    CommandedForces,
-)
-from hsp_control.control.actuation.contact_forces import (
-    force_map,
-    minimum_norm_forces,
-    within_cones,
-)
-from hsp_control.control.planned_contact import PlannedContact
+from hsp_control.constraints.contacts import Contact, SlidingContact
+from hsp_control.constraints.contacts.contact import NORMAL, WRENCH, shares
+from hsp_control.control.planned import PlannedContact
 from hsp_control.law import Resolution
 from hsp_control.robot import Robot, RobotState
+from hsp_control.robot.kinematics import FrameMotion
+from hsp_control.trajectories import TrajectorySample
 
 _MAX_FORCE = 3.0
 """Maximum normal force at a point of a scheduled contact when fully active, in robot
@@ -31,39 +34,26 @@ weights."""
 
 
 class Support:
-    """Forces f at the points of some contacts, in the axes (tangents, normal) of each.
-
-    Attributes:
-        contacts: The active contacts.
-        size: Length of f: three per point.
-        map: The generalised force of f is ``map @ f``, shape (nv, size).
-        points: Where the points of each contact are in arrays of points.
-        positions: Positions of the points in the world, shape (size/3, 3) [m].
-        cone: Rows with cone f ≥ 0, four per point, shape (4 size/3, size).
-        lower: Lower bounds of the forces, shape (size,) [N].
-        upper: Upper bounds of the forces, shape (size,) [N].
-        supporting_dofs: Degrees of freedom between the root and a contact, whose
-            efforts depend on the forces.
-        inverse_cost: e, shape (size,): the closed form minimises Σ (f - f_ref)²/e.
-        reference: f_ref, shape (size,): the commanded forces, zero where none is.
-        forces: What `minimum_norm_forces` wrote last, shape (size,) [N].
-    """
+    """Forces f at the points of contacts, in the axes (tangents, normal) of each."""
 
     def __init__(
         self, contacts: Sequence[PlannedContact], robot: Robot, weight: float
     ) -> None:
-        """Allocate for contacts of a robot."""
         nv = robot.nv
         self.contacts = tuple(each.contact for each in contacts)
         counts = [len(contact.points) for contact in self.contacts]
         points = sum(counts)
-        self.size = 3 * points
+        self.size = 3 * points  # length of f: three per point
+        # generalised force of f is ``map @ f``, shape (nv, size)
         self.map: Array = np.zeros((nv, self.size))
         self.positions: Array = np.zeros((points, 3))
+        # rows with cone f ≥ 0, four per point, shape (4 size/3, size)
         self.cone: Array = np.zeros((4 * points, self.size))
         self.lower = np.full(self.size, -np.inf)
+        # upper bounds of the forces, shape (size,) [N]
         self.upper = np.full(self.size, np.inf)
         self.lower[2::3] = 0.0
+        # e, shape (size,): the closed form minimises Σ (f - f_ref)²/e
         self.inverse_cost = np.ones(self.size)
         self._weight = weight
         self.supporting_dofs = _supporting_dofs(robot, self.contacts)
@@ -77,6 +67,7 @@ class Support:
                     self.cone[4 * k + row, 3 * k + axis] = sign
                     self.cone[4 * k + row, 3 * k + 2] = contact.side
 
+        # f_ref, shape (size,): the commanded forces, zero where none is
         self.reference = np.zeros(self.size)
         self._scheduled: list[tuple[PlannedContact, slice, Array]] = []
         self._commanded: list[tuple[PlannedContact, CommandedForces, Array]] = []
@@ -92,6 +83,7 @@ class Support:
             if not planned.always:
                 self._scheduled.append((planned, columns, full))
         self._wanted, self._tau = np.zeros(nv), np.zeros(nv)
+        # what `minimum_norm_forces` wrote last, shape (size,) [N]
         self.forces, self._asked = np.zeros(self.size), np.zeros(self.size)
         self._maps = IdentityCache(self._bind_maps)
         self._solve = IdentityCache(self._bind_solve)
@@ -161,3 +153,214 @@ def _supporting_dofs(robot: Robot, contacts: Sequence[Contact]) -> Indices:
             start = model.joints[k].idx_v
             found.update(range(start, start + model.joints[k].nv))
     return np.array(sorted(i for i in found if i >= 0), dtype=np.int64)
+
+
+COMMANDED_INVERSE_COST = 1e-6
+"""ε: how much cheaper it is, per squared force, to change a free force than a commanded
+one. Feet that carry 1 kN then leave a commanded force 1 mN from its command. In a
+limited step it makes a miss of the command dearer than motion of the null space, and
+cheaper than a miss of the tasks."""
+
+
+class CommandedForces:
+    """Writes f_ref for the points of one contact, and how dear other forces are."""
+
+    def __init__(self, planned: PlannedContact) -> None:
+        """Follow the command of a contact."""
+        contact = planned.contact
+        assert contact.force is not None
+        self._contact, self._offset = contact, planned.force_offset
+        n = contact.force.dimension
+        self._command = TrajectorySample.allocate(n)
+        self._follow = contact.force.followed.follow(self._command)
+        k = len(contact.points)
+        self._varies = n == WRENCH  # with the arms
+        self._shares = np.zeros((3 * k, n))
+        if not self._varies:
+            self._shares[:] = shares(n, np.zeros((k, 3)))
+        only_normal = n == NORMAL and not contact.slides
+        # commanded entries of the contact's forces, shape (3 k,)
+        self.mask = np.tile([not only_normal, not only_normal, True], k)
+        self._normal = 0 if n == NORMAL else 2
+
+    def write(
+        self, state: RobotState, weight: float, resolution: Resolution, out: Array
+    ) -> None:
+        """Write f_ref."""
+        self._follow(state.t)
+        command = self._command.position.copy()
+        command[self._normal] = max(command[self._normal] + self._offset[0], 0.0)
+        contact = self._contact
+        if self._varies:
+            arms = contact.arms_in_axes(state.frame(contact.frame))
+            self._shares[:] = shares(WRENCH, arms)
+        out[:] = weight * (self._shares @ command)
+        if isinstance(contact, SlidingContact) and contact.slides:
+            slip = _slip(contact, state, intended_velocity(state, resolution))
+            speed = float(np.hypot(slip[0], slip[1]))
+            if speed > 0.0:
+                share = np.tanh(speed / contact.smoothing) / speed
+                out[:2] = -contact.friction * share * out[2] * slip[:2]
+
+
+def _slip(contact: Contact, state: RobotState, v: Array) -> Array:
+    """Return the velocity of the first point in the contact's axes, (3,) [m/s]."""
+    frame = state.frame(contact.frame)
+    twist, arm = frame.jacobian @ v, contact.arms(frame)[0]
+    return np.asarray((twist[:3] + np.cross(twist[3:], arm)) @ contact.axes)
+
+
+def intended_velocity(state: RobotState, resolution: Resolution) -> Array:
+    """Return v + e_N + J# e', shape (nv,): the velocity once both errors are zero."""
+    # Measurement noise cancels in it, and a hand that sticks is pushed where it is to
+    # go.
+    problem = resolution.problem
+    L, J = problem.metric.L, problem.task.jacobian
+    whitened = np.linalg.solve(L, J.T)
+    motion = np.linalg.pinv(whitened.T, rcond=1e-6) @ problem.task.error_rate
+    raised = np.linalg.solve(L.T, motion)
+    return np.asarray(state.v + resolution.null_space_error + raised)
+
+
+_NEGLIGIBLE = 1e-10
+"""Eigenvalue, relative to the largest, below which a direction has no support."""
+_TRUSTED = 1e-6
+"""Pivot, relative to the largest, above which no direction is without support."""
+
+
+@kernel
+def force_map(
+    frame: FrameMotion,
+    points: Array,
+    shift: Array,
+    axes: Array,
+    first: int,
+    positions: Array,
+    out: Array,
+) -> None:
+    """Write the positions of the points, and the generalised forces of unit forces.
+
+    A force s at an arm r has the wrench (s, r × s): column Jᵀ(s, r × s).
+
+    ``first`` is the index of the first of these points among all.
+    Shapes: points (k, 3), shift (3,), axes (3, 3), positions (all, 3), out (nv, 3 all).
+    """
+    J, _, R, origin, _ = frame
+    for k in range(points.shape[0]):
+        p, px, py, pz = first + k, points[k, 0], points[k, 1], points[k, 2]
+        x = R[0, 0] * px + R[0, 1] * py + R[0, 2] * pz + shift[0]
+        y = R[1, 0] * px + R[1, 1] * py + R[1, 2] * pz + shift[1]
+        z = R[2, 0] * px + R[2, 1] * py + R[2, 2] * pz + shift[2]
+        positions[p, 0] = origin[0] + x
+        positions[p, 1] = origin[1] + y
+        positions[p, 2] = origin[2] + z
+        for axis in range(3):
+            a, b, c = axes[0, axis], axes[1, axis], axes[2, axis]
+            d, e, f = y * c - z * b, z * a - x * c, x * b - y * a
+            for j in range(J.shape[1]):
+                out[j, 3 * p + axis] = (
+                    (a * J[0, j] + b * J[1, j] + c * J[2, j])
+                    + (d * J[3, j] + e * J[4, j] + f * J[5, j])
+                )  # fmt: skip
+
+
+@kernel
+def minimum_norm_forces(
+    F: Array,
+    base: Indices,
+    inverse_cost: Array,
+    reference: Array,
+    wanted: Array,
+    A: Array,
+    G: Array,
+    U: Array,
+    scratch: Array,
+    forces: Array,
+    tau: Array,
+) -> None:
+    """Write the forces of minimum Σ (f - r)²/e, and the remaining effort.
+
+    f = r + E Aᵀ(A E Aᵀ)⁺(w - A r) with A the base's rows of F, E = diag(e), w the
+    base's rows of the wanted effort, and r what is commanded. w lies in the range of A:
+    directions without support are left out. The effort of the base, which has no
+    motor, is zero.
+
+    Shapes: F (nv, size), inverse_cost, reference (r) and forces (f) (size,), wanted and
+    tau (nv,), A (nb, size), G and U (nb, nb), scratch (2, nb), nb = len(base).
+    """
+    n, size = base.shape[0], inverse_cost.shape[0]
+    w, scaled = scratch[0], scratch[1]
+    for i in range(n):
+        w[i] = wanted[base[i]]
+        for k in range(size):
+            A[i, k] = F[base[i], k]
+            w[i] -= A[i, k] * reference[k]
+    for i in range(n):
+        for j in range(i + 1):
+            total = 0.0
+            for k in range(size):
+                total += A[i, k] * inverse_cost[k] * A[j, k]
+            G[i, j] = G[j, i] = total
+    if _well_conditioned(G, U):
+        for i in range(n):
+            scaled[i] = w[i]
+        solve_lower(U, scaled)
+        solve_lower_transposed(U, scaled)
+    else:
+        _least_squares(G, U, w, scaled)
+    multiply_transposed(A, scaled, forces)
+    for k in range(size):
+        forces[k] = reference[k] + inverse_cost[k] * forces[k]
+    multiply(F, forces, tau)
+    for i in range(tau.shape[0]):
+        tau[i] = wanted[i] - tau[i]
+    for i in range(n):
+        tau[base[i]] = 0.0
+
+
+@kernel
+def _well_conditioned(G: Array, L: Array) -> bool:
+    """Write the Cholesky factor of G, and return whether it can be trusted."""
+    if not cholesky(G, L):
+        return False
+    least, most = np.inf, 0.0
+    for i in range(G.shape[0]):
+        least, most = min(least, L[i, i]), max(most, L[i, i])
+    return bool(least * least > _TRUSTED * most * most)
+
+
+@kernel
+def _least_squares(G: Array, U: Array, w: Array, out: Array) -> None:
+    """Write G⁺ w, and overwrite G, U and w; G is positive semidefinite, shape (n, n).
+
+    The lengths of the orthogonalised rows of G are its eigenvalues.
+    """
+    n = G.shape[0]
+    orthogonalise_rows(G, U)
+    largest = 0.0
+    for r in range(n):
+        square = 0.0
+        for i in range(n):
+            square += G[r, i] * G[r, i]
+        G[r, 0] = np.sqrt(square)
+        largest = max(largest, G[r, 0])
+    multiply(U, w, out)
+    for r in range(n):
+        w[r] = out[r] / G[r, 0] if G[r, 0] > _NEGLIGIBLE * largest else 0.0
+    multiply_transposed(U, w, out)
+
+
+@kernel
+def within_cones(cone: Array, forces: Array, lower: Array, upper: Array) -> bool:
+    """Return whether forces are within friction cones, cone f ≥ 0, and bounds."""
+    # Shapes: cone (4 size/3, size), forces, lower and upper (size,).
+    inside = True
+    for k in range(forces.shape[0]):
+        inside = inside and lower[k] <= forces[k] <= upper[k]
+    for r in range(cone.shape[0]):
+        total = 0.0
+        point = r // 4
+        for k in range(3 * point, 3 * point + 3):
+            total += cone[r, k] * forces[k]
+        inside = inside and total >= 0.0
+    return inside

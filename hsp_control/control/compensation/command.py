@@ -17,6 +17,7 @@ from itertools import islice
 import numpy as np
 
 from hsp_control.common.arrays import Array
+from hsp_control.common.linalg import cholesky
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation.status import Status
 from hsp_control.control.compensation.compensation import Compensation
@@ -26,13 +27,17 @@ from hsp_control.control.compensation.integral_action import RunningIntegral
 from hsp_control.control.compensation.momentum_observer import RunningObserver
 from hsp_control.control.compensation.predictor import Predictor, RunningPredictor
 from hsp_control.control.compensation.start_up_ramp import RunningRamp
-from hsp_control.control.compensation.task_wrench import task_wrench
 from hsp_control.control.compensation.velocity_filter import RunningFilter
 from hsp_control.control.controller import Controller
-from hsp_control.control.log_channel import LogChannel
-from hsp_control.control.measurement import NO_WRENCHES
+from hsp_control.control.measurement import NO_WRENCHES, LogChannel
 from hsp_control.control.output import ControlOutput
+from hsp_control.law import VARYING
+from hsp_control.law.pseudo_inverse import (
+    apply_pseudo_inverse_transpose,
+    weighted_pseudo_inverse,
+)
 from hsp_control.robot import RobotState
+from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import CompliantTask
 
 
@@ -90,17 +95,19 @@ class Command:
         self.controller.restart()
         self._filter: RunningFilter | None = None
         if own.velocity_filter is not None:
-            self._filter = own.velocity_filter.begin()
+            self._filter = RunningFilter(own.velocity_filter)
         self._observer: RunningObserver | None = None
         if own.momentum_observer is not None:
             self._observer = own.momentum_observer.begin(robot)
         self._feed_forward: FrictionFeedForward | None = own.friction(robot)
         self._integral: RunningIntegral | None = None
         if own.integral_action is not None:
-            self._integral = own.integral_action.begin(self.controller)
+            self._integral = RunningIntegral(own.integral_action, self.controller)
         self._force_feedback: RunningForceFeedback | None = None
         if own.force_feedback is not None:
-            self._force_feedback = own.force_feedback.begin(self.controller)
+            self._force_feedback = RunningForceFeedback(
+                own.force_feedback, self.controller
+            )
         self._ramp: RunningRamp | None = None  # begins at the first state
         self._predictor: RunningPredictor | None = None
         self._period = 0.0
@@ -270,7 +277,7 @@ class Command:
         disturbance = self._zero if observer is None else observer.disturbance
         efforts = (tau + disturbance for tau in islice(self._under_way, 1, None))
         if self._predictor is None:
-            self._predictor = predictor.begin(self.controller.robot)
+            self._predictor = RunningPredictor(self.controller.robot)
         q, v = self._predictor.predict(q, v, efforts, period)
         return t + predictor.effort_delay * period, q, v
 
@@ -284,7 +291,7 @@ class Command:
     ) -> tuple[Array, Array | None]:
         """Return the acceleration to deliver, and the effort besides M a + N."""
         if self._ramp is None and self.compensation.start_up_ramp is not None:
-            self._ramp = self.compensation.start_up_ramp.begin(state)
+            self._ramp = RunningRamp(self.compensation.start_up_ramp, state)
         if self._ramp is not None:
             a = self._ramp.blend(state, a)
         offset = self._zero
@@ -306,10 +313,7 @@ class Command:
             self._under_way.popleft()
 
     def _integrate(
-        self,
-        integral: RunningIntegral,
-        output: ControlOutput,
-        period: float,
+        self, integral: RunningIntegral, output: ControlOutput, period: float
     ) -> None:
         """Integrate the errors of the fully active tasks over this period."""
         t, controller = self.state.t, self.controller
@@ -321,3 +325,23 @@ class Command:
             if controller.weight_of(name, t) >= 1.0:
                 errors[name] = output.task.error[rows]
         integral.advance(errors, period, saturated)
+
+
+def task_wrench(
+    task: Task, state: RobotState, disturbance: Array, threshold: float
+) -> Array:
+    """Return f = Λ J M⁻¹ r = J̄ᵀ r, shape (m,): the force at the rows of a task.
+
+    If r = Jᵀf then this is f. Whatever else r is, f is the force that moves the task as
+    r does. J̄ = M⁻¹JᵀΛ is bounded near singularities as the law's own pseudo-inverse is:
+    a force along a lost direction, which the joints do not feel, is taken for zero.
+    """
+    J = task.evaluate(state, feedback=task.feedback()).jacobian
+    m, nv = J.shape
+    L, B, Q = np.zeros((nv, nv)), np.zeros((m, nv)), np.zeros((m, nv))
+    X, part, force = np.zeros((m, m)), np.zeros(m), np.zeros(m)
+    if not cholesky(state.mass_matrix, L):
+        return np.full(m, np.nan)
+    weighted_pseudo_inverse(J, L, VARYING, threshold, B, Q, X)
+    apply_pseudo_inverse_transpose(Q, X, L, VARYING, disturbance.copy(), part, force)
+    return force

@@ -57,24 +57,20 @@ class Compensation(Part, error=CompensationError):
         return given
 
     def check(
-        self,
-        robot: Robot,
-        tasks: Sequence[Task],
-        contacts: Sequence[Contact] = (),
+        self, robot: Robot, tasks: Sequence[Task], contacts: Sequence[Contact] = ()
     ) -> None:
-        """Check that the compensators fit a robot, its tasks and contacts.
-
-        Raises:
-            CompensationError: Names the compensator, the setting, and what it must be.
-            GainError: If errors would not decay with the integral action.
-        """
-        parts = {
-            "predictor": self.predictor,
-            "momentum_observer": self.momentum_observer,
-            "friction_feed_forward": self.friction(robot),
-            "start_up_ramp": self.start_up_ramp,
-        }
-        for name, part in parts.items():
+        """Check that the compensators fit a robot, its tasks and contacts."""
+        for name in ("predictor", "momentum_observer", "start_up_ramp"):
+            if robot.unactuated and getattr(self, name) is not None:
+                with within(name):
+                    raise CompensationError(
+                        f"{robot.name} has a free-flyer root, and its contact forces "
+                        "are not measured; needs a robot with a fixed base"
+                    )
+        for name, part in (
+            ("momentum_observer", self.momentum_observer),
+            ("friction_feed_forward", self.friction(robot)),
+        ):
             if part is not None:
                 with within(name):
                     part.check(robot)
@@ -82,7 +78,7 @@ class Compensation(Part, error=CompensationError):
         self._check_forces(contacts)
         if self.integral_action is not None:
             with within("integral_action"):
-                self.integral_action.check(tasks)
+                self.integral_action.gains(tasks)
 
     def _check_forces(self, contacts: Sequence[Contact]) -> None:
         """Check that there are forces to feed back, and that none is cancelled."""

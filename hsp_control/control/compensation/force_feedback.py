@@ -10,7 +10,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.constraints.contacts import Contact
-from hsp_control.constraints.contacts.commanded_force import NORMAL
+from hsp_control.constraints.contacts.contact import NORMAL
 from hsp_control.control.controller import Controller
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import Names, Positive
@@ -48,15 +48,7 @@ class ForceFeedback(Part, error=CompensationError):
     """Names of the contacts; all with a commanded force by default."""
 
     def check(self, contacts: Sequence[Contact], observed: bool) -> None:
-        """Check that there is something to feed back.
-
-        Args:
-            contacts: The contacts of the controller.
-            observed: Whether there is a momentum observer.
-
-        Raises:
-            CompensationError: If there is not.
-        """
+        """Check that there is something to feed back."""
         names = [contact.name for contact in contacts if contact.force is not None]
         with within("contacts"):
             for name in self.contacts or ():
@@ -75,21 +67,11 @@ class ForceFeedback(Part, error=CompensationError):
                     "false"
                 )
 
-    def begin(self, controller: Controller) -> "RunningForceFeedback":
-        """Return the feedback of a controller for one run; it begins at zero."""
-        return RunningForceFeedback(self, controller)
-
 
 class RunningForceFeedback:
-    """Force feedback in one run: it keeps the integrals.
-
-    Attributes:
-        felt: λ_m by contact, at the last step [N].
-        integrals: What is added to each command [N].
-    """
+    """Force feedback in one run: it keeps the integrals."""
 
     def __init__(self, declared: ForceFeedback, controller: Controller) -> None:
-        """Begin with no offset."""
         self._declared, self._controller = declared, controller
         names = [
             contact.name
@@ -97,21 +79,13 @@ class RunningForceFeedback:
             if contact.force is not None
             and (declared.contacts is None or contact.name in declared.contacts)
         ]
-        self.integrals = dict.fromkeys(names, 0.0)
-        self.felt = dict.fromkeys(names, np.nan)
+        self.integrals = dict.fromkeys(names, 0.0)  # what is added to each command [N]
+        self.felt = dict.fromkeys(names, np.nan)  # λ_m by contact, at the last step [N]
         for name in names:
             controller.force_offset(name)[0] = 0.0
 
     def measure(self, wrenches: Mapping[str, Array], pressed: bool) -> None:
-        """Read the sensors.
-
-        Args:
-            wrenches: Of the world on the robot, by frame; see `Measurement`.
-            pressed: Whether an effort acted in the period that ends.
-
-        Raises:
-            CompensationError: If a contact has no sensor.
-        """
+        """Read the sensors' wrenches by frame; none counts before an effort acted."""
         for contact in self._fed:
             if contact.frame not in wrenches:
                 with within("compensation", "force_feedback", "force"):
@@ -125,13 +99,7 @@ class RunningForceFeedback:
             self.felt[contact.name] = felt if pressed else np.nan
 
     def estimate(self, state: RobotState, disturbance: Array, forces: Array) -> None:
-        """Estimate the forces from what the model does not explain.
-
-        Args:
-            state: The state as measured.
-            disturbance: r: what acts besides the forces that were expected, (nv,).
-            forces: The forces that were expected, of the active contacts [N].
-        """
+        """Estimate forces from r, what acts besides those that were expected."""
         unexpected = np.linalg.solve(state.mass_matrix, disturbance)
         support = self._controller.active_stack.support
         for contact in self._fed:
@@ -149,14 +117,7 @@ class RunningForceFeedback:
             self.felt[contact.name] = float(expected + (inverse @ F.T @ unexpected)[2])
 
     def advance(self, t: float, period: float, forces: Array, hindered: bool) -> None:
-        """Integrate the errors over one period, for the next effort.
-
-        Args:
-            t: The time [s].
-            period: The period [s].
-            forces: The forces of this step, of the active contacts [N].
-            hindered: Whether the law was not delivered exactly.
-        """
+        """Integrate the errors over one period, for the next effort."""
         support = self._controller.active_stack.support
         gain, bound = self._declared.gain, self._declared.bound
         for contact in self._fed:

@@ -42,31 +42,18 @@ class FrictionFeedForward(Part, error=CompensationError):
         return cls(own.coulomb, own.viscous)
 
     def check(self, robot: Robot) -> None:
-        """Check that the coefficients fit the robot.
-
-        Raises:
-            CompensationError: If there are neither one nor nv numbers.
-        """
+        """Check that the coefficients fit the robot."""
         self._friction(robot)
 
     def effort(self, state: RobotState, active: ActiveStack) -> Array:
-        """Return the friction effort, shape (nv,) [N·m or N].
-
-        Args:
-            state: The robot's state.
-            active: The active stack, resolved at this state.
-        """
+        """Return the friction effort, shape (nv,) [N·m or N]."""
         v = desired_velocity(state, active)
         friction = state.made(self, "friction", lambda: self._friction(state.robot))
         coulomb = friction.coulomb * np.tanh(v / self.smoothing)
         return np.asarray(coulomb + friction.viscous * v)
 
     def _friction(self, robot: Robot) -> JointFriction:
-        """Return the coefficients of each degree of freedom.
-
-        Raises:
-            CompensationError: If there are neither one nor nv numbers.
-        """
+        """Return the coefficients of each degree of freedom."""
         try:
             return JointFriction.of(robot, self.coulomb, self.viscous)
         except SimulationError as error:
@@ -75,15 +62,9 @@ class FrictionFeedForward(Part, error=CompensationError):
 
 
 def desired_velocity(state: RobotState, active: ActiveStack) -> Array:
-    """Return v_d = J# x_d' + P g = v + e_N + J#(x_d' - J v), shape (nv,).
-
-    J# is that of the law, bounded near singularities by the law's threshold. The rows
-    of unactuated base motions have no desired rate.
-
-    Args:
-        state: The robot's state.
-        active: The active stack, resolved at this state.
-    """
+    """Return v_d = J# x_d' + P g = v + e_N + J#(x_d' - J v), shape (nv,)."""
+    # J# is that of the law, bounded near singularities by the law's threshold. The rows
+    # of unactuated base motions have no desired rate.
     resolution, v = active.resolution, state.v
     task, metric = resolution.problem.task, resolution.problem.metric
     rate_error = -task.jacobian @ v

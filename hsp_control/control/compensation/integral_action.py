@@ -1,6 +1,6 @@
 """Integral action: e'' + Kv e' + Kp e + Ki ∫e = 0."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY
 from typing import Annotated
 
@@ -10,13 +10,44 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError, GainError
 from hsp_control.common.suggestions import did_you_mean, listing
-from hsp_control.control.compensation.gains_by_task import GainsByTask
 from hsp_control.control.controller import Controller
 from hsp_control.declaration import Part, within
+from hsp_control.declaration.equality import same
 from hsp_control.declaration.quantities import ArrayField, Gain, Names, Positive
 from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.gains import as_gain, as_matrix
+
+
+class GainsByTask(Mapping[str, Array]):
+    """Gains by task name; they never change."""
+
+    def __init__(self, gains: Mapping[str, Array] | None = None) -> None:
+        self._gains = dict(gains or {})
+
+    def __getitem__(self, task: str) -> Array:
+        return self._gains[task]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._gains)
+
+    def __len__(self) -> int:
+        return len(self._gains)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Mapping) and same(self._gains, dict(other))
+
+    def __hash__(self) -> int:
+        gains = self._gains.items()
+        return hash(frozenset((k, g.shape, (g + 0.0).tobytes()) for k, g in gains))
+
+    def __repr__(self) -> str:
+        return repr({k: np.asarray(g).tolist() for k, g in self._gains.items()})
+
+    def __setstate__(self, state: dict[str, dict[str, Array]]) -> None:
+        for gain in state["_gains"].values():
+            gain.setflags(write=False)  # pickle forgets it
+        vars(self).update(state)
 
 
 class IntegralAction(Part, error=CompensationError):
@@ -49,23 +80,8 @@ class IntegralAction(Part, error=CompensationError):
         if self.rate is None and not self.ki:
             raise CompensationError("integral action needs a rate [1/s], or ki by task")
 
-    def check(self, tasks: Sequence[Task]) -> None:
-        """Check that the gains fit the tasks, and that errors decay.
-
-        Raises:
-            CompensationError: If a task does not exist, or cannot have integral action.
-            GainError: If a gain does not fit its task, or e''' + Kv e'' + Kp e' + Ki e
-                = 0 has a mode that does not decay (for scalars: if Ki ≥ Kv Kp).
-        """
-        self.gains(tasks)
-
     def gains(self, tasks: Sequence[Task]) -> dict[str, Array]:
-        """Return Ki, shape (m, m), of each task that has integral action.
-
-        Raises:
-            CompensationError: As `check` does.
-            GainError: As `check` does.
-        """
+        """Return Ki, shape (m, m), of each task that has integral action."""
         names = [task.name for task in tasks]
         named = [("ki", name) for name in self.ki]
         named += [("tasks", name) for name in self.tasks or ()]
@@ -101,27 +117,15 @@ class IntegralAction(Part, error=CompensationError):
             gains[task.name] = Ki
         return gains
 
-    def begin(self, controller: Controller) -> "RunningIntegral":
-        """Return the integral action of a controller for one run; it begins at zero.
-
-        Args:
-            controller: The controller, in whose feedback the action is written.
-        """
-        return RunningIntegral(self, controller)
-
 
 class RunningIntegral:
-    """Integral action in one run: it keeps the integrals.
-
-    Attributes:
-        integrals: ∫e by task, shape (m,) [m·s or rad·s].
-    """
+    """Integral action in one run: it keeps the integrals."""
 
     def __init__(self, declared: IntegralAction, controller: Controller) -> None:
-        """Set all integrals to zero."""
         self._limit = np.inf if declared.limit is None else declared.limit
         self._gains = declared.gains(controller.tasks)
         self._feedback = {name: controller.feedback(name) for name in self._gains}
+        # ∫e by task, shape (m,) [m·s or rad·s]
         self.integrals: dict[str, Array] = {
             name: np.zeros(len(Ki)) for name, Ki in self._gains.items()
         }
@@ -129,13 +133,7 @@ class RunningIntegral:
     def advance(
         self, errors: Mapping[str, Array | None], period: float, saturated: bool
     ) -> None:
-        """Integrate the errors over one period, for the next effort.
-
-        Args:
-            errors: e by task, shape (m,); None: the task is not fully active.
-            period: The period [s].
-            saturated: Whether the law was not delivered exactly.
-        """
+        """Integrate the errors over one period, for the next effort."""
         for name, feedback in self._feedback.items():
             integral, e = self.integrals[name], errors.get(name)
             if e is None:

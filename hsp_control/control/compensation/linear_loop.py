@@ -1,12 +1,51 @@
-"""The sampled control loop of a linear error: its transition over one period."""
+"""Sampled control loops of linear errors: rigid, elastic, or loaded by other bodies."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Literal, NamedTuple
 
 import numpy as np
+from scipy.linalg import expm
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.compensation.compensation import Compensation
-from hsp_control.control.compensation.elastic_joint import ElasticJoint
+from hsp_control.control.controller import Controller
+from hsp_control.law import FieldSample, MetricSample
+from hsp_control.robot import Robot, RobotState
+
+
+@dataclass(frozen=True)
+class ElasticJoint:
+    """An elastic joint whose model is rigid: a motor moves a link through a spring.
+
+    M. W. Spong, "Modeling and control of elastic joint robots", J. Dyn. Sys. Meas.
+    Control 109 (1987), for one joint. With the inertias relative to the model's,
+
+        λ x'' = κ (θ - x) + δ (θ' - x'),     μ θ'' = u - κ (θ - x) - δ (θ' - x').
+    """
+
+    link: float  # λ, the link's inertia over that of the model [-]
+    # μ, the motor's inertia over that of the model [-]; a model that is right but for
+    # the spring has λ + μ = 1
+    motor: float
+    stiffness: float  # κ, the spring's stiffness over the model's inertia [1/s²]
+    damping: float = 0.0  # δ, its damping over the model's inertia [1/s]
+    # where position and velocity are measured
+    measured: Literal["motor", "link"] = "motor"
+
+    def transition(self, period: float) -> tuple[Array, Array]:
+        """Return Φ, shape (4, 4), and Γ, shape (4,), of (x, x', θ, θ') over a period.
+
+        The acceleration u is held: the state becomes Φ s + Γ u.
+        """
+        spring = np.array(
+            [-self.stiffness, -self.damping, self.stiffness, self.damping]
+        )
+        rates = np.zeros((5, 5))
+        rates[0, 1] = rates[2, 3] = 1.0
+        rates[1, :4], rates[3, :4] = spring / self.link, -spring / self.motor
+        rates[3, 4] = 1.0 / self.motor
+        after = expm(rates * period)
+        return after[:4, :4], after[:4, 4]
 
 
 @dataclass(frozen=True)
@@ -16,29 +55,20 @@ class LinearLoop:
     x is the error of a task, or that of the null space, with Kp = K_N A, Kv = K_N + A
     for a field g of slope -A. The loop includes delays and compensators, in the order
     of `Command`. The robot equals its model, or performs a part of each acceleration.
-
-    Attributes:
-        kp: Kp, shape (m, m) [1/s²].
-        kv: Kv, shape (m, m) [1/s].
-        ki: Ki, shape (m, m) [1/s³].
-        period: h [s].
-        effort_delay: Delay of efforts, in periods.
-        sensor_delay: Delay of measurements, in periods.
-        compensation: The compensators. Those that act on a linear loop are the velocity
-            filter, the predictor and the momentum observer; integral action is ``ki``.
-        share: The part of u that the robot performs: below 1 where it is heavier than
-            its model; a matrix, shape (m, m), where that differs with the direction.
-        joint: The elastic joint that performs u; None: a rigid one.
     """
 
-    kp: Array
-    kv: Array
-    ki: Array
-    period: float
-    effort_delay: int = 0
-    sensor_delay: int = 0
+    kp: Array  # Kp, shape (m, m) [1/s²]
+    kv: Array  # Kv, shape (m, m) [1/s]
+    ki: Array  # Ki, shape (m, m) [1/s³]
+    period: float  # h [s]
+    effort_delay: int = 0  # delay of efforts, in periods
+    sensor_delay: int = 0  # delay of measurements, in periods
+    # what counts: velocity filter, predictor, momentum observer; integral action is ki
     compensation: Compensation = field(default_factory=Compensation)
+    # part of u that the robot performs: below 1 where it is heavier than its model; a
+    # matrix, shape (m, m), where that differs with the direction
     share: float | Array = 1.0
+    # elastic joint that performs u; None: a rigid one
     joint: ElasticJoint | None = None
 
     def transition(self) -> Array:
@@ -117,11 +147,149 @@ def _moved(x: Array, v: Array, u: Array, h: float) -> tuple[Array, Array]:
 
 
 def _coupled(A: Array) -> Array:
-    """Return the matrix without states that are never written or never read.
-
-    Such states only add eigenvalues of 0. A loop without compensators and delays uses a
-    sixth of all states.
-    """
+    """Return the matrix without states that are never written or never read."""
+    # Such states only add eigenvalues of 0. A loop without compensators and delays uses
+    # a sixth of all states.
     while not (used := A.any(axis=0) & A.any(axis=1)).all():
         A = A[np.ix_(used, used)]
     return A
+
+
+_STEP = 1e-5
+"""Step of the differences [rad or m]."""
+
+
+def null_space_rates(controller: Controller, state: RobotState) -> tuple[Array, Array]:
+    """Return K_N and the field's slope A ≥ 0 in the null space, shape (k, k) each."""
+    # Both are in coordinates that are orthonormal in the metric. A is the symmetric
+    # part of -∂g/∂q, by central differences, `without_saddles`.
+    nothing = np.zeros((0, 0))
+    if not controller.field.controls:
+        return nothing, nothing
+    J = controller.stack(state).jacobian
+    L = controller.active_stack.resolution.problem.metric.L
+    across = np.linalg.solve(L, J.T).T  # J L⁻ᵀ
+    _, values, Vt = np.linalg.svd(across)
+    rank = int((values > controller.active_stack.resolution.threshold).sum())
+    Z = Vt[rank:].T
+    if not Z.size:
+        return nothing, nothing
+    into, out_of = L.T, np.linalg.inv(L.T)
+    A = -Z.T @ into @ field_slope(controller, state) @ out_of @ Z
+    K = Z.T @ into @ controller.null_space_gain @ out_of @ Z
+    return K, without_saddles(A)
+
+
+def without_saddles(A: Array) -> Array:
+    """Return the symmetric part of a slope, with 0 for its negative eigenvalues."""
+    # There the field drives the robot away from a point (a saddle of its cost), which
+    # is intended, and no control rate changes it.
+    values, U = np.linalg.eigh(0.5 * (A + A.T))
+    stable: Array = (U * np.maximum(values, 0.0)) @ U.T
+    return stable
+
+
+def field_slope(controller: Controller, state: RobotState) -> Array:
+    """Return ∂g/∂q at a state, shape (nv, nv), by central differences."""
+    nv, metric = state.robot.nv, MetricSample.allocate(state.robot.nv)
+    out, slope = FieldSample.allocate(nv), np.zeros((nv, nv))
+    for i in range(nv):
+        for sign in (1.0, -1.0):
+            moved = np.zeros(nv)
+            moved[i] = sign * _STEP
+            near = state.displaced(0.0, moved)
+            controller.metric.evaluate(near, metric)
+            controller.field.evaluate(near, metric, controller.metric.form, out)
+            slope[:, i] += sign * out.g / (2.0 * _STEP)
+    return slope
+
+
+class LoadedLoop(NamedTuple):
+    """The loop of a whole robot, for any part of its difference from the model.
+
+    A robot with the mass matrix M̃ performs M̃⁻¹ M u where the law asks for the
+    acceleration u. That couples the tasks and the null space, which the law decouples
+    for its model. In coordinates y = T δq with T = Vᵀ Lᵀ, orthonormal in the metric
+    W = L Lᵀ, and J L⁻ᵀ = U [S 0] Vᵀ, all are one linear loop:
+
+        y'' = T M̃⁻¹ M T⁻¹ u,
+        u₁ = -S⁻¹ Uᵀ (Kp e + Kv e' + Ki ∫e),     e = U S y₁,
+        u₂ = -(K_N + A₂₂) y₂' - K_N A₂ y - A₂₁ y₁',
+
+    with the field's slope A = -T (∂g/∂q) T⁻¹, without saddles. It is exact about a
+    state at rest of a robot without weight. A payload's weight adds a slow motion in
+    the null space.
+    """
+
+    loop: LinearLoop  # loop of a robot that equals its model
+    # M̃ - M in the loop's coordinates, relative to M: T M⁻¹ (M̃ - M) T⁻¹
+    difference: Array
+    # how many times as heavy as its model the robot is at the tasks, in the heaviest
+    # direction: 1/β with the smallest eigenvalue β of J M̃⁻¹ M J#
+    heavier: float
+
+    def largest_part(self, wanted: float) -> float:
+        """Return this part, or less: what is lighter must keep a tenth of its mass."""
+        lightest = float(np.linalg.eigvals(self.difference).real.min())
+        return wanted if lightest >= 0.0 else min(wanted, -0.9 / lightest)
+
+    def with_part(self, s: float) -> LinearLoop:
+        """Return the loop of a robot with s times the difference."""
+        one = np.eye(len(self.difference))
+        share: Array = np.asarray(np.linalg.inv(one + s * self.difference), float)
+        return replace(self.loop, share=share)
+
+
+def loaded_loop(
+    controller: Controller,
+    state: RobotState,
+    plant: Robot,
+    period: float,
+    effort_delay: int,
+    sensor_delay: int,
+    compensation: Compensation,
+) -> LoadedLoop | None:
+    """Return the loop of the whole robot at a state."""
+    robot = controller.robot
+    M = state.mass_matrix
+    others = plant.state(state.t, state.q, state.v).mass_matrix - M
+    if robot.unactuated or controller.contacts or np.abs(others).max() < 1e-9:
+        return None
+    J = controller.stack(state).jacobian
+    problem = controller.active_stack.resolution
+    U, S, Vt = np.linalg.svd(np.linalg.solve(problem.problem.metric.L, J.T).T)
+    m, n = J.shape
+    if m > n or S.min(initial=np.inf) <= problem.threshold:
+        return None
+    if m < n and not controller.field.controls:
+        return None
+    T = Vt @ problem.problem.metric.L.T
+    back = np.linalg.inv(T)
+    into, out_of = (U / S).T, U * S  # S⁻¹ Uᵀ and U S
+    rows = controller.active_stack.task_rows
+    Kp, Kv, Ki = (np.zeros((m, m)) for _ in range(3))
+    action = compensation.integral_action
+    integral = {} if action is None else action.gains(controller.tasks)
+    for task in controller.tasks:
+        if (at := rows.get(task.name)) is None:
+            continue
+        own_p, own_v, *_ = controller.linear_feedback(task.name, state)[-np.inf]
+        if task.order == 1:  # e' + K e = 0 with K in the place of Kp
+            own_p, own_v = np.zeros_like(own_p), own_p
+        Kp[at, at], Kv[at, at] = own_p, own_v
+        if task.name in integral:
+            Ki[at, at] = integral[task.name]
+    kp, kv, ki = (np.zeros((n, n)) for _ in range(3))
+    for gain, own in ((kp, Kp), (kv, Kv), (ki, Ki)):
+        gain[:m, :m] = into @ own @ out_of
+    if m < n:
+        A = -(T @ field_slope(controller, state) @ back)[m:]
+        A[:, m:] = without_saddles(A[:, m:])
+        K = (T @ controller.null_space_gain @ back)[m:, m:]
+        kp[m:], kv[m:] = K @ A, A
+        kv[m:, m:] += K
+    difference = T @ np.linalg.solve(M, others) @ back
+    performed = np.linalg.inv(np.eye(n) + difference)
+    beta = np.linalg.eigvals(out_of @ performed[:m, :m] @ into).real.min()
+    loop = LinearLoop(kp, kv, ki, period, effort_delay, sensor_delay, compensation)
+    return LoadedLoop(loop, difference, float(1.0 / beta))

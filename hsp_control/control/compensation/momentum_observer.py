@@ -16,7 +16,6 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError
 from hsp_control.constraints.limits.joint_numbers import Positives, by_dof
-from hsp_control.control.compensation.checks import check_fixed_base
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import Flag, Positive
 from hsp_control.robot import Robot, RobotState
@@ -45,11 +44,7 @@ class MomentumObserver(Part, error=CompensationError):
     """Whether the estimate is cancelled [-]; false: it is only logged."""
 
     def __post_init__(self) -> None:
-        """Check that nothing is clipped if nothing is cancelled.
-
-        Raises:
-            CompensationError: If it is.
-        """
+        """Check that nothing is clipped if nothing is cancelled."""
         if self.clip is not None and not self.cancel:
             raise CompensationError(
                 "clip bounds the effort that is cancelled, and cancel is false; remove "
@@ -57,13 +52,7 @@ class MomentumObserver(Part, error=CompensationError):
             )
 
     def check(self, robot: Robot) -> None:
-        """Check that the observer fits the robot.
-
-        Raises:
-            CompensationError: If the robot has a free-flyer root, or there are neither
-                one nor nv numbers in `clip`.
-        """
-        check_fixed_base(robot)
+        """Check that the observer fits the robot."""
         self._bounds(robot)
 
     def begin(self, robot: Robot) -> "RunningObserver":
@@ -79,33 +68,18 @@ class MomentumObserver(Part, error=CompensationError):
 
 
 class RunningObserver:
-    """A momentum observer in one run: it keeps the estimate and the last momentum.
-
-    Attributes:
-        disturbance: r, shape (nv,) [N·m or N].
-        cancelled: r, clipped, shape (nv,) [N·m or N].
-    """
+    """A momentum observer in one run: it keeps the estimate and the last momentum."""
 
     def __init__(self, bandwidth: float, clip: Array) -> None:
-        """Set K_O [1/s], and the maximum of |r| that is cancelled, shape (nv,)."""
         self._bandwidth, self._clip = bandwidth, clip
-        self.disturbance: Array = np.zeros(len(clip))
+        # K_O [1/s], and the maximum of |r| that is cancelled, shape (nv,)
+        self.disturbance: Array = np.zeros(len(clip))  # r, shape (nv,) [N·m or N]
         self.cancelled: Array = np.zeros(len(clip))
         self._momentum: Array | None = None
         self._drift: Array = np.zeros(len(clip))
 
     def update(self, state: RobotState, tau: Array, period: float) -> Array:
-        """Update the estimate with a measurement, and return it.
-
-        Args:
-            state: The state as measured now.
-            tau: The effort that acted on the model since the last measurement, shape
-                (nv,): without the friction feed-forward, which friction has taken.
-            period: Time since the last measurement [s].
-
-        Returns:
-            r, shape (nv,), overwritten by the next call.
-        """
+        """Return r; ``tau`` is the effort on the model in the period that ends."""
         momentum, drift = state.mass_matrix @ state.v, _drift(state)
         if self._momentum is not None:
             mean = 0.5 * (drift + self._drift)

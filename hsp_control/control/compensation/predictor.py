@@ -7,7 +7,6 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError
-from hsp_control.control.compensation.checks import check_fixed_base
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Count
 from hsp_control.robot import Robot
@@ -39,24 +38,11 @@ class Predictor(Part, error=CompensationError):
         """The total delay from a measurement to its effort, in control periods."""
         return self.effort_delay + self.sensor_delay
 
-    def check(self, robot: Robot) -> None:
-        """Check that the efforts alone determine the robot's motion.
-
-        Raises:
-            CompensationError: If the robot has a free-flyer root.
-        """
-        check_fixed_base(robot)
-
-    def begin(self, robot: Robot) -> "RunningPredictor":
-        """Return the predictor of one run."""
-        return RunningPredictor(robot)
-
 
 class RunningPredictor:
     """Integrates the model under the efforts that are under way."""
 
     def __init__(self, robot: Robot) -> None:
-        """Allocate."""
         self._robot, self._period = robot, 0.0
         self._tau = np.zeros(robot.nv)
 
@@ -69,14 +55,7 @@ class RunningPredictor:
     def predict(
         self, q: Array, v: Array, efforts: Iterable[Array], period: float
     ) -> tuple[Array, Array]:
-        """Return (q, v) after the efforts have acted, each for one period.
-
-        Args:
-            q: Configuration as measured, shape (nq,).
-            v: Velocity as measured, shape (nv,).
-            efforts: The efforts on the model in order of time, shape (nv,) each.
-            period: How long each effort acts [s].
-        """
+        """Return (q, v) after the efforts on the model, each for one period."""
         if period != self._period:
             self._period = period
             self._advance = Rk4(period).begin(self._robot, self._bind)

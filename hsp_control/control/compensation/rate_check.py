@@ -14,11 +14,14 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError, UnstableRateError
 from hsp_control.control.compensation.compensation import Compensation
-from hsp_control.control.compensation.linear_loop import LinearLoop
-from hsp_control.control.compensation.loaded_loop import LoadedLoop, loaded_loop
-from hsp_control.control.compensation.null_space_rates import null_space_rates
+from hsp_control.control.compensation.linear_loop import (
+    LinearLoop,
+    LoadedLoop,
+    loaded_loop,
+    null_space_rates,
+)
 from hsp_control.control.controller import Controller
-from hsp_control.control.held_gains import rounded_down
+from hsp_control.control.gains_in_force import rounded_down
 from hsp_control.declaration import within
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import Task
@@ -175,16 +178,11 @@ def _findings_of(
 
 
 class _Speed(NamedTuple):
-    """How fast a loop is to be, and what makes it slower.
+    """How fast a loop is to be, and what makes it slower."""
 
-    Attributes:
-        what: The setting that decides.
-        rate: Its rate [1/s].
-        at_most: Which settings make the rate another one: a function of this [1/s].
-    """
-
-    what: str
-    rate: float
+    what: str  # setting that decides
+    rate: float  # its rate [1/s]
+    # which settings make the rate another one: a function of this [1/s]
     at_most: Callable[[float], str]
 
 
@@ -339,10 +337,7 @@ def _finding(
 
 
 def _stabilising_changes(
-    loop: LinearLoop,
-    speed: _Speed,
-    rule: float,
-    null_space: tuple[Array, Array] | None,
+    loop: LinearLoop, speed: _Speed, rule: float, null_space: tuple[Array, Array] | None
 ) -> tuple[list[str], list[str]]:
     """Return changes of single settings, each of which makes the loop stable."""
 
@@ -400,10 +395,8 @@ def _stabilising_changes(
 def _largest(
     of_scale: Callable[[float], LinearLoop], smallest: float = 1e-3
 ) -> float | None:
-    """Return the largest scale below 1 at which a loop is stable, or None.
-
-    The loop is also stable at all scales tried between ``smallest`` and the result.
-    """
+    """Return the largest scale below 1 at which a loop is stable, or None."""
+    # The loop is also stable at all scales tried between ``smallest`` and the result.
 
     def stable(s: float) -> bool:
         try:

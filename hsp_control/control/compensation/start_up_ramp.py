@@ -4,10 +4,9 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError
-from hsp_control.control.compensation.checks import check_fixed_base
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import NonNegative, Positive
-from hsp_control.robot import Robot, RobotState
+from hsp_control.robot import RobotState
 from hsp_control.trajectories.schedule import Schedule
 
 
@@ -25,24 +24,11 @@ class StartUpRamp(Part, error=CompensationError):
     """Natural frequency ω of the spring that holds the robot meanwhile [rad/s]; 0 is
     pure gravity compensation."""
 
-    def check(self, robot: Robot) -> None:
-        """Check that the motors alone can hold the robot still.
-
-        Raises:
-            CompensationError: If the robot has a free-flyer root.
-        """
-        check_fixed_base(robot)
-
-    def begin(self, state: RobotState) -> "RunningRamp":
-        """Return the ramp that begins at a state: at its time and configuration."""
-        return RunningRamp(self, state)
-
 
 class RunningRamp:
     """A start-up ramp in one run: it knows when and where it began."""
 
     def __init__(self, declared: StartUpRamp, state: RobotState) -> None:
-        """Set the ramp, and the state at which it begins."""
         self._frequency = declared.natural_frequency
         self._schedule = Schedule([(state.t, None)], ramp=declared.duration)
         self._q0 = state.q.copy()

@@ -29,23 +29,10 @@ class VelocityFilter(Part, error=CompensationError):
         """The delay of slow motion [s]."""
         return (1.0 if self.order == 1 else sqrt(2.0)) / (2.0 * pi * self.cutoff)
 
-    def begin(self) -> "RunningFilter":
-        """Return the filter for one run; it knows no measurement yet."""
-        return RunningFilter(self)
-
     def step(
         self, v: Array, past: tuple[Array, ...], period: float
     ) -> tuple[Array, tuple[Array, ...]]:
-        """Compute one step of the filter.
-
-        Args:
-            v: Input, of any shape.
-            past: The last two inputs and the last two outputs, each the latest first.
-            period: Time since the last input [s].
-
-        Returns:
-            The output, and ``past`` for the next step.
-        """
+        """Return the output for an input, and ``past`` for the next step."""
         b, a = self.coefficients(period)
         in1, in2, out1, out2 = past
         out = b[0] * v + b[1] * in1 + b[2] * in2 - a[0] * out1 - a[1] * out2
@@ -54,15 +41,9 @@ class VelocityFilter(Part, error=CompensationError):
     def coefficients(
         self, period: float
     ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Return b_0..b_2 and a_1, a_2 of y_k = Σ b_i v_(k-i) - Σ a_i y_(k-i).
-
-        The first order is exact for a piecewise constant velocity. The second is the
-        bilinear transform of 1/(1 + √2 s + s²), prewarped to keep the cut-off.
-
-        Raises:
-            CompensationError: If the order is 2, and the cut-off is not below half the
-                sampling rate.
-        """
+        """Return b_0..b_2 and a_1, a_2 of y_k = Σ b_i v_(k-i) - Σ a_i y_(k-i)."""
+        # The first order is exact for a piecewise constant velocity. The second is the
+        # bilinear transform of 1/(1 + √2 s + s²), prewarped to keep the cut-off.
         if self.order == 1:
             pole = exp(-2.0 * pi * self.cutoff * period)
             return (1.0 - pole, 0.0, 0.0), (-pole, 0.0)
@@ -82,20 +63,11 @@ class RunningFilter:
     """A velocity filter in one run: it keeps the last inputs and outputs."""
 
     def __init__(self, declared: VelocityFilter) -> None:
-        """Set the filter."""
         self._filter = declared
         self._past: tuple[Array, ...] | None = None
 
     def apply(self, v: Array, period: float) -> Array:
-        """Return the filtered velocity, a new array of shape (nv,).
-
-        Args:
-            v: Measured velocity, shape (nv,).
-            period: Time since the last measurement [s].
-
-        Raises:
-            CompensationError: If the cut-off is too high for the sampling rate.
-        """
+        """Return the filtered velocity, a new array of shape (nv,)."""
         if self._past is None:
             self._past = tuple(v.copy() for _ in range(4))
             return v.copy()

@@ -10,8 +10,7 @@ from zlib import crc32
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.control.log_channel import LogChannel
-from hsp_control.control.measurement import Inertial
+from hsp_control.control.measurement import Inertial, LogChannel
 from hsp_control.declaration import within
 from hsp_control.simulation.plants.drives import Drive, Driving
 from hsp_control.simulation.plants.plant import SampledPlant, to_json_data

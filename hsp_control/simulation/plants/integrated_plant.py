@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.control.log_channel import LogChannel
+from hsp_control.control.measurement import LogChannel
 from hsp_control.robot.integrators import Advance, Integrator, Steps
 from hsp_control.simulation.plants.plant import ContinuousPlant, SampledPlant
 

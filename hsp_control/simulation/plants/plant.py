@@ -9,8 +9,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
-from hsp_control.control.log_channel import LogChannel
-from hsp_control.control.measurement import NO_WRENCHES, Inertial
+from hsp_control.control.measurement import NO_WRENCHES, Inertial, LogChannel
 from hsp_control.robot import Robot
 from hsp_control.robot.acceleration import Acceleration
 

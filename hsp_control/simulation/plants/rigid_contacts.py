@@ -10,7 +10,7 @@ from pydantic import Field
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
-from hsp_control.control.log_channel import LogChannel
+from hsp_control.control.measurement import LogChannel
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.named import BY_FRAME, stored_by_frame
 from hsp_control.declaration.quantities import ArrayField, NonNegative

@@ -17,7 +17,7 @@ from hsp_control.companions.franka import (
 )
 from hsp_control.companions.franka.client_process import ClientProcess
 from hsp_control.live import Hardware, LiveSettings, Measurement
-from hsp_control.live.adapting import AdaptingHardware
+from hsp_control.live.hardware import AdaptingHardware
 
 Array = NDArray[np.float64]
 APPLIED = np.linspace(-0.6, 0.6, 7)

@@ -30,8 +30,8 @@ from hsp_control.live import (
     run_loop,
 )
 from hsp_control.live.bearing_feet import BearingFeet
-from hsp_control.live.measurement_checks import DeadReckoning, valid_measurement
-from hsp_control.live.sensor_layout import SensorLayout
+from hsp_control.live.state_reader import DeadReckoning, valid_measurement
+from hsp_control.live.udp import SensorLayout
 
 pytest.importorskip("example_robot_data")
 pytest.importorskip("mujoco")

@@ -317,7 +317,7 @@ def test_a_library_that_a_slim_system_lacks_is_named(
         def load(_: object) -> int:
             raise ImportError(f"{library}: {reason}")
 
-        monkeypatch.setattr("hsp_control.cli.commands.check", load)
+        monkeypatch.setattr("hsp_control.cli.check.check", load)
 
     reason = "cannot open shared object file: No such file or directory"
     lacks("libgomp.so.1", reason)

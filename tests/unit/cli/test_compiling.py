@@ -8,7 +8,7 @@ import pytest
 from rich.console import Console
 from rich.progress import Progress
 
-from hsp_control.cli.compiling import compiling_shown, compiling_told
+from hsp_control.cli.consoles import compiling_shown, compiling_told
 from hsp_control.common import kernels
 
 HIDE = "\x1b[?25l"

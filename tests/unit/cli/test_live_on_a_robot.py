@@ -9,8 +9,9 @@ import pytest
 from hsp_control import Robot, Rollout, load_experiment
 from hsp_control.cli import main
 from hsp_control.cli.live_experiment import simulated_robot
-from hsp_control.live import InProcessRobot, backends
-from hsp_control.live.adapting import AdaptingHardware, LocatedHardware
+from hsp_control.live import InProcessRobot
+from hsp_control.live import hardware as live_hardware
+from hsp_control.live.hardware import AdaptingHardware, LocatedHardware
 
 AWAY = 0.1
 
@@ -38,7 +39,7 @@ class Somewhere(InProcessRobot):
 @pytest.fixture(autouse=True)
 def offered(monkeypatch: pytest.MonkeyPatch) -> None:
     entry = EntryPoint("some", f"{__name__}:Somewhere", "hsp_control.hardware")
-    monkeypatch.setattr(backends, "entry_points", lambda group: {"some": entry})
+    monkeypatch.setattr(live_hardware, "entry_points", lambda group: {"some": entry})
 
 
 def command(tmp_path: Path, address: str) -> list[str]:

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import pytest
 
-from hsp_control.cli.opening_page import OpeningPage, draw_before
+from hsp_control.cli.pages import OpeningPage, draw_before
 from hsp_control.common import adapters, kernels
 from hsp_control.common.exceptions import SimulationError, ViewerError
 from hsp_control.config.loaded_scenario import load_scenario

@@ -7,9 +7,8 @@ from types import SimpleNamespace
 import pytest
 
 import hsp_control as hsp
-from hsp_control.cli import page_process, steering
-from hsp_control.cli.page_process import PageProcess
-from hsp_control.cli.steering import SteeringPage
+from hsp_control.cli import steering
+from hsp_control.cli.steering import PageProcess, SteeringPage
 from hsp_control.common.exceptions import ViewerError
 from hsp_control.live import OperatorRequests
 from hsp_control.play.channel import channel_pair
@@ -28,7 +27,7 @@ def test_a_page_that_says_nothing_ends_the_wait(
     silent.write_text("#!/bin/sh\nexec sleep 600\n")
     silent.chmod(0o755)
     monkeypatch.setattr(sys, "executable", str(silent))
-    monkeypatch.setattr(page_process, "START", 0.05)
+    monkeypatch.setattr(steering, "START", 0.05)
     page = PageProcess(port=None, host="127.0.0.1", held=True)
     with pytest.raises(ViewerError, match=r"did not start within 0\.05 s"):
         page.__enter__()

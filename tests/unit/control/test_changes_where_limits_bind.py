@@ -16,7 +16,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.control.actuation import actuation
 from hsp_control.control.actuation.status import Status
 from hsp_control.control.compensation import Command, Compensation, FrictionFeedForward
-from hsp_control.control.switched import Switched
+from hsp_control.control.planned import Switched
 from hsp_control.trajectories import HoldOrientation, Schedule
 from hsp_control.trajectories.switch import Switch
 from hsp_control.trajectories.timing import smooth_step

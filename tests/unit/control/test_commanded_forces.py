@@ -26,7 +26,7 @@ from hsp_control.constraints.contacts import (
     SurfaceContact,
 )
 from hsp_control.control.actuation import Status
-from hsp_control.control.actuation.contact_forces import minimum_norm_forces
+from hsp_control.control.actuation.support import minimum_norm_forces
 from hsp_control.simulation.plants import ContactPlant, ContinuousPlant, RigidContact
 from hsp_control.trajectories import CallableTrajectory, Hold, Schedule, Stream
 

@@ -27,6 +27,9 @@ from hsp_control.control.compensation import (
     StartUpRamp,
     VelocityFilter,
 )
+from hsp_control.control.compensation.integral_action import RunningIntegral
+from hsp_control.control.compensation.predictor import RunningPredictor
+from hsp_control.control.compensation.velocity_filter import RunningFilter
 from hsp_control.null_space.fields import TargetPosture
 from hsp_control.robot.friction import JointFriction
 from hsp_control.robot.integrators import Rk4
@@ -376,15 +379,15 @@ def test_matrix_gains_are_judged_by_their_modes() -> None:
     for scale, fits in ((8000.0, True), (9000.0, False)):  # 1.9 · 8421 = Kv Kp
         action = IntegralAction(ki={"hand": scale * coupled})
         if fits:
-            action.check([circle()])
+            action.gains([circle()])
             continue
         with pytest.raises(GainError, match="does not decay"):
-            action.check([circle()])
+            action.gains([circle()])
 
 
 def test_an_integral_only_unwinds_while_the_law_is_not_delivered() -> None:
     made = controller()
-    action = IntegralAction(10.0, limit=8.0).begin(made)
+    action = RunningIntegral(IntegralAction(10.0, limit=8.0), made)
     offset = made.feedback("hand").offset
     e = np.array([1e-3, -1e-3, 0.0])
     action.advance({"hand": e}, 0.5, saturated=False)
@@ -416,13 +419,13 @@ def test_an_arm_that_is_too_weak_does_not_wind_up() -> None:
 @pytest.mark.parametrize("order", [1, 2])
 def test_half_of_the_power_passes_at_the_cut_off(order: int) -> None:
     declared = VelocityFilter(20.0, order)
-    own = declared.begin()
+    own = RunningFilter(declared)
     assert own.apply(np.full(3, 4.0), 0.0).tolist() == [4.0] * 3
     for _ in range(50):
         assert_allclose(own.apply(np.full(3, 4.0), H), 4.0, rtol=1e-12)
     for frequency, gain in ((20.0, 0.5**0.5), (2.0, 1.0), (200.0, 0.1**order)):
         t = np.arange(0.0, 2.0, H / 4.0)
-        own = declared.begin()
+        own = RunningFilter(declared)
         out = np.array(
             [own.apply(np.sin([2 * np.pi * frequency * s]), H / 4) for s in t]
         )
@@ -430,7 +433,7 @@ def test_half_of_the_power_passes_at_the_cut_off(order: int) -> None:
         # Sampling bends the first order by 2 % at a twentieth of the rate.
         assert size == pytest.approx(gain, rel=0.03)
     t = np.arange(0.0, 1.0, H)
-    own = declared.begin()
+    own = RunningFilter(declared)
     late = np.array([own.apply(np.array([s]), H)[0] for s in t])
     # A held input is itself half a period late.
     assert t[-1] - late[-1] == pytest.approx(declared.delay, abs=0.51 * H)
@@ -544,7 +547,7 @@ def test_a_copy_of_a_running_predictor_has_memory_of_its_own() -> None:
     robot, rng = PANDA, np.random.default_rng(0)
     q, v = robot.home(), 0.1 * rng.standard_normal(7)
     efforts = [10.0 * rng.standard_normal(7)]
-    first = Predictor(effort_delay=1).begin(robot)
+    first = RunningPredictor(robot)
     expected = [each.copy() for each in first.predict(q, v, efforts, 1e-3)]
     other = deepcopy(first)
     first.predict(q + 0.3, -v, efforts, 1e-3)

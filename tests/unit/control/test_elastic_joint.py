@@ -11,8 +11,7 @@ from scipy.integrate import solve_ivp
 import hsp_control as hsp
 from hsp_control import Controller, Gains, JointPosture, Robot, simulate
 from hsp_control.common.arrays import Array
-from hsp_control.control.compensation.elastic_joint import ElasticJoint
-from hsp_control.control.compensation.linear_loop import LinearLoop
+from hsp_control.control.compensation.linear_loop import ElasticJoint, LinearLoop
 from hsp_control.simulation.plants import EffortDelay, ImperfectPlant, SampledPlant
 from hsp_control.simulation.plants.sensors import SensorDelay
 

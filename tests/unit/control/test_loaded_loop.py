@@ -14,8 +14,11 @@ from hsp_control.control.compensation import (
     VelocityFilter,
     check_rate,
 )
-from hsp_control.control.compensation.loaded_loop import LoadedLoop, loaded_loop
-from hsp_control.control.compensation.null_space_rates import field_slope
+from hsp_control.control.compensation.linear_loop import (
+    LoadedLoop,
+    field_slope,
+    loaded_loop,
+)
 from hsp_control.null_space.fields import FunctionField
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants.model_changes import Inertias, Payload, changed

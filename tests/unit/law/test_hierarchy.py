@@ -199,7 +199,6 @@ def test_levels_are_the_tasks_of_one_priority() -> None:
     names = [[task.name for task in level] for level in controller.levels]
     assert names == [["hand"], ["wrist", "rival"]]
     assert [task.name for task in controller.tasks] == ["hand", "wrist", "rival"]
-    assert [controller.priority_of(n) for n in ("hand", "wrist", "rival")] == [1, 2, 2]
     hand, wrist, rival = controller.tasks
     spread = [replace(rival, priority=70), replace(hand, priority=3), wrist]
     levels = hsp.Controller(panda(), spread, limits=None).levels

@@ -40,7 +40,7 @@ from hsp_control.live import (
     StopSettings,
     run_loop,
 )
-from hsp_control.live.measurement_checks import MeasurementMonitor
+from hsp_control.live.state_reader import MeasurementMonitor
 
 RATE, EFFORT = 1000.0, 80.0
 QUICK = StopSettings(hold=0.02)

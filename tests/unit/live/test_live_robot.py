@@ -21,7 +21,7 @@ from hsp_control.live import (
     run_loop,
 )
 from hsp_control.live.effort_limiter import EffortLimiter
-from hsp_control.live.packets import Kind
+from hsp_control.live.link import Kind
 from hsp_control.robot.integrators import Rk4, SemiImplicitEuler
 from hsp_control.simulation.plants import IntegratedPlant, RigidBodyPlant
 from hsp_control.simulation.plants.model_changes import Payload, changed

@@ -19,10 +19,15 @@ from hsp_control.live import (
     UdpHardware,
     serve,
 )
-from hsp_control.live.faults import FaultInjector
-from hsp_control.live.link import AgeEstimator
-from hsp_control.live.packets import Kind, Packet, decode, encode
-from hsp_control.live.udp_robot import CLOSED_BY_LOOP
+from hsp_control.live.link import (
+    AgeEstimator,
+    FaultInjector,
+    Kind,
+    Packet,
+    decode,
+    encode,
+)
+from hsp_control.live.udp import CLOSED_BY_LOOP
 
 numbers = st.lists(st.floats(), max_size=20)
 

@@ -9,8 +9,8 @@ import pytest
 
 import hsp_control as hsp
 from hsp_control.common.exceptions import SimulationError
-from hsp_control.live.deadlines import Quantiles
 from hsp_control.live.real_time import no_garbage_collection, real_time_priority
+from hsp_control.live.report import Quantiles
 
 
 def test_quantiles_are_times_that_were_measured() -> None:

@@ -9,8 +9,8 @@ import pytest
 
 import hsp_control as hsp
 from hsp_control.common import adapters, native
-from hsp_control.live import rehearsal
-from hsp_control.live.rehearsal import rehearse
+from hsp_control.live import loop
+from hsp_control.live.loop import rehearse
 
 CONFIG = {
     "robot": {"name": "panda"},
@@ -79,7 +79,7 @@ def test_it_evaluates_a_copy_within_the_loop_and_no_more_often_than_allowed(
     assert np.allclose(times, [1.1, 1.2, 1.9, 2.0, 5.0], rtol=0.0, atol=1e-12)
     assert controller.state.t == 0.0
     times.clear()
-    monkeypatch.setattr(rehearsal, "_MOST", 2)
+    monkeypatch.setattr(loop, "_MOST", 2)
     rehearse(controller, 1.0, 5.0, q, v)
     assert len(times) == 2
     times.clear()

@@ -14,10 +14,10 @@ from hsp_control import Limits
 from hsp_control.constraints.limits import own_limits
 from hsp_control.control.compensation import Command
 from hsp_control.live import LiveSettings, Phase, SafeStop, StopSettings, run_loop
-from hsp_control.live.deadlines import Deadlines
 from hsp_control.live.effort_limiter import EffortLimiter
-from hsp_control.live.measurement_checks import DeadReckoning
+from hsp_control.live.report import Deadlines
 from hsp_control.live.safe_stop import largest_scale
+from hsp_control.live.state_reader import DeadReckoning
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants import IntegratedPlant, RigidBodyPlant
 from hsp_control.simulation.plants.model_changes import Inertias, changed

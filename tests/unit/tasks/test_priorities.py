@@ -18,7 +18,7 @@ from hsp_control import (
     Robot,
     Task,
 )
-from hsp_control.control.composition import priority_of
+from hsp_control.control.setup import priority_of
 from hsp_control.tasks import AngularMomentum, RelativePose
 
 UP = (0.0, 0.0, 1.0)
@@ -122,8 +122,9 @@ def test_a_controller_s_levels(quadruped: Robot) -> None:
         ["FL_FOOT"],
         ["posture"],
     ]
+    found = {task.name: priority_of(task, quadruped) for task in controller.tasks}
     for name, priority in (("FR_FOOT", 1), ("FL_FOOT", 2), ("posture", 5)):
-        assert controller.priority_of(name) == priority
+        assert found[name] == priority
     # The placed tasks say what the user said, and no more.
     given = {task.name: task.priority for task in controller.tasks}
     assert given == {task.name: task.priority for task in tasks}

@@ -32,8 +32,7 @@ from hsp_control.companions.walking.estimation.leg_kinematics import (
 from hsp_control.constraints.contacts import Contact
 from hsp_control.control.controller import Controller
 from hsp_control.control.estimator import Estimator, RunningEstimator
-from hsp_control.control.log_channel import LogChannel
-from hsp_control.control.measurement import Inertial, Measurement
+from hsp_control.control.measurement import Inertial, LogChannel, Measurement
 from hsp_control.declaration.quantities import Names, NonNegative, Positive
 
 

@@ -17,8 +17,7 @@ from hsp_control.constraints.contacts import Contact
 from hsp_control.control.compensation.momentum_observer import RunningObserver
 from hsp_control.control.controller import Controller
 from hsp_control.control.estimator import Estimator, RunningEstimator
-from hsp_control.control.log_channel import LogChannel
-from hsp_control.control.measurement import Inertial, Measurement
+from hsp_control.control.measurement import Inertial, LogChannel, Measurement
 from hsp_control.declaration.quantities import Flag, Positive
 from hsp_control.robot import RobotState
 

@@ -16,7 +16,7 @@ import numpy as np
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import FrameNotFoundError, SimulationError
 from hsp_control.common.suggestions import did_you_mean, listing
-from hsp_control.control.log_channel import LogChannel
+from hsp_control.control.measurement import LogChannel
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Flag
 from hsp_control.declaration.quantities import Names as NameList

@@ -1,29 +1,25 @@
-"""The lock of a controller: other threads wait, and the thread that has it is told."""
+"""What guards a controller: a lock, and attributes that cannot be assigned."""
 
 import sys
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from threading import Lock
 from types import CodeType, FrameType
+from typing import Any, Generic, NoReturn, Self, TypeVar, overload
 
-from hsp_control.common.exceptions import ControllerError
+from hsp_control.common.exceptions import ControllerError, ImmutableError
 
 
 class StepLock:
-    """A lock that does not let a thread wait for itself.
+    """A lock: other threads wait for it, and the thread that has it is told.
 
     Whether it is the same thread is looked for when the lock is taken, among the
     functions that this thread runs: a step that gets it at once pays nothing for it.
-
-    Attributes:
-        acquire: Takes the lock; that of `threading.Lock`.
-        release: Gives it back.
-        holders: The code of the methods that hold the lock of their ``self._lock``.
     """
 
     def __init__(self, holders: Collection[CodeType]) -> None:
-        """Set which methods hold it."""
         lock = Lock()
         self.acquire, self.release = lock.acquire, lock.release
+        # code of the methods that hold the lock of their ``self._lock``
         self.holders = holders
 
     def wait(self) -> None:
@@ -54,3 +50,36 @@ class StepLock:
 
 
 _ENTER = StepLock.__enter__.__code__
+
+
+Value = TypeVar("Value")
+
+
+class ReadOnly(Generic[Value]):
+    """A property that refuses assignment; made by the decorator `read_only`."""
+
+    def __init__(self, get: Callable[[Any], Value], instead: str) -> None:
+        self._get, self._instead = get, instead
+        self.__doc__ = get.__doc__
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = f"{owner.__name__}.{name}"
+
+    @overload
+    def __get__(self, instance: None, owner: type) -> Self: ...
+
+    @overload
+    def __get__(self, instance: object, owner: type) -> Value: ...
+
+    def __get__(self, instance: object | None, owner: type) -> Value | Self:
+        return self if instance is None else self._get(instance)
+
+    def __set__(self, instance: object, value: object) -> NoReturn:
+        raise ImmutableError(f"{self._name} cannot be assigned: {self._instead}")
+
+
+def read_only(
+    instead: str = "build another one",
+) -> Callable[[Callable[[Any], Value]], ReadOnly[Value]]:
+    """Return a decorator for a read-only property."""
+    return lambda get: ReadOnly(get, instead)

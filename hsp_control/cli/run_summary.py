@@ -1,0 +1,115 @@
+"""What a run did: its tasks, what limits did to it, its speed, the size of its log."""
+
+from collections.abc import Iterator
+from time import perf_counter
+
+import numpy as np
+from rich.table import Table
+
+from hsp_control.simulation import Rollout
+from hsp_control.simulation.limit_excess import POSITION, VELOCITY
+from hsp_control.simulation.unreached import FAR, OUT, unreached
+
+
+def summary(rollout: Rollout) -> Table:
+    """Return what a run did, as a table."""
+    table = Table(show_header=False, box=None, pad_edge=False)
+    table.add_row(
+        "run", f"{len(rollout)} rows to t = {rollout.t[-1]:g} s, {rollout.status}"
+    )
+    tasks = rollout.meta["tasks"]
+    away = {each.task: each for each in unreached(rollout.columns, tasks)}
+    for task in tasks:
+        error = np.linalg.norm(rollout[f"task.{task}.error"], axis=1)
+        tracked = error[np.isfinite(error)]  # a task may be off for a while
+        if not len(tracked):
+            table.add_row(f"task {task}", "was never active")
+            continue
+        rms, last = float(np.sqrt(np.mean(tracked**2))), tracked[-1]
+        table.add_row(f"task {task}", f"|e| rms {rms:.3g}, at the end {last:.3g}")
+        for words, rows in ((FAR, away[task].far), (OUT, away[task].out > 0.0)):
+            if count := int(rows.sum()):
+                text = f"{count} rows: {words}"
+                if words == OUT and rows[-1]:
+                    text += f", {away[task].length(-1)} at the end"
+                table.add_row("", text)
+    norm = rollout["null_space_norm"]
+    table.add_row(
+        "null space", f"|e_N| {norm[0]:.3g} at the start, {norm[-1]:.3g} at the end"
+    )
+    table.add_row(
+        "det(J W⁻¹ Jᵀ)",
+        f"minimum {np.nanmin(rollout['manipulability']):.4g}, "
+        f"smallest singular value {np.nanmin(rollout['singular_values']):.3g}",
+    )
+    table.add_row("effort", f"largest {np.abs(rollout.tau).max():.3g}")
+    for row in limit_rows(rollout):
+        table.add_row("limits", row)
+    if damped := int((rollout["damped"] > 0.0).sum()):
+        table.add_row("singular", f"{damped} rows: the law was damped there, not exact")
+    return table
+
+
+def limit_rows(rollout: Rollout) -> Iterator[str]:
+    """Yield one sentence each; none where no limit was active and no joint beyond."""
+    if POSITION not in rollout.columns:
+        return
+    status = rollout["status"]
+    limited, relaxed = (int((status == s).sum()) for s in (2, 3))
+    if limited or relaxed:
+        yield f"{limited} rows limited of {len(rollout)}" + (
+            f", {relaxed} relaxed by up to {np.nanmax(rollout['relaxation']):.3g}"
+            if relaxed
+            else ""
+        )
+    yield from excess_rows(rollout)
+
+
+def excess_rows(rollout: Rollout) -> Iterator[str]:
+    """Yield where the robot was beyond its limits, a sentence each."""
+    if POSITION not in rollout.columns:
+        return
+    names = rollout.meta["robot"]["dofs"]
+    for column, of, per in ((POSITION, "position", ""), (VELOCITY, "speed", "/s")):
+        excess = rollout[column]
+        if rows := int((excess > 0.0).any(axis=1).sum()):
+            row, dof = np.unravel_index(np.nanargmax(excess), excess.shape)
+            unit = rollout.meta["robot"]["units"][dof] + per
+            yield (
+                f"{names[dof]} is {excess[row, dof]:.3g} {unit} beyond its {of} limit "
+                f"at {rollout.t[row]:g} s ({rows} rows): more than the model expected"
+            )
+
+
+class Stopwatch:
+    """Measures the wall time from the first row on: kernels are compiled before."""
+
+    def __init__(self) -> None:
+        self._first: float | None = None
+        self._last = 0.0
+
+    def lap(self) -> None:
+        """Record the time of a row."""
+        self._last = perf_counter()
+        if self._first is None:
+            self._first = self._last
+
+    def table_rows(self, rollout: Rollout) -> list[tuple[str, str]]:
+        """Return speed and size as rows of a table: name and text."""
+        rows = len(rollout)
+        size = sum(column.nbytes for column in rollout.columns.values())
+        found = [
+            ("log", f"{size / rows:.0f} bytes per row, {size / 1e6:.2g} MB in memory")
+        ]
+        took = 0.0 if self._first is None else self._last - self._first
+        if rows > 1 and took > 0.0:
+            simulated = float(rollout.t[-1] - rollout.t[0])
+            found.insert(
+                0,
+                (
+                    "speed",
+                    f"{simulated / took:.3g} times real time ({simulated:g} s in "
+                    f"{took:.2g} s, logging included)",
+                ),
+            )
+        return found

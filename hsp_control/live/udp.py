@@ -1,0 +1,256 @@
+"""A robot that is connected by UDP: the loop's end, and that of a simulated one."""
+
+import secrets
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from time import monotonic, sleep
+from typing import NamedTuple
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.control.measurement import Inertial, Measurement
+from hsp_control.live.link import LOOPBACK, Address, AgeEstimator, Faults, Kind, Link
+from hsp_control.live.real_time import no_garbage_collection
+from hsp_control.live.safe_stop import Phase
+from hsp_control.live.simulated_robot import SimulatedRobot
+from hsp_control.robot import Robot
+
+_EACH = 6
+"""Numbers of a wrench, and of what an inertial measurement unit reports."""
+
+
+class SensorLayout(NamedTuple):
+    """The sensors that both ends of a connection know.
+
+    The numbers of a state are q, v, then six of each wrench in this order, then those
+    of the inertial measurement unit (angular velocity, specific force), and at the end
+    the effort that the robot has, if it has one.
+
+    Attributes:
+        wrenches: The frames whose wrench is measured; see `Measurement.wrenches`.
+        inertial: The frame of the inertial measurement unit; None: there is none.
+    """
+
+    wrenches: tuple[str, ...] = ()
+    inertial: str | None = None
+
+    @classmethod
+    def of(cls, measured: Measurement) -> "SensorLayout":
+        """Return the layout of what a robot measures."""
+        unit = measured.inertial
+        return cls(tuple(measured.wrenches), None if unit is None else unit.frame)
+
+    def pack(self, measured: Measurement) -> Array:
+        """Return the numbers of a measurement with these sensors, shape (n,)."""
+        parts = [measured.q, measured.v]
+        parts += [measured.wrenches[frame] for frame in self.wrenches]
+        if measured.inertial is not None:
+            parts += measured.inertial[1:]
+        if measured.applied is not None:
+            parts.append(measured.applied)
+        return np.concatenate(parts)
+
+    def unpack(self, numbers: Array, robot: Robot) -> Measurement:
+        """Return a measurement from its numbers; number and time of it are 0.
+
+        With too few or too many numbers the last parts have wrong shapes, for
+        `valid_measurement` to refuse.
+        """
+        sizes = [robot.nq, robot.nv] + [_EACH] * len(self.wrenches)
+        sizes += [3, 3] if self.inertial is not None else []
+        q, v, *rest = np.split(numbers, np.cumsum(sizes))
+        inertial = None
+        if self.inertial is not None:
+            inertial = Inertial(self.inertial, rest[-3], rest[-2])
+        return Measurement(
+            0,
+            0.0,
+            q,
+            v,
+            applied=rest[-1] if rest[-1].size else None,
+            wrenches=dict(zip(self.wrenches, rest, strict=False)),
+            inertial=inertial,
+        )
+
+
+_BYES = 3
+"""Number of BYE packets that are sent: one may be lost."""
+
+
+class UdpHardware:
+    """`Hardware` that exchanges `packets` with a robot, for example a simulated one.
+
+    The robot sends its states to `address` with the number `session`; its own address
+    is taken from its first packet.
+
+    Attributes:
+        period: Time between two states [s].
+        link: The connection, with its counts of packets.
+        closed: Whether `close` was called.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        period: float,
+        *,
+        address: Address = (LOOPBACK, 0),
+        session: int | None = None,
+        faults: Faults | None = None,
+        sensors: SensorLayout | None = None,
+    ) -> None:
+        """Open the socket.
+
+        Args:
+            robot: The model; gives the sizes nq and nv.
+            period: Time between two states [s].
+            address: Where to listen; port 0: any free port.
+            session: A number that the robot knows; None: a random one.
+            faults: Faults to inject into the efforts sent.
+            sensors: What the robot measures besides q and v; None: nothing.
+
+        Raises:
+            HardwareError: If the address does not exist or is in use.
+        """
+        self.period = period
+        self._robot = robot
+        self._sensors = SensorLayout() if sensors is None else sensors
+        session = secrets.randbits(63) if session is None else session
+        self.link = Link(session, address, faults=faults, stream=1)
+        self._age_estimator = AgeEstimator()
+        self.closed = False
+
+    @property
+    def address(self) -> Address:
+        """The address to which the robot must send its states."""
+        return self.link.address
+
+    @property
+    def session(self) -> int:
+        """The number of the session, which the robot must know."""
+        return self.link.session
+
+    def read(self, timeout: float) -> Measurement | None:
+        """Return the newest state; see `Hardware.read`."""
+        states = [p for p in self.link.receive(timeout) if p.kind is Kind.STATE]
+        for packet in states:
+            age = self._age_estimator.age(monotonic(), 1e-9 * packet.stamp)
+        if not states:
+            return None
+        measured = self._sensors.unpack(packet.payload, self._robot)
+        return measured._replace(
+            sequence=packet.sequence,
+            t=packet.t,
+            age=age,
+            halted=packet.phase > Phase.RUNNING,
+        )
+
+    def write(self, effort: Array) -> None:
+        """Send an effort; see `Hardware.write`."""
+        self.link.send(Kind.EFFORT, effort)
+
+    def close(self) -> None:
+        """Send the end of the session; packets that still arrive can be counted."""
+        if not self.closed and self.link.peer is not None:
+            for _ in range(_BYES):
+                self.link.send(Kind.BYE)
+        self.closed = True
+
+    def drain(self) -> None:
+        """Count the packets that arrived after `close`, and close the socket."""
+        self.link.receive(0.0)
+        self.link.close()
+
+
+CLOSED_BY_LOOP = "the loop closed the connection"
+"""Why a robot stops at the regular end of a run."""
+
+
+@dataclass
+class ServerReport:
+    """What `serve` counted."""
+
+    # number of efforts that were ignored, because they were computed from a state older
+    # than the watchdog's limit
+    outdated: int = 0
+    # by how much the robot's time fell behind real time, because its process did not
+    # get the processor [s]
+    overrun: float = 0.0
+    never_started: bool = False  # whether no effort arrived
+
+
+Row = Callable[[float, Array, Array, bool], object]
+"""Called with t [s], q, shape (nq,), and v, shape (nv,), at the beginning of a period,
+and whether it is the last one."""
+
+
+def serve(
+    robot: SimulatedRobot,
+    link: Link,
+    *,
+    stop_reason: Callable[[], str | None],
+    start_timeout: float = 60.0,
+    on_row: Row | None = None,
+) -> ServerReport:
+    """Run a robot in real time, until it has stopped and was held.
+
+    Each period: receive efforts, advance the plant, send the state. An effort that
+    arrives within the period of its state acts from that state on, as if it had been
+    computed in no time; a later one acts from the next period on.
+
+    If this process overruns by more than a period, the robot's time stands still
+    meanwhile, so that the loop's efforts do not count as late.
+
+    Args:
+        robot: The robot, waiting for its first effort.
+        link: The connection; its peer is known.
+        stop_reason: Called every period; returns a reason to stop, or None.
+        start_timeout: Longest time to wait for the first effort [s].
+        on_row: Called after the state was sent, in the rest of the period.
+
+    Returns:
+        The counts.
+    """
+    report, nv = ServerReport(), robot.plant.robot.nv
+    sensors = SensorLayout.of(robot.measured())
+    state_sequence = 0
+    with no_garbage_collection():
+        begin = monotonic()
+        give_up = begin + start_timeout
+        while True:
+            begin += robot.period
+            now = monotonic()
+            if now < begin:
+                sleep(begin - now)
+            elif now - begin > robot.period:
+                report.overrun += now - begin
+                begin = now
+            efforts = []
+            for packet in link.receive(0.0):
+                if packet.kind is Kind.BYE:
+                    robot.halt(CLOSED_BY_LOOP)
+                elif packet.kind is Kind.EFFORT and len(packet.payload) == nv:
+                    if state_sequence - packet.acks > robot.watchdog:
+                        report.outdated += 1
+                    else:
+                        efforts.append(packet.payload)
+            reason = stop_reason()
+            if robot.phase == Phase.WAITING and not efforts:
+                if reason is not None or monotonic() > give_up or robot.halted:
+                    report.never_started = True
+                    return report
+            elif reason is not None:
+                robot.halt(reason)
+            t, q, v = robot.t, robot.q, robot.v
+            robot.advance(efforts)
+            state = sensors.pack(robot.measured())
+            with suppress(OSError):  # a line that fails loses packets
+                link.send(Kind.STATE, state, t=robot.t, phase=int(robot.phase))
+            state_sequence = link.counts["sent"]
+            done = robot.done
+            if on_row is not None and robot.t > t:
+                on_row(t, q, v, done)
+            if done:
+                return report
