@@ -168,9 +168,6 @@ def robots(options: argparse.Namespace) -> int:
     if options.name is not None:
         _describe(Robot.load(options.name))
         return 0
-    if options.markdown:
-        print(robot_table.markdown(), end="")
-        return 0
     found = list(
         track(
             robot_table.rows(),

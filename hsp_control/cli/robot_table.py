@@ -48,20 +48,6 @@ REMARKS = {
 
 FLOATING = "floating base: needs contacts"
 NO_URDF = "has no URDF (only SDF, which is not read)"
-_PREFACE = """\
-# Robots
-
-The robots that `Robot.load` finds by name, as printed by `hsp robots` and `hsp robots
---markdown`. Any other robot is loaded by the path of its URDF:
-[your own robot](own_robot.md), or from an MJCF: [MuJoCo](mujoco.md).
-
-The end effector is the frame that the robot's source names; if it names none, it is the
-most likely frame in the tree of joints (`Robot.end_effector`). *Position* and *pose*
-give the rank of these tasks at the end effector, and how many of its joints remain
-for self-motion: 3 + 4 for an arm with seven joints. Every robot with a number there is
-simulated in `tests/integration/test_every_robot.py`. Robots with a floating base, which
-need contacts, are simulated there with `root: fixed`.
-"""
 
 
 @dataclass(frozen=True)
@@ -102,30 +88,6 @@ def rows() -> Iterator[Row]:
         yield Row(name, "example-robot-data", "-", note=NO_URDF)
 
 
-def markdown() -> str:
-    """Return the table as the document ``docs/robots.md``."""
-    headings = (
-        *("robot", "root", "nq", "nv", "end effector"),
-        *("joints to it", "position", "pose", "note"),
-    )
-    lines = [
-        *_PREFACE.splitlines(),
-        "",
-        f"| {' | '.join(headings)} |",
-        "|---|---|--:|--:|---|--:|---|---|---|",
-    ]
-    for row in rows():
-        cells = (
-            row.name + (" (bundled)" if row.origin == "bundled" else ""),
-            *(row.root.replace("_", "-"), _number(row.nq), _number(row.nv)),
-            f"`{row.end_effector}`" if row.end_effector else "-",
-            _number(row.joints or None),
-            *(task(row, row.position, 3), task(row, row.pose, 6), row.note),
-        )
-        lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines) + "\n"
-
-
 def text(found: Sequence[Row]) -> Iterator[str]:
     """Yield the table's lines, of at most 80 characters."""
     headings = ("nv", "end effector", "position", "pose")
@@ -135,7 +97,7 @@ def text(found: Sequence[Row]) -> Iterator[str]:
             if row.origin != origin:
                 continue
             tasks = task(row, row.position, 3), task(row, row.pose, 6)
-            yield _line(row.name, _number(row.nv), row.end_effector or "-", *tasks)
+            yield _line(row.name, number(row.nv), row.end_effector or "-", *tasks)
             note = row.note.replace("`", "")
             yield from textwrap.wrap(
                 note, 76, initial_indent="    ", subsequent_indent="    "
@@ -206,5 +168,6 @@ def abilities(robot: Robot) -> dict[str, int]:
     }
 
 
-def _number(value: int | None) -> str:
+def number(value: int | None) -> str:
+    """Return a number as the table has it; a dash for none."""
     return "-" if value is None else str(value)

@@ -160,7 +160,6 @@ def command_line() -> argparse.ArgumentParser:
     )
     complete(name, bundled_robots)
     which.add_argument("--json", action="store_true", help="print JSON")
-    which.add_argument("--markdown", action="store_true", help="print docs/robots.md")
 
     add_inspect(_command(commands, "inspect", "say what is odd about a robot's URDF"))
     doctor = _command(commands, "doctor", "say what this machine lacks")

@@ -42,7 +42,7 @@ from hsp_control.live import (
     LoopReport,
     OperatorRequests,
     SimulatedRobot,
-    backends,
+    hardware,
     run_loop,
 )
 from hsp_control.live.simulated_robot import sampled
@@ -298,7 +298,7 @@ def test_the_command_line_drives_the_arm(
     entry = EntryPoint(
         "franka", "franka_arms:connect_patiently", "hsp_control.hardware"
     )
-    monkeypatch.setattr(backends, "entry_points", lambda group: {"franka": entry})
+    monkeypatch.setattr(hardware, "entry_points", lambda group: {"franka": entry})
     later = PUSH | {"start": 0.9}
     experiment = circle(plant={"type": "rigid_body", "pushes": [later]})
     file = tmp_path / "circle.yaml"
