@@ -2,19 +2,26 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from itertools import count
+from operator import is_
 from os import PathLike
 from pathlib import Path
-from typing import Any, Literal, NoReturn, Self
+from time import monotonic, sleep
+from typing import Any, Literal, NoReturn, Self, cast
 
 import yaml
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ConfigError, ImmutableError, ModelError
+from hsp_control.common.exceptions import (
+    ConfigError,
+    ImmutableError,
+    ModelError,
+    SceneError,
+)
 from hsp_control.config.document import Document
 from hsp_control.config.loaded_scenario import LoadedScenario, load_scenario
 from hsp_control.config.loop_check import check_compensation, check_rates
-from hsp_control.config.named_obstacles import named_obstacles
 from hsp_control.config.scenario import Scenario
 from hsp_control.config.source import read_document
 from hsp_control.config.view_settings import ViewSettings
@@ -26,6 +33,7 @@ from hsp_control.control.controller import Controller
 from hsp_control.control.estimator import Estimator, begun
 from hsp_control.control.plan import Plan
 from hsp_control.control.setup import Base
+from hsp_control.declaration import Part
 from hsp_control.declaration.named import keyed
 from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.plain_data import plain_data
@@ -40,7 +48,6 @@ from hsp_control.robot.integrators import Integrator
 from hsp_control.simulation import Rollout, simulate
 from hsp_control.simulation.initial_state import InitialState
 from hsp_control.simulation.plants import Plant, PlantPart, SampledPlant
-from hsp_control.simulation.real_time import in_real_time
 from hsp_control.simulation.recorder import Recorder
 from hsp_control.simulation.settings import SimulationSettings
 from hsp_control.simulation.simulate import check_steps
@@ -135,7 +142,7 @@ class Experiment:
                 `load_experiment`.
         """
         terms = () if field is None else tuple(terms_of(field))
-        scene, (terms, limits, changes) = named_obstacles(
+        scene, (terms, limits, changes) = _named_obstacles(
             scene if isinstance(scene, Scene) else Scene(scene),
             (terms, limits, tuple(changes)),
         )
@@ -297,7 +304,7 @@ class Experiment:
         """
         settings = self.scenario.simulation
         if self.hears:
-            on_row = in_real_time(settings.log_period, on_row)
+            on_row = _in_real_time(settings.log_period, on_row)
         return simulate(
             self.controller,
             self.q0,
@@ -385,3 +392,44 @@ def _description(robot: str | Robot | RobotDescription) -> RobotDescription:
             "name it; give a name, a path or a RobotDescription"
         )
     return robot.description
+
+
+def _named_obstacles(scene: Scene, parts: Any) -> tuple[Scene, Any]:
+    """Return the scene with the parts' own obstacles, and parts with their names."""
+    known = dict(scene)
+
+    def named(value: Any) -> Any:
+        if isinstance(value, Obstacle):
+            if known.setdefault(value.name, value) != value:
+                raise SceneError(f"two obstacles have the name {value.name!r}")
+            return value.name
+        if isinstance(value, tuple):
+            new = tuple(map(named, value))
+            return value if all(map(is_, value, new)) else new
+        if isinstance(value, Part):
+            fields = value.all_fields()
+            found = {name: named(each) for name, each in fields.items()}
+            changed = {k: each for k, each in found.items() if each is not fields[k]}
+            return replace(cast("Any", value), **changed) if changed else value
+        return value
+
+    parts = named(parts)
+    return (scene if len(known) == len(scene) else Scene(known.values())), parts
+
+
+def _in_real_time(
+    period: float, on_row: Callable[[Recorder], None] | None
+) -> Callable[[Recorder], None]:
+    """Return what keeps a simulation pace with the clock, called after every row."""
+    rows, begin = count(), monotonic()
+
+    def wait(recorder: Recorder) -> None:
+        nonlocal begin
+        if on_row is not None:
+            on_row(recorder)
+        row = next(rows)
+        if row == 0:
+            begin = monotonic()  # kernels are compiled now
+        sleep(max(begin + row * period - monotonic(), 0.0))
+
+    return wait

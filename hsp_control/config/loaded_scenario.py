@@ -6,12 +6,15 @@ from typing import NamedTuple
 
 from hsp_control.common.arrays import Array
 from hsp_control.config.document import Document
-from hsp_control.config.located_scene import located_scene
 from hsp_control.config.scenario import Scenario
 from hsp_control.config.streams import with_messages
 from hsp_control.config.validation import validate
-from hsp_control.geometry.scene import Scene
+from hsp_control.declaration import within
+from hsp_control.geometry.scene import Obstacle, Scene
+from hsp_control.geometry.shapes import Mesh
 from hsp_control.robot import Robot
+from hsp_control.robot.description.access import Access
+from hsp_control.robot.description.mesh_files import check_references
 
 
 class LoadedScenario(NamedTuple):
@@ -59,3 +62,19 @@ def load_robot(document: Document, scenario: Scenario) -> Robot:
     keys = [key for key in ("name", "description") if getattr(scenario.robot, key)]
     with document.at("robot", *keys):
         return Robot.load(scenario.robot, access=document.access)
+
+
+def located_scene(scene: Scene, folder: Path, access: Access) -> Scene:
+    """Return the scene with absolute paths of its meshes, checked."""
+    return Scene([_located(each, folder, access) for each in scene.values()])
+
+
+def _located(obstacle: Obstacle, folder: Path, access: Access) -> Obstacle:
+    with within("scene", "obstacles", obstacle.name, "shape"):
+        shape = obstacle.shape.located(folder)
+        if isinstance(shape, Mesh):
+            with within("file"):
+                access.check(Path(shape.file), "mesh")
+                check_references(Path(shape.file), "mesh", access)
+        shape.geometry()  # fails here, where the error has a location
+        return replace(obstacle, shape=shape)

@@ -34,21 +34,13 @@ from hsp_control.law.samples import VARYING, FieldSample, MetricSample, TaskSamp
 
 
 class LevelScratch(NamedTuple):
-    """Memory of `resolve_levels` between its steps.
+    """Memory of `resolve_levels` between its steps."""
 
-    Attributes:
-        Q: Shape (nv, nv); the last null space's Q_K = P W⁻¹ afterwards.
-        QJ: Q_{k-1} J_kᵀ of all levels side by side, shape (nv, m).
-        G_inverse: q(G_k) of all levels along the diagonal, shape (m, m).
-        square: Shape (2, m, m).
-        rows: Shape (6, max(nv, m)).
-    """
-
-    Q: Array
-    QJ: Array
-    G_inverse: Array
-    square: Array
-    rows: Array
+    Q: Array  # (nv, nv); the last null space's Q_K = P W⁻¹ afterwards
+    QJ: Array  # Q_{k-1} J_kᵀ of all levels side by side, shape (nv, m)
+    G_inverse: Array  # q(G_k) of all levels along the diagonal, shape (m, m)
+    square: Array  # (2, m, m)
+    rows: Array  # (6, max(nv, m))
 
 
 @kernel

@@ -32,14 +32,7 @@ class Record(NamedTuple):
 
     @classmethod
     def over(cls, memory: Array, rows: int, nv: int) -> "Record":
-        """Return the record of m = ``rows`` rows whose arrays are views of ``memory``.
-
-        Args:
-            memory: J, J', e, e', a_x, g, g', e_N and a one after another, shape
-                (2 m nv + 3 m + 4 nv,).
-            rows: m.
-            nv: Degrees of freedom.
-        """
+        """Return the record of m = ``rows`` rows: its arrays are views of ``memory``."""
         square, ends = rows * nv, 2 * rows * nv + 3 * rows
         vectors = memory[2 * square : ends].reshape(3, rows)
         joints = memory[ends:].reshape(4, nv)
@@ -69,13 +62,7 @@ class Problem:
     """
 
     def __init__(self, rows: int, nv: int, gain: Array) -> None:
-        """Allocate for a number of rows and of degrees of freedom.
-
-        Args:
-            rows: Number of rows.
-            nv: Degrees of freedom.
-            gain: K_N; the law reads this very array.
-        """
+        """Allocate for a number of rows and of degrees of freedom."""
         self.record = Record.allocate(rows, nv)
         self.task = self.record.task
         self.field = self.record.field

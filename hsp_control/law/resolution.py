@@ -25,65 +25,40 @@ from hsp_control.law.threshold import NOT, Following, write_thresholds
 
 
 class Resolved(NamedTuple):
-    """The law's result at one state.
+    """The law's result at one state."""
 
-    Attributes:
-        acceleration: a, shape (nv,).
-        null_space_error: e_N = P(g - v), shape (nv,).
-        outcome: Whether the law is exact.
-    """
-
-    acceleration: Array
-    null_space_error: Array
-    outcome: Outcome
+    acceleration: Array  # a, shape (nv,)
+    null_space_error: Array  # e_N = P(g - v), shape (nv,)
+    outcome: Outcome  # whether the law is exact
 
 
 class Factors(NamedTuple):
-    """The two factors of the stack's pseudo-inverse, see `weighted_pseudo_inverse`.
+    """The two factors of the stack's pseudo-inverse, see `weighted_pseudo_inverse`."""
 
-    Attributes:
-        Q: Shape (m, nv).
-        X: Shape (m, m).
-    """
-
-    Q: Array
-    X: Array
+    Q: Array  # (m, nv)
+    X: Array  # (m, m)
 
 
 class Projectors(NamedTuple):
     """What `resolve_levels` leaves of its projectors, where it was needed.
 
     Level k takes Q_{k-1} J_kᵀ q(G_k) J_k Q_{k-1} of W⁻¹, and leaves Q_k.
-
-    Attributes:
-        Q: What the last level leaves, Q_K = P W⁻¹, shape (nv, nv).
-        QJ: Q_{k-1} J_kᵀ of all levels side by side, shape (nv, m).
-        G_inverse: q(G_k) of all levels along the diagonal, shape (m, m).
     """
 
-    Q: Array
-    QJ: Array
-    G_inverse: Array
+    Q: Array  # what the last level leaves, Q_K = P W⁻¹, shape (nv, nv)
+    QJ: Array  # Q_{k-1} J_kᵀ of all levels side by side, shape (nv, m)
+    G_inverse: Array  # q(G_k) of all levels along the diagonal, shape (m, m)
 
 
 class Scratch(NamedTuple):
-    """Memory of the law between its steps.
+    """Memory of the law between its steps."""
 
-    Attributes:
-        factors: The stack's pseudo-inverse.
-        wide: Shape (m, nv).
-        square: Shape (3, m, m).
-        rows: Shape (7, max(m, nv)).
-        tall: Shape (nv, m); for levels in conflict.
-        inner: Shape (nv, nv); for levels in conflict.
-    """
-
-    factors: Factors
-    wide: Array
-    square: Array
-    rows: Array
-    tall: Array
-    inner: Array
+    factors: Factors  # the stack's pseudo-inverse
+    wide: Array  # (m, nv)
+    square: Array  # (3, m, m)
+    rows: Array  # (7, max(m, nv))
+    tall: Array  # (nv, m); for levels in conflict
+    inner: Array  # (nv, nv); for levels in conflict
 
 
 class Resolution:
@@ -115,17 +90,7 @@ class Resolution:
         threshold: float,
         following: Following = NOT,
     ) -> None:
-        """Allocate.
-
-        Args:
-            levels: Rows of each level, the highest priority first.
-            nv: Number of degrees of freedom.
-            form: The metric's form.
-            gain: Null-space gain K_N, shape (nv, nv) [1/s].
-            threshold: ε_0, the singular value of the whitened Jacobian below which its
-                inverse is always bounded.
-            following: How the threshold follows what the feedback asks for.
-        """
+        """Allocate."""
         m = sum(levels)
         self.problem = Problem(m, nv, gain)
         self.ends: Indices = np.cumsum([*levels] or [0], dtype=np.int64)
@@ -152,22 +117,12 @@ class Resolution:
         self._triangles: dict[int, tuple[Callable[[], float], Array, Array]] = {}
 
     def resolve(self, v: Array, *, controls_null_space: bool = True) -> Resolved:
-        """Return the acceleration that tracks the tasks and the field.
-
-        Args:
-            v: Velocity, shape (nv,).
-            controls_null_space: False for φ_N = 0, the paper's first simulation.
-        """
+        """Return the acceleration that tracks the tasks and the field."""
         code = self.compile(v, controls=controls_null_space)()
         return Resolved(self.acceleration, self.null_space_error, outcome_of(code))
 
     def compile(self, v: Array, *, controls: bool) -> Callable[[], float]:
-        """Return the call that `resolve` makes; it returns what `outcome_of` takes.
-
-        Args:
-            v: The velocity, shape (nv,); the call reads this array each time.
-            controls: False for φ_N = 0.
-        """
+        """Return the call that `resolve` makes; it returns what `outcome_of` takes."""
         problem = self.problem
         alone = self.alone
         return bind(

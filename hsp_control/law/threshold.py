@@ -29,15 +29,11 @@ MODEST, MODEST_ON_LEGS = 1.0, 10.0
 
 
 class Following(NamedTuple):
-    """How the threshold follows what is asked for.
+    """How the threshold follows what is asked for."""
 
-    Attributes:
-        steepest: L [rad/s² for each unit of a singular value]; inf: it does not follow.
-        modest: f_0 [m/s² or rad/s²].
-    """
-
+    # L [rad/s² for each unit of a singular value]; inf: it does not follow
     steepest: float
-    modest: float
+    modest: float  # f_0 [m/s² or rad/s²]
 
     @classmethod
     def of(cls, size: float, *, on_legs: bool) -> Self:

@@ -218,13 +218,6 @@ class Link:
     Every received packet is one of: accepted; corrupted (incomplete or changed);
     foreign (of another session); duplicated (the newest again); stale (older than the
     newest). `receive` returns the accepted ones only.
-
-    Attributes:
-        session: Number of the session, the same at both ends.
-        address: Address of this end.
-        peer: Address of the other end; None until a packet arrived from it.
-        newest: Sequence number of the newest accepted packet.
-        counts: Number of packets of each kind above, and of packets ``sent``.
     """
 
     def __init__(
@@ -236,18 +229,7 @@ class Link:
         faults: Faults | None = None,
         stream: int = 0,
     ) -> None:
-        """Open the socket.
-
-        Args:
-            session: A number that both ends know.
-            address: Where to listen; port 0: any free port.
-            peer: The other end; None: the sender of the first packet of the session.
-            faults: Faults to inject into the packets sent.
-            stream: Stream of the faults' random numbers.
-
-        Raises:
-            HardwareError: If the address does not exist or is in use.
-        """
+        """Open the socket."""
         self.session, self.peer = session, peer
         self._faults = FaultInjector(faults or Faults(), stream)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -283,17 +265,7 @@ class Link:
     def send(
         self, kind: Kind, payload: Array = _NOTHING, *, t: float = 0.0, phase: int = 0
     ) -> None:
-        """Send a packet; if the other end has closed, nothing happens.
-
-        Args:
-            kind: What the packet is.
-            payload: The numbers, shape (n,).
-            t: Time of the payload [s].
-            phase: The robot's phase.
-
-        Raises:
-            HardwareError: If the other end's address is not known yet.
-        """
+        """Send a packet; if the other end has closed, nothing happens."""
         if self.peer is None:
             raise HardwareError("no packet of the robot has arrived yet")
         self._sent += 1

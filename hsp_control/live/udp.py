@@ -27,13 +27,11 @@ class SensorLayout(NamedTuple):
     The numbers of a state are q, v, then six of each wrench in this order, then those
     of the inertial measurement unit (angular velocity, specific force), and at the end
     the effort that the robot has, if it has one.
-
-    Attributes:
-        wrenches: The frames whose wrench is measured; see `Measurement.wrenches`.
-        inertial: The frame of the inertial measurement unit; None: there is none.
     """
 
+    # the frames whose wrench is measured; see `Measurement.wrenches`
     wrenches: tuple[str, ...] = ()
+    # the frame of the inertial measurement unit; None: there is none
     inertial: str | None = None
 
     @classmethod

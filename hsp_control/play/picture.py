@@ -21,6 +21,7 @@ from hsp_control.visualization.viewer.appearance import CHALK, INK
 from hsp_control.visualization.viewer.commands import (
     Command,
     delete,
+    path_element,
     play_command,
     typed_array,
 )
@@ -32,7 +33,6 @@ from hsp_control.visualization.viewer.measured_links import (
 from hsp_control.visualization.viewer.motion import Motion
 from hsp_control.visualization.viewer.obstacle_layer import ObstacleLayer
 from hsp_control.visualization.viewer.run_drawing import Layer, RunDrawing, all_layers
-from hsp_control.visualization.viewer.scene_path import path_element
 
 FRAME = 1.0 / 30.0  # time between two pictures [s]
 _FIELD_LAYERS = ("influence", "distances", "capsules")

@@ -24,7 +24,7 @@ from hsp_control.simulation.loops import Instant, sampled_loop
 from hsp_control.simulation.plants import Plant
 from hsp_control.simulation.plants.push import Pushes, Spring
 from hsp_control.simulation.recorder import Recorder
-from hsp_control.visualization.viewer.scene_path import path_element
+from hsp_control.visualization.viewer.commands import path_element
 
 ROW = 0.01
 """Time between two rows of the log, at which messages are taken [s]; whole periods."""

@@ -31,17 +31,7 @@ class JointFriction:
     def of(
         cls, robot: Robot, coulomb: ArrayLike = 0.0, viscous: ArrayLike = 0.0
     ) -> Self:
-        """Return friction from one number for all joints, or nv numbers.
-
-        Args:
-            robot: The robot.
-            coulomb: One number or shape (nv,) [N·m or N].
-            viscous: One number or shape (nv,) [N·m·s/rad or N·s/m].
-
-        Raises:
-            SimulationError: If a number is negative or not finite, or there are not 1
-                or nv numbers.
-        """
+        """Return friction from one number for all joints, or nv numbers."""
         given = Friction(coulomb, viscous)
         with within("coulomb"):
             dry = per_dof(robot, given.coulomb)
@@ -65,9 +55,5 @@ class Friction(Part, error=SimulationError):
     """Viscous friction [N·m·s/rad or N·s/m], one number or nv."""
 
     def of(self, robot: Robot) -> JointFriction:
-        """Return the friction of each joint of a robot.
-
-        Raises:
-            SimulationError: If there are not 1 or nv numbers.
-        """
+        """Return the friction of each joint of a robot."""
         return JointFriction.of(robot, self.coulomb, self.viscous)

@@ -175,14 +175,6 @@ class MujocoCoordinates:
         """Return the coordinates of a robot in a compiled MuJoCo model.
 
         Its joints are found by their names; the model may contain more.
-
-        Args:
-            robot: The robot, for example from `Robot.from_mujoco`.
-            model: The compiled model, a ``mujoco.MjModel``.
-
-        Raises:
-            JointNotFoundError: If the model lacks a joint of the robot.
-            ModelError: If MuJoCo has no joint of that kind.
         """
         joints = joints_of(robot)
         known = {name: i for i, name in enumerate(Names(model).joints)}

@@ -45,12 +45,7 @@ class EffortSource(Protocol):
         """
 
     def applied(self, tau: Array, period: float) -> None:
-        """Record the effort, shape (nv,), that the motors really apply.
-
-        Args:
-            tau: The effort after all limits, shape (nv,).
-            period: Time until the next effort [s].
-        """
+        """Record the effort, shape (nv,), that the motors really apply."""
 
     def log_channels(self) -> Mapping[str, LogChannel]:
         """Return what it logs of the last effort besides the controller, by name."""

@@ -98,15 +98,7 @@ class InitialState(Part, error=ConfigurationError):
         return _put_on_ground(self.ground, list(contacts), robot, q)
 
     def velocity_of(self, controller: Controller, q: Array) -> Array:
-        """Return the start velocity, shape (nv,).
-
-        Args:
-            controller: The controller, whose flow it may be.
-            q: The start configuration, shape (nq,).
-
-        Raises:
-            ShapeError: If there are not nv numbers.
-        """
+        """Return the start velocity, shape (nv,)."""
         robot = controller.robot
         if isinstance(self.velocity, str):
             flows = self.velocity == "flow"

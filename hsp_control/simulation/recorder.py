@@ -1,6 +1,6 @@
 """Records a rollout row by row, into columns that are allocated before the run."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -8,6 +8,9 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.identity_cache import IdentityCache
+from hsp_control.common.kernels import kernel
+from hsp_control.common.native import bind
+from hsp_control.common.step_plan import CallSequence, merged
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.controller import Controller
 from hsp_control.control.measurement import LogChannel
@@ -21,7 +24,6 @@ from hsp_control.simulation.limit_excess import VELOCITY, LimitExcess
 from hsp_control.simulation.log_columns import LogColumns
 from hsp_control.simulation.repeatable import repeatable
 from hsp_control.simulation.rollout import FORMAT, Rollout, complete_columns
-from hsp_control.simulation.row_copies import RowCopies
 from hsp_control.simulation.run_meta import (
     continuous_dofs,
     null_space_meta,
@@ -33,6 +35,26 @@ from hsp_control.simulation.task_columns import TaskColumns
 from hsp_control.simulation.term_columns import TermColumns
 
 _EFFORT_UNITS = {"rad": "N·m", "m": "N"}
+
+
+class RowCopies:
+    """Copies arrays to a row of their columns, ten times as fast as Python."""
+
+    def __init__(self, pairs: Iterable[tuple[Array, Array]]) -> None:
+        copies = [bind(_copy, *pair, timed=True) for pair in pairs]
+        self._write = merged(CallSequence(*copies))
+
+    def write(self, row: int) -> None:
+        """Write a row."""
+        self._write(float(row))
+
+
+@kernel
+def _copy(source: Array, column: Array, row: float) -> None:
+    """Write a row of a column; the row comes as the time does in other calls."""
+    i = int(row)
+    for j in range(source.shape[0]):
+        column[i, j] = source[j]
 
 
 class Recorder:

@@ -80,15 +80,6 @@ class Impedance(Part, error=GainError):
 
         Numbers between those of two impedances are those of an impedance as well, so
         that one may change into the other. `parts_of` takes it apart.
-
-        Args:
-            parts: The parts of the error.
-
-        Returns:
-            Shape (2 rows + 3, rows).
-
-        Raises:
-            GainError: If one of them has another size.
         """
         rows = sum(part.size for part in parts)
         out = np.zeros((2 * rows + 3, rows))
@@ -111,11 +102,7 @@ class Impedance(Part, error=GainError):
 
 
 def parts_of(numbers: Array) -> tuple[Array, Array, Array, Array, Array]:
-    """Return views: K and D, shape (m, m), ζ, 1/largest error, 1/largest force, (m,).
-
-    Args:
-        numbers: The five of them, one below the other, shape (2 m + 3, m).
-    """
+    """Return views: K, D (m, m), and ζ, 1/largest error, 1/largest force (m,)."""
     m = numbers.shape[1]
     K, D, rest = numbers[:m], numbers[m : 2 * m], numbers[2 * m :]
     return K, D, rest[0], rest[1], rest[2]

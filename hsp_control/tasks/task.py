@@ -37,19 +37,15 @@ class Feedback(NamedTuple):
 
     The controller owns these arrays and changes them in place: gains by events, the
     offset by compensators such as integral action.
-
-    Attributes:
-        Kp: Position gain, shape (m, m) [1/s²].
-        Kv: Velocity gain, shape (m, m) [1/s].
-        offset: Additional term of the error equation, shape (m,) [m/s² or rad/s²];
-            zero unless a compensator writes it.
-        largest: Of each part of e that is bounded: its first row, the row after its
-            last, and its largest length, shape (parts, 3) [-, -, m or rad].
     """
 
-    Kp: Array
-    Kv: Array
+    Kp: Array  # position gain, shape (m, m) [1/s²]
+    Kv: Array  # velocity gain, shape (m, m) [1/s]
+    # additional term of the error equation, shape (m,) [m/s² or rad/s²]; zero unless a
+    # compensator writes it
     offset: Array
+    # of each part of e that is bounded: its first row, the row after its last, and its
+    # largest length, shape (parts, 3) [-, -, m or rad]
     largest: Array = _UNBOUNDED
 
 

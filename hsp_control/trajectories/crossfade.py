@@ -167,17 +167,7 @@ class OrientationOf(OrientationTrajectory):
 def crossfade(
     before: AnyReference, after: AnyReference, *, start_time: float, duration: float
 ) -> AnyReference:
-    """Return the smooth change from one reference to another of the same kind.
-
-    Args:
-        before: The reference until the change.
-        after: The reference from the end of the change on.
-        start_time: When the change begins [s].
-        duration: How long it takes [s].
-
-    Raises:
-        TrajectoryError: If they are of different kinds.
-    """
+    """Return the smooth change from one reference to another of the same kind."""
     t0, T = start_time, duration
     if isinstance(before, Trajectory) and isinstance(after, Trajectory):
         return Crossfade(before, after, start_time=t0, duration=T)

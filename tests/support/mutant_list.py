@@ -755,7 +755,7 @@ config: integers of 65 bits
 @ config/loop_check.py | unit/control/test_rate_check.py
 config: the sensor's delay is forgotten | told_where
   sensor_delay=plant.sensor_delay => sensor_delay=0
-@ config/named_obstacles.py | unit/config/test_round_trip.py
+@ config/experiment.py | unit/config/test_round_trip.py
 config: two obstacles of one name
 -if known.setdefault(value.name, value) != value:
 +if known.setdefault(value.name, value) is None:

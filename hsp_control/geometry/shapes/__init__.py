@@ -6,8 +6,6 @@ parallel. The gradient of a sphere's distance to a convex shape is continuous.
 `ObstacleClearance` chooses the proxies of links accordingly.
 """
 
-from hsp_control.geometry.shapes.logged import shape_from_log as shape_from_log
-from hsp_control.geometry.shapes.logged import shape_to_log as shape_to_log
 from hsp_control.geometry.shapes.primitives import Box as Box
 from hsp_control.geometry.shapes.primitives import Capsule as Capsule
 from hsp_control.geometry.shapes.primitives import Cylinder as Cylinder
@@ -17,3 +15,5 @@ from hsp_control.geometry.shapes.primitives import Mesh as Mesh
 from hsp_control.geometry.shapes.primitives import PointCloud as PointCloud
 from hsp_control.geometry.shapes.primitives import Shape as Shape
 from hsp_control.geometry.shapes.primitives import Sphere as Sphere
+from hsp_control.geometry.shapes.primitives import shape_from_log as shape_from_log
+from hsp_control.geometry.shapes.primitives import shape_to_log as shape_to_log

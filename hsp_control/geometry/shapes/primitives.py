@@ -1,6 +1,7 @@
 """The shapes: each is one of Coal's geometries."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar, Self
@@ -11,6 +12,7 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SceneError
 from hsp_control.declaration import Part
+from hsp_control.declaration.families import value_fields
 from hsp_control.declaration.quantities import (
     FileName,
     Flag,
@@ -20,6 +22,7 @@ from hsp_control.declaration.quantities import (
     Positive,
     PositiveVector2,
     PositiveVector3,
+    plain,
 )
 from hsp_control.geometry.hulls import convex_hull
 from hsp_control.robot.description import mesh_files
@@ -262,3 +265,20 @@ class Sphere(Shape, type="sphere"):
     def bounding_radius(self) -> float:
         """The radius."""
         return self.radius
+
+
+def shape_to_log(shape: Shape) -> dict[str, Any]:
+    """Return the fields of a shape as JSON data, for `shape_from_log`."""
+    return {f.name: plain(getattr(shape, f.name)) for f in value_fields(shape)}
+
+
+def shape_from_log(kind: str, parameters: Mapping[str, Any]) -> Shape | None:
+    """Return the shape that a log describes, or None if the kind is unknown."""
+    assert Shape.family is not None
+    members = {each.__name__: each for each in Shape.family.members.values()}
+    shape_class = members.get(kind)
+    if shape_class is None:
+        return None
+    shape = shape_class(**parameters)
+    assert isinstance(shape, Shape)
+    return shape

@@ -27,12 +27,6 @@ class ImperfectPlant(SampledPlant):
 
     The measured state and the applied effort are logged beside the true state and the
     commanded effort. A copy, or a pickle, must be reset before it moves on.
-
-    Attributes:
-        plant: The plant that moves.
-        sensors: The chain from the true state to the controller, in this order.
-        drives: The chain from the controller to the joints, in this order.
-        seed: Seed of the random numbers.
     """
 
     def __init__(
@@ -42,14 +36,7 @@ class ImperfectPlant(SampledPlant):
         drives: Sequence[Drive] = (),
         seed: int = 0,
     ) -> None:
-        """Set the plant, and the sensors and drives between it and the controller.
-
-        Args:
-            plant: The plant that moves.
-            sensors: The chain from the true state to the controller, in order.
-            drives: The chain from the controller to the joints, in order.
-            seed: Seed of the random numbers; each sensor and drive has its own.
-        """
+        """Set the plant, and the sensors and drives between it and the controller."""
         super().__init__(plant.robot)
         self.plant = plant
         self.sensors, self.drives = tuple(sensors), tuple(drives)

@@ -64,11 +64,6 @@ class StickingPlant(SampledPlant):
     M and N at its middle. This is the implicit law of dry friction: joints stick and
     break away exactly, and the equations do not become stiff. A step in which no joint
     sticks or reverses is of second order.
-
-    Attributes:
-        friction: Friction of the joints.
-        step: The largest step [s].
-        pushes: External wrenches.
     """
 
     def __init__(
@@ -78,18 +73,7 @@ class StickingPlant(SampledPlant):
         step: float = 1e-3,
         pushes: Sequence[Push] = (),
     ) -> None:
-        """Set the robot, its friction, the step and the pushes.
-
-        Args:
-            robot: The robot that moves.
-            friction: Friction of the joints.
-            step: The largest step [s].
-            pushes: External wrenches.
-
-        Raises:
-            SimulationError: If the step is not positive.
-            FrameNotFoundError: If a push's frame does not exist.
-        """
+        """Set the robot, its friction, the step and the pushes."""
         super().__init__(robot)
         if not 0.0 < step < np.inf:
             raise SimulationError(f"step is {step}; must be positive")

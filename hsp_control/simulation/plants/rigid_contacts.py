@@ -83,11 +83,6 @@ class ContactPlant(ContinuousPlant):
     are logged as ``plant.contact.<frame>.force`` and ``.moment``, so that you can check
     whether a real contact could exert them. A velocity at the start of a contact decays
     as exp(-k t).
-
-    Attributes:
-        contacts: The contacts.
-        damping: k [1/s].
-        pushes: External wrenches.
     """
 
     def __init__(
@@ -98,18 +93,7 @@ class ContactPlant(ContinuousPlant):
         damping: float = 100.0,
         pushes: Sequence[Push] = (),
     ) -> None:
-        """Set the robot and its contacts.
-
-        Args:
-            robot: The robot that moves; a free-flyer root has no motor.
-            contacts: The contacts.
-            damping: Rate k at which the velocity of a contact decays [1/s].
-            pushes: External wrenches.
-
-        Raises:
-            FrameNotFoundError: If a frame does not exist.
-            SimulationError: If two contacts share a frame, or the damping is negative.
-        """
+        """Set the robot and its contacts."""
         super().__init__(robot)
         names = [contact.frame for contact in contacts]
         for name in names:

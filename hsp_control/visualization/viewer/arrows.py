@@ -18,13 +18,17 @@ from hsp_control.visualization.viewer.appearance import (
     LegendEntry,
 )
 from hsp_control.visualization.viewer.clip import Track
-from hsp_control.visualization.viewer.commands import Command, Json, set_object
+from hsp_control.visualization.viewer.commands import (
+    Command,
+    Json,
+    path_element,
+    set_object,
+)
 from hsp_control.visualization.viewer.controller_analysis import (
     from_the_start,
     null_space_projector,
 )
 from hsp_control.visualization.viewer.motion import Motion
-from hsp_control.visualization.viewer.scene_path import path_element
 from hsp_control.visualization.viewer.threejs import (
     always_visible,
     material,

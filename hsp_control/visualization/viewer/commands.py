@@ -185,3 +185,8 @@ def _transform_head(path: str) -> bytes:
     )
     ext8_of_16_doubles = struct.pack("BBB", 0xC7, 16 * 8, 0x18)
     return b"\x83" + head + ext8_of_16_doubles
+
+
+def path_element(name: str) -> str:
+    """Return a name as one element of a path in the scene tree: without slashes."""
+    return name.replace("/", "_") or "_"

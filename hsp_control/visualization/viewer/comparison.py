@@ -13,7 +13,12 @@ from hsp_control.visualization import palette
 from hsp_control.visualization.viewer.appearance import ACTUAL, LegendEntry, merged
 from hsp_control.visualization.viewer.arrows import SelfMotion
 from hsp_control.visualization.viewer.clip import Band, Clip, bands_of
-from hsp_control.visualization.viewer.commands import Command, set_ghost, set_transform
+from hsp_control.visualization.viewer.commands import (
+    Command,
+    path_element,
+    set_ghost,
+    set_transform,
+)
 from hsp_control.visualization.viewer.motion import motion_of
 from hsp_control.visualization.viewer.robot_drawing import RobotDrawing
 from hsp_control.visualization.viewer.run_drawing import (
@@ -22,7 +27,6 @@ from hsp_control.visualization.viewer.run_drawing import (
     all_layers,
     ghost_layers,
 )
-from hsp_control.visualization.viewer.scene_path import path_element
 from hsp_control.visualization.viewer.stage import in_sight
 from hsp_control.visualization.viewer.threejs import pose_at
 

@@ -17,9 +17,8 @@ from hsp_control.visualization.viewer.appearance import (
     translucent,
 )
 from hsp_control.visualization.viewer.clip import Track
-from hsp_control.visualization.viewer.commands import Command, set_object
+from hsp_control.visualization.viewer.commands import Command, path_element, set_object
 from hsp_control.visualization.viewer.motion import Motion
-from hsp_control.visualization.viewer.scene_path import path_element
 from hsp_control.visualization.viewer.threejs import material
 
 SECONDS = 0.2

@@ -33,6 +33,7 @@ from hsp_control.visualization.viewer.clip import Track
 from hsp_control.visualization.viewer.commands import (
     Command,
     Json,
+    path_element,
     set_length_label,
     set_object,
     set_transform,
@@ -41,7 +42,6 @@ from hsp_control.visualization.viewer.controller_analysis import terms_of_type
 from hsp_control.visualization.viewer.motion import Motion
 from hsp_control.visualization.viewer.obstacle_layer import obstacle_tracks
 from hsp_control.visualization.viewer.obstacle_shapes import facets, triangles_of
-from hsp_control.visualization.viewer.scene_path import path_element
 from hsp_control.visualization.viewer.threejs import (
     always_visible,
     material,

@@ -12,11 +12,15 @@ from hsp_control.geometry.shapes import Shape, shape_from_log
 from hsp_control.simulation.plants.mujoco.mjcf import Solid
 from hsp_control.visualization.viewer.appearance import OBSTACLE, SOLID, LegendEntry
 from hsp_control.visualization.viewer.clip import Track
-from hsp_control.visualization.viewer.commands import Command, set_object, set_transform
+from hsp_control.visualization.viewer.commands import (
+    Command,
+    path_element,
+    set_object,
+    set_transform,
+)
 from hsp_control.visualization.viewer.motion import Motion
 from hsp_control.visualization.viewer.obstacle_shapes import logged_shape, obstacle
 from hsp_control.visualization.viewer.robot_drawing import robot_entry
-from hsp_control.visualization.viewer.scene_path import path_element
 
 ROOT = "/obstacles"
 _TOLD = 3  # number of obstacles that the legend names

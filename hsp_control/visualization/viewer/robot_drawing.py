@@ -14,13 +14,13 @@ from hsp_control.visualization.viewer.clip import Track
 from hsp_control.visualization.viewer.commands import (
     Command,
     Json,
+    path_element,
     set_object,
     set_transform,
 )
 from hsp_control.visualization.viewer.mesh_files import collada_object, mesh_geometry
 from hsp_control.visualization.viewer.motion import Motion
 from hsp_control.visualization.viewer.obstacle_shapes import facets
-from hsp_control.visualization.viewer.scene_path import path_element
 from hsp_control.visualization.viewer.threejs import material, pose_along, pose_at
 from hsp_control.visualization.viewer.visuals import Visual, read_visuals
 

@@ -23,11 +23,11 @@ from hsp_control.visualization.viewer.commands import (
     Command,
     Json,
     extend_trail,
+    path_element,
     set_object,
     set_trail,
 )
 from hsp_control.visualization.viewer.motion import Motion
-from hsp_control.visualization.viewer.scene_path import path_element
 from hsp_control.visualization.viewer.threejs import (
     color_number,
     material,

@@ -44,7 +44,7 @@ MISTAKES: list[tuple[dict[str, Any], str, Any, str, str]] = [
     (SOLO, f"{FOOT}.normal", [0, 0, 0], "ContactError",
      f"{FOOT}.normal: [0.0, 0.0, 0.0] has no direction; must not be zero"),
     (SOLO, FOOT, {**SOLE, "type": "sphere"}, "ConfigError",
-     f"{FOOT}.type: unknown type 'sphere' (allowed: point, ball, sliding, surface)"),
+     f"{FOOT}.type: unknown type 'sphere' (allowed: ball, point, sliding, surface)"),
     (SOLO, FOOT, SOLE, "ContactError",
      f"{FOOT}: give length and width of the sole, or its corners"),
     (SOLO, FOOT, {**SOLE, "corners": LINE}, "ContactError",

@@ -350,7 +350,7 @@ MESSAGES: dict[str, Callable[[], Any]] = {
     "Rod: a mass of 11.0 is too much for this size": lambda: Rod(1.0, 11.0),
     "Bag: first: 3 is an integer; expected a mapping": lambda: Bag(3),  # type: ignore
     "Bag: first: a Hammer is not one of the gadgets": lambda: Bag(Hammer(1)),  # type: ignore
-    "Bag: first: missing key 'type'; type is one of: ball, rod, bag": (
+    "Bag: first: missing key 'type'; type is one of: bag, ball, rod": (
         lambda: Bag({"radius": 1})  # type: ignore
     ),
     "Bag: first.type: unknown type 'bal'; did you mean 'ball'? (allowed: ball, "

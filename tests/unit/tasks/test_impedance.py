@@ -410,7 +410,8 @@ REFUSED: dict[str, tuple[Callable[[], Any], type[Exception], str]] = {
      .impedance("hand", Impedance(1.0, largest_error=0.1)),
      GainError, "impedance: largest_error needs a diagonal stiffness"),
     "integral action": (
-     lambda: IntegralAction(1.0).check(panda_hand(impedance=Impedance(1.0)).tasks),
+     lambda: Compensation(integral_action=IntegralAction(1.0)).check(
+         hsp.Robot.load("panda"), panda_hand(impedance=Impedance(1.0)).tasks),
      CompensationError,
      "task 'hand' has an impedance: integral action would press against what"),
     "a cancelling observer": (lambda: Compensation(

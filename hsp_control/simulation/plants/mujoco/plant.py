@@ -64,26 +64,7 @@ class MujocoPlant(SampledPlant):
         friction: JointFriction | None = None,
         pushes: Sequence[Push] = (),
     ) -> None:
-        """Build the MuJoCo model.
-
-        Args:
-            robot: The robot that moves.
-            timestep: The largest step [s]; each interval is divided into equal steps.
-            integrator: MuJoCo's integrator.
-            contacts: The shapes that may touch the ground and the solids.
-            ground: The ground; None: at height 0, with the friction coefficient 0.8.
-            solids: The other things that these shapes may touch.
-            joint_limits: Whether MuJoCo keeps joints within the robot's position
-                limits, by its own soft constraints.
-            friction: Friction of the joints, by MuJoCo's own constraints.
-            pushes: External wrenches.
-
-        Raises:
-            SimulationError: If MuJoCo is not installed or rejects the model, or nothing
-                may touch the solids.
-            ModelError: If a joint has no counterpart in MuJoCo.
-            FrameNotFoundError: If a contact's frame does not exist.
-        """
+        """Build the MuJoCo model."""
         super().__init__(robot)
         mujoco = import_mujoco()
         if not 0.0 < timestep < np.inf:
