@@ -32,7 +32,7 @@ class Record(NamedTuple):
 
     @classmethod
     def over(cls, memory: Array, rows: int, nv: int) -> "Record":
-        """Return the record of m = ``rows`` rows: its arrays are views of ``memory``."""
+        """Return the record of m = ``rows`` rows; its arrays view ``memory``."""
         square, ends = rows * nv, 2 * rows * nv + 3 * rows
         vectors = memory[2 * square : ends].reshape(3, rows)
         joints = memory[ends:].reshape(4, nv)
