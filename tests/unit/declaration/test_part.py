@@ -353,8 +353,8 @@ MESSAGES: dict[str, Callable[[], Any]] = {
     "Bag: first: missing key 'type'; type is one of: bag, ball, rod": (
         lambda: Bag({"radius": 1})  # type: ignore
     ),
-    "Bag: first.type: unknown type 'bal'; did you mean 'ball'? (allowed: ball, "
-    "rod, bag)": (
+    "Bag: first.type: unknown type 'bal'; did you mean 'ball'? (allowed: bag, "
+    "ball, rod)": (
         lambda: Bag({"type": "bal", "radius": 1})  # type: ignore
     ),
     "Bag: first.radus: unknown key 'radus'; did you mean 'radius'? (allowed: type, "
