@@ -10,7 +10,10 @@ from places import ROOT
 HERE = [  # without those of companions that were taken away
     each
     for each in MUTANTS
-    if "companions" not in each.file or (ROOT / each.file).parent.is_dir()
+    if all(
+        "companions/" not in file or (ROOT / file).parent.is_dir()
+        for file in (each.file, each.tests)
+    )
 ]
 every_mutant = pytest.mark.parametrize("mutant", HERE, ids=lambda m: m.name)
 

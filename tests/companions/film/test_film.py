@@ -113,3 +113,18 @@ def test_the_command_says_what_it_wants(
     with pytest.raises(SystemExit):
         main(["export", log, "--gif=a.gif", "--size=800"])
     assert "'800' is not WIDTHxHEIGHT" in capsys.readouterr().err
+    assert main(["export", log, log, "--gif", str(tmp_path / "a.gif")]) == 2
+    assert capsys.readouterr().err == (
+        "hsp: a film shows one run, 2 logs are given: give one log, or --html for a "
+        "page with a switch between them\n"
+    )
+    assert not (tmp_path / "a.gif").exists()
+
+
+def test_doctor_tells_that_there_is_no_browser(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.delenv("HSP_BROWSER", raising=False)
+    assert main(["doctor"]) == 0
+    assert "no Chromium on the path" in capsys.readouterr().out

@@ -18,7 +18,7 @@ from hsp_control import (
     metrics,
 )
 from hsp_control.common import exceptions
-from hsp_control.common.resources import bundled, bundled_configs
+from hsp_control.common.resources import bundled_configs
 from hsp_control.config import json_schema
 
 MOVING = "paper/4_moving_obstacle"
@@ -62,18 +62,6 @@ def test_every_bundled_configuration_follows_the_exported_schema() -> None:
         data = yaml.safe_load(file.read_text(encoding="utf-8"))
         valid.validate(data)
         assert data["title"], name
-
-
-def test_the_bundled_schema_is_the_exported_one() -> None:
-    """Editors find it by the first line of each bundled configuration."""
-    file = bundled("configs") / "hsp_control.schema.json"
-    assert json.loads(file.read_text(encoding="utf-8")) == json_schema(), (
-        "refresh it with: hsp schema > configs/hsp_control.schema.json"
-    )
-    for path in bundled_configs().values():
-        first = path.read_text(encoding="utf-8").splitlines()[0]
-        where = first.removeprefix("# yaml-language-server: $schema=")
-        assert (path.parent / where).samefile(file), path
 
 
 def test_a_configuration_becomes_the_objects_it_names() -> None:

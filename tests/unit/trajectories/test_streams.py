@@ -582,7 +582,7 @@ def test_what_does_not_fit_the_task_is_counted_and_dropped() -> None:
     [
         ({"source": "udp://5005"}, "source is 'udp://5005'; needs udp://HOST:PORT"),
         ({"source": "udp://a:5005/x"}, "needs udp://HOST:PORT"),
-        ({"source": "tcp://a:5005"}, "an address begins with udp:// or ros2://, and"),
+        ({"source": "tcp://a:5005"}, "an address begins with udp://"),
         ({"source": "a.jsonl", "messages": []}, "give either source or messages"),
         ({"messages": [{"value": [0.0]}]}, "message 0 of the recording: it needs the"),
         ({"messages": [{"at": 1.0, "valeu": [0.0]}]}, "has the key 'valeu'; known are"),

@@ -218,9 +218,7 @@ def test_what_cannot_be_compared_is_said(planar: ComparedRun, tmp_path: Path) ->
     assert not path.exists()
 
 
-def test_the_command_exports_two_logs(
-    planar: ComparedRun, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_exports_two_logs(planar: ComparedRun, tmp_path: Path) -> None:
     logs = [
         str(planar.rollout.save(tmp_path / f"{n}.npz")) for n in ("with", "without")
     ]
@@ -234,11 +232,3 @@ def test_the_command_exports_two_logs(
         titled.append(str(Rollout(rollout.columns, meta).save(Path(log))))
     assert main(["export", *titled, "--html", str(page)]) == 0
     assert "<title>Case 0 and Case 1</title>" in page.read_text(encoding="utf-8")
-    capsys.readouterr()
-    film = tmp_path / "film.gif"
-    assert main(["export", *logs, "--gif", str(film)]) == 2
-    assert capsys.readouterr().err == (
-        "hsp: a film shows one run, 2 logs are given: give one log, or --html for a "
-        "page with a switch between them\n"
-    )
-    assert not film.exists()
