@@ -32,7 +32,7 @@ from hsp_control.visualization.viewer.offline.clip_reduction import (
     POSITION_BOUND,
 )
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 sync_api = pytest.importorskip("playwright.sync_api")
 

@@ -18,7 +18,7 @@ import pytest
 from nbclient.exceptions import CellExecutionError
 from places import ROOT
 
-pytestmark = pytest.mark.process
+pytestmark = [pytest.mark.process, pytest.mark.slow]
 
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 

@@ -12,7 +12,7 @@ from played import Played
 
 import hsp_control as hsp
 
-pytestmark = [pytest.mark.browser, pytest.mark.process]
+pytestmark = [pytest.mark.browser, pytest.mark.process, pytest.mark.slow]
 
 SMALL = {"viewport": {"width": 800, "height": 500}}  # a picture takes less time
 READY = "typeof play !== 'undefined' && play.ready && play.state.t > 0"

@@ -30,7 +30,7 @@ from hsp_control.companions.sweeps.row import Row
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.simulation.measures import Measure
 
-pytestmark = pytest.mark.process
+pytestmark = [pytest.mark.process, pytest.mark.slow]
 
 # Some tenths of a second each, also where kernels are not compiled.
 SECONDS = 0.3 if numba.config.DISABLE_JIT else 3
