@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import daqp
 import numpy as np
+import quadprog
 from numpy.typing import NDArray
 
 from hsp_control.control.actuation.dual_active_set import Problem, Workspace, minimise
@@ -294,6 +295,25 @@ def by_daqp(case: Case) -> Array | None:
         np.eye(nz), np.zeros(nz), C, upper, lower, sense, primal_tol=1e-11
     )
     return case.x0 + case.JT.T @ y if flag >= 1 else None
+
+
+def by_quadprog(case: Case) -> Array | None:
+    """Return x by quadprog, or None. It declares redundant equalities inconsistent."""
+    constraints, nz = _in_y(case), len(case.JT)
+    if constraints is None:
+        return None
+    C, lower, upper = constraints
+    same = upper - lower < 1e-12
+    G = np.vstack([C[same], C[~same], -C[~same]])
+    b = np.concatenate([lower[same], lower[~same], -upper[~same]])
+    some, equal = np.isfinite(b), int(same.sum())
+    if not some.any():
+        return case.x0
+    try:
+        y = quadprog.solve_qp(np.eye(nz), np.zeros(nz), G[some].T, b[some], equal)[0]
+    except ValueError:
+        return None
+    return np.asarray(case.x0 + case.JT.T @ y)
 
 
 # --- what proves an optimum ----------------------------------------------------------
