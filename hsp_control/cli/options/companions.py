@@ -1,9 +1,10 @@
 """What a companion adds to the command line; entry points name it, no import does."""
 
 import argparse
-from collections.abc import Callable, Mapping
+import sys
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hsp_control.common.entry_points import entry_points
 
@@ -49,12 +50,20 @@ class ExportFormat(NamedTuple):
 
 
 def added_commands() -> dict[str, AddedCommand]:
-    """Return the commands that companions add, by name."""
-    found = entry_points("commands")
-    return {name: found[name].load() for name in sorted(found)}
+    """Return the commands that companions and other packages add, by name."""
+    return dict(_loaded("commands"))
 
 
 def export_formats() -> list[ExportFormat]:
-    """Return the formats that companions add to `hsp export`."""
-    found = entry_points("exports")
-    return [found[name].load() for name in sorted(found)]
+    """Return the formats that companions and other packages add to `hsp export`."""
+    return [each for _, each in _loaded("exports")]
+
+
+def _loaded(group: str) -> Iterator[tuple[str, Any]]:
+    """Yield what can be imported; what cannot is told, and stops no other command."""
+    for name, entry in sorted(entry_points(group).items()):
+        try:
+            yield name, entry.load()
+        except (ImportError, AttributeError) as error:
+            told = f"hsp: {name!r} cannot be imported from {entry.value}: {error}"
+            print(told, file=sys.stderr)

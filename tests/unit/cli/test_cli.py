@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable
 from importlib import metadata
+from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from mjcf_texts import CELL
 from hsp_control import Rollout, __version__
 from hsp_control.cli import doctor, main
 from hsp_control.cli.interrupts import PATIENCE, DeferredInterrupt
+from hsp_control.cli.options import companions
 
 MOVING = "paper/4_moving_obstacle"
 SHORT = ["--set", "simulation.duration=0.1"]
@@ -433,3 +435,13 @@ def test_check_takes_a_robot_of_a_mujoco_model(
     )
     assert main(["check", str(file)]) == 0
     assert f"{file}: OK" in capsys.readouterr().out
+
+
+def test_a_package_whose_command_is_broken_stops_no_other(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    broken = EntryPoint("fly", "no_such_package.command:FLY", "hsp_control.commands")
+    monkeypatch.setattr(companions, "entry_points", lambda group: {"fly": broken})
+    assert main(["schema"]) == 0
+    told = "hsp: 'fly' cannot be imported from no_such_package.command:FLY: No module"
+    assert told in capsys.readouterr().err
