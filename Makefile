@@ -82,11 +82,11 @@ bench: $(STAMP) ## compare with other controllers, in .venv-peers (TSID builds: 
 	@.venv-peers/bin/python -W "ignore:to-Python converter" benchmarks/limit_side_by_side.py
 	@.venv-peers/bin/python -W "ignore:to-Python converter" benchmarks/scaling.py
 
-fuzz: $(STAMP) ## random states, mutated files, faults, soak: hours; writes docs/fuzz.md
+fuzz: $(STAMP) ## random states, mutated files, faults, soak: hours
 	@PYTHONPATH=tests nice $(BIN)/python -m campaigns $(ARGS)
 
 mutants: $(STAMP) ## break the code on purpose, report what no test notices
-	@PYTHONPATH=tests/support $(BIN)/python tests/mutants.py $(ARGS)
+	@$(BIN)/python tools/mutants.py $(ARGS)
 
 # What is in the wheel goes: a checkout compiles for its own processor.
 wheel: $(STAMP) ## build the wheel into dist/, with machine code for every configuration

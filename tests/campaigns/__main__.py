@@ -1,21 +1,20 @@
 """Run campaigns in full: ``python -m campaigns [NAME ...]`` in ``tests``, or make fuzz.
 
-Counts are kept in out/fuzz after every batch, and written into docs/fuzz.md at the end:
-what was interrupted is told as far as it went.
+Counts are kept in out/fuzz after every batch: what was interrupted is told as far as it
+went. docs/fuzz.md tells them.
 """
 
 import argparse
 import signal
 import sys
-from collections import Counter
 from collections.abc import Callable, Iterable
 from functools import partial
 
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from campaigns import document, faults, random_states, soak
+from campaigns import faults, random_states, soak
 from campaigns.cases import KINDS, Count, count_cases, warm_up
-from campaigns.results import keep, kept
+from campaigns.results import keep
 from hsp_control.common.resources import bundled_robots
 
 STEPS, OTHER_STEPS = 1_000_000, 20_000
@@ -43,7 +42,7 @@ def states(progress: Progress, seed: int, share: float) -> bool:
     return good
 
 
-def cases(progress: Progress, seed: int, share: float, kind: str, resume: bool) -> bool:
+def cases(progress: Progress, seed: int, share: float, kind: str) -> bool:
     """Answer mutated files of one kind."""
     wanted = max(1, round(share * CASES[kind]))
     bar = progress.add_task(f"mutated {kind}", total=wanted)
@@ -54,18 +53,14 @@ def cases(progress: Progress, seed: int, share: float, kind: str, resume: bool) 
             keep(f"files-{kind}", vars(count) | {"wanted": CASES[kind], "seed": seed})
 
     warm_up()
-    before, so_far = kept().get(f"files-{kind}"), Count()
-    if resume and before is not None and before["seed"] == seed:
-        so_far = Count(**{name: before[name] for name in vars(so_far)})
-        so_far.kinds = Counter(so_far.kinds)
-    return count_cases(KINDS[kind], seed, wanted, show, so_far).good
+    return count_cases(KINDS[kind], seed, wanted, show).good
 
 
 def main(arguments: Iterable[str] | None = None) -> int:
-    """Run what is named, write the document, and say whether all was well."""
+    """Run what is named, and say whether all was well."""
     stages: dict[str, Callable[[Progress, int, float], bool]] = {
         "states": states,
-        **{kind: partial(cases, kind=kind, resume=False) for kind in CASES},
+        **{kind: partial(cases, kind=kind) for kind in CASES},
         "soak": soak.campaign,
         "faults": faults.campaign,
     }
@@ -73,13 +68,7 @@ def main(arguments: Iterable[str] | None = None) -> int:
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(stages))
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("--share", type=float, default=1.0, help="of the full counts")
-    parser.add_argument("--no-document", action="store_true", help="keep counts only")
-    parser.add_argument(
-        "--resume", action="store_true", help="go on with mutated files where it ended"
-    )
     options = parser.parse_args(None if arguments is None else list(arguments))
-    if options.resume:
-        stages |= {kind: partial(cases, kind=kind, resume=True) for kind in CASES}
     unknown = [name for name in options.names if name not in stages]
     if unknown:
         parser.error(f"no campaign {unknown[0]!r}; there are {', '.join(stages)}")
@@ -99,8 +88,6 @@ def main(arguments: Iterable[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("stopped; what was counted is kept", file=sys.stderr)
         good = False
-    if not options.no_document:
-        document.write()
     return 0 if good else 1
 
 

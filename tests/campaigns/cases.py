@@ -52,12 +52,11 @@ def count_cases(
     seed: int,
     cases: int,
     show: Callable[[Count], None] | None = None,
-    so_far: Count | None = None,
 ) -> Count:
-    """Return what came of the first cases of a seed, going on from some of them."""
-    count = so_far or Count()
+    """Return what came of the first cases of a seed."""
+    count = Count()
     with Worker(function, TIMEOUT) as worker:
-        for answer in worker.answers(seed, range(count.cases, cases)):
+        for answer in worker.answers(seed, range(cases)):
             count.cases += 1
             count.kinds[answer.kind] += 1
             count.seconds += answer.seconds

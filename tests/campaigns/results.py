@@ -1,4 +1,4 @@
-"""What the campaigns have counted, kept in files that the next stage reads."""
+"""What the campaigns have counted, kept in files."""
 
 import json
 import platform
@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 FOLDER = Path("out/fuzz")
-"""Where counts are kept until the document is written."""
 
 
 def keep(name: str, counts: dict[str, Any]) -> None:
@@ -16,9 +15,3 @@ def keep(name: str, counts: dict[str, Any]) -> None:
     part = FOLDER / f".{name}.part"
     part.write_text(text, encoding="utf-8")
     part.replace(FOLDER / f"{name}.json")
-
-
-def kept() -> dict[str, dict[str, Any]]:
-    """Return all counts that are there, by campaign."""
-    files = sorted(FOLDER.glob("*.json"))
-    return {file.stem: json.loads(file.read_text(encoding="utf-8")) for file in files}

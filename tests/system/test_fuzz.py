@@ -6,9 +6,8 @@ from pathlib import Path
 from random import Random
 
 import pytest
-from campaigns import document, faults, random_states
+from campaigns import faults, random_states
 from campaigns.cases import KINDS, count_cases
-from campaigns.results import keep, kept
 from campaigns.soak import PROCESS_GROWTH, PYTHON_GROWTH, soak
 from campaigns.worker import Worker
 from places import THOROUGH
@@ -108,15 +107,3 @@ def test_a_run_that_cannot_be_saved_is_saved_elsewhere(
     (elsewhere,) = tmp_path.glob("hsp-*/2_rest.npz")
     assert f"Log: {elsewhere}" in captured.out
     assert len(Rollout.load(elsewhere)) == 3
-
-
-def test_counts_are_kept_as_they_were(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Beside what is added to them; the document's line on the soak was lost once."""
-    monkeypatch.chdir(tmp_path)
-    read = {"python": [100_000, 120_200], "process": [1_000_000, 1_080_000]}
-    counts = read | {"steps": 600_000, "wanted": 600_000, "worst_error": 1.4e-4}
-    keep("soak", counts)
-    assert counts.items() <= kept()["soak"].items()
-    assert "grew by 20.2 kB, the process by 0.08 MB" in document.counts(kept())

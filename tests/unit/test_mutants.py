@@ -4,7 +4,7 @@ from pathlib import Path
 
 import mutants
 import pytest
-from mutant_list import MUTANTS, Mutant
+from mutants import MUTANTS, Mutant
 from places import ROOT
 
 HERE = [  # without those of companions that were taken away
@@ -35,21 +35,6 @@ def test_the_tests_that_should_see_it_exist(mutant: Mutant) -> None:
     assert files
     assert all((ROOT / file).is_file() for file in files.split())
     assert " " not in word
-
-
-def test_names_are_unique_and_fit_the_table() -> None:
-    names = [mutant.name for mutant in MUTANTS]
-    assert len(set(names)) == len(names)
-    assert max(map(len, names)) <= 44
-
-
-def test_the_names_can_be_listed(capsys: pytest.CaptureFixture[str]) -> None:
-    assert mutants.main(["law without", "K_N", "--list"]) == 0
-    listed = capsys.readouterr().out.splitlines()
-    assert {"law without J'", "K_N transposed"} <= set(listed)
-    assert "effort limit ignored" not in listed
-    assert mutants.main(["--list"]) == 0
-    assert len(capsys.readouterr().out.splitlines()) == len(MUTANTS)
 
 
 # --- the runner ----------------------------------------------------------------------
@@ -109,13 +94,6 @@ def test_tests_that_fail_anyway_catch_nothing(
 
 
 @pytest.mark.process
-def test_code_that_cannot_be_imported_catches_nothing(checkout: Path) -> None:
-    """A mutant must be noticed by a test that ran, not by a file that did not."""
-    (checkout / "code_under_test.py").write_text("def area(a, b:\n")
-    assert mutants.run(checkout, "test_area.py").word == "BROKEN"
-
-
-@pytest.mark.process
 @pytest.mark.parametrize(
     ("wrong", "detail"),
     [
@@ -129,11 +107,3 @@ def test_what_never_ends_or_eats_the_memory_is_caught(
     monkeypatch.setattr(mutants, "LONGEST", 5.0)
     (checkout / "code_under_test.py").write_text(f"def area(a, b):\n    {wrong}\n")
     assert mutants.run(checkout, "test_area.py") == ("caught", detail)
-
-
-def test_an_edit_that_does_not_fit_is_an_error(checkout: Path) -> None:
-    with pytest.raises(ValueError, match=r"code that is not there: 0 places in code_"):
-        list(mutants.tried(checkout, [ELSEWHERE]))
-    twice = CAUGHT._replace(old="a, b", name="both")
-    with pytest.raises(ValueError, match=r"both: 2 places"):
-        mutants.mutated(twice, CODE + CODE)

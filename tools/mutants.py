@@ -4,9 +4,9 @@ Every mutant is one edit in one named place, and the tests that should go red. A
 that survives is a claim that nobody checks. ``tests/unit/test_mutants.py`` checks that
 every edit still fits the code.
 
-    python tests/mutants.py                    all of them
-    python tests/mutants.py law gain           those whose name contains a word
-    python tests/mutants.py --list
+    python tools/mutants.py                    all of them
+    python tools/mutants.py law gain           those whose name contains a word
+    python tools/mutants.py --list
 """
 
 import argparse
@@ -22,14 +22,61 @@ from pathlib import Path
 from time import perf_counter
 from typing import NamedTuple
 
-from mutant_list import MUTANTS, Mutant
-
 ROOT = Path(__file__).resolve().parents[1]
 COPIED = ("hsp_control", "tests", "robots", "configs", "docs", "pyproject.toml")
 TESTS_FAILED = 1
 """The exit status of pytest when tests ran and one failed."""
 LONGEST, MEMORY = 900.0, 16 << 30
 """What the tests of one mutant may take: time [s], and memory that they ask for [B]."""
+
+
+class Mutant(NamedTuple):
+    """One edit that makes the code wrong and keeps it running.
+
+    Attributes:
+        name: What is wrong then.
+        file: The edited file, from the checkout's folder.
+        old: The text that is replaced; it stands in the file once.
+        new: What replaces it.
+        tests: Arguments of pytest: the tests that should go red.
+    """
+
+    name: str
+    file: str
+    old: str
+    new: str
+    tests: str
+
+
+def read(text: str) -> tuple[Mutant, ...]:
+    """Return the mutants of a text.
+
+    A line ``@ file | tests`` says where what follows is and who should see it: the name
+    of each mutant, with the word for pytest's -k if any, and its edit: ``old => new``,
+    indented, or as in a diff.
+    """
+    found: list[tuple[str, str, dict[str, list[str]], str]] = []
+    file = tests = ""
+    for line in text.strip().splitlines():
+        if line.startswith("@"):
+            file, tests = line[2:].split(" | ")
+        elif line.startswith(("-", "+")):
+            found[-1][2][line[0]].append(line[1:])
+        elif line.startswith("  "):
+            old, new = line[2:].split(" => ")
+            found[-1][2].update({"-": [old], "+": [new]})
+        elif not line.startswith("#"):
+            name, _, word = line.partition(" | ")
+            chosen = f"tests/{tests} -k {word}" if word else f"tests/{tests}"
+            found.append((name, f"hsp_control/{file}", {"-": [], "+": []}, chosen))
+    return tuple(
+        Mutant(name, file, "\n".join(edit["-"]), "\n".join(edit["+"]), chosen)
+        for name, file, edit, chosen in found
+    )
+
+
+MUTANTS = read((Path(__file__).parent / "mutants.txt").read_text(encoding="utf-8"))
+"""All of them, from the lowest room to the highest."""
 
 
 class Verdict(NamedTuple):
