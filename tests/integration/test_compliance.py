@@ -12,19 +12,17 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.integrate import simpson
-from scipy.linalg import sqrtm
 
 import hsp_control as hsp
 from hsp_control import Controller, FramePose, FramePosition, Robot, Rollout
 from hsp_control.common.exceptions import ControllerError
-from hsp_control.control.compensation import Compensation, MomentumObserver, check_rate
+from hsp_control.control.compensation import Compensation, MomentumObserver
 from hsp_control.control.compensation.linear_loop import LinearLoop
-from hsp_control.control.gains_in_force import dissipated, held_radius, spring_energy
+from hsp_control.control.gains_in_force import held_radius
 from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric, Metric
 from hsp_control.robot.integrators import Dop853, Rk4
 from hsp_control.simulation.plants import Push, RigidBody
 from hsp_control.tasks import Impedance
-from hsp_control.tasks.task import ErrorPart
 
 Array = NDArray[np.float64]
 
@@ -93,23 +91,6 @@ def test_an_unknown_force_at_the_hand_does_not_reach_the_null_space(name: str) -
     assert (felt["null_space_norm"] / predicted).max() > 3.0
 
 
-def test_a_force_elsewhere_does_reach_it() -> None:
-    """At the elbow it must: the elbow is what the null space moves."""
-    elbow = Push("panda_link4", FORCE, duration=10.0)
-    pushed = run(pose_hand(impedance=POSE), MassMatrixMetric(), [elbow])
-    predicted = pushed["null_space_norm"][0] * np.exp(-3.0 * pushed.t)
-    assert (pushed["null_space_norm"] / predicted).max() > 2.0
-
-
-def test_a_moment_is_a_force_elsewhere_for_a_position() -> None:
-    """The rows of a position do not hold it: a pose keeps it from the null space."""
-    turned = Push("panda_tcp", moment=MOMENT, duration=10.0)
-    hand = position_hand(impedance=Impedance(600.0))
-    pushed = run(hand, MassMatrixMetric(), [turned])
-    predicted = pushed["null_space_norm"][0] * np.exp(-3.0 * pushed.t)
-    assert (pushed["null_space_norm"] / predicted).max() > 1.5
-
-
 # --- the spring ----------------------------------------------------------------------
 
 
@@ -134,19 +115,6 @@ def test_under_a_constant_force_the_hand_rests_where_the_spring_holds_it(
     error = rest["task.hand.error"][-1]
     np.testing.assert_allclose(-error[:3], moved, rtol=1e-5)
     np.testing.assert_allclose(error[3:], 0.0, atol=1e-5)
-
-
-def test_a_bounded_spring_pulls_no_harder() -> None:
-    """At four times its largest error the hand feels the same force: it creeps on."""
-    stiffness, bound, damping = 500.0, 0.02, 80.0
-    spring = Impedance(stiffness, damping=damping, largest_error=bound)
-    push = Push("panda_tcp", [0.0, 0.0, -16.0], duration=10.0)
-    slow = run(position_hand(impedance=spring), MassMatrixMetric(), [push], gain=5.0)
-    error, rate = slow["task.hand.error"][:, 2], slow["task.hand.error_rate"][:, 2]
-    assert error[-1] > 3.0 * bound
-    # What is left of the force moves the damper: 16 N - 10 N over 80 N·s/m, but for
-    # the change of the inertia along the way.
-    np.testing.assert_allclose(rate[-5:], 6.0 / damping, rtol=0.05)
 
 
 def inertia(q: Array, rows: int) -> Array:
@@ -254,57 +222,6 @@ def test_at_its_target_a_hand_becomes_stiffer_at_once_and_copies_wait_alike() ->
         Controller(panda(), [hsp.JointPosture()]).stiffness("posture")
 
 
-def test_a_hand_that_is_held_becomes_softer_at_once() -> None:
-    """A stiffening that waits delays no other change, and nothing piles up."""
-    hand = position_hand(impedance=Impedance(600.0))
-    controller = Controller(panda(), [hand], limits=None)
-    controller.at(0.2).ramp(0.3).impedance("hand", Impedance(2000.0))
-    q, v = start(), np.zeros(7)
-    away = panda().integrate(q, np.full(7, 0.05))
-    controller.compute(0.0, q, v)
-
-    def hold(begin: float, end: float) -> Array:
-        for t in np.arange(begin, end, 1e-3):
-            controller.applied(controller.compute(t, away, v).tau, 1e-3)
-        return np.diag(controller.stiffness("hand"))
-
-    assert hold(0.001, 3.0) == pytest.approx([600.0] * 3)
-    controller.at(3.0).ramp(0.3).impedance("hand", Impedance(60.0))
-    assert hold(3.0, 6.0) == pytest.approx([60.0] * 3)
-    for _ in range(3):  # all else goes on
-        controller.at(6.0).ramp(0.1).null_space_gain(5.0)
-    hold(6.0, 8.0)
-    assert len(controller._time_line.open) == 0
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_the_power_of_the_damping_is_that_of_the_gains(seed: int) -> None:
-    """e'ᵀ(D + D_ζ) e' from the modes, and from D_ζ = 2 ζ Λ √(Λ⁻¹K)."""
-    rng = np.random.default_rng(seed)
-    m = rng.integers(1, 7)
-    A, B, C = rng.normal(size=(3, m, m))
-    K, D = A @ A.T + np.eye(m), B @ B.T + np.eye(m)
-    G, rate = C @ C.T + 0.1 * np.eye(m), rng.normal(size=m)
-    D_ratio = 1.4 * np.linalg.inv(G) @ sqrtm(G @ K)
-    for impedance, damping in (
-        (Impedance(K, damping=D), D),
-        (Impedance(K, damping_ratio=0.7), D_ratio.real),
-    ):
-        parts = [ErrorPart("joints", "rad", "rad/s", int(m))]
-        power = dissipated(impedance.numbers(parts), G, rate)
-        assert power == pytest.approx(rate @ damping @ rate, rel=1e-8)
-
-
-def test_the_spring_s_energy_is_the_integral_of_its_force() -> None:
-    spring = Impedance([200.0, 300.0], largest_error=[0.1, 0.2])
-    for e in (np.array([0.05, -0.1]), np.array([0.3, -0.5])):
-        s = np.linspace(0.0, 1.0, 20001)[:, None]
-        force = np.array([200.0, 300.0]) * np.clip(s * e, [-0.1, -0.2], [0.1, 0.2])
-        work = simpson(force @ e, x=s[:, 0])
-        numbers = spring.numbers([ErrorPart("position", "m", "m/s", 2)])
-        assert spring_energy(numbers, np.array([2]), e) == pytest.approx(work, rel=1e-6)
-
-
 def test_limits_that_an_observer_tells_are_not_bound_by_a_push() -> None:
     """The robot's own limits, far from being reached: they know that it is pushed."""
     configuration = "compliance/panda_cartesian_impedance"
@@ -345,103 +262,11 @@ def test_the_observer_finds_the_force_and_does_not_fight_it() -> None:
     assert np.abs(found[early] - low_pass[:, None] * wrench).max() < 0.5
 
 
-def test_a_position_sees_the_force_that_moves_it() -> None:
-    push = Push("panda_tcp", FORCE, duration=10.0)
-    only = Compensation(momentum_observer=MomentumObserver(60.0, cancel=False))
-    hand = position_hand(axes="zx", impedance=Impedance(600.0))
-    log = run(
-        hand,
-        MassMatrixMetric(),
-        [push],
-        compensation=only,
-        duration=1.0,
-        control_period=0.001,
-        integrator=Rk4(0.001),
-    )
-    # Of the three components two are rows: f = Λ J M⁻¹ r for these. The estimate of a
-    # robot that moves lags by 1/K_O.
-    state = panda().state(0.0, log.q[-1], log.v[-1])
-    J = state.frame("panda_tcp").jacobian
-    rows = J[[2, 0]]
-    M_inv = np.linalg.inv(state.mass_matrix)
-    expected = np.linalg.solve(rows @ M_inv @ rows.T, rows @ M_inv @ J[:3].T @ FORCE)
-    np.testing.assert_allclose(log["observer.wrench.hand"][-1], expected, atol=0.2)
-    assert log.meta["columns"]["observer.wrench.hand"]["unit"] == "N"
-
-
 # --- the rate ------------------------------------------------------------------------
 
 
 def stiff(impedance: Impedance) -> Controller:
     return Controller(panda(), [position_hand(impedance=impedance)], limits=None)
-
-
-def test_a_stiffness_that_the_period_does_not_bear() -> None:
-    """It is said before the run, and the advice is right."""
-    q = panda().home()
-    with pytest.raises(
-        hsp.errors.UnstableRateError,
-        match=r"tasks.hand.impedance: unstable at this rate: √\(stiffness/inertia\) of "
-        r"task 'hand' at the start times the period is .*; use at most ([\d.]+) times "
-        r"this stiffness and ([\d.]+) times this damping or a control_period",
-    ) as caught:
-        check_rate(stiff(Impedance(4e6)), q, 0.001)
-    text = str(caught.value)
-    factor = float(text.split("use at most ")[1].split(" times")[0])
-    assert not [
-        each
-        for each in check_rate(stiff(Impedance(0.999 * factor * 4e6)), q, 0.001)
-        if each.unstable
-    ]
-    (warned,) = check_rate(stiff(Impedance(1e5)), q, 0.001)
-    assert warned.path == ("tasks", "hand", "impedance")
-    assert "at most 0.2 is recommended: use at most" in warned.message
-    assert not check_rate(stiff(Impedance(800.0)), q, 0.001)
-    with pytest.raises(hsp.errors.UnstableRateError, match=r"damping/\(2 inertia\) of"):
-        check_rate(stiff(Impedance(100.0, damping=8000.0)), q, 0.001)
-
-
-def test_changes_to_come_are_checked_too() -> None:
-    q, soft = panda().home(), Impedance(100.0)
-    controller = stiff(soft)
-    controller.at(2.0).ramp(0.5).impedance("hand", Impedance(4e6))
-    with pytest.raises(
-        hsp.errors.UnstableRateError,
-        match=r"^changes: .* of task 'hand' from t = 2.5 s on times the period is",
-    ):
-        check_rate(controller, q, 0.001)
-    gains = Controller(panda(), [position_hand()], limits=None)
-    gains.at(1.0).ramp(0.0).gains("hand", hsp.Gains(natural_frequency=3000.0))
-    with pytest.raises(
-        hsp.errors.UnstableRateError,
-        match=r"^changes: .*ω0 of task 'hand' from t = 1 s on times the period",
-    ):
-        check_rate(gains, q, 0.001)
-
-
-@pytest.mark.parametrize(
-    ("spring", "message"),
-    [
-        (
-            Impedance(4e6),
-            r"tasks\.hand\.impedance: .*; use at most [\d.]+ times this s",
-        ),
-        # However far beyond: what is advised is stable.
-        (Impedance(600.0, damping=3e6), r"at most [\d.e-]+ times this .* a control_"),
-    ],
-    ids=["stiffness", "damping"],
-)
-def test_a_simulation_refuses_what_its_period_does_not_bear(
-    spring: Impedance, message: str
-) -> None:
-    q = panda().home()
-    how: dict[str, Any] = {"duration": 0.01, "integrator": Rk4(1e-3)}
-    with pytest.raises(hsp.errors.UnstableRateError, match=message):
-        hsp.simulate(stiff(spring), q, control_period=1e-3, **how)
-    # Without a period nothing is held; and who knows better may say so.
-    hsp.simulate(stiff(Impedance(4e6)), q, **how)
-    how["check_rate"] = False
-    hsp.simulate(stiff(Impedance(4e6)), q, control_period=1e-3, **how)
 
 
 @pytest.mark.parametrize("kind", ["impedance", "gains", "null_space_gain", "add"])
@@ -510,16 +335,6 @@ def test_the_radius_of_held_gains_is_that_of_the_loop_and_of_its_closed_form(
     assert (radius < 1.0) == bool(((kv * h < 2.0) & (kp * h < 2.0 * kv)).all())
     loop = LinearLoop(Kp, Kv, np.zeros((m, m)), h)
     assert radius == pytest.approx(loop.radius(), rel=1e-6)
-
-
-def test_the_check_looks_at_the_spring_below_its_bound() -> None:
-    """Far from the reference a bounded spring is soft; it will not stay there."""
-    robot, q = panda(), panda().home()
-    far = hsp.Hold(robot.state(0.0, q, np.zeros(7)).position("panda_tcp") + 0.2)
-    bounded = Impedance(4e6, largest_error=1e-4)
-    hand = FramePosition("panda_tcp", far, name="hand", impedance=bounded)
-    with pytest.raises(hsp.errors.UnstableRateError):
-        check_rate(Controller(robot, [hand], limits=None), q, 0.001)
 
 
 # --- the configurations --------------------------------------------------------------

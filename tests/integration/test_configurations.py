@@ -10,7 +10,6 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import yaml
-from places import ROOT
 
 from hsp_control import RobotState, Rollout, load_experiment
 from hsp_control.common.resources import bundled_configs
@@ -182,20 +181,3 @@ def test_a_configuration_runs_as_it_is_written(name: str) -> None:
     rollout = load_experiment(name, "simulation.duration=0.1").run()
     assert rollout.status == "completed"
     assert errors(rollout).max() < 1e-4
-
-
-def test_an_obstacle_s_orientation_may_be_null() -> None:
-    """It is so in the configurations that logs of version 0.1 contain."""
-    null = "scene.obstacles.disk.orientation=null"
-    experiment, plain = (
-        load_experiment("paper/4_moving_obstacle", *some) for some in ([null], [])
-    )
-    assert experiment.scenario.scene == plain.scenario.scene
-
-
-def test_the_page_shows_every_configuration() -> None:
-    page = ROOT / "docs" / "configurations.md"
-    text = page.read_text(encoding="utf-8")
-    for name in CONFIGURATIONS:
-        title = load_experiment(name).scenario.title
-        assert f"## `{name}`\n\n**{title}.**" in text, name

@@ -13,7 +13,6 @@ import hsp_control
 from hsp_control import load_experiment
 from hsp_control.cli.options.command_line import command_line
 from hsp_control.common.resources import bundled_configs, bundled_robots
-from hsp_control.live import LiveSettings
 from hsp_control.null_space.fields.weight import sample_weight
 from hsp_control.robot import RobotDescription
 from hsp_control.simulation import InitialState, StartPose
@@ -127,42 +126,10 @@ def test_every_command_of_a_page_can_be_given(page: str) -> None:
         assert a_reader_s_own or name in bundled, words
 
 
-def test_pages_have_commands() -> None:
-    """The test above looks at what a reader would type."""
-    assert {
-        "docs/view.md",
-        "docs/companions/franka.md",
-        "docs/tutorial/ten_minutes.md",
-    } <= set(PAGES)
-    assert commands("```sh\nhsp run a.yaml --set x='[1, 2]'  # why\n```") == [
-        ["run", "a.yaml", "--set", "x=[1, 2]"]
-    ]
-
-
 def test_the_readme_s_yaml_is_a_configuration() -> None:
     (text,) = blocks(README, "yaml")
     experiment = load_experiment(yaml.safe_load(text), "simulation.duration=0.05")
     assert experiment.run().status == "completed"
-
-
-@pytest.mark.parametrize("page", ["plants", "robustness"])
-def test_the_pages_configurations_begin_gently(page: str) -> None:
-    text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
-    (configuration,) = blocks(text, "yaml")[:1]
-    if "mujoco" in configuration:
-        pytest.importorskip("mujoco")
-    experiment = load_experiment(
-        yaml.safe_load(configuration),
-        *("simulation.duration=0.02", "compensation.start_up_ramp=null"),
-    )
-    assert experiment.run().status == "completed"
-
-
-def test_the_readme_s_commands_exist() -> None:
-    found = commands(README)
-    assert {words[0] for words in found} == {"run", "play", "view", "live", "inspect"}
-    for words in found:
-        command_line().parse_args(words)
 
 
 def test_the_compensators_of_the_document_are_a_configuration() -> None:
@@ -245,14 +212,6 @@ def test_every_public_name_is_documented_and_importable() -> None:
             assert not name.startswith("_")
 
 
-def test_pictures_that_documents_show_exist() -> None:
-    for document in (ROOT / "README.md", *(ROOT / "docs").rglob("*.md")):
-        text = document.read_text(encoding="utf-8")
-        for target in re.findall(r"\]\(([^)#]+)\)", text):
-            if "://" not in target:
-                assert (document.parent / target).exists(), f"{document.name}: {target}"
-
-
 def test_the_live_page_is_true(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     text = (ROOT / "docs" / "live.md").read_text(encoding="utf-8")
@@ -264,17 +223,6 @@ def test_the_live_page_is_true(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     weights = {each.name: sample_weight(each.weight, state)[0] for each in fields}
     assert weights == {"obstacle_clearance": 0.0, "target_posture": 0.0, "calm": 1.0}
     assert space["run"].status == "completed"
-
-
-def test_the_live_page_s_defaults_are_the_code_s() -> None:
-    text = (ROOT / "docs" / "live.md").read_text(encoding="utf-8")
-    told = dict(re.findall(r"^\| `([\w.]+)` \|.*\| ([^|]*) \|$", text, re.MULTILINE))
-    settings = LiveSettings().all_fields()
-    stop = settings.pop("stop").all_fields()
-    settings |= {f"stop.{name}": value for name, value in stop.items()}
-    for name, value in settings.items():
-        shown = "none" if value is None else str(value).lower().removesuffix(".0")
-        assert re.split("[ ,:]", told[name])[0] == shown, name
 
 
 def test_the_page_of_one_s_own_robot_is_true() -> None:

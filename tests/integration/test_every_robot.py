@@ -30,7 +30,6 @@ from hsp_control import (
 )
 from hsp_control.cli import robot_table
 from hsp_control.cli.robot_table import FLOATING, LOAD_OPTIONS
-from hsp_control.common.exceptions import ModelError
 from hsp_control.common.resources import bundled_robots
 from hsp_control.robot.description.sources import example_robots
 from hsp_control.robot.integrators import Rk4
@@ -255,16 +254,6 @@ def test_end_effector_is_the_frame_that_a_person_would_name(
     assert frame in robot.frame_names
 
 
-def test_a_name_that_a_joint_and_a_link_share_means_the_link() -> None:
-    """The desk arm's joint "gripper" moves the jaw; its link "gripper" is the hand."""
-    pytest.importorskip("example_robot_data")
-    robot = Robot.load("so100")
-    assert robot.frame_names.count("gripper") == 2
-    frame = robot.model.frames[robot.frame_id("gripper")]
-    assert frame.type == pin.FrameType.BODY
-    assert robot.model.names[frame.parentJoint] == "wrist_roll"
-
-
 # --- the table -----------------------------------------------------------------------
 
 
@@ -286,22 +275,6 @@ def test_every_robot_is_driven_or_listed_with_its_reason() -> None:
     # What does not load as it is says what it is to be loaded with.
     for name in LOAD_OPTIONS:
         assert "load it with `" in rows[name].note
-
-
-@pytest.mark.parametrize("name", LOAD_OPTIONS)
-def test_load_options_are_needed_and_help(name: str) -> None:
-    pytest.importorskip("example_robot_data")
-    robot = Robot.load(name, **LOAD_OPTIONS[name])
-    if name == "icub":
-        plain = Robot.load(name, root="fixed")
-        still = np.zeros(plain.nv)
-        M = plain.state(0.0, plain.home(), still).mass_matrix
-        assert np.linalg.eigvalsh(M)[0] < 1e-15
-    else:
-        with pytest.raises(ModelError):
-            Robot.load(name)
-    M = robot.state(0.0, robot.home(), np.zeros(robot.nv)).mass_matrix
-    assert np.linalg.eigvalsh(M)[0] > 1e-6
 
 
 def test_the_document_holds_the_table() -> None:

@@ -39,17 +39,6 @@ def test_a_panda_wipes_without_losing_contact() -> None:
     assert not log["status"].any()
 
 
-def test_mujoco_s_own_surface_lets_it_chatter() -> None:
-    """Its friction pushes off what slides: contact is lost, though it is pressed."""
-    log = load_experiment(
-        "forces/panda_wipe",
-        "simulation.duration=1.6",
-        "plant.solids.table.slip_damping=null",
-        "plant.solids.table.impedance=null",
-    ).run()
-    assert (felt(log, WIPER, [0.0, 0.0, 1.0])[log.t > 1.2] <= 0.0).mean() > 0.1
-
-
 @pytest.mark.parametrize(("share", "lost"), [(0.7, False), (1.6, True)])
 @pytest.mark.parametrize("impedance", [0.5, 0.8])
 def test_the_bound_on_the_damping_of_a_slip(

@@ -73,13 +73,6 @@ def test_towards_a_joint_limit() -> None:
     assert ours["status"][home] == 0
 
 
-def test_strict_order() -> None:
-    """With the least weight of the null space its giving way costs the hand nothing."""
-    strict, _ = run("panda_towards_limit", "simulation.duration=2.9")
-    assert strict["null_space_norm"][-1] > 1.0
-    assert error(strict)[-1] < 1e-5
-
-
 @pytest.mark.parametrize("name", ["panda_half_strength", "panda_towards_limit"])
 def test_the_law_until_a_limit_is_met(name: str) -> None:
     """Before the first limited step both runs are one."""

@@ -25,7 +25,6 @@ from hsp_control import (
 from hsp_control.constraints.limits import ObstacleDistance
 from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric
 from hsp_control.robot.integrators import Rk4
-from hsp_control.robot.matrix_view import matrix_view
 from hsp_control.simulation.plants import Push, RigidBodyPlant
 
 Array = NDArray[np.float64]
@@ -84,16 +83,6 @@ def test_terms_are_the_pendulums_at_every_state(robot: Robot) -> None:
             (state.mass_matrix_rate, [[0.0]]),
         ):
             np.testing.assert_allclose(got, wanted, rtol=0, atol=1e-12)
-
-
-def test_a_matrix_of_one_column_is_a_view(robot: Robot) -> None:
-    data = robot.model.createData()
-    for name in ("J", "dJ", "Ag", "dAg"):
-        matrix = matrix_view(getattr(data, name))
-        assert matrix.shape == (6, 1)
-        assert np.shares_memory(matrix, getattr(data, name))
-    wide = np.zeros((6, 2))
-    assert matrix_view(wide) is wide
 
 
 def gains() -> Gains:

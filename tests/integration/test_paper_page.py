@@ -1,19 +1,16 @@
 """docs/paper.md and its pictures: every number, and every frame, comes from a run."""
 
 import importlib.util
-import json
 import re
 from types import ModuleType
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from PIL import Image
 from places import ROOT
 
 from hsp_control import Rollout, load_experiment
 from hsp_control.config import Experiment
-from hsp_control.declaration.plain_data import plain_data
 from hsp_control.simulation.log_series import joint_positions
 
 Array = NDArray[np.float64]
@@ -141,74 +138,3 @@ def test_every_number_of_the_page_comes_from_a_run(
     assert len(printed) >= 4
     for label, value in printed.items():
         assert agrees(value, measured[label]), f"{label}: {value}, {measured[label]:g}"
-
-
-def test_what_the_page_says_of_figure_4_beside_figure_3(
-    runs: dict[int, Rollout],
-) -> None:
-    """A hundred times the determinant, a sixty-fifth of the effort."""
-    det = {n: runs[n]["manipulability"].min() for n in (3, 4)}
-    effort = {n: np.abs(runs[n].tau).max() for n in (3, 4)}
-    assert det[4] / det[3] == pytest.approx(100.0, rel=0.05)
-    assert effort[3] / effort[4] == pytest.approx(65.0, rel=0.05)
-
-
-def test_link_two_lies_over_the_disk_in_frame_5(runs: dict[int, Rollout]) -> None:
-    run, times = runs[5], PAPER[5].times
-    over = []
-    for frame, time in enumerate(times, start=1):
-        row = int(np.abs(run.t - time).argmin())
-        points, center = run["skeleton"][row, :, :2], run["obstacle.disk"][row, :2]
-        share = np.linspace(0.0, 1.0, 201)[:, None]
-        link_two = points[1] + share * (points[2] - points[1])
-        if np.linalg.norm(link_two - center, axis=1).min() < 0.2:
-            over.append(frame)
-    assert over == [5]
-
-
-# ----------------------------------------------------------------------- the pictures
-
-
-@pytest.mark.parametrize("number", FIGURES)
-def test_pictures_show_runs_of_today(number: int, runs: dict[int, Rollout]) -> None:
-    """What a picture says of itself is what a run gives: else `make figures`."""
-    with Image.open(PAPER[number].file) as picture:
-        said = dict(picture.text)
-    run = runs[number]
-    # Through the schema of today, which may have more to say than that of then.
-    then = load_experiment(json.loads(said["configuration"])).scenario
-    assert plain_data(then, defaults=True) == run.config
-    drawn = json.loads(said["frames"])
-    today = json.loads(drawing.provenance(run, PAPER[number].times)["frames"])
-    assert drawn["t"] == today["t"]
-    # The first simulation is chaos, tenfold a second: its later frames are of that run.
-    rows = slice(None) if number != 2 else np.array(drawn["t"]) < 5.0
-    for name in ("skeleton", "manipulability"):
-        found, expected = np.array(drawn[name])[rows], np.array(today[name])[rows]
-        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6, err_msg=name)
-
-
-@pytest.mark.parametrize("number", [3, 5])
-def test_panels_are_drawn_from_the_run(number: int, runs: dict[int, Rollout]) -> None:
-    """Curves and stick figures of the very figure that is written are the log's."""
-    run, one = runs[number], PAPER[number]
-    figure = one.figure(run)
-    assert figure.get_suptitle().startswith(f"Figure {number}")
-    joints, conditioning = (
-        next(a for a in figure.axes if a.get_title(loc="left").startswith(panel))
-        for panel in ("(b)", "(c)")
-    )
-    for line, expected in zip(joints.lines, angles(run).T, strict=False):
-        np.testing.assert_array_equal(line.get_ydata(), expected)
-    np.testing.assert_array_equal(
-        conditioning.lines[0].get_ydata(), run["manipulability"]
-    )
-    frames = [a for a in figure.axes if "t = " in a.get_title(loc="left")]
-    numbers = [a.get_title(loc="left").split()[0] for a in frames]
-    assert numbers == [rf"$\mathbf{{{k}}}$" for k in range(1, 9)]
-    for axes, time in zip(frames, one.times, strict=True):
-        row = int(np.abs(run.t - time).argmin())
-        sticks = np.concatenate([line.get_xydata() for line in axes.lines])
-        for point in run["skeleton"][row, :, :2]:
-            away = np.abs(sticks - point).sum(axis=1)
-            assert np.nanmin(away) < 1e-12

@@ -79,16 +79,6 @@ def test_null_space_error_decays(number: int, rng: np.random.Generator) -> None:
     assert_allclose(P @ e_N_dot, expected, rtol=0.0, atol=1e-8 * scale)
 
 
-def test_short_form_of_the_correction(rng: np.random.Generator) -> None:
-    """J⁺J'J⁺ + (J⁺)' = (I - J⁺J) J'ᵀ(JJᵀ)⁻¹, on which the package's law rests."""
-    _, theta, v = random_state(rng)
-    J, J_dot = arm.jacobian(theta), arm.jacobian_rate(theta, v)
-    J_plus = arm.pseudo_inverse(J)
-    printed = J_plus @ J_dot @ J_plus + arm.pseudo_inverse_rate(J, J_dot)
-    short = (np.eye(3) - J_plus @ J) @ J_dot.T @ np.linalg.inv(J @ J.T)
-    assert_allclose(printed, short, atol=1e-12)
-
-
 # --- the four simulations ------------------------------------------------------------
 
 

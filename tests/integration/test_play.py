@@ -5,22 +5,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 import pytest
 from clips import told
 from numpy.typing import NDArray
 
 import hsp_control as hsp
 from hsp_control.common.exceptions import ConfigError
-from hsp_control.geometry.scene import Obstacle
-from hsp_control.null_space.fields import ObstacleClearance
-from hsp_control.null_space.fields.field import terms_of
-from hsp_control.null_space.fields.weight import sample_weight
 from hsp_control.play import Picture, Session, play
 from hsp_control.play.knobs import _scaled, knobs_of
 from hsp_control.play.playable import playable
-from hsp_control.simulation.plants import RigidBody
-from hsp_control.simulation.plants.push import Push, Pushes, Spring
 from hsp_control.visualization.viewer import Recorder, Viewer
 
 Array = NDArray[np.float64]
@@ -133,59 +126,6 @@ def test_the_elbow_of_the_posture_leads_the_null_space(tmp_path: Path) -> None:
     np.testing.assert_array_equal(again.q, log.q)
 
 
-def test_the_field_comes_back_as_it_is_by_then(still: Session) -> None:
-    """What is moved or weighed while it is off counts when it is on again."""
-    go(still, 0.1)
-    still.take({"do": "set", "id": "field", "value": False})
-    go(still, 0.5)
-    ball, weight = [0.1, 0.3, 0.6], "weight.obstacle_clearance"
-    still.take({"do": "obstacle", "name": "ball", "position": ball})
-    still.take({"do": "set", "id": weight, "value": 0.5})
-    wanted = pose_of(still, "posture")
-    wanted[1] += 0.05
-    still.take({"do": "move", "target": "posture", "pose": wanted.tolist()})
-    go(still, 2.0)
-    assert not still.handles.warning
-    log = still.rollout()
-    np.testing.assert_array_equal(log["field.g"][-1], np.zeros(7))
-    assert log["null_space_norm"][-1] < 1e-4  # self-motion has come to rest
-    led = pose_of(still, "posture")
-    np.testing.assert_allclose(led[1], wanted[1], atol=0.01)
-    still.take({"do": "set", "id": "field", "value": True})
-    go(still, 1.5)
-    np.testing.assert_allclose(pose_of(still, "posture"), led, atol=1e-9)
-    terms = {term.name: term for term in terms_of(still.controller.field)}
-    clearance = terms["obstacle_clearance"]
-    assert isinstance(clearance, ObstacleClearance)
-    assert sample_weight(clearance.weight, still.controller.state)[0] == 0.5
-    (obstacle,) = clearance.obstacles or ()
-    assert isinstance(obstacle, Obstacle)
-    where = obstacle.placement(still.t).translation
-    np.testing.assert_allclose(where, ball, atol=1e-9)
-
-
-def test_a_return_is_no_jolt(still: Session) -> None:
-    """A target and an obstacle that were led far away return at a bearable speed."""
-    go(still, 0.1)
-    targets, obstacles = still.handles.places()
-    far = np.add(targets["hand"], [0.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0])
-    still.take({"do": "move", "target": "hand", "pose": far.tolist()})
-    away = np.add(obstacles["ball"], [0.0, 0.0, 0.5])
-    still.take({"do": "obstacle", "name": "ball", "position": away.tolist()})
-    go(still, 2.0)
-    first = still.recorder.count
-    still.take({"do": "resume", "target": "hand"})
-    still.take({"do": "resume", "name": "ball"})
-    go(still, 2.0)
-    np.testing.assert_allclose(still.handles.places()[1]["ball"], obstacles["ball"])
-    np.testing.assert_allclose(pose_of(still)[:3], targets["hand"][:3], atol=1e-4)
-    rows = still.recorder.rows(first)
-    for column in ("task.hand.actual", "obstacle.ball"):
-        steps = np.linalg.norm(np.diff(rows[column][:, :3], axis=0), axis=1)
-        assert steps.max() < 0.65 * still.row  # 15/8 of half a metre in 1.5 s
-    assert not rows["status"].any()
-
-
 LINK = "/robot/panda_joint4"
 BAD: list[dict[str, Any]] = [
     {"do": "move", "target": "foot", "pose": [0.0] * 7},
@@ -221,13 +161,6 @@ def test_nonsense_is_answered_and_moves_nothing(
     go(session, 0.05)
 
 
-def test_a_knob_goes_no_further_than_the_period_bears(session: Session) -> None:
-    session.take({"do": "set", "id": "frequency.hand", "value": 1e9})
-    go(session, 0.5)
-    assert session.handles.values["frequency.hand"] == pytest.approx(100.0)  # ten times
-    assert np.abs(session.rollout().v).max() < 5.0
-
-
 class Told:
     """Keeps the gains that a knob asks for."""
 
@@ -257,34 +190,6 @@ def test_a_slider_that_is_dragged_makes_few_changes(session: Session) -> None:
     go(session, 0.2)
     assert session.handles.values["null_space_gain"] == pytest.approx(19.9)
     assert len(session.controller.changes) <= 12
-
-
-@pytest.mark.parametrize("joint", [2, 4, 7])
-def test_a_spring_pulls_at_its_point(experiment: hsp.Experiment, joint: int) -> None:
-    """Its effort is the slope of its energy, for small differences of q."""
-    robot, q = experiment.robot, experiment.q0
-    data = robot.model.createData()
-    point, hand = np.array([0.02, -0.05, 0.1]), np.array([0.5, 0.2, 0.6])
-    spring = Spring(joint, point, hand, 200.0, np.inf)
-    pushes = Pushes(robot)
-    pushes.spring = spring
-
-    def energy(q: Array) -> float:
-        pin.forwardKinematics(robot.model, data, q)
-        away = hand - data.oMi[joint].act(point)
-        return float(100.0 * away @ away)
-
-    step = 1e-6
-    slope = [
-        (energy(robot.integrate(q, step * d)) - energy(robot.integrate(q, -step * d)))
-        / (2.0 * step)
-        for d in np.eye(robot.nv)
-    ]
-    assert pushes.any_active(0.0, 0.0)
-    np.testing.assert_allclose(pushes.effort(0.0, q), -np.array(slope), atol=1e-6)
-    spring.largest = 10.0
-    assert np.linalg.norm(spring.force(np.zeros(3))) == pytest.approx(10.0)
-    assert not spring.force(hand).any()
 
 
 def test_somebody_pulls_at_the_elbow_and_the_hand_goes_on(
@@ -468,12 +373,6 @@ def test_any_fixed_robot_is_a_playground() -> None:
     assert list(session.handles.obstacles) == ["ball"]
 
 
-def test_a_configuration_without_a_period_gets_one() -> None:
-    experiment = playable("paper/4_moving_obstacle")
-    settings = experiment.scenario.simulation
-    assert (settings.control_period, settings.log_period) == (0.001, 0.01)
-
-
 @pytest.mark.parametrize(
     ("source", "message"),
     [
@@ -485,18 +384,6 @@ def test_a_configuration_without_a_period_gets_one() -> None:
 def test_what_cannot_be_played_with_is_said(source: str, message: str) -> None:
     with pytest.raises(ConfigError, match=message):
         playable(source)
-
-
-def test_pushes_that_were_declared_go_on_beside_a_pull() -> None:
-    robot = hsp.Robot.load("panda")
-    plant = RigidBody(pushes=[Push("panda_tcp", [1.0, 0.0, 0.0], duration=1.0)])
-    pushes = plant.build(robot, hsp.Experiment("panda", [hsp.FramePose()]).integrator)
-    found = pushes.pushes  # type: ignore[attr-defined]
-    alone = found.effort(0.0, robot.home())
-    found.spring = Spring(4, np.zeros(3), np.ones(3), 10.0, 5.0)
-    both = found.effort(0.0, robot.home())
-    found.pushes = ()
-    np.testing.assert_allclose(both - alone, found.effort(0.0, robot.home()))
 
 
 def test_the_operational_space_law_keeps_the_tasks_and_not_the_field(

@@ -55,12 +55,6 @@ def test_its_types_work_in_a_configuration(installed: Path, tmp_path: Path) -> N
     assert "DampedPlant" in ran.stdout or "damped" in ran.stdout.lower()
 
 
-def test_without_the_package_they_are_unknown(tmp_path: Path) -> None:
-    ran = hsp(None, "check", DEMO, where=tmp_path)
-    assert ran.returncode == 2
-    assert "tasks.height.type: unknown type 'frame_height'" in ran.stderr
-
-
 def test_strict_reading_admits_it_by_name_only(installed: Path, tmp_path: Path) -> None:
     refused = hsp(installed, "check", "--strict", DEMO, where=tmp_path)
     assert refused.returncode == 2

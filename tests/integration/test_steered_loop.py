@@ -132,23 +132,6 @@ def test_it_stops_at_once(keyed: Steered, message: dict[str, Any], reason: str) 
     assert stopped == pytest.approx(0.1, abs=0.003)
 
 
-def test_without_a_key_it_goes_on_when_the_page_is_gone(steered: Steered) -> None:
-    steered.page.close()
-    steered.at(0.05, do="left")
-    assert steered.run(0.2).ended == "completed"
-
-
-def test_a_page_whose_process_has_ended_does_not_keep_the_loop_waiting(
-    keyed: Steered,
-) -> None:
-    """Before the key is held for the first time, nothing else would end the wait."""
-    keyed.loop.listen()
-    assert keyed.requests.reason is None
-    keyed.page.close()
-    keyed.loop.listen()
-    assert keyed.requests.reason == "the process of the page has ended"
-
-
 def test_a_word_that_is_too_much_is_dropped_and_nobody_waits() -> None:
     here, there = channel_pair()
     other = Channel(there)

@@ -1,6 +1,5 @@
 """Files of strangers: nothing runs, nothing outside is read, sizes are bounded."""
 
-import os
 from pathlib import Path
 from typing import Any
 
@@ -96,13 +95,6 @@ def test_no_pickle_is_opened(tmp_path: Path) -> None:
 
 
 # --- paths ---------------------------------------------------------------------------
-
-
-def test_what_lies_beside_or_is_bundled_is_read(home: Path) -> None:
-    for robot in ("arm.urdf", str(home / "arm.urdf"), "panda", "./arm.urdf"):
-        load_experiment(write(home, robot), strict=True)
-    load_experiment("panda_obstacle", strict=True)
-    load_experiment(write(home, more=MESH.replace("MESH", "good.stl")), strict=True)
 
 
 def test_a_robot_elsewhere_is_refused_and_allowed(
@@ -285,16 +277,6 @@ def test_files_are_bounded(
     monkeypatch.setattr(f"hsp_control.robot.description.{module}.MAX_SIZE", 200)
     with pytest.raises(ModelError, match=r"larger than|collision mesh: .*at most"):
         load_experiment(home / "config.yaml")
-
-
-def test_a_pipe_is_no_mesh(home: Path) -> None:
-    """It would be waited for."""
-    os.mkfifo(home / "pipe.stl")
-    (home / "arm.urdf").write_text(ARM.replace("good.stl", "pipe.stl"))
-    with pytest.raises(ModelError, match="a collision mesh"):
-        load_experiment(home / "config.yaml")
-    with pytest.raises(SceneError, match="no such file"):
-        Mesh(home / "pipe.stl").geometry()
 
 
 @pytest.mark.parametrize(("overrides", "message"), [

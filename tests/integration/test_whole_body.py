@@ -4,8 +4,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-import yaml
-from places import ROOT
 
 from hsp_control import Rollout, load_experiment
 from hsp_control.control.actuation import Status
@@ -89,25 +87,9 @@ def test_solo_lifts_a_foot_and_puts_it_down() -> None:
     assert jumps.max() < 0.35 * np.abs(rollout["tau"]).max()
 
 
-def test_solo_moves_its_trunk() -> None:
-    rollout = run("solo12_trunk", "simulation.duration=1")
-    assert rms(rollout, "trunk") < 5e-4
-    check_forces(rollout)
-
-
 def test_baxter_tracks_with_both_hands() -> None:
     rollout = run("baxter_two_hands", "simulation.duration=0.6")
     assert rms(rollout, "left_hand") < 1e-4
     assert rms(rollout, "right_hand") < 1e-4
     assert rollout.meta["tasks"]["left_hand"]["level"] == 0
     assert rollout.meta["tasks"]["right_hand"]["level"] == 1
-
-
-def test_the_page_s_yaml_runs() -> None:
-    text = (ROOT / "docs" / "whole_body.md").read_text(encoding="utf-8")
-    (yaml_text,) = text.split("```yaml\n")[1:]
-    data = yaml.safe_load(yaml_text.split("```")[0])
-    data["simulation"]["duration"] = 0.05
-    rollout = load_experiment(data).run()
-    assert rollout.meta["status"] == "completed"
-    assert rms(rollout, "mass") < 1e-3

@@ -5,7 +5,6 @@ Chromium without a window. Where there is none these tests are skipped, but not 
 
 import io
 import itertools
-import re
 import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -17,24 +16,22 @@ import pinocchio as pin
 import pytest
 from browsers import HARMLESS
 from PIL import Image, ImageSequence
-from places import ROOT, THOROUGH
 
 from hsp_control import Robot, Rollout, load_experiment
 from hsp_control.cli import main
-from hsp_control.common.resources import bundled_configs
 from hsp_control.companions.film import FilmStyle, export_film
 from hsp_control.companions.film.encoding import find_ffmpeg
 from hsp_control.visualization.viewer import LiveView, Viewer, export_html
-from hsp_control.visualization.viewer.commands import PLOTS, set_property
+from hsp_control.visualization.viewer.commands import PLOTS
 from hsp_control.visualization.viewer.latest_commands import key_of
 from hsp_control.visualization.viewer.offline.clip_reduction import (
     ANGLE_BOUND,
     POSITION_BOUND,
 )
 
+pytest.importorskip("playwright.sync_api")
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
-sync_api = pytest.importorskip("playwright.sync_api")
 
 SIZE = (1000, 640)
 # As configured, a run takes minutes without compiled kernels.
@@ -252,40 +249,6 @@ def test_timeline_plots_and_robot_move_together(
     expect(0.5)
 
 
-def test_it_plays_by_itself_and_to_its_end(
-    planar_page: Path, watch: Callable[..., Watched]
-) -> None:
-    watched = exported(watch, planar_page)
-    assert watched.page.evaluate("player.playing")
-    watched.page.evaluate("player.setSpeed(8)")
-    watched.until("!player.playing")
-    assert watched.page.evaluate("player.time === player.end")
-
-
-def test_the_plots_can_be_put_away_and_narrow_screens_stack(
-    planar_page: Path, watch: Callable[..., Watched]
-) -> None:
-    watched = exported(watch, planar_page, at="#t=1")
-    page = watched.page
-    width = page.locator("#meshcat-pane canvas").bounding_box()["width"]
-    page.keyboard.press("g")
-    watched.until(f"document.querySelector('canvas').clientWidth === {SIZE[0]}")
-    assert width < SIZE[0]
-    assert not page.locator("#side").is_visible()
-    page.locator(".player .side").click()
-    watched.until(f"document.querySelector('canvas').clientWidth === {width}")
-
-    page.set_viewport_size({"width": 390, "height": 800})
-    watched.until("document.querySelector('canvas').clientWidth === 390")
-    stage, side = (page.locator(x).bounding_box() for x in ("#stage", "#side"))
-    assert side["y"] == pytest.approx(stage["y"] + stage["height"], abs=1)
-    assert page.evaluate("document.documentElement.scrollWidth") == 390
-    image = watched.picture()
-    arm = np.argwhere(image.sum(axis=2) < 200)
-    assert arm.size
-    assert (arm.min(axis=0) > 2).all()  # all of it is in sight
-
-
 def test_a_page_has_its_bands_and_presents(
     planar: Rollout, tmp_path: Path, watch: Callable[..., Watched]
 ) -> None:
@@ -314,9 +277,6 @@ def test_a_page_has_its_bands_and_presents(
 
 
 # -- the legend, whose rows are switches ----------------------------------------------
-
-
-PHONE = (390, 844)
 
 
 def row(watched: Watched, name: str) -> Any:
@@ -378,163 +338,6 @@ def test_a_row_of_the_legend_switches_what_it_names(
         assert not page.evaluate("player.playing")
 
 
-def test_a_choice_survives_what_the_program_sends_later(
-    planar: Rollout, watch: Callable[..., Watched]
-) -> None:
-    experiment = load_experiment(PLANAR, "simulation.duration=4")
-    with Viewer(experiment.robot) as viewer:
-        viewer.play(planar, controller=experiment.controller)
-        watched = watch(viewer.url)
-        assert viewer.wait_for_browser(200.0)
-        row(watched, "obstacle disk").click()
-        row(watched, "manipulability").click()
-        chosen = states(watched)
-        assert (chosen["obstacle disk"], chosen["manipulability"]) == (False, True)
-        row(watched, "grid").focus()
-        # All layers are deleted and drawn again, and the legend is sent again.
-        viewer.replace_run(planar, 3.0, experiment.controller, "again")
-        assert viewer.wait_for_browser(200.0)
-        assert watched.page.locator("#caption .status").inner_text() == "again"
-        assert states(watched) == chosen
-        assert not watched.page.evaluate("node('/obstacles').visible")
-        assert watched.page.evaluate("node('/ellipsoid/tip').visible")
-        assert watched.page.evaluate("document.activeElement.textContent") == "grid"
-        # What the program hides, the row tells.
-        viewer.transport.send([set_property("/robot", "visible", False)])
-        assert viewer.wait_for_browser(200.0)
-        assert not states(watched)["robot"]
-        watched.page.close()
-
-
-def test_bars_have_their_length_beside_them(
-    planar: Rollout, planar_page: Path, watch: Callable[..., Watched]
-) -> None:
-    watched = exported(watch, planar_page, at="#t=0")
-    label = watched.page.locator(".length-label")
-    places = []
-    for moment in (0.0, 1.0, 2.5):
-        seek(watched, moment)
-        watched.page.evaluate(SETTLE)
-        logged = planar["distance.point_distance"][np.argmin(abs(planar.t - moment))]
-        assert float(label.inner_text().removesuffix(" m")) == pytest.approx(
-            logged, abs=0.006
-        )
-        box, bar = label.bounding_box(), middle(watched)
-        center = [box["x"] + box["width"] / 2, box["y"] + box["height"] / 2]
-        assert 10 < np.linalg.norm(np.subtract(center, bar)) < 60
-        places.append(center)
-    assert len(np.unique(np.round(places), axis=0)) == 3  # it follows
-    row(watched, "distance to the obstacle's centre").click()
-    watched.page.evaluate(SETTLE)
-    assert not label.is_visible()
-
-
-def middle(watched: Watched) -> list[float]:
-    """Where the middle of the only distance bar is on the screen."""
-    return watched.page.evaluate(
-        """() => {
-          const [path] = lengthLabels.paths;
-          const point = new MeshCat.THREE.Vector3(0, 0, 0.5);
-          point.applyMatrix4(node(path).matrixWorld).project(viewer.camera);
-          const {width, height, left, top} = viewer.dom_element.getBoundingClientRect();
-          return [left + (point.x + 1) / 2 * width, top + (1 - point.y) / 2 * height];
-        }"""
-    )
-
-
-def test_on_a_phone_the_legend_waits_behind_a_button_and_all_is_in_sight(
-    planar: Rollout, watch: Callable[..., Watched]
-) -> None:
-    with Viewer(Robot.load("planar3r")) as viewer:
-        viewer.draw_scene(planar)
-        watched = watch(viewer.url, size=PHONE)
-        page = watched.page
-        assert viewer.wait_for_browser(200.0)
-        page.evaluate(SETTLE)
-        assert page.locator("meta[name=viewport]").count() == 1
-        assert page.evaluate("document.documentElement.scrollWidth") == PHONE[0]
-        assert not page.locator("#layers").is_visible()
-        button = page.locator("#caption .layers-toggle")
-        assert button.get_attribute("aria-expanded") == "false"
-        left, right, top, bottom = spread(watched)
-        heading = page.locator("#caption h1").bounding_box()
-        bar = page.locator(".player").bounding_box()
-        assert left > 0
-        assert right < PHONE[0]
-        assert top > heading["y"] + heading["height"]
-        assert bottom < bar["y"]
-        assert right - left > 0.5 * PHONE[0]  # and not small
-
-        button.click()
-        assert page.locator("#layers").is_visible()
-        row(watched, "obstacle disk").click()
-        assert not states(watched)["obstacle disk"]
-        button.click()
-        assert not page.locator("#layers").is_visible()
-
-        # Turned to a large window, the rows are there, and the camera is nearer.
-        far = page.evaluate("viewer.camera.position.length()")
-        page.set_viewport_size({"width": 1280, "height": 800})
-        page.evaluate(SETTLE)
-        assert page.locator("#layers").is_visible()
-        assert page.evaluate("viewer.camera.position.length()") < 0.8 * far
-        # A camera that the user has moved stays where it is.
-        page.mouse.move(900, 400)
-        page.mouse.wheel(0, -240)
-        page.evaluate(SETTLE)
-        moved = page.evaluate("viewer.camera.position.toArray()")
-        page.set_viewport_size({"width": PHONE[0], "height": PHONE[1]})
-        page.evaluate(SETTLE)
-        kept = page.evaluate("viewer.camera.position.toArray()")
-        np.testing.assert_allclose(kept, moved, rtol=1e-6)
-        page.close()
-
-
-def spread(watched: Watched) -> list[float]:
-    """The box on the screen around all joints and paths: left, right, top, bottom."""
-    return watched.page.evaluate(
-        """() => {
-          const {width, height} = viewer.dom_element.getBoundingClientRect();
-          const {Box3, Vector3} = MeshCat.THREE;
-          const box = new Box3();
-          for (const path of ["/robot", "/paths"]) {
-            node(path).traverse((thing) => {
-              const {position} = thing.geometry?.attributes ?? {};
-              for (let k = 0; k < (position?.count ?? 0); k++) {
-                const point = new Vector3().fromBufferAttribute(position, k);
-                point.applyMatrix4(thing.matrixWorld).project(viewer.camera);
-                box.expandByPoint(point);
-              }
-            });
-          }
-          return [(1 + box.min.x) / 2 * width, (1 + box.max.x) / 2 * width,
-                  (1 - box.max.y) / 2 * height, (1 - box.min.y) / 2 * height];
-        }"""
-    )
-
-
-@pytest.mark.parametrize("eye", [None, [2.6, -1.4, 1.3]])
-def test_a_tall_and_wide_robot_fits_a_window_of_any_shape(
-    eye: list[float] | None, watch: Callable[..., Watched]
-) -> None:
-    with Viewer(Robot.load("tiago"), camera=eye, background="#14202B") as viewer:
-        watched = watch(viewer.url, size=PHONE)
-        assert viewer.wait_for_browser(200.0)
-        page = watched.page
-        for width, height in (PHONE, (844, 390), (700, 700)):
-            page.set_viewport_size({"width": width, "height": height})
-            page.evaluate(SETTLE)
-            left, right, top, bottom = spread(watched)
-            assert left > 0
-            assert right < width
-            if eye is None:
-                assert top > 0
-                assert bottom < height
-        color = "getComputedStyle(document.getElementById('caption')).color"
-        assert page.evaluate(color) == "rgb(246, 247, 248)"  # the background is dark
-        page.close()
-
-
 # -- the live view --------------------------------------------------------------------
 
 
@@ -588,19 +391,6 @@ def test_the_live_view_has_the_run_s_plots(
         assert all(request.startswith(local) for request in watched.requests)
 
 
-def test_on_a_phone_the_plots_of_the_live_view_are_away_at_first(
-    planar: Rollout, watch: Callable[..., Watched]
-) -> None:
-    with Viewer(Robot.load("planar3r")) as viewer:
-        viewer.play(planar)
-        watched = watch(viewer.url, size=PHONE)
-        assert viewer.wait_for_browser(200.0)
-        assert not watched.page.locator("#side").is_visible()
-        watched.page.locator(".player .side").click()
-        assert watched.page.locator("#side").is_visible()
-        assert watched.page.evaluate("document.documentElement.scrollWidth") == PHONE[0]
-
-
 # -- films ----------------------------------------------------------------------------
 
 
@@ -651,47 +441,3 @@ def test_films_from_the_command_line(
     with Image.open(films[1]) as film:
         assert (film.format, film.size) == ("WEBP", (301, 200))
         assert film.n_frames == 5
-
-
-def test_the_document_s_film(
-    planar: Rollout, browser: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    del browser
-    monkeypatch.chdir(tmp_path)
-    text = (ROOT / "docs" / "export.md").read_text(encoding="utf-8")
-    snippet = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)[-1]
-    columns = {name: column[:101] for name, column in planar.columns.items()}
-    exec(snippet, {"rollout": Rollout(columns, planar.meta)})
-    with Image.open(tmp_path / "out" / "film.webp") as film:
-        assert film.n_frames == 6
-
-
-# -- every configuration --------------------------------------------------------------
-
-
-# A robot's motion is run coarsely and not to its end: what it does is tested elsewhere.
-# A plant that moves by itself needs its control period: there only the beginning is.
-QUICK = (*COARSE, "simulation.duration=4")
-SHORT = ("simulation.duration=0.6",)
-SHOWN = {"paper": (), "whole_body": SHORT, "forces": SHORT, "compliance": SHORT}
-
-
-EACH_KIND = ("panda_obstacle", "whole_body/talos_circle")
-
-
-@pytest.mark.parametrize("name", bundled_configs() if THOROUGH else EACH_KIND)
-def test_a_configuration_has_its_picture(
-    name: str, browser: Any, tmp_path: Path
-) -> None:
-    overrides = SHOWN.get(name.partition("/")[0], QUICK)
-    rollout = load_experiment(name, *overrides).run()
-    file = export_html(rollout, tmp_path / "page.html")
-    moment = 0.6 * rollout.t[-1]
-    page, wrong = browsers.exported(browser, file, moment, (1280, 800))
-    page.evaluate(SETTLE)
-    picture = page.screenshot()
-    page.close()
-    assert wrong == []
-    with Image.open(io.BytesIO(picture)) as image:
-        pixels = np.asarray(image.convert("RGB"))
-    assert len(np.unique(pixels.reshape(-1, 3), axis=0)) > 1000

@@ -79,13 +79,6 @@ def outputs(page: Any, plot: int) -> list[str]:
     return page.locator("#side section").nth(plot).locator("output").all_inner_texts()
 
 
-@pytest.mark.smoke
-def test_axes_have_units(page: Any) -> None:
-    units = page.locator("#side svg").nth(JOINTS).locator(".unit").all_text_contents()
-    assert sorted(units) == ["[rad]", "t [s]"]
-    assert ticks(page, JOINTS) == ["0", "1", "2", "3"]
-
-
 def test_the_pointer_shows_values_in_all_plots_and_leaves_the_time(page: Any) -> None:
     before = outputs(page, JOINTS)
     page.mouse.move(*place(page, JOINTS, 3.0))
@@ -143,26 +136,6 @@ def test_all_plots_zoom_together_and_back(page: Any) -> None:
     assert end - start == pytest.approx(4.0 * np.exp(-0.6), abs=0.03)
 
 
-def test_a_name_shows_its_curve_alone(page: Any) -> None:
-    section = page.locator("#side section").nth(JOINTS)
-    curves = section.locator("polyline")
-    low_to_high = section.locator("svg text[text-anchor=end]")
-    all_of_them, labels = curves.count(), low_to_high.all_text_contents()
-    assert all_of_them == 6  # three joints of two runs
-    section.locator("li button").nth(1).click()
-    assert curves.count() == 2
-    assert low_to_high.all_text_contents() != labels  # its own axis
-    assert section.locator("li button.off").count() == 2
-    page.keyboard.press("Space")  # the keyboard is the player's again
-    assert page.evaluate("player.playing")
-    page.keyboard.press("Space")
-    section.locator("li button").nth(1).focus()
-    page.keyboard.press("Enter")
-    assert not page.evaluate("player.playing")
-    assert curves.count() == all_of_them
-    assert low_to_high.all_text_contents() == labels
-
-
 def test_a_plot_is_used_with_the_keyboard(page: Any) -> None:
     picture = page.locator("#side svg").first
     picture.focus()
@@ -184,42 +157,6 @@ def test_a_plot_is_used_with_the_keyboard(page: Any) -> None:
     assert page.evaluate("player.time") == 2
     page.keyboard.press("Home")
     assert page.evaluate("player.time") == 0
-
-
-def test_fingers_pinch_and_move_the_time(browser: Any, page_file: Path) -> None:
-    context = browser.new_context(
-        viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True
-    )
-    page = context.new_page()
-    page.goto(page_file.resolve().as_uri() + "#t=1")
-    page.wait_for_selector("body[data-ready]", state="attached")
-    page.locator("#side svg").nth(1).scroll_into_view_if_needed()
-    camera = context.new_cdp_session(page)
-
-    def touch(kind: str, *moments: float) -> None:
-        points = [dict(zip("xy", place(page, 1, t), strict=True)) for t in moments]
-        points = [{**point, "id": k} for k, point in enumerate(points)]
-        camera.send(
-            "Input.dispatchTouchEvent", {"type": f"touch{kind}", "touchPoints": points}
-        )
-
-    touch("Start", 1.0)
-    touch("Move", 2.0)
-    touch("Move", 3.0)
-    touch("End")
-    assert page.evaluate("player.time") == pytest.approx(3.0, abs=0.05)
-    touch("Start", 1.5)
-    touch("Start", 1.5, 2.5)
-    touch("Move", 1.0, 3.0)
-    touch("End")
-    label = zoom_label(page)
-    assert label is not None
-    start, end = map(float, label.removesuffix(" s").split(" – "))
-    assert (start, end) == pytest.approx((1.0, 3.0), abs=0.05)
-    page.locator(".whole-run").tap()
-    assert zoom_label(page) is None
-    assert page.evaluate("document.documentElement.scrollWidth") == 390
-    context.close()
 
 
 def seen(page: Any, path: str) -> bool:
@@ -282,14 +219,6 @@ def test_the_switch_shows_one_run_or_both(page: Any) -> None:
     assert state() == ("with", True, False, False)
     page.keyboard.press("Space")
     assert page.evaluate("player.playing")
-
-
-def test_what_is_active_stands_above_the_switch(page: Any) -> None:
-    active = "'<span>a limit is active</span>'"
-    page.evaluate(f"document.querySelector('.moments').innerHTML = {active}")
-    told = page.locator(".moments span").bounding_box()
-    switch = page.locator(".run-switch").bounding_box()
-    assert told["y"] + told["height"] <= switch["y"]
 
 
 def test_the_floor_is_drawn_where_the_effort_is_held(page: Any) -> None:

@@ -9,7 +9,6 @@ import os
 import signal
 import subprocess
 import sys
-from functools import partial
 from pathlib import Path
 from time import monotonic, sleep
 from typing import Any
@@ -199,32 +198,6 @@ def test_the_loop_s_process_is_killed(tmp_path: Path) -> None:
     assert_whole(log)
     assert log.t[-1] == pytest.approx(0.3, abs=0.02)
     assert set(log["live.phase"]) == {Phase.RUNNING}
-
-
-def _runs_or_ended(process: "subprocess.Popen[str]", journal: Path) -> bool:
-    return rows(journal) > 10 or process.poll() is not None
-
-
-def test_ctrl_c_is_the_operator_s_stop(tmp_path: Path) -> None:
-    for attempt in range(4):  # where the machine stands still, the arm is stopped first
-        tmp_path = tmp_path / str(attempt)
-        tmp_path.mkdir()
-        process = hsp_live(tmp_path, "--duration", "inf")
-        journal = tmp_path / "arm-live.journal"
-        assert wait_for(partial(_runs_or_ended, process, journal), 200.0)
-        process.send_signal(signal.SIGINT)
-        out, error = process.communicate(timeout=60)
-        if process.returncode == 0:
-            break
-    assert process.returncode == 0, error  # what else should end it
-    assert "stopped by the operator (SIGINT)" in out
-    assert "The robot: the loop closed the connection; holding" in out
-    log = Rollout.load(tmp_path / "arm-live.npz")
-    assert log.status == "interrupted"
-    assert log["live.phase"][-1] == Phase.HOLDING
-    assert log.meta["link"]["accepted"] > 0
-    assert_stopped(Rollout.load(tmp_path / "arm-robot.npz"))
-    assert not list(tmp_path.glob("*.journal"))
 
 
 @pytest.mark.smoke

@@ -128,21 +128,3 @@ def test_runs_are_shown_without_any_server(
     assert other.evaluate("innerHeight") == 300
     assert other.evaluate("document.body.classList.contains('dark')")
     notebook.close()
-
-
-def test_a_posture_needs_no_player(
-    browser: Any, tmp_path: Path, experiment: Experiment
-) -> None:
-    q = experiment.robot.integrate(
-        experiment.robot.neutral(), np.array([0.5, 0.0, 0.0])
-    )
-    with Viewer(experiment.robot) as viewer:
-        viewer.show(q)
-        shown = viewer._repr_html_()
-    notebook = Notebook(browser, tmp_path, shown)
-    (view,) = notebook.views
-    assert view.locator(".player").is_hidden()
-    height = view.locator("canvas").bounding_box()["height"]
-    assert height == view.evaluate("innerHeight")
-    assert turn(view) == pytest.approx(0.5, abs=1e-4)  # packed
-    notebook.close()

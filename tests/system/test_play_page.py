@@ -184,17 +184,6 @@ def test_the_ball_stays_under_the_pointer(page: Any) -> None:
     assert page.evaluate("viewer.controls.enabled") is True
 
 
-def test_a_coordinate_that_is_not_followed_stays(page: Any) -> None:
-    start = pixel(page, ELBOW)
-    drag(page, start, start + np.array([40.0, 25.0]))
-    pose = until_sent(page, "move")[-1]["pose"]
-    assert pose[2] == ELBOW[2]
-    page.mouse.up()
-    assert lies_under(
-        page, sent(page, "move")[-1]["pose"], start + np.array([40.0, 25.0])
-    )
-
-
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_an_arrow_moves_along_its_axis(page: Any, axis: int) -> None:
     start = np.array(page.evaluate(HANDLE, ["hand", "arrow", axis]))
@@ -225,12 +214,6 @@ def test_a_ring_turns_about_its_axis(page: Any, axis: int) -> None:
     local = np.array([a * x - b * z, a * y - b * w, a * z + b * x])
     assert a * w + b * y < 1.0 - 1e-5  # it has turned
     assert np.delete(local, axis) == pytest.approx([0.0, 0.0], abs=1e-9)
-
-
-def test_a_click_moves_nothing(page: Any) -> None:
-    page.mouse.click(*pixel(page, HAND))
-    assert page.evaluate("play.selected") == "target hand"
-    assert sent(page) == []
 
 
 def test_the_keyboard_moves_by_a_centimetre(page: Any) -> None:
@@ -357,64 +340,6 @@ def test_a_link_is_pulled(page: Any) -> None:
     assert page.locator(".play-label.force").is_hidden()
 
 
-CANCEL = """viewer.dom_element.dispatchEvent(new PointerEvent("pointercancel",
-  {pointerId: play.hand.grip.pointer, bubbles: true}))"""
-HIDE = """() => {
-  Object.defineProperty(document, "hidden", {value: true, configurable: true});
-  document.dispatchEvent(new Event("visibilitychange"));
-  delete document.hidden;
-}"""
-
-
-@pytest.mark.parametrize("loss", [CANCEL, HIDE])
-def test_a_lost_pointer_lets_go(page: Any, loss: str) -> None:
-    start = pixel(page, HAND)
-    drag(page, start, start + 30.0)
-    page.evaluate(loss)
-    # The last move is not lost: it comes before the release.
-    assert [message["do"] for message in sent(page)][-2:] == ["move", "release"]
-    page.mouse.up()
-    page.evaluate("sent.length = 0")
-    start = page.evaluate(LINK)
-    drag(page, start, np.array(start) + 30.0)
-    page.evaluate(loss)
-    assert [message["do"] for message in sent(page)][-2:] == ["pull", "let_go"]
-    assert page.evaluate("viewer.controls.enabled") is True
-    page.mouse.up()
-
-
-def test_beside_all_handles_the_camera_turns(page: Any) -> None:
-    before = page.evaluate("viewer.camera.position.toArray()")
-    drag(page, [60.0, 600.0], [160.0, 600.0])
-    page.mouse.up()
-    assert page.evaluate("viewer.camera.position.toArray()") != before
-    assert sent(page) == []
-    page.evaluate("camera(placed.command)")
-
-
-def test_a_page_that_watches_says_nothing(page: Any) -> None:
-    start = pixel(page, HAND)
-    drag(page, start, start + 20.0)
-    until_sent(page, "move")
-    tell(page, "play_drive", mine=False, taken=True)
-    page.evaluate("sent.length = 0")
-    page.mouse.move(*(start + 40.0))
-    page.mouse.up()
-    drag(page, start, start + 30.0)
-    page.mouse.up()
-    for key in ("1", "ArrowRight", " ", ".", "r", "s"):
-        page.keyboard.press(key)
-    page.evaluate("new Promise(requestAnimationFrame)")
-    assert sent(page) == []
-    for name in (".play-bar .toggle", ".play-bar .reset", "#play-stiffness"):
-        assert page.locator(name).is_disabled()
-    page.get_by_role("button", name="Take over").click()
-    assert sent(page) == [{"do": "take_over"}]
-    tell(page, "play_drive", mine=True, taken=True)
-    assert page.locator(".play-watching").is_hidden()
-    page.evaluate("camera(placed.command)")
-
-
 def told_until(page: Any, values: dict[str, Any], expression: str) -> None:
     """Say what the settings are, as with each picture, until an expression is true."""
     text = json.dumps(values)
@@ -456,72 +381,6 @@ def test_a_target_and_an_obstacle_return_to_their_paths(page: Any) -> None:
         {"do": "resume", "target": "elbow"},
         {"do": "resume", "name": "ball"},
     ]
-
-
-SAMPLES = """(times) => viewer.handle_command({
-  type: "play_samples", path: "/play", number: 1,
-  times: Float64Array.from(times),
-  values: Float32Array.from(times.flatMap((t) => [1 + t, Math.sin(t), -t]))})"""
-
-
-def test_the_plots_keep_the_last_seconds(page: Any) -> None:
-    times = [0.01 * k for k in range(400)]
-    page.evaluate(SAMPLES, times)
-    page.evaluate(SAMPLES, [time + 6.0 for time in times])  # the page had stalled
-    assert page.evaluate("play.plots.count") == 800
-    gaps = """[...Array(play.plots.count - 1).keys()].filter((row) =>
-      play.plots.isGap(play.plots.time(row + 1) - play.plots.time(row)))"""
-    assert page.evaluate(gaps) == [399]
-    outputs = page.locator(".play-plots output")
-    until(
-        page,
-        "document.querySelector('.play-plots output').textContent === '10.99'"
-        " || document.querySelector('.play-plots output').textContent === '11.0'",
-    )
-    assert outputs.nth(2).inner_text() == "−9.990"
-    box = page.locator(".play-plots canvas").nth(1).bounding_box()
-    page.mouse.move(box["x"] + 60, box["y"] + 40)  # 0.3 s into the plot
-    until(page, "document.querySelectorAll('.play-plots time')[1].textContent !== ''")
-    entry = page.locator(".play-plots li button").nth(1)
-    entry.click()
-    assert entry.get_attribute("aria-pressed") == "true"
-    entry.click()
-    assert entry.get_attribute("aria-pressed") == "false"
-    rows = page.evaluate("LivePlots.ROWS")
-    page.evaluate(SAMPLES, [10.0 + 1e-3 * k for k in range(rows + 500)])
-    assert page.evaluate("play.plots.count") == rows
-    assert page.evaluate("play.plots.end") == pytest.approx(10 + 1e-3 * (rows + 499))
-    page.evaluate(SAMPLES, [0.0, 0.01])  # after a reset
-    assert page.evaluate("play.plots.count") == 2
-
-
-def test_a_closed_panel_draws_nothing(page: Any) -> None:
-    page.locator(".play-bar .panel").click()
-    assert page.locator(".play-panel").is_hidden()
-    assert page.evaluate("viewer.dom_element.offsetWidth === innerWidth")
-    page.evaluate("() => { play.plots.draw = () => { throw new Error('drawn'); }; }")
-    page.evaluate(SAMPLES, [20.0, 20.01])
-    assert page.evaluate("play.plots.waiting") is False
-    page.evaluate("delete play.plots.draw")
-    page.locator(".play-bar .panel").click()
-    assert page.locator(".play-panel").is_visible()
-
-
-def test_a_warning_is_read(page: Any) -> None:
-    words = "Stiffness 9000 N/m is too stiff for this period."
-    tell(
-        page,
-        "play_state",
-        t=2.0,
-        running=True,
-        rate=0.5,
-        message=words,
-        level="warning",
-    )
-    status = page.locator(".play-status.message")
-    assert status.inner_text() == words
-    assert "warning" in status.get_attribute("class")
-    assert page.locator(".play-bar .rate").inner_text().startswith("0.50 ×")
 
 
 def test_a_target_out_of_reach_is_read_beside_a_message(page: Any) -> None:

@@ -8,7 +8,6 @@ from typing import Any
 
 import browsers
 import numpy as np
-import pinocchio as pin
 import pytest
 from browsers import until
 
@@ -18,14 +17,10 @@ from hsp_control.visualization.viewer.clip import (
     Band,
     Clip,
     Track,
-    extend_clip,
-    remove_clip,
     set_clip,
 )
 from hsp_control.visualization.viewer.commands import (
-    extend_trail,
     set_object,
-    set_property,
     set_trail,
 )
 from hsp_control.visualization.viewer.mesh_files import collada_object
@@ -124,27 +119,6 @@ def test_a_time_is_shown_exactly(page: Any) -> None:
     page.evaluate("player.seek(50)")
     assert player(page, "time") == 3.0
     assert page.evaluate("viewer.scene_tree.children.nobody === undefined")
-
-
-def test_between_keys_the_turn_is_on_the_sphere(page: Any, viewer: Viewer) -> None:
-    ends = np.array([[0, 0, 0, 1.0], [0, 0, -np.sin(1.0), -np.cos(1.0)]])
-    track = Track(JOINT, "quaternion", np.array([0.0, 1.0]), ends)
-    tell(viewer, set_clip(Clip(0.0, 1.0, [track])))
-    page.evaluate("player.seek(0.3)")
-    start, end = (pin.Quaternion(*q[[3, 0, 1, 2]]) for q in ends)
-    expected = start.slerp(0.3, end).coeffs()
-    assert abs(np.array(thing(page, "quaternion")) @ expected) == pytest.approx(1.0)
-
-
-def test_a_jump_leaves_the_users_switch_alone(page: Any, viewer: Viewer) -> None:
-    inner = f"node('{JOINT}/link1').children[0].visible"
-    for moment, seen in ((1.0, True), (1.99, True), (2.0, False), (3.0, False)):
-        page.evaluate("(t) => player.seek(t)", moment)
-        assert page.evaluate(inner) is seen
-    tell(viewer, [set_property(JOINT, "visible", False)])
-    page.evaluate("player.seek(1)")
-    assert page.evaluate(f"node('{JOINT}').visible") is False
-    tell(viewer, [set_property(JOINT, "visible", True)])
 
 
 def test_it_is_steered_from_the_keyboard(page: Any) -> None:
@@ -257,22 +231,6 @@ def test_the_time_line_has_bands_and_they_say_what_they_are(
         assert moments(page) == said
 
 
-def test_bands_grow_with_their_clip(page: Any, viewer: Viewer) -> None:
-    begun = clip(6, horizon=3.0)._replace(bands=[BANDS[0]._replace(spans=[(1.2, 1.5)])])
-    tell(viewer, set_clip(begun))
-    bands = page.locator(".bands button")
-    bands.first.focus()
-    more = [BANDS[0]._replace(spans=[(1.5, 2.0), (2.4, 2.6)]), BANDS[1]]
-    tell(viewer, [extend_clip(clip()._replace(tracks=[], bands=more), 1)])
-    names = bands.evaluate_all("all => all.map((band) => band.ariaLabel)")
-    assert names == [
-        "limit active 1.20–2.00 s", "limit active 2.40–2.60 s", "damped 2.10–2.50 s",
-    ]  # fmt: skip
-    tell(viewer, set_clip(clip()))
-    assert bands.count() == 0
-    assert moments(page) == []
-
-
 def test_presenting_leaves_the_scene_its_title_and_what_happens(
     page: Any, viewer: Viewer
 ) -> None:
@@ -309,82 +267,6 @@ def test_presenting_leaves_the_scene_its_title_and_what_happens(
     page.evaluate("(rest) => { Presentation.REST = rest; }", rest)
     # Nothing is put away later.
     assert not page.evaluate("document.body.classList.contains('resting')")
-
-
-@pytest.mark.smoke
-def test_others_are_told_the_time(page: Any) -> None:
-    page.evaluate(
-        """window.told = [];
-        player.addEventListener("time", ({detail}) => told.push(detail))"""
-    )
-    page.evaluate("player.seek(2.25)")
-    assert page.evaluate("told") == [{"time": 2.25, "start": 1, "end": 3}]
-
-
-def test_a_clip_that_grows_is_followed_to_its_end(page: Any, viewer: Viewer) -> None:
-    """As a run does that is computed more slowly than it is played."""
-    tell(viewer, [*trail(), *set_clip(clip(6, horizon=3.0), play=True, speed=4.0)])
-    assert page.evaluate("[player.open, player.horizon, player.end]") == [True, 3, 1.5]
-    until(page, "player.time > 1.45")
-    assert player(page, "playing") is True  # it waits
-    rest = clip()
-    tracks = [
-        track._replace(times=track.times[k:], values=track.values[k:])
-        for track in rest.tracks
-        for k in [int(np.searchsorted(track.times, 1.55))]
-    ]
-    more = np.zeros((2, 3))
-    part = rest._replace(tracks=tracks)
-    tell(viewer, [extend_trail(TRAIL, more, 1), extend_clip(part, 1)])
-    assert page.evaluate("[player.open, player.end]") == [False, 3]
-    points = page.evaluate(
-        f"node('{TRAIL}').children[0].geometry.userData.points.length"
-    )
-    assert points == 3 * (len(TIMES) + 2)
-    until(page, "!player.playing && player.time === 3")
-    for moment in (1.2, 1.52, 2.7):
-        page.evaluate("(t) => player.seek(t)", moment)
-        angle = np.array(thing(page, "quaternion"))
-        assert abs(angle @ turns(np.array([moment]))[0]) == pytest.approx(1.0, abs=1e-6)
-
-
-def test_another_clip_can_go_on_where_the_last_one_was(
-    page: Any, viewer: Viewer
-) -> None:
-    page.evaluate("player.seek(2.2); player.setSpeed(0.5)")
-    tell(viewer, set_clip(clip(), play=True, speed=1.0, keep=True))
-    assert page.evaluate("[player.time, player.playing, player.speed]") == [
-        2.2, False, 0.5,
-    ]  # fmt: skip
-    tell(viewer, set_clip(clip(6), keep=True))
-    assert player(page, "time") == 1.5  # there is no more
-    tell(viewer, set_clip(clip(), play=False, speed=1.0))
-    assert page.evaluate("[player.time, player.speed]") == [1, 1]
-
-
-def test_without_a_clip_there_is_nothing_to_play(page: Any, viewer: Viewer) -> None:
-    tell(viewer, remove_clip())
-    assert page.locator(".player").is_hidden()
-    page.keyboard.press(" ")
-    assert player(page, "playing") is False
-    q = viewer.robot.integrate(viewer.robot.neutral(), np.array([0.3, 0.0, 0.0]))
-    viewer.show(q)
-    tell(viewer, [])
-    expected = [0.0, 0.0, np.sin(0.15), np.cos(0.15)]
-    np.testing.assert_allclose(thing(page, "quaternion"), expected, atol=1e-9)
-
-
-def test_a_trail_lies_about_its_path_even_where_that_rests_or_turns_back(
-    page: Any, viewer: Viewer
-) -> None:
-    points = np.array([[0, 0, 0], [0, 0, 0], [1, 0, 0], [1, 0, 0], [0, 0, 0.0]])
-    tell(viewer, [set_trail("/paths/odd", points, 0.1, 0)])
-    found = page.evaluate(
-        "Array.from(node('/paths/odd').children[0].geometry.attributes.position.array)"
-    )
-    rings = np.reshape(found, (-1, 8, 3))
-    distances = np.linalg.norm(rings - points[:, None, :], axis=2)
-    np.testing.assert_allclose(distances, 0.1, atol=1e-6)
 
 
 MULTICOLOURED = """<?xml version="1.0"?>

@@ -1,7 +1,6 @@
 """Check that the view shows robots, paths and obstacles where Pinocchio puts them."""
 
 import re
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,9 +22,9 @@ from hsp_control.geometry.shapes import (
     Shape,
     Sphere,
 )
-from hsp_control.trajectories import Hold, UniformLine
+from hsp_control.trajectories import Hold
 from hsp_control.visualization.viewer import Recorder, Viewer
-from hsp_control.visualization.viewer.commands import CAMERA, CAPTION, CLIP
+from hsp_control.visualization.viewer.commands import CAPTION, CLIP
 from hsp_control.visualization.viewer.threejs import _Y_TO_Z
 
 pytestmark = pytest.mark.process
@@ -90,68 +89,9 @@ def test_every_visual_stands_where_pinocchio_puts_it(name: str) -> None:
             np.testing.assert_allclose(shown, expected, atol=1e-12)
 
 
-def test_the_planar_arm_is_drawn_from_above(arm: Robot, recorder: Recorder) -> None:
-    Viewer(arm, transport=recorder)
-    links = recorder.paths("/robot/")
-    nodes = ("universe/base", "joint1/link1", "joint2/link2", "joint3/link3")
-    assert links == [f"/robot/{node}" for node in nodes]
-    shapes = [shape for path in links[1:] for shape in geometries(recorder, path)]
-    sizes = [s["radius"] for s in shapes if s["type"] == "SphereGeometry"]
-    assert sizes == [0.08] * 3  # the point masses
-    camera = told(recorder, CAMERA, "camera")
-    assert camera["direction"] == [0.0, 0.0, 1.0]
-    assert camera["up"] == [0.0, 1.0, 0.0]
-    floor = recorder.transform("/floor/shadow")[2, 3]
-    assert floor == pytest.approx(-0.12)  # below the stand
-
-
 def geometries(recorder: Recorder, path: str) -> list[dict[str, Any]]:
     command = told(recorder, path, "object")
     return list(command["object"]["geometries"])
-
-
-def test_a_spatial_arm_is_seen_from_above_its_front_unless_told(
-    recorder: Recorder,
-) -> None:
-    robot = Robot.load("iiwa14")
-    Viewer(robot, transport=recorder)
-    camera = told(recorder, CAMERA, "camera")
-    assert camera["up"] == [0.0, 0.0, 1.0]
-    assert camera["direction"][0] > 0.0
-    assert camera["direction"][2] > 0.0
-    Viewer(robot, transport=recorder, camera=[2, 0, 0.5], target=[0, 0, 0.5])
-    camera = told(recorder, CAMERA, "camera")
-    assert camera["eye"] == [2.0, 0.0, 0.5]
-    assert camera["target"] == [0.0, 0.0, 0.5]
-    assert "direction" not in camera
-
-
-def test_capsules_stand_in_for_missing_meshes(
-    recorder: Recorder, caplog: pytest.LogCaptureFixture
-) -> None:
-    found = Robot.load("panda")
-    robot = Robot(found.model, replace(found.source, package_dirs=()))
-    viewer = Viewer(robot, transport=recorder)
-    assert len(caplog.records) == 1
-    assert re.match(
-        r"panda: 11 of 11 meshes are not found \(the first belongs to link "
-        r"'panda_link0'\).*pip install example-robot-data-loaders",
-        caplog.text.partition("robot_drawing.py:")[2].partition(" ")[2],
-    )
-    joints = [f"/robot/{name}/placeholder" for name in robot.model.names]
-    assert recorder.paths("/robot/") == joints
-    q = robot.random_configuration(np.random.default_rng(0))
-    viewer.show(q)
-    state = robot.state(0.0, q, np.zeros(7))
-    # The upper arm's capsule ends where the elbow is.
-    capsule = children(recorder, "/robot/panda_joint2/placeholder")[-1]
-    points = geometries(recorder, "/robot/panda_joint2/placeholder")[-1]["points"]
-    axis = [0.0, points[-1]["y"] - points[-1]["x"], 0.0]
-    pose = recorder.transform("/robot/panda_joint2") @ matrix(capsule)
-    end = pose[:3, :3] @ axis + pose[:3, 3]
-    radius = max(point["x"] for point in points)
-    elbow = state.data.oMi[3].translation
-    assert np.linalg.norm(end - elbow) < radius
 
 
 def test_a_robot_without_visuals_gets_a_body(
@@ -163,16 +103,6 @@ def test_a_robot_without_visuals_gets_a_body(
     Viewer(Robot.load(bare), transport=recorder)
     assert len(recorder.paths("/robot/")) == 4
     assert not caplog.records
-
-
-def test_two_robots_in_one_workspace_are_both_drawn(recorder: Recorder) -> None:
-    beside = pin.SE3(np.eye(3), np.array([0.0, 3.0, 0.0]))
-    arm = Robot.load("planar3r")
-    robot = Robot.combine({"left": (arm, pin.SE3.Identity()), "right": (arm, beside)})
-    Viewer(robot, transport=recorder)
-    assert len(recorder.paths("/robot/")) == 8
-    base = children(recorder, "/robot/universe/right_base")[0]
-    np.testing.assert_allclose(matrix(base)[:3, 3], [0.0, 3.0, -0.11], atol=1e-12)
 
 
 # --- the run -------------------------------------------------------------------------
@@ -237,36 +167,6 @@ def test_a_state_is_shown_with_what_the_run_did_then(
     viewer.show(arm.state(0.25, q, run.v[37]))
     clock = told(recorder, CAPTION, "time")
     assert clock["text"] == "t = 0.25 s"
-
-
-def test_a_new_scene_replaces_the_old(
-    arm: Robot, run: Rollout, recorder: Recorder
-) -> None:
-    viewer = Viewer(arm, transport=recorder)
-    viewer.draw_scene(run)
-    ball = Obstacle("ball", Sphere(0.1), UniformLine([0, 2, 0], [1, 0, 0]))
-    viewer.draw_scene(Scene([ball]))
-    assert recorder.paths("/paths/") == recorder.paths("/targets/") == []
-    assert recorder.paths("/obstacles/") == ["/obstacles/ball"]
-    viewer.show(arm.state(0.5, arm.home(), np.zeros(3)))
-    center = recorder.transform("/obstacles/ball")[:3, 3]
-    np.testing.assert_allclose(center, [1.0, 1.0, 0.0], atol=1e-12)
-
-
-def test_a_pose_task_shows_its_axes(recorder: Recorder) -> None:
-    screw = {"type": "screw", "position": [0.5, 0.1, 0.5], "rotation": [3.0, 0.2, 0.0]}
-    hand = {"type": "frame_pose", "trajectory": screw | {"duration": 0.1}}
-    experiment = load_experiment(
-        {"robot": {"name": "iiwa14"}, "tasks": {"hand": hand},
-         "simulation": {"duration": 0.1}}
-    )  # fmt: skip
-    rollout = experiment.run()
-    viewer = Viewer(experiment.robot, transport=recorder)
-    viewer.play(rollout, speed=10.0)
-    assert len(children(recorder, "/targets/hand")) == 3
-    shown = pin.SE3(Clip(recorder).pose("/targets/hand", 0.1))
-    goal = pin.SE3(pin.rpy.rpyToMatrix(3.0, 0.2, 0.0), np.array([0.5, 0.1, 0.5]))
-    assert np.linalg.norm(pin.log6(shown.actInv(goal))) < 1e-6
 
 
 SHAPES: list[Shape] = [

@@ -33,18 +33,6 @@ def recorder() -> Recorder:
     return Recorder()
 
 
-def test_the_page_is_told_how_to_play(
-    arm: Robot, run: Rollout, recorder: Recorder
-) -> None:
-    viewer = Viewer(arm, transport=recorder, speed=0.5)
-    viewer.play(run)
-    begin = told(recorder, CLIP, "begin")
-    assert (begin["play"], begin["loop"], begin["speed"]) == (True, False, 0.5)
-    viewer.play(run, speed=3.0, loop=True)
-    begin = told(recorder, CLIP, "begin")
-    assert (begin["play"], begin["loop"], begin["speed"]) == (True, True, 3.0)
-
-
 def test_coarse_logs_play_smoothly_and_fine_ones_are_thinned(
     arm: Robot, run: Rollout, recorder: Recorder
 ) -> None:
@@ -71,23 +59,6 @@ def resampled(run: Rollout, rows: int) -> Rollout:
     t = np.linspace(run.t[0], run.t[-1], rows)
     near = np.searchsorted(run.t, t).clip(0, len(run) - 1)
     return Rollout({k: v[near] for k, v in run.columns.items()} | {"t": t}, run.meta)
-
-
-def test_orientations_between_rows_turn_the_short_way(recorder: Recorder) -> None:
-    robot = Robot.load("iiwa14")
-    turns = np.array([[0, 0, 0, 1.0], [0, 0, -np.sin(0.2), -np.cos(0.2)]])
-    columns = {
-        "t": np.array([0.0, 1.0]),
-        "q": np.zeros((2, 7)),
-        "v": np.zeros((2, 7)),
-        "obstacle.box": np.zeros((2, 3)),
-        "obstacle.box.quaternion": turns,
-    }
-    about = {"box": {"shape": "Box", "parameters": {"size": [1, 1, 1]}, "radius": 1}}
-    viewer = Viewer(robot, transport=recorder)
-    viewer.draw_scene(Rollout(columns, {"status": "completed", "obstacles": about}))
-    half = Clip(recorder).value("/obstacles/box", "quaternion", 0.5)
-    assert abs(half @ [0, 0, np.sin(0.1), np.cos(0.1)]) == pytest.approx(1.0)
 
 
 def test_what_cannot_be_played_is_refused(arm: Robot, run: Rollout) -> None:

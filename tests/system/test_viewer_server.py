@@ -1,7 +1,6 @@
 """Check the view's server: to this machine alone, and it leaves nothing behind."""
 
 import asyncio
-import logging
 import os
 import signal
 import socket
@@ -18,7 +17,6 @@ from http.client import HTTPConnection
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from pages import Page, Steering, scene_request
 from played import wait_until
@@ -176,21 +174,6 @@ def end_group(leader: int) -> None:
         os.killpg(leader, signal.SIGKILL)
 
 
-def test_two_viewers_have_two_addresses(started: Server) -> None:
-    other = Server()
-    try:
-        assert other.url != started.url
-        assert answers(port_of(started.url))
-        assert answers(port_of(other.url))
-        port = port_of(started.url)
-        with pytest.raises(ViewerError, match=rf"cannot listen on 127\.0\.0\.1:{port}"):
-            Server(port)
-        with pytest.raises(ViewerError, match="port 70000 is not between"):
-            Server(70000)
-    finally:
-        other.close()
-
-
 @LINUX
 def test_without_a_browser_nothing_waits(
     arm: Robot, run: Rollout, monkeypatch: pytest.MonkeyPatch
@@ -204,23 +187,6 @@ def test_without_a_browser_nothing_waits(
             viewer.show(arm.home())
         assert not viewer.wait_for_browser(0.0)
     assert time.monotonic() - begin < 10.0
-
-
-def test_it_is_known_when_the_last_page_is_closed(
-    arm: Robot, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(server, "RELOAD_TIMEOUT", 0.7)
-    with Viewer(arm) as viewer:
-        assert viewer.url is not None
-        page = Page(viewer.url)
-        assert viewer.wait_for_browser(200.0)
-        waiting = threading.Thread(target=viewer.wait_until_closed, daemon=True)
-        waiting.start()
-        waiting.join(1.5)
-        assert waiting.is_alive()
-        page.leave()
-        waiting.join(8.0)
-        assert not waiting.is_alive()
 
 
 def test_a_notebook_holds_what_is_shown(arm: Robot, recorder: Recorder) -> None:
@@ -306,50 +272,6 @@ def test_a_page_that_opens_late_sees_everything(arm: Robot, run: Rollout) -> Non
         assert not any(path.startswith("/paths") for path in paths)
     first.join(5.0)
     second.join(5.0)
-
-
-def test_a_slow_page_skips_what_is_out_of_date(arm: Robot) -> None:
-    with Viewer(arm) as viewer:
-        assert viewer.url is not None
-        page = Page(viewer.url, pause=0.1)
-        assert viewer.wait_for_browser(200.0)
-        before = len(page.commands)
-        q = arm.home()
-        for angle in np.linspace(0.0, 1.0, 400):
-            q = arm.integrate(arm.neutral(), np.full(3, angle))
-            viewer.show(q)
-            time.sleep(1e-3)
-        assert viewer.wait_for_browser(200.0)
-        moves = [c for c in page.commands[before:] if c["type"] == "set_transform"]
-        assert len(moves) < 3 * 100  # of 400 moves of three joints
-        last = page.last("set_transform", "/robot/joint1")["matrix"]
-        expected = arm.state(0.0, q, np.zeros(3)).data.oMi[1].homogeneous
-        np.testing.assert_array_equal(
-            np.frombuffer(last.data).reshape(4, 4).T, expected
-        )
-
-
-def test_its_files_are_for_this_machine_alone(started: Server) -> None:
-    assert started.url is not None
-    for file, text in (
-        ("", "connect();"),
-        ("page.js", "MeshCat"),
-        ("player.js", "class Player"),
-        ("player.css", ".player"),
-        ("main.min.js", ""),
-    ):
-        with urllib.request.urlopen(started.url + file) as answer:
-            assert text in answer.read().decode()
-    for path, headers in (
-        ("nothing", {}),
-        ("../server.py", {}),
-        ("", {"Host": "evil.example"}),
-    ):
-        request = urllib.request.Request(started.url + path, headers=headers)
-        with pytest.raises(urllib.error.HTTPError) as refused:
-            urllib.request.urlopen(request)
-        refused.value.close()
-        assert refused.value.code == (403 if headers else 404)
 
 
 def test_a_connection_names_host_and_origin(started: Server) -> None:
@@ -474,29 +396,6 @@ def test_a_flood_is_no_more_than_its_newest_words(steered: Server) -> None:
     assert len(moves) < 5000
 
 
-@pytest.mark.parametrize(
-    "text", ["{", "[]", '{"do": 1}', '{"do": NaN}', '{"x": 1}', "jump", "{" * 5000]
-)
-def test_what_is_no_message_closes_the_page(steered: Server, text: str) -> None:
-    assert steered.url is not None
-    page = Steering(steered.url)
-    wait_until(lambda: page.drives() == (True, True))
-    page.send(text)
-    page.join(10.0)
-    assert not page.is_alive()
-    assert heard(steered, "left") == [{"do": "left"}]
-
-
-def test_pages_of_a_view_say_nothing(started: Server) -> None:
-    assert started.url is not None
-    page = Steering(started.url)
-    wait_until(lambda: hasattr(page, "socket"))
-    page.say(do="pause")
-    page.join(10.0)
-    assert not page.is_alive()
-    assert started.messages() == []
-
-
 def test_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(server.importlib.util, "find_spec", lambda name: None)
     with pytest.raises(ViewerError, match="pip install meshcat"):
@@ -573,11 +472,3 @@ def test_importing_the_package_pulls_in_no_viewer_and_that_no_meshcat() -> None:
     package, viewer = (set(line.split()) for line in printed.splitlines())
     assert not {"tornado", "umsgpack", "hsp_control.visualization.viewer"} & package
     assert not {"meshcat", "tornado", "zmq", "IPython", "matplotlib"} & viewer
-
-
-def test_nothing_is_printed(capfd: pytest.CaptureFixture[str], arm: Robot) -> None:
-    logging.getLogger("hsp_control").handlers.clear()
-    with Viewer(arm) as viewer:
-        viewer.show(arm.home())
-    captured = capfd.readouterr()
-    assert (captured.out, captured.err) == ("", "")

@@ -1,6 +1,5 @@
 """`make links`: what it finds in a document, and what it says of an address."""
 
-import json
 import runpy
 import threading
 from collections.abc import Iterator
@@ -63,30 +62,3 @@ def test_a_missing_file_is_told_with_its_document(tmp_path: Path) -> None:
         "other.md: there is no such file",
         "gone.png: there is no such file",
     ]
-
-
-def test_addresses_are_found_in_all_kinds_of_documents(tmp_path: Path) -> None:
-    address = "https://example.org/a"
-    notebook = {"cells": [{"source": [f"see [this]({address})"]}]}
-    for name, text in {
-        "a.md": f"<{address}>",
-        "b.cff": f'url: "{address}"',
-        "c.ipynb": json.dumps(notebook),
-    }.items():
-        (tmp_path / name).write_text(text)
-        assert [link.target for link in tool["links"](tmp_path / name)] == [address]
-
-
-def test_an_address_that_does_not_answer_is_told(site: str) -> None:
-    ask = tool["ask"]
-    for there in ("/page", "/moved", "/for-persons", "/post"):
-        assert ask(site + there) == ""
-    assert ask(site + "/gone") == "404 Not Found"
-    nobody = site.rsplit(":", 1)[0] + ":1"  # a port on which nothing listens
-    assert "refused" in ask(nobody)
-
-
-def test_examples_of_private_addresses_are_not_asked(site: str) -> None:
-    link = tool["Link"]
-    asked = [link("page.md", "https://172.16.0.2"), link("page.md", site + "/gone")]
-    assert list(tool["unreachable"](asked)) == []

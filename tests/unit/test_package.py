@@ -90,13 +90,6 @@ def test_importing_the_package_imports_nothing_heavy() -> None:
 
 
 @pytest.mark.process
-def test_no_part_of_scipy_that_is_rarely_used_comes_with_the_names() -> None:
-    code = "import hsp_control as h\nfor name in h.__all__: getattr(h, name)"
-    rare = {"scipy.optimize", "scipy.integrate", "scipy.spatial", "scipy.stats"}
-    assert not imported(code) & (rare | {"matplotlib", "meshcat", "tornado"})
-
-
-@pytest.mark.process
 @pytest.mark.parametrize("words", [["--help"], ["--version"], ["chekc"], ["run"]])
 def test_hsp_answers_without_the_engine(words: list[str]) -> None:
     code = (
@@ -148,16 +141,6 @@ def test_a_shell_completes_without_the_engine(
     )
     assert answer.read_text().strip("\013") == offered
     assert not found & HEAVY
-
-
-@pytest.mark.process
-def test_check_needs_no_compiler() -> None:
-    code = (
-        "import sys; sys.argv[0] = 'hsp'\n"
-        "from hsp_control.cli import main\n"
-        "assert main(['check', 'paper/2_rest']) == 0"
-    )
-    assert "numba" not in imported(code)
 
 
 @pytest.mark.process

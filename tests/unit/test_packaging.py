@@ -3,7 +3,6 @@
 import re
 import shlex
 import tomllib
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -67,18 +66,6 @@ def test_every_file_has_the_package_s_version() -> None:
     assert newest.groups() == (__version__, str(citation["date-released"]))
 
 
-def test_what_pypi_shows_links_to_no_file() -> None:
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
-    for each in SHOWN["substitutions"]:
-        changed = re.sub(each["pattern"], each["replacement"], text)
-        assert changed != text
-        text = changed
-    links = re.findall(r"\]\(([^)]*)\)|(?:src|href)=\"([^\"]*)\"", text)
-    assert links
-    assert all("".join(link).startswith("https://") for link in links)
-    assert "The site" in text
-
-
 def included() -> set[str]:
     """Return what the source distribution has, at the top."""
     listed = PROJECT["tool"]["hatch"]["build"]["targets"]["sdist"]["include"]
@@ -128,40 +115,3 @@ def test_the_container_has_what_the_wheel_is_built_of() -> None:
     admitted = (ROOT / ".dockerignore").read_text().split()
     assert {f"!{name}" for name in copied} <= set(admitted)
     assert copied <= included()
-
-
-def test_the_container_s_python_is_one_that_the_package_takes() -> None:
-    first, *others = [words[1] for words in containerfile() if words[0] == "FROM"]
-    assert others == ["base", "base"]  # an environment is copied from one to the other
-    version = re.fullmatch(r"docker\.io/library/python:([\d.]+)-slim", first)
-    assert version is not None
-    takes = Requirement(f"python{PROJECT['project']['requires-python']}").specifier
-    assert takes.contains(version[1])
-
-
-def test_the_container_s_choices_exist() -> None:
-    """Its extras and configurations, and those of its page."""
-    text = (ROOT / "Containerfile").read_text() + (ROOT / "docs/install.md").read_text()
-    extras = re.findall(r"EXTRAS=\"?([\w,]+)", text)
-    configs = re.findall(r'CONFIGS="([^"]+)"', text)
-    assert len(extras) == len(configs) == 2
-    assert set(",".join(extras).split(",")) <= set(
-        PROJECT["project"]["optional-dependencies"]
-    )
-    for name in " ".join(configs).split():
-        assert (ROOT / "configs" / f"{name}.yaml").is_file()
-
-
-def test_the_page_names_every_extra_of_users() -> None:
-    page = (ROOT / "docs" / "install.md").read_text(encoding="utf-8")
-    table = page.split("## Extras")[1].split("\n## ")[0]
-    rows = re.findall(r"^\| (`.*?) \|", table, re.MULTILINE)
-    named = {name for row in rows for name in re.findall(r"`(\w+)`", row)}
-    ours = {"test", "docs", "dev"}
-    assert named == set(PROJECT["project"]["optional-dependencies"]) - ours
-
-
-def test_installing_is_told_where_a_user_looks() -> None:
-    """The page is a link of the README, and on the site."""
-    assert "(docs/install.md)" in (ROOT / "README.md").read_text(encoding="utf-8")
-    assert "../install" in Path(ROOT / "docs/how_to/index.md").read_text()

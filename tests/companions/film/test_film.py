@@ -119,12 +119,3 @@ def test_the_command_says_what_it_wants(
         "page with a switch between them\n"
     )
     assert not (tmp_path / "a.gif").exists()
-
-
-def test_doctor_tells_that_there_is_no_browser(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("PATH", "")
-    monkeypatch.delenv("HSP_BROWSER", raising=False)
-    assert main(["doctor"]) == 0
-    assert "no Chromium on the path" in capsys.readouterr().out

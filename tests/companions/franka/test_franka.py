@@ -34,7 +34,6 @@ from hsp_control.companions.franka import (
     connect,
     connecting,
 )
-from hsp_control.companions.franka.hardware import EFFORT_RATE
 from hsp_control.companions.franka.reflexes import REFLEXES, table
 from hsp_control.live import (
     InProcessRobot,
@@ -129,50 +128,6 @@ def test_the_operator_s_stop_finishes_the_motion() -> None:
         assert box.said("motion ended: the client has finished it")
 
 
-def test_efforts_with_gravity_are_not_sent() -> None:
-    experiment = circle()
-    with serving(experiment) as box:
-        arm = connect(box.address, experiment.robot, PERIOD)
-        report = moved(arm, settings=LiveSettings())
-        # What is sent too much is said, by the loop or, if it comes first, by the arm.
-        said = "a Franka adds g(q) itself", "the effort changed by more than"
-        assert any(each in report.reason for each in said)
-
-
-def test_the_fastest_change_that_is_sent_is_accepted() -> None:
-    """The limit itself is 1000: with 1000.5 the box reports a reflex."""
-    experiment = circle()
-    with serving(experiment) as box:
-        arm = connect(box.address, experiment.robot, PERIOD)
-        arm.read(60.0)
-        k, applied = -1, None
-        while k < 320:
-            state = arm.read(60.0)
-            assert state is not None
-            assert state.applied is not None
-            # Until the first command the box does not wait: what is late has no effect.
-            k += applied is None or bool((state.applied != applied).any())
-            applied = state.applied
-            # Up and down around zero: the arm stays where it is; the wrist is light.
-            slow, fast = ((k + n // 4) % n < n // 2 for n in (32, 4))
-            signs = np.array([1.0 if slow else -1.0] * 4 + [1.0 if fast else -1.0] * 3)
-            arm.write(applied + signs * EFFORT_RATE * PERIOD)
-        arm.close()
-        assert arm.fault is None
-        assert not box.said("reflex")
-
-
-def test_a_cut_line_ends_the_loop() -> None:
-    experiment = circle()
-    with serving(experiment, cut=0.3) as box:
-        arm = connect(box.address, experiment.robot, PERIOD)
-        report = moved(arm)
-        assert report.ended == "fault"
-        assert report.silent
-        assert "NetworkException: UDP receive: Timeout" in report.reason
-        assert box.said("the link is cut")
-
-
 def test_a_killed_box_ends_the_loop() -> None:
     address = host(1)
     command = [sys.executable, "-m", "hsp_control", "franka-box", "panda"]
@@ -233,21 +188,6 @@ def test_a_client_that_hangs_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
         with pytest.raises(HardwareError, match="did not answer for 1 s"):
             connect(f"{address}?realtime=ignore", Robot.load("panda"), PERIOD)
         thread.join()
-
-
-def test_nobody_there_is_told() -> None:
-    with pytest.raises(HardwareError, match=r"NetworkException: .*refused.*in Desk"):
-        connect(f"{host(3)}?realtime=ignore", Robot.load("panda"), PERIOD)
-
-
-@pytest.mark.skipif(
-    Path("/sys/kernel/realtime").exists(), reason="this is a real-time kernel"
-)
-def test_real_time_is_enforced_unless_told_otherwise() -> None:
-    with serving(circle()) as box:
-        told = r"RealtimeException: .*(rtprio|PREEMPT_RT).*\?realtime=ignore"
-        with pytest.raises(HardwareError, match=told):
-            connect(box.host, Robot.load("panda"), PERIOD)
 
 
 def test_who_only_reads_sets_no_thresholds(tmp_path: Path) -> None:

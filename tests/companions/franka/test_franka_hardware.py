@@ -16,7 +16,7 @@ from hsp_control.companions.franka import (
     connecting,
 )
 from hsp_control.companions.franka.client_process import ClientProcess
-from hsp_control.live import Hardware, LiveSettings, Measurement
+from hsp_control.live import Hardware, Measurement
 from hsp_control.live.hardware import AdaptingHardware
 
 Array = NDArray[np.float64]
@@ -145,17 +145,6 @@ def test_a_first_effort_with_gravity_is_refused() -> None:
     with pytest.raises(HardwareError, match=r"jumps by 2\d.* N·m; a Franka adds g"):
         hardware.write(gravity)
     assert answers.asked == b"RS"
-
-
-def test_the_loop_s_settings_become_the_arm_s() -> None:
-    hardware, _ = arm()
-    adapted = hardware.adapted(LiveSettings(missing=7))
-    assert adapted.compensates_gravity
-    assert adapted.missing == 7
-    robot = Robot.load("panda")
-    np.testing.assert_array_equal(adapted.rate_limits(robot), 999.0)
-    slower = hardware.adapted(LiveSettings(effort_rate=[2000.0] * 6 + [300.0]))
-    np.testing.assert_array_equal(slower.rate_limits(robot), [999.0] * 6 + [300.0])
 
 
 def test_a_load_that_the_robot_did_not_take_is_refused() -> None:

@@ -95,19 +95,6 @@ def test_a_saved_model_is_the_robot_s(like: bool, tmp_path: Path) -> None:
         )
 
 
-def test_the_joints_of_transmissions_are_no_joints(tmp_path: Path) -> None:
-    source = Robot.load("panda").source.urdf.read_text()
-    driven = "".join(
-        f'<transmission name="t{k}"><joint name="panda_joint{k}"/></transmission>'
-        for k in range(1, 8)
-    )
-    like = tmp_path / "driven.urdf"
-    like.write_text(source.replace("</robot>", f"{driven}</robot>"))
-    locked = {"panda_finger_joint1": 0.0}
-    text = calibrated(arm_alone(), said(), Robot.load(like, locked=locked))
-    assert loaded(text, tmp_path).nv == 7
-
-
 def test_a_forgotten_load_is_refused() -> None:
     robot = Robot.load("panda")
     q = postures(robot)

@@ -1,16 +1,12 @@
 """What is written behind franka://, and what the arm's errors are told as."""
 
-import tomllib
-from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import numpy as np
 import pytest
-from places import ROOT
 
 from hsp_control.common.exceptions import LiveError
-from hsp_control.companions.franka import FrankaSettings, Load, connect
-from hsp_control.companions.franka.layouts import Error
+from hsp_control.companions.franka import FrankaSettings, Load
 from hsp_control.companions.franka.reflexes import MODES, REFLEXES, explained
 
 pylibfranka = pytest.importorskip("pylibfranka")
@@ -90,18 +86,3 @@ def test_an_exception_is_told_with_its_names() -> None:
     assert "stop button was pressed" in explained("ControlException", stopped)
     other = explained("ValueError", "something new\nand more")
     assert other == "ValueError: something new; and more"
-
-
-@pytest.mark.parametrize("error", Error, ids=lambda error: error.spelling)
-def test_every_error_is_explained_as_its_message_spells_it(error: Error) -> None:
-    text = f'libfranka: motion aborted by reflex! ["{error.spelling}"]'
-    what = REFLEXES[error.spelling.lower().removesuffix("_flag")][0]
-    assert what in explained("ControlException", text)
-
-
-def test_the_package_offers_the_arm() -> None:
-    with (ROOT / "pyproject.toml").open("rb") as file:
-        points = tomllib.load(file)["project"]["entry-points"]
-    group = "hsp_control.hardware"
-    point = EntryPoint("franka", points[group]["franka"], group)
-    assert point.load() is connect

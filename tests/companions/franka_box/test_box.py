@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 from franka_boxes import home, panda, plant
 
-from hsp_control.common.exceptions import LiveError
 from hsp_control.companions.franka.layouts import (
     COMMAND,
     HEADER,
-    PERIOD,
     REQUESTS,
     STATE,
     Command,
@@ -23,7 +21,7 @@ from hsp_control.companions.franka.layouts import (
 )
 from hsp_control.companions.franka_box import Box
 from hsp_control.companions.franka_box.requests import Requests
-from hsp_control.simulation.plants import Payload, VelocityNoise
+from hsp_control.simulation.plants import Payload
 
 REST = np.zeros(7)
 TORQUE = Controller.EXTERNAL, MotionGenerator.NONE
@@ -69,22 +67,6 @@ def ask(box: Talking, kind: Command, number: int = 5, **fields: Any) -> list[Any
     return answers(box)
 
 
-def test_without_effort_an_arm_floats_where_it_is() -> None:
-    """Gravity is the box's: an exact model leaves nothing, at any posture."""
-    start = home() + 0.1
-    box = Talking(q=start)
-    box.begin(1, *TORQUE)
-    for _ in range(200):
-        box.step(command())
-    np.testing.assert_allclose(box.q, start, atol=1e-9)
-    assert answers(box) == [(Command.MOVE, 1, MoveStatus.MOTION_STARTED)]
-    told = state(box)
-    assert told["robot_mode"] == RobotMode.MOVE
-    assert told["control_command_success_rate"] == 1.0
-    np.testing.assert_allclose(told["tau_J"], box.model.gravity, rtol=1e-6)
-    np.testing.assert_allclose(told["tau_ext_hat_filtered"], REST, atol=1e-6)
-
-
 def test_a_payload_sinks_unless_its_load_is_set() -> None:
     sunk = []
     for mass in (0.0, 2.0):
@@ -101,47 +83,6 @@ def test_a_payload_sinks_unless_its_load_is_set() -> None:
         sunk.append(float(np.abs(box.q - home()).max()))
     assert sunk[0] > 1e-3
     assert sunk[1] < 1e-9
-
-
-def test_a_motion_begins_at_the_effort_that_its_client_is_told() -> None:
-    """What holds a payload is the box's effort: a client's rate is taken from zero."""
-    box = Talking(plant(payload=Payload("panda_link8", 2.0)))
-    for _ in range(300):
-        box.step(None)
-    assert np.abs(state(box)["tau_J_d"]).max() > 5.0
-    box.begin(1, *TORQUE)
-    assert not state(box)["tau_J_d"].any()
-    box.step(command(tau_J_d=state(box)["tau_J_d"] + 0.9))
-    assert box.motion is not None
-
-
-def test_the_same_commands_give_the_same_bits() -> None:
-    random = np.random.default_rng(3)
-    efforts = np.cumsum(random.uniform(-0.5, 0.5, (100, 7)), axis=0)
-    states = []
-    for _ in range(2):
-        box = Talking(plant(sensors=[VelocityNoise(1e-3)], seed=7))
-        box.begin(1, *TORQUE)
-        seen = []
-        for effort in efforts:
-            box.step(command(tau_J_d=effort))
-            seen.append(box.state()[1])
-        states.append(seen)
-    assert states[0] == states[1]
-
-
-def test_an_effort_acts_for_one_period() -> None:
-    """After the first step v = h M⁻¹ tau, with the rotors in M, to first order in h."""
-    box, effort = Talking(), np.array([0.9, -0.8, 0.7, -0.6, 0.5, -0.4, 0.3])
-    box.begin(1, *TORQUE)
-    box.step(command(tau_J_d=effort))
-    robot = box.plant.robot
-    gravity = box.arm.robot.inverse_dynamics(home(), REST, REST)
-    expected = robot.forward_dynamics(home(), REST, effort + gravity)
-    np.testing.assert_allclose(box.v, PERIOD * expected, rtol=1e-3)
-    told = state(box)
-    np.testing.assert_allclose(told["tau_J_d"], effort, rtol=1e-6)
-    np.testing.assert_allclose(told["dtau_J"] * PERIOD, effort, atol=1e-3)
 
 
 def test_lost_commands_hold_the_effort_and_the_twentieth_ends_the_motion() -> None:
@@ -201,23 +142,6 @@ def test_recovery_answers_when_the_arm_is_back() -> None:
     assert told["robot_mode"] == RobotMode.IDLE
     assert not told["errors"].any()
     assert told["reflex_reason"].any()  # of the last motion, until the next reflex
-
-
-def test_the_errors_of_the_last_motion_are_those_of_the_last_reflex() -> None:
-    box = Talking()
-    for effort, error in (
-        (np.full(7, 2.0), Error.CONTROLLER_TORQUE_DISCONTINUITY),
-        (None, Error.COMMUNICATION_CONSTRAINTS_VIOLATION),
-    ):
-        box.begin(1, *TORQUE)
-        box.step(command())
-        while box.motion is not None:
-            box.step(None if effort is None else command(tau_J_d=effort))
-        told = state(box)
-        assert np.flatnonzero(told["reflex_reason"]).tolist() == [error]
-        ask(box, Command.AUTOMATIC_ERROR_RECOVERY)
-        box.settle()
-        assert not state(box)["errors"].any()
 
 
 def test_an_arm_that_folds_into_itself_stops() -> None:
@@ -364,27 +288,3 @@ def test_an_unknown_payload_stretches_the_springs_that_are_set(
     else:
         sunk = before.translation[2] - box.model.O_T_EE.translation[2]
         assert sunk == pytest.approx(9.81 / 500.0, rel=0.1)
-
-
-def test_a_client_is_told_the_pose_that_it_commands() -> None:
-    box = Talking()
-    box.begin(1, Controller.JOINT_IMPEDANCE, MotionGenerator.CARTESIAN_VELOCITY)
-    twist = 2e-4 * np.array([1, 0, 2, 0, 1, 0])
-    start = box.model.O_T_EE.translation.copy()
-    for step in range(1, 4):
-        box.step(command(O_dP_EE_c=step * twist))
-    told = state(box)
-    moved = told["O_T_EE_c"].reshape(4, 4).T[:3, 3] - start
-    np.testing.assert_allclose(moved, 6 * PERIOD * twist[:3], atol=1e-7)
-    assert box.motion is not None
-    np.testing.assert_allclose(told["O_dP_EE_c"], 3 * twist, rtol=1e-6)
-    np.testing.assert_allclose(told["O_ddP_EE_c"], twist / PERIOD, rtol=1e-6)
-
-
-def test_a_start_beyond_a_limit_is_refused() -> None:
-    q = home()
-    q[3] = 0.0
-    with pytest.raises(
-        LiveError, match=r"the start is not allowed: .*joint 4 at 0 rad"
-    ):
-        Talking(q=q)

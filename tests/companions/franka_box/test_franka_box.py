@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -17,14 +16,10 @@ from franka_boxes import (
     PRELUDE,
     addresses,
     home,
-    panda,
-    plant,
     served,
 )
 
-from hsp_control import Rollout, load_experiment
-from hsp_control.companions.franka.layouts import Error
-from hsp_control.simulation.plants import Payload
+from hsp_control import Rollout
 
 COMMAND = [
     *(sys.executable, "-m", "hsp_control", "franka-box"),
@@ -71,43 +66,6 @@ print(json.dumps({
         )
 
 
-def test_the_clients_names_of_errors_are_ours() -> None:
-    with served() as rig:
-        rig.box.readings.fields["errors"][:] = 1
-        told = rig.run("print(json.dumps(str(robot.read_once().current_errors)))")
-    assert told == str([error.spelling for error in Error]).replace("'", '"')
-
-
-REACH = """
-goal = np.array(robot.read_once().q) + [0.2, -0.1, 0.1, 0.2, -0.1, 0.2, 0.1]
-control, effort = robot.start_torque_control(), np.zeros(7)
-for step in range(1500):
-    state, _ = control.readOnce()
-    pull = 60.0 * (goal - np.array(state.q))
-    effort += np.clip(pull - effort, -0.3, 0.3)
-    command = franka.Torques((effort - 25.0 * np.array(state.dq)).tolist())
-    command.motion_finished = step == 1499
-    control.writeOnce(command)
-del control
-state = robot.read_once()
-print(json.dumps([(goal - np.array(state.q)).tolist(), str(state.robot_mode),
-                  state.q, state.tau_J]))
-"""
-
-
-def test_the_same_client_gives_the_same_bits() -> None:
-    runs = []
-    for _ in range(2):
-        with served() as rig:
-            left, mode, *numbers = rig.run(REACH)
-            assert mode == "RobotMode.Idle"
-            assert np.abs(left).max() < 0.02
-            runs.append((numbers, rig.box.q.tolist()))
-            assert "finished" in rig.tells("motion ended")
-            assert "1499 commands, 0 lost" in rig.tells("motion ended")
-    assert runs[0] == runs[1]
-
-
 def test_a_reflex_is_named_and_recovered_from() -> None:
     with served() as rig:
         told = rig.run("""
@@ -144,29 +102,6 @@ print(json.dumps(told))
     assert "joint 6 at 1500 N·m/s; limit 1000" in line
 
 
-def test_a_limit_that_is_reached_is_left_again() -> None:
-    with served() as rig:
-        at, back = rig.run("""
-control, push = robot.start_torque_control(), 0.0
-try:
-    while True:
-        state, _ = control.readOnce()
-        push = min(push + 0.02, 4.0)
-        control.writeOnce(damped(state, np.array([0, 0, 0, push, 0, 0, 0])))
-except franka.ControlException as error:
-    assert "joint_position_limits_violation" in str(error)
-control = None
-at = robot.read_once().q[3]
-robot.automatic_error_recovery()
-print(json.dumps([at, robot.read_once().q[3]]))
-""")
-        upper = panda().limits.upper[3]
-    assert at > upper > back
-    line = rig.tells("joint_position_limits_violation: joint 4 at ")
-    assert f"rad; limit {upper:.6g}" in line
-    assert "recovered" in rig.tells("recovered")
-
-
 @pytest.mark.parametrize("controller", ["JointImpedance", "CartesianImpedance"])
 @pytest.mark.parametrize("kind", ["position", "velocity"])
 def test_motion_generators_are_tracked(kind: str, controller: str) -> None:
@@ -199,44 +134,6 @@ print(json.dumps([worst, moved, str(robot.read_once().robot_mode)]))
         )
     assert error < 0.02
     assert moved == pytest.approx(np.array([0, 0, 0, 1, 1, 0, 1]) * np.pi / 8, abs=0.02)
-    assert mode == "RobotMode.Idle"
-    assert "finished" in rig.tells("motion ended")
-
-
-@pytest.mark.parametrize("kind", ["pose", "velocity"])
-def test_motion_generators_of_the_hand_are_tracked(kind: str) -> None:
-    with served() as rig:
-        error, moved, mode = rig.run(
-            f"kind = {kind!r}"
-            + """
-mode = franka.ControllerMode.JointImpedance
-control = getattr(robot, f"start_cartesian_{kind}_control")(mode)
-state, _ = control.readOnce()
-start, worst = np.array(state.O_T_EE), 0.0
-way = np.array([0.03, -0.03, 0.05])
-for step in range(1001):
-    t = 2.0 * np.pi * step / 1000
-    if kind == "pose":
-        pose = start.copy()
-        pose[12:15] += way * 0.5 * (1 - np.cos(t))
-        command = franka.CartesianPose(pose.tolist())
-    else:
-        speed = 2.0 * np.pi / 1.0 * 0.5 * np.sin(t)
-        command = franka.CartesianVelocities([*(way * speed), 0, 0, 0])
-    command.motion_finished = step == 1000
-    control.writeOnce(command)
-    if step < 1000:
-        state, _ = control.readOnce()
-        far = np.array(state.O_T_EE) - state.O_T_EE_c
-        worst = max(worst, np.abs(far).max())
-        if step == 500:
-            moved = (np.array(state.O_T_EE) - start)[12:15].tolist()
-del control
-print(json.dumps([worst, moved, str(robot.read_once().robot_mode)]))
-"""
-        )
-    assert error < 2e-3
-    assert moved == pytest.approx([0.03, -0.03, 0.05], abs=2e-3)
     assert mode == "RobotMode.Idle"
     assert "finished" in rig.tells("motion ended")
 
@@ -285,109 +182,6 @@ control = robot = None
         assert rig.run("print(json.dumps(str(robot.read_once().robot_mode)))") == (
             "RobotMode.Reflex"
         )
-
-
-CIRCLE: dict[str, Any] = {
-    "robot": {"name": "panda"},
-    "tasks": {
-        "hand": {
-            "type": "frame_position",
-            "trajectory": {
-                "type": "circle",
-                "origin": "start",
-                "center": [0.0, 0.0, 0.05],
-                "radius": 0.05,
-                "angular_rate": 6.0,
-                "normal": [1, 0, 0],
-            },
-            "gains": {"natural_frequency": 10.0},
-            "blend": 0.5,
-        }
-    },
-    "null_space": {"gain": 10, "fields": [{"type": "target_posture"}]},
-    "simulation": {
-        "duration": 1.0,
-        "control_period": 0.001,
-        "log_period": 0.01,
-        "integrator": {"type": "rk4", "step": 0.001},
-    },
-}
-
-
-@pytest.mark.slow
-def test_a_circle_with_a_posture_is_the_one_that_is_simulated() -> None:
-    """The same law and plant with and without the box: they differ by single precision.
-
-    The simulation knows no box, no gravity that somebody else adds, no packets.
-    """
-    experiment = load_experiment(CIRCLE)
-    run, path = experiment.run(), []
-    with served(plant(motor_inertia=0.0), experiment.q0) as rig:
-        rig.box.on_period = lambda: path.append(rig.box.q.copy())
-        rig.run(
-            f"config = {CIRCLE!r}"
-            + """
-from hsp_control import Rollout, load_experiment
-experiment = load_experiment(config)
-arm, state, rest = experiment.robot, experiment.robot.state, np.zeros(7)
-experiment.controller.compute(0.0, experiment.q0, rest)  # compile before the motion
-control = robot.start_torque_control()
-for step in range(1001):
-    told, _ = control.readOnce()
-    q, v = np.array(told.q), np.array(told.dq)
-    tau = experiment.controller.compute(1e-3 * step, q, v).tau
-    command = franka.Torques((tau - arm.inverse_dynamics(q, rest, rest)).tolist())
-    command.motion_finished = step == 1000
-    control.writeOnce(command)
-"""
-        )
-        assert "1000 commands, 0 lost" in rig.tells("finished")
-    simulated = np.asarray(run["q"])
-    served_path = np.array([experiment.q0, *path[:1000]])[::10]
-    assert np.abs(simulated - experiment.q0).max() > 0.1
-    np.testing.assert_allclose(served_path, simulated, atol=1e-6)
-
-
-def test_a_payload_that_nobody_knows_is_an_external_force() -> None:
-    """Two kilograms at the hand pull down; the load that is set explains them."""
-    payload = Payload("panda_tcp", 2.0)
-    still = """
-control = robot.start_joint_position_control(franka.ControllerMode.JointImpedance)
-for _ in range(600):
-    state, _ = control.readOnce()
-    control.writeOnce(franka.JointPositions(list(state.q_d)))
-del control
-print(json.dumps(state.O_F_ext_hat_K))
-"""
-    with served(plant(payload=payload)) as rig:
-        force = rig.run(still)
-        assert force[2] == pytest.approx(2.0 * 9.81, rel=0.02)
-        known = rig.run("robot.set_load(2.0, [0, 0, 0.1034], [0] * 9)" + still)
-        assert np.abs(known).max() < 0.2
-
-
-def test_a_client_that_is_killed_leaves_a_box_for_the_next() -> None:
-    with served() as rig:
-        endless = """
-control = robot.start_torque_control()
-while True:
-    state, _ = control.readOnce()
-    control.writeOnce(damped(state, np.zeros(7)))
-    print(flush=True)
-"""
-        client = subprocess.Popen(
-            [sys.executable, "-c", PRELUDE + endless, rig.host], stdout=subprocess.PIPE
-        )
-        try:
-            assert client.stdout is not None
-            assert client.stdout.readline()
-        finally:
-            client.kill()
-            client.communicate(timeout=LONGEST)
-        assert rig.run("print(json.dumps(str(robot.read_once().robot_mode)))") == (
-            "RobotMode.Idle"
-        )
-        assert "its client is disconnected" in rig.tells("motion ended")
 
 
 def await_start(box: "subprocess.Popen[str]") -> None:

@@ -13,7 +13,6 @@ from hsp_control.companions.franka_box.generators import (
     Generator,
     HandPoses,
     HandTwists,
-    JointPositions,
 )
 from hsp_control.companions.franka_box.model import Model
 
@@ -64,19 +63,6 @@ def test_joints_follow_the_hand_to_its_pose() -> None:
         np.testing.assert_allclose(
             J @ generator.reference.dq, generator.hand.twist, atol=2e-3
         )
-
-
-def test_joints_follow_the_twist_of_the_hand() -> None:
-    """What is integrated comes back where the twist's integral is zero."""
-    generator, model = made(HandTwists)
-    start = model.hand_at(home())[0]
-    for step in range(STEPS + 1):
-        assert follow(generator, command(O_dP_EE_c=way(step)[1])) == []
-        at, _ = model.hand_at(generator.reference.q)
-        assert np.abs(hand.displacement(generator.hand.pose, at)).max() < 1e-5
-    np.testing.assert_allclose(
-        generator.hand.pose.homogeneous, start.homogeneous, atol=1e-4
-    )
 
 
 def test_an_elbow_that_is_commanded_is_reached_by_a_hand_that_stays() -> None:
@@ -130,16 +116,6 @@ def test_each_limit_of_a_commanded_hand_is_watched() -> None:
             assert all(v.reason.startswith(name) for v in violations)
 
 
-def test_joints_that_cannot_follow_the_hand_are_told_apart() -> None:
-    """About the tool's axis the hand may jerk faster than joint 7 that turns it."""
-    generator, model = made(HandTwists)
-    axis = model.hand_at(home())[0].rotation[:, 2]
-    jerky = 0.9 * reflexes.HAND_JERK[1] * PERIOD**2
-    assert follow(generator, command(O_dP_EE_c=[0, 0, 0, *(jerky * axis)])) == [
-        Error.CARTESIAN_MOTION_GENERATOR_JOINT_ACCELERATION_DISCONTINUITY
-    ]
-
-
 def test_a_hand_starts_where_it_is_and_its_pose_is_one() -> None:
     near, far = np.zeros(6), np.zeros(6)
     near[0], far[0] = 2.9e-3, 3.1e-3
@@ -155,14 +131,6 @@ def test_a_hand_starts_where_it_is_and_its_pose_is_one() -> None:
     assert follow(generator, command(O_T_EE_c=np.ones(16))) == [
         Error.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME_FLAG
     ]
-
-
-def test_a_twist_is_that_of_the_poses_it_makes() -> None:
-    """In the base's axes, however the hand is turned."""
-    pose = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.8, 1.2), np.array([0.3, 0.1, 0.5]))
-    before, twist = hand.at_rest(pose), np.array([0.1, -0.2, 0.3, 0.5, -0.4, 0.3])
-    made = hand.to_twist(twist, before)
-    np.testing.assert_allclose(hand.to_pose(made.pose, before).twist, twist, atol=1e-9)
 
 
 def test_a_lost_command_keeps_the_acceleration_of_the_hand() -> None:
@@ -181,12 +149,3 @@ def test_a_lost_command_keeps_the_acceleration_of_the_hand() -> None:
     generator.extrapolate()
     at, _ = model.hand_at(generator.reference.q)
     assert at.translation[0] > model.hand_at(home())[0].translation[0]
-
-
-def test_the_first_position_is_the_start() -> None:
-    """A client may begin at the measured position: noise is no jerk."""
-    generator, _ = made(JointPositions)
-    noisy = home() + 1e-4 * np.array([1, -1, 1, -1, 1, -1, 1])
-    assert follow(generator, command(q_c=noisy), first=True) == []
-    assert follow(generator, command(q_c=noisy)) == []
-    assert not generator.reference.ddq.any()

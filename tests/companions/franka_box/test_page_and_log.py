@@ -6,23 +6,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 from franka_boxes import home, panda, plant
 
 from hsp_control import Rollout, load_experiment
 from hsp_control.cli.main import main
-from hsp_control.cli.options.command_line import command_line
 from hsp_control.common.exceptions import LogError
 from hsp_control.companions.franka.layouts import (
     COMMAND,
-    PERIOD,
     Controller,
     Error,
     MotionGenerator,
 )
-from hsp_control.companions.franka_box import Arm, Box, generators, reflexes
+from hsp_control.companions.franka_box import Box, generators, reflexes
 from hsp_control.companions.franka_box.log import BoxLog
-from hsp_control.live.simulated_robot import sampled
 
 PAGE = (Path(__file__).parents[3] / "docs/companions/franka_box.md").read_text("utf-8")
 
@@ -34,23 +30,6 @@ def test_the_errors_of_the_page_are_those_that_the_box_has() -> None:
     rows = [row.split("|")[1] for row in table.splitlines() if row.startswith("| `")]
     told = [name for row in rows for name in re.findall(r"`(\w+)`", row)]
     assert sorted(told) == sorted(Error[name].spelling for name in raised)
-
-
-def test_the_options_of_the_page_exist() -> None:
-    values = {"ADDRESS": "127.0.0.2", "FILE": "x.npz", "KEY=VALUE": "a=1"}
-    for option, _, value in re.findall(r"^\| `(--[a-z]+)( (\S+))?` \|", PAGE, re.M):
-        given = [values.get(value, "1")] if value else []
-        assert command_line().parse_args(["franka-box", option, *given])
-
-
-def test_the_plant_of_the_page_is_one() -> None:
-    (text,) = re.findall(r"```yaml\n(.*?)```", PAGE, re.S)
-    experiment = load_experiment(yaml.safe_load(text))
-    simulated = sampled(experiment.plant, experiment.integrator, PERIOD)
-    box = Box(Arm(experiment.robot), simulated, experiment.q0, print)
-    for _ in range(5):
-        box.step(None)
-    assert np.isfinite(box.q).all()
 
 
 def test_the_log_has_the_true_motion(tmp_path: Path) -> None:
@@ -98,14 +77,6 @@ def test_a_mistake_is_one_line(
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("hsp: ")
     assert said in line
-
-
-def test_strict_reading_expands_no_xacro_file(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "arm.urdf.xacro").write_text("<robot/>")
-    assert main(["franka-box", str(tmp_path / "arm.urdf.xacro"), "--strict"]) == 2
-    assert "strict reading allows no xacro file" in capsys.readouterr().err
 
 
 def test_a_log_has_the_name_of_one(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from hsp_control.companions.franka.layouts import (
 from hsp_control.companions.franka_box import reference, reflexes
 from hsp_control.companions.franka_box.arm import ACCELERATION, JERK
 from hsp_control.companions.franka_box.motion import Motion
-from hsp_control.companions.franka_box.reflexes import Reference, Thresholds
+from hsp_control.companions.franka_box.reflexes import Reference
 
 REST = np.zeros(7)
 
@@ -55,32 +55,6 @@ def test_each_limit_of_the_measured_state_is_watched(joint: int, sign: int) -> N
             assert all(f"joint {joint + 1} at" in v.reason for v in violations)
 
 
-def test_effort_rates_are_taken_from_what_the_client_was_told() -> None:
-    before = np.full(7, 40.0 / 3.0).astype(np.float32).astype(float)
-    step = np.full(7, 1.0 - 1e-6)
-    assert not list(reflexes.effort_rate(before + step, before))
-    (violation,) = reflexes.effort_rate(before - step - unit(4, 0.5), before)
-    assert violation.error is Error.CONTROLLER_TORQUE_DISCONTINUITY
-    assert "joint 5 at -1500 N·m/s; limit -1000" in str(violation)
-
-
-def test_twenty_lost_commands_are_too_many() -> None:
-    assert not list(reflexes.communication(19))
-    assert errors(reflexes.communication(20)) == [
-        Error.COMMUNICATION_CONSTRAINTS_VIOLATION
-    ]
-
-
-def test_collisions_have_the_thresholds_of_the_client() -> None:
-    thresholds = Thresholds(REST, np.full(7, 10.0), np.zeros(6), np.full(6, 20.0))
-    assert not list(reflexes.collisions(unit(2, 9.9), np.full(6, -19.9), thresholds))
-    joint, axis = reflexes.collisions(unit(2, -11.0), np.eye(6)[3] * 21, thresholds)
-    assert (joint.error, axis.error) == (Error.JOINT_REFLEX, Error.CARTESIAN_REFLEX)
-    assert "joint 3" in joint.reason
-    assert axis.reason.startswith("R at 21")
-    assert not list(reflexes.collisions(unit(0, 1e9), np.ones(6), Thresholds.none()))
-
-
 def test_each_limit_of_a_commanded_motion_is_watched() -> None:
     limits, start = panda().limits, Reference(home(), REST, REST)
 
@@ -99,22 +73,6 @@ def test_each_limit_of_a_commanded_motion_is_watched() -> None:
     assert errors(reflexes.commanded_motion(beyond, start, limits))[0] is (
         Error.JOINT_POSITION_LIMITS_VIOLATION
     )
-
-
-def test_a_constant_acceleration_is_no_jerk() -> None:
-    limits, most = panda().limits, np.full(7, 0.9 * ACCELERATION)
-    before = Reference(home(), 0.1 * most, most)
-    new = reference.extrapolated(before)
-    assert not list(reflexes.commanded_motion(new, before, limits))
-
-
-def test_a_motion_starts_where_the_arm_is() -> None:
-    limits, at = panda().limits, home()
-    reach = limits.velocity[1] * PERIOD
-    assert not list(reflexes.start_position(at + unit(1, 0.99 * reach), at, limits))
-    (violation,) = reflexes.start_position(at + unit(1, 1.01 * reach), at, limits)
-    assert violation.error is Error.JOINT_POSITION_MOTION_GENERATOR_START_POSE_INVALID
-    assert violation.reason.startswith("joint 2 at ")
 
 
 def test_a_lost_command_keeps_the_acceleration() -> None:

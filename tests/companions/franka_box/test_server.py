@@ -113,31 +113,6 @@ def test_a_malformed_request_ends_the_connection(data: bytes, said: str) -> None
         assert "is disconnected: " in rig.tells(said)
 
 
-def test_whoever_does_not_connect_first_is_sent_away() -> None:
-    with served() as rig:
-        with client(rig) as rude:
-            assert rude.ask(Command.GET_ROBOT_MODEL) == b""
-        assert serves(rig)
-        assert rig.tells("get_robot_model where the first request has to be connect")
-
-
-def test_a_request_in_pieces_is_whole() -> None:
-    with served() as rig, client(rig) as slow:
-        assert slow.connect()
-        for byte in message(Command.GET_ROBOT_MODEL, 7, b""):
-            slow.tcp.sendall(bytes([byte]))
-        answer = slow.answer()
-        assert answer == b"\0" + rig.box.arm.urdf.encode()
-
-
-def test_requests_in_one_piece_are_all_answered() -> None:
-    with served() as rig, client(rig) as hasty:
-        assert hasty.connect()
-        stop = [message(Command.STOP_MOVE, number, b"") for number in (5, 6, 7)]
-        hasty.tcp.sendall(b"".join(stop))
-        assert [hasty.answer() for _ in stop] == [b"\0"] * 3
-
-
 def test_a_command_is_late_by_when_it_arrived_not_by_when_it_is_read() -> None:
     with socket.create_server(("127.0.0.1", 0)) as listener:
         tcp = socket.create_connection(listener.getsockname())

@@ -8,7 +8,6 @@ import pytest
 from franka_boxes import panda
 
 from hsp_control import Robot
-from hsp_control.common.exceptions import LiveError
 from hsp_control.companions.franka.layouts import (
     COMMAND,
     HEADER,
@@ -71,27 +70,6 @@ def test_what_clients_are_told_has_the_same_dynamics(name: str) -> None:
         assert mine.tolist() == theirs.tolist()
 
 
-def test_the_end_effector_is_what_the_flange_carries() -> None:
-    arm = panda()
-    assert arm.end_effector.mass == pytest.approx(0.73 + 2 * 0.015)
-    assert arm.nominal_end_effector.translation == pytest.approx([0, 0, 0.1034])
-    assert arm.flange.translation == pytest.approx([0, 0, 0.107])
-
-
-def test_a_load_is_one_more_body() -> None:
-    arm = panda()
-    load = pin.Inertia(2.0, np.array([0.0, 0.1, 0.2]), np.eye(3))
-    carrying, rest = arm.carrying(load), np.zeros(7)
-    q = arm.robot.home() + 0.3  # the hand does not hang straight down
-    state = arm.robot.state(0.0, q, rest)
-    flange = state.frame("panda_link8")
-    lever = flange.rotation @ load.lever
-    point = flange.jacobian[:3] + np.cross(flange.jacobian[3:].T, lever).T
-    more = carrying.inverse_dynamics(q, rest, rest)
-    less = arm.robot.inverse_dynamics(q, rest, rest)
-    np.testing.assert_allclose(more - less, point.T @ [0, 0, 2 * 9.81], atol=1e-12)
-
-
 def test_velocity_limits_are_those_that_libfranka_computes() -> None:
     """``computeUpperLimitsJointVelocity`` of libfranka 0.21, without its tolerance."""
     limits = ArmLimits(**{k: np.array(x, float) for k, x in FR3_URDF_LIMITS.items()})
@@ -119,17 +97,3 @@ def test_velocity_limits_are_read_beside_transmissions(tmp_path: Path) -> None:
     arm.write_text(urdf.replace("</robot>", f"{driven}</robot>"))
     found = Arm(Robot.load(arm, locked={"panda_finger_joint1": 0.0})).limits
     assert found.velocity_offset.tolist() == [0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 0.0]
-
-
-def test_velocity_limits_without_a_position_stay() -> None:
-    limits = panda().limits
-    lowest, highest = limits.velocities(limits.upper + 0.1)
-    assert highest.tolist() == limits.velocity.tolist() == (-lowest).tolist()
-
-
-def test_other_robots_are_refused_by_name() -> None:
-    with pytest.raises(LiveError, match=r"planar3r has the joints .* seven revolute"):
-        Arm(Robot.load("planar3r"))
-    unlocked = Robot.load("panda", locked={})
-    with pytest.raises(LiveError, match=r"finger_joint.*lock the others"):
-        Arm(unlocked)

@@ -9,7 +9,6 @@ import mujoco
 import numpy as np
 import pytest
 import rerun
-import trimesh
 from numpy.typing import NDArray
 from rerun.chunk import RrdReader
 
@@ -17,7 +16,6 @@ import hsp_control as hsp
 from hsp_control import Robot
 from hsp_control.cli import main
 from hsp_control.common.exceptions import ExportError
-from hsp_control.companions.rerun import log as rerun_log
 from hsp_control.companions.rerun.log import _archetypes, log_to_rerun
 from hsp_control.visualization.viewer.visuals import read_visuals
 
@@ -77,18 +75,6 @@ def test_the_scene_has_the_names_and_poses_of_our_view(
     ]
     assert any("Mesh3D" in " ".join(written[m].to_record_batch().schema.names)
                for m in meshes)  # fmt: skip
-
-
-def test_every_column_is_a_curve(written: Mapping[str, Any], log: hsp.Rollout) -> None:
-    for path, values in (
-        ("/log/tau/panda_joint3", log.tau[:, 2]),
-        ("/log/null_space_norm", log["null_space_norm"]),
-        ("/log/task.hand.error/5", log["task.hand.error"][:, 5]),
-    ):
-        found = column(written[path], "Scalars:scalars")
-        np.testing.assert_array_equal(found[:, 0], values)
-    curves = {path.split("/")[2] for path in written if path.startswith("/log/")}
-    assert curves == set(log.columns) - {"t"}
 
 
 def test_it_goes_where_others_log(log: hsp.Rollout, tmp_path: Path) -> None:
@@ -162,15 +148,6 @@ def test_what_is_missing_is_said(
     monkeypatch.setattr(builtins, "__import__", without)
     with pytest.raises(ExportError, match=r"pip install 'hsp_control\[rerun\]'"):
         log_to_rerun(log)
-
-
-def test_meshes_are_shaded_by_the_normals_of_their_surface() -> None:
-    """Of a ball, the normals are the directions from its centre."""
-    ball = trimesh.creation.icosphere(subdivisions=4)
-    normals = rerun_log._normals(np.array(ball.vertices), np.array(ball.faces))
-    np.testing.assert_allclose(normals, ball.vertices, atol=0.01)  # triangles of 0.07
-    alone = rerun_log._normals(np.eye(3), np.zeros((0, 3), dtype=int))
-    assert not alone.any()
 
 
 def test_every_kind_of_geom_is_drawn_as_what_it_is() -> None:

@@ -12,19 +12,6 @@ def test_an_address_has_a_name_a_domain_and_options() -> None:
     assert parse("/left/eff").name == "/left/eff"
 
 
-def test_the_domain_is_that_of_ros(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
-    assert parse("a").domain == 0
-    monkeypatch.setenv("ROS_DOMAIN_ID", "12")
-    assert parse("a").domain == 12
-    assert parse("a?domain=3").domain == 3
-    monkeypatch.setenv("ROS_DOMAIN_ID", "x")
-    with pytest.raises(
-        HardwareError, match=r"^ROS_DOMAIN_ID: the domain is 'x'; needs"
-    ):
-        parse("a")
-
-
 @pytest.mark.parametrize(
     ("address", "message"),
     [

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from rosbags.typesys import Stores, get_typestore
 
-from hsp_control.companions.ros2 import messages
 from hsp_control.companions.ros2.messages import (
     TYPE_HASHES,
     Float64MultiArray,
@@ -76,9 +75,3 @@ def test_the_hashes_are_those_of_ros() -> None:
     for kind, digest in TYPE_HASHES.items():
         name = ros_name(kind.__idl_typename__)
         assert types.hash_rihs01(name) == f"RIHS01_{digest}"
-
-
-def test_times_come_back_to_the_nanosecond() -> None:
-    for nanoseconds in (0, 1, 999_999_999, 1_795_368_647_996_620_284):
-        assert Time.of(nanoseconds).nanoseconds == nanoseconds
-    assert messages.ros_name("std_msgs::msg::dds_::Header_") == "std_msgs/msg/Header"

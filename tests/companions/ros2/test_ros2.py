@@ -13,16 +13,13 @@ from typing import Any
 import numpy as np
 import pytest
 from live_rigs import PERIOD, law, panda, start
-from live_rigs import watched as watched_robot
 from ros2_rigs import DOMAIN, client, fresh
 
 from hsp_control import load_experiment
 from hsp_control.cli.live_experiment import simulated_robot
 from hsp_control.companions.ros2 import robot as ros2_robot
 from hsp_control.companions.ros2.hardware import Ros2Hardware
-from hsp_control.companions.ros2.watch import Watched
-from hsp_control.control.compensation import Command
-from hsp_control.live import InProcessRobot, LiveSettings, Measurement, run_loop
+from hsp_control.live import LiveSettings, Measurement, run_loop
 
 pytestmark = pytest.mark.process
 
@@ -135,31 +132,3 @@ def test_mistakes_at_the_command_line_are_one_line(
         "hsp: ros2://eff?domains=1: there is no option 'domains'; did you mean "
         "'domain'? (known: domain, states, joints)\n"
     )
-
-
-@pytest.mark.smoke
-def test_a_client_watches_a_loop(tmp_path: Path) -> None:
-    prefix, _, _ = fresh()
-    command, seen = Command(law()), []
-    watched = Watched(f"{prefix}?domain={DOMAIN}&rate=1000", command)
-    said = tmp_path / "said.json"
-    with client(said, "watch", DOMAIN, f"{prefix}/tip/actual", 5) as watcher:
-        poses = watched._poses[f"{prefix}/tip/actual"]
-        while poses.matched == 0 and watcher.poll() is None:
-            pass
-
-        def publish(t: float) -> None:
-            seen.append(command.state.position("panda_tcp").tolist())
-            watched(t)
-
-        report = run_loop(
-            command, InProcessRobot(watched_robot()), duration=0.2, on_period=publish
-        )
-    assert report.ended == "completed"
-    poses_heard = json.loads(said.read_text())
-    assert len(poses_heard) == 5
-    for frame, stamp, *numbers in poses_heard:
-        assert frame == "panda_link0"
-        assert stamp > 1e9
-        assert numbers[:3] in seen
-        assert numbers[3:] == [0.0, 0.0, 0.0, 1.0]

@@ -15,8 +15,7 @@ from hsp_control.companions.ros2.hardware import Ros2Hardware
 from hsp_control.companions.ros2.joints import Joints
 from hsp_control.companions.ros2.messages import Float64MultiArray
 from hsp_control.companions.ros2.node import Node, Subscription
-from hsp_control.companions.ros2.stamps import Stamps
-from hsp_control.live import Hardware, LiveSettings, run_loop
+from hsp_control.live import LiveSettings, run_loop
 
 NAMES = panda().dof_names
 LONG = 30.0
@@ -104,41 +103,7 @@ def test_a_message_has_every_joint_once(names: tuple[str, ...], message: str) ->
         Joints(panda()).state(joint_state(1, names, [0.0] * len(names)), "/js")
 
 
-# --- stamps --------------------------------------------------------------------------
-
-
-def test_stamps_number_the_states() -> None:
-    stamps = Stamps(PERIOD)
-    heard = [(5, True), (6, True), (6, False), (4, False), (7.4, True), (8.5, True)]
-    heard += [(11.5, True)]
-    numbers = []
-    for stamp, new in heard:
-        assert stamps.take(round(stamp * MILLISECOND)) is new
-        numbers.append(stamps.sequence)
-    assert numbers == [0, 1, 1, 1, 2, 3, 6]
-    assert stamps.t == pytest.approx(0.0065, abs=1e-12)
-    stamps.begin(0.001)
-    assert stamps.t == 0.001
-
-
 # --- reading and writing -------------------------------------------------------------
-
-
-def test_a_run_begins_at_zero_however_long_the_loop_compiles(
-    rig: tuple[Rig, Ros2Hardware],
-) -> None:
-    made, hardware = rig
-    assert isinstance(hardware, Hardware)
-    assert hardware.q.tolist() == start().tolist()
-    # The fixture's reads were the first ones.
-    hardware._reads = 0
-    for wait, t in ((0, 0.0), (5000, 0.001), (1, 0.002), (3, 0.005)):
-        made.robot.stamp += (wait - 1) * MILLISECOND if wait else 0
-        made.robot.send()
-        found = hardware.read(LONG)
-        assert found is not None
-        assert found.t == pytest.approx(t, abs=1e-12)
-    assert hardware.read(0.0) is None
 
 
 def test_the_newest_of_many_counts_and_old_ones_do_not(
@@ -159,19 +124,6 @@ def test_the_newest_of_many_counts_and_old_ones_do_not(
     assert hardware.old == 2
 
 
-def test_other_joints_are_no_states_of_this_robot(
-    rig: tuple[Rig, Ros2Hardware],
-) -> None:
-    made, hardware = rig
-    gripper = Broadcaster(made.states, names=("finger",), q=[0.02])
-    gripper.send()
-    assert hardware.read(0.05) is None
-    made.robot.send()
-    found = hardware.read(LONG)
-    assert found is not None
-    assert not found.fault
-
-
 def test_efforts_arrive_in_the_order_of_the_controller() -> None:
     rig = Rig("&joints=" + ",".join(NAMES[::-1]))
     hardware = rig.connected()
@@ -181,17 +133,6 @@ def test_efforts_arrive_in_the_order_of_the_controller() -> None:
     hardware.close()
     hardware.close()
     assert hardware.read(0.0) is None
-
-
-def test_joints_that_the_robot_lacks_are_ignored_with_a_word() -> None:
-    names = ("finger", *NAMES)
-    rig = Rig(names=names, q=[0.5, *start()])
-    with pytest.warns(RuntimeWarning, match="does not have are ignored: finger"):
-        hardware = rig.connected()
-    rig.robot.send()
-    found = hardware.read(LONG)
-    assert found is not None
-    assert np.array_equal(found.q, start())
 
 
 # --- what is wrong -------------------------------------------------------------------
@@ -296,16 +237,6 @@ def test_a_robot_that_is_not_there_is_not_waited_for_in_silence() -> None:
     robot = Broadcaster(states)
     with robot.sending(), refused(rf"nobody listens to {controller}/commands"):
         Ros2Hardware(address, panda(), PERIOD, timeout=5.0)
-
-
-def test_a_topic_of_another_type_is_named() -> None:
-    _, states, address = fresh()
-    wrong = Node(DOMAIN).publisher(states, Float64MultiArray)
-    with refused(
-        rf"{states} has type std_msgs/msg/Float64MultiArray; needs sensor_msgs/msg/"
-    ):
-        Ros2Hardware(address, panda(), PERIOD, timeout=0.2)
-    assert wrong.matched == 0
 
 
 @pytest.mark.parametrize(

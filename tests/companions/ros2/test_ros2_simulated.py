@@ -134,15 +134,6 @@ def test_a_wrong_effort_stops_the_robot(
     assert served.robot.phase == Phase.HOLDING
 
 
-def test_a_robot_stops_when_its_controller_has_gone(served: Served) -> None:
-    publisher = served.sender()
-    publisher.send(Float64MultiArray(MultiArrayLayout(), [0.0] * 7))
-    while served.robot.phase == Phase.WAITING:
-        pass
-    del publisher
-    assert served.ended() == "the loop closed the connection"
-
-
 def test_a_robot_that_nobody_commands_ends_when_it_is_told(served: Served) -> None:
     served.stop.set()
     assert served.ended() == ""

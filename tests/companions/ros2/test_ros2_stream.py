@@ -89,14 +89,6 @@ def test_wrong_poses_are_counted_and_dropped(
     until(lambda: inbox.count == 1)
 
 
-def test_the_frame_is_the_address_s() -> None:
-    inbox, publisher = opened(POSE, "&frame=panda_link0")
-    publisher.send(pose())
-    publisher.send(pose(frame="panda_link0"))
-    until(lambda: inbox.count == 1)
-    assert inbox.rejected == 1
-
-
 def test_a_task_s_reference_goes_where_the_topic_says() -> None:
     topic, _, _ = fresh()
     source = f"ros2:/{topic}?domain={DOMAIN}"

@@ -97,44 +97,6 @@ def test_the_hand_arrives_and_the_finger_obeys(arm: ArmEnv) -> None:
     assert reward == pytest.approx(-(0.03**2))  # the arm's own action is zero
 
 
-def test_a_change_begins_where_the_hand_is_and_is_clipped(arm: ArmEnv) -> None:
-    env = HandTargets(arm, "hand", FREE, axes="xz", scale=(0.02, 0.0))
-    env.reset(seed=0)
-    assert env.action_space.shape == (3,)
-    before = pose_of(env).translation
-    env.step([0.5, -7.0, 0.0])
-    task = env.hand.command.controller.tasks[0]
-    reference = task.followed.sample(0.0).position
-    np.testing.assert_allclose(reference, before[[0, 2]] + [0.01, -0.02], atol=1e-12)
-
-
-def test_a_stream_s_reference_has_bounds(arm: ArmEnv) -> None:
-    stream = {"delay": 0.04, "speed": 0.2, "acceleration": 2.0}
-    env = HandTargets(arm, "hand", {"stream": stream}, absolute=True)
-    env.reset(seed=0)
-    start = pose_of(env)
-    goal = pin.SE3(start.rotation, start.translation + np.array([0.0, 0.1, 0.0]))
-    speeds = []
-    for _ in range(60):
-        env.step(action_of(goal))
-        task = env.hand.command.controller.tasks[0]
-        sample = task.followed.sample(env.hand.command.state.t)
-        speeds.append(np.abs(sample.position.velocity).max())
-    assert 0.15 < max(speeds) <= 0.2 + 1e-9
-    np.testing.assert_allclose(sample.position.position, goal.translation, atol=1e-6)
-
-
-def test_the_same_seed_and_actions_give_the_same_bits(arm: ArmEnv) -> None:
-    env = HandTargets(arm, "hand", {"stream": {"delay": 0.04}})
-    runs = []
-    for _ in range(2):
-        env.reset(seed=3)
-        rng = np.random.default_rng(0)
-        actions = rng.uniform(-1.0, 1.0, (10, 7))
-        runs.append([env.step(action)[0] for action in actions])
-    np.testing.assert_array_equal(*runs)
-
-
 def test_a_loaded_state_begins_a_new_run(arm: ArmEnv) -> None:
     env = HandTargets(arm, "hand", absolute=False)
     env.reset(seed=0)
@@ -162,18 +124,6 @@ def test_it_is_an_environment_like_others() -> None:
     assert data.body("tips_arm").xpos[1] - before[1] > 0.2
 
 
-def test_an_arm_with_two_joints_follows_in_the_plane() -> None:
-    env = HandTargets(gymnasium.make("Reacher-v5"), "fingertip", axes="xy")
-    env.reset(seed=1)
-    data = env.unwrapped.data
-    before = data.body("fingertip").xpos.copy()
-    for _ in range(25):
-        env.step([-0.2, 0.2])
-    moved = data.body("fingertip").xpos - before
-    assert moved[0] < -0.01
-    assert moved[1] > 0.01
-
-
 def test_what_does_not_fit_is_refused(tmp_path: Path, arm: ArmEnv) -> None:
     with pytest.raises(
         ControllerError, match=r"CartPoleEnv is none of .* has no model"
@@ -192,19 +142,6 @@ def test_what_does_not_fit_is_refused(tmp_path: Path, arm: ArmEnv) -> None:
         env.step(np.zeros(6))
     with pytest.raises(NonFiniteError, match="the target contains NaN"):
         env.step(np.full(7, np.nan))
-
-
-def test_servos_may_be_switched_off(tmp_path: Path) -> None:
-    servos = ArmEnv(tmp_path, drive="position")
-    env = HandTargets(servos, "hand", absolute=True, disable_servos=True)
-    assert env.action_space.shape == (6 + 8,)  # their controls have no effect any more
-    env.reset(seed=0)
-    start = pose_of(env)
-    goal = pin.SE3(start.rotation, start.translation + np.array([0.0, 0.05, 0.0]))
-    others = np.zeros(7)
-    for _ in range(60):
-        env.step(np.concatenate([action_of(goal, 0.0)[:6], others, [0.0]]))
-    assert np.linalg.norm(pose_of(env).translation - goal.translation) < 1e-3
 
 
 def test_what_the_page_shows_runs() -> None:

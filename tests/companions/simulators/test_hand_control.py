@@ -59,20 +59,6 @@ def test_between_jumps_the_error_equation_holds(
     np.testing.assert_allclose(linear[tracked], wanted[tracked], atol=1e-9)
 
 
-def test_it_begins_where_the_hand_is(robot: hsp.Robot) -> None:
-    """At rest, with the posture of the start, nothing accelerates."""
-    hand = HandControl(robot, "panda_tcp", LAW, gains=GAINS)
-    for q in (robot.home(), moving(robot)[0]):  # the second run has another start
-        hand.begin(0.0, q, np.zeros(7))
-        tau = hand.effort(0.0, q, np.zeros(7), PERIOD)
-        gravity = robot.state(0.0, q, np.zeros(7)).nonlinear_effects
-        np.testing.assert_allclose(tau, gravity, atol=1e-9)
-        away = hand.pose(q)
-        away.translation = away.translation + np.array([0.0, 0.0, 0.1])
-        hand.aim(away, PERIOD)  # forgotten by the next run
-        assert hand.effort(PERIOD, q, np.zeros(7), PERIOD) != pytest.approx(gravity)
-
-
 def test_by_default_the_posture_obeys_the_simulator_s_equation(
     robot: hsp.Robot,
 ) -> None:
@@ -114,38 +100,6 @@ def test_efforts_are_clipped_and_the_observer_knows(robot: hsp.Robot) -> None:
     hand.effort(PERIOD, q, PERIOD * acceleration, PERIOD)
     channels = hand.command.log_channels()
     assert np.abs(channels["observer.disturbance"].value).max() < 0.5
-
-
-@pytest.mark.parametrize("axes", [None, "xz"])
-def test_two_hands_do_not_hear_each_other_s_targets(
-    robot: hsp.Robot, axes: str | None
-) -> None:
-    q, rest = robot.home(), np.zeros(7)
-    hands = [HandControl(robot, "panda_tcp", gains=GAINS, axes=axes) for _ in range(2)]
-    goal = hands[0].pose(q)
-    goal.translation = goal.translation + np.array([0.0, 0.0, 0.1])
-    for hand in hands:
-        hand.begin(0.0, q, rest)
-    hands[0].aim(goal, 0.0)
-    efforts = [
-        [hand.effort(k * PERIOD, q, rest, PERIOD).copy() for k in range(10)][-1]
-        for hand in hands
-    ]
-    assert np.abs(efforts[0] - efforts[1]).max() > 0.1
-    still = robot.state(0.0, q, rest).nonlinear_effects
-    np.testing.assert_allclose(efforts[1], still, atol=1e-6)
-
-
-def test_a_jump_of_time_is_noticed(robot: hsp.Robot) -> None:
-    hand = HandControl(robot, "panda_tcp", gains=GAINS)
-    q, rest = robot.home(), np.zeros(7)
-    hand.begin(3.0, q, rest)
-    assert not hand.has_jumped(3.0)
-    hand.effort(3.0, q, rest, PERIOD)
-    assert not hand.has_jumped(3.0)  # asked twice at one time
-    assert not hand.has_jumped(3.0 + PERIOD)
-    assert hand.has_jumped(0.0)
-    assert hand.has_jumped(4.0)
 
 
 def test_what_is_wrong_is_named_with_its_place(

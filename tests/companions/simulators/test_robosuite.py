@@ -3,7 +3,6 @@
 robosuite needs another MuJoCo than the other tests, and an environment of its own.
 """
 
-import json
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -21,7 +20,6 @@ from hsp_control.common.exceptions import (  # noqa: E402
     ConfigError,
     ControllerError,
     GainError,
-    ModelError,
 )
 from hsp_control.companions.simulators.robosuite import HspPose  # noqa: E402
 
@@ -94,35 +92,6 @@ def test_every_arm_goes_where_it_is_told(name: str) -> None:
         assert orientation < 2e-2
 
 
-@pytest.mark.parametrize("robots", [["Panda", "Panda"], ["Baxter"]])
-def test_each_of_two_arms_obeys_its_own_actions(robots: list[str]) -> None:
-    configs = []
-    for name in robots:
-        config = robosuite.load_composite_controller_config(robot=name)
-        config["type"] = "HSP"
-        for arm in {"right", "left"} & set(config["body_parts"]):
-            config["body_parts"][arm]["type"] = "HSP_POSE"
-        configs.append(config)
-    env = robosuite.make(
-        "TwoArmLift",
-        robots=robots,
-        controller_configs=configs,
-        has_renderer=False,
-        has_offscreen_renderer=False,
-        use_camera_obs=False,
-        seed=0,
-    )
-    env.reset()
-    arms = [robot.part_controllers[arm] for robot in env.robots for arm in robot.arms]
-    begun = [arm.ref_pos.copy() for arm in arms]
-    for _ in range(20):
-        env.step(np.array([0.0, 0.0, 0.5] + [0.0] * (env.action_dim - 3)))
-    moved = [arm.ref_pos - where for arm, where in zip(arms, begun, strict=True)]
-    assert moved[0][2] > 0.1
-    assert np.abs(moved[1]).max() < 2e-3
-    env.close()
-
-
 def test_the_model_is_the_simulation_s() -> None:
     """Without what it leaves out, MuJoCo's acceleration is the law's: 7 of 9 joints."""
     with made(hsp=LAW) as env:
@@ -169,46 +138,6 @@ def test_an_action_means_what_it_means_to_osc_pose(frame: str) -> None:
     np.testing.assert_allclose(*ends, atol=0.25 * np.linalg.norm(ends[0]))
 
 
-def test_robosuite_gets_the_efforts_and_may_store_the_configuration(
-    tmp_path: Path,
-) -> None:
-    file = tmp_path / "hand.yaml"
-    file.write_text(
-        "null_space:\n  gain: 5\n  fields: [{type: joint_centering}]\n",
-        encoding="utf-8",
-    )
-    with made(hsp=str(file)) as env:
-        env.step(np.array([1.0, 0.0, 0.0, 0.0, 0.0, 1.0, -1.0]))
-        arm = arm_of(env)
-        assert isinstance(arm, HspPose)
-        assert arm.hand.command.controller.null_space_gain[0, 0] == 5.0
-        np.testing.assert_array_equal(env.sim.data.ctrl[:7], arm.torques)
-        json.dumps(env.robots[0].composite_controller_config)
-
-
-def test_a_loaded_state_begins_a_new_run() -> None:
-    with made() as env:
-        begun = env.sim.get_state().flatten()
-        for _ in range(10):
-            env.step(np.array([1.0, 1.0, 0.0, 0.0, 0.0, 0.0, -1.0]))
-        env.sim.set_state_from_flattened(begun)
-        env.sim.forward()
-        where = env.sim.data.get_site_xpos(arm_of(env).ref_name).copy()
-        env.step(np.zeros(7))
-        moved = env.sim.data.get_site_xpos(arm_of(env).ref_name) - where
-        assert np.linalg.norm(moved) < 1e-3
-
-
-def test_two_resets_give_the_same_bits() -> None:
-    ends = []
-    for _ in range(2):
-        with made(hsp={"stream": {"delay": 0.11, "policy": "interpolate"}}) as env:
-            for k in range(8):
-                env.step(np.array([0.5, np.sin(k), 0.0, 0.0, 0.0, 0.3, -1.0]))
-            ends.append(env.sim.data.qpos[:7].copy())
-    np.testing.assert_array_equal(*ends)
-
-
 @pytest.mark.parametrize(
     ("settings", "error", "message"),
     [
@@ -223,11 +152,6 @@ def test_two_resets_give_the_same_bits() -> None:
 )
 def test_what_it_cannot_do_is_refused(settings: Any, error: Any, message: str) -> None:
     with pytest.raises(error, match=message), made(**settings):
-        pass
-
-
-def test_a_base_that_moves_is_refused() -> None:
-    with pytest.raises(ModelError, match="its base must stand still"), made("Tiago"):
         pass
 
 

@@ -1,8 +1,6 @@
 """Check the sweep command: its mistakes, what it tells, and what it draws."""
 
 import json
-import shutil
-import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -103,15 +101,6 @@ def test_reasons_that_differ_in_numbers_alone_are_told_once(
     assert "No sensitivities: 1 runs were completed" in printed
 
 
-def test_importing_the_package_imports_no_extra() -> None:
-    heavy = ["pyarrow", "distributed", "matplotlib", "scipy.stats", "meshcat"]
-    code = f"import sys, hsp_control; print([m for m in {heavy} if m in sys.modules])"
-    ran = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True
-    )
-    assert ran.stdout.strip() == "[]"
-
-
 def test_without_pyarrow_the_message_says_what_to_install(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -136,23 +125,6 @@ def test_a_stream_from_another_process_cannot_be_swept() -> None:
     heard = "tasks.tip.trajectory={type: stream, source: 'udp://127.0.0.1:5005'}"
     with pytest.raises(SweepError, match=r"hears udp://127.0.0.1:5005, which only one"):
         hsp.sweeps.sweep(MOVING, OVER, overrides=[*QUICK, heard])
-
-
-def test_a_robot_beside_its_configuration_is_found_from_anywhere(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    shutil.copy(hsp.Robot.load("planar3r").source.urdf, tmp_path / "arm.urdf")
-    (tmp_path / "mine.yaml").write_text(
-        "robot: {name: arm.urdf}\n"
-        "start: {joints: [0.3, 0.4, 0.5]}\n"
-        "tasks: {tip: {type: frame_position, axes: xy, frame: tip,"
-        " trajectory: {type: hold}, gains: {kp: 9, kv: 6}}}\n"
-        "simulation: {duration: 0.02}\n"
-    )
-    found = hsp.sweeps.sweep(
-        tmp_path / "mine.yaml", {"null_space.gain": [1]}, workers=1
-    )
-    assert found.completed.all()
 
 
 def test_a_worker_with_other_versions_is_an_error_that_loses_nothing(

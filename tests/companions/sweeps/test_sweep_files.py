@@ -26,9 +26,6 @@ from hsp_control.companions.sweeps import (
     local_workers,
 )
 from hsp_control.companions.sweeps.journal import Journal, journal_of
-from hsp_control.companions.sweeps.row import Row
-from hsp_control.declaration.plain_data import plain_data
-from hsp_control.simulation.measures import Measure
 
 pytestmark = [pytest.mark.process, pytest.mark.slow]
 
@@ -136,16 +133,6 @@ def test_the_file_is_parquet_that_describes_itself(file: Path, swept: Sweep) -> 
     same(Sweep.load(file), swept)
 
 
-def test_metres_and_radians_are_not_added() -> None:
-    short = ["simulation.duration=0.02", "simulation.log_period=0.01"]
-    found = hsp.sweeps.sweep(
-        "panda_obstacle", {"null_space.gain": [5]}, overrides=short, workers=1
-    )
-    units = {name: told["unit"] for name, told in found.meta["metrics"].items()}
-    assert units["tracking.hand.position.rms"] == "m"
-    assert units["tracking.hand.orientation.rms"] == "rad"
-
-
 def test_anything_in_the_configuration_can_vary() -> None:
     over = {
         "start.velocity": ["rest", "flow"],
@@ -174,27 +161,11 @@ def test_failures_are_rows_with_their_reason() -> None:
     assert found.complete
 
 
-def test_the_configuration_given_is_not_changed() -> None:
-    scenario = hsp.load_experiment(MOVING, *QUICK).scenario
-    data = plain_data(scenario, defaults=True)
-    before = json.dumps(data)
-    hsp.sweeps.sweep(data, {"null_space.gain": [3.0, 4.0]}, workers=1)
-    assert json.dumps(data) == before
-
-
 # --- the same bits, nothing twice ----------------------------------------------------
 
 
 def test_the_number_of_workers_changes_no_bit(swept: Sweep) -> None:
     same(hsp.sweeps.sweep(MOVING, OVER, overrides=QUICK, workers=1), swept)
-
-
-def test_what_is_done_is_not_done_again(file: Path, swept: Sweep) -> None:
-    before = file.read_bytes()
-    again = hsp.sweeps.sweep(MOVING, OVER, overrides=QUICK, out=file)
-    same(again, swept)
-    assert again["wall_time"].tobytes() == swept["wall_time"].tobytes()
-    assert file.read_bytes() == before
 
 
 def sweep_command(out: Path, *more: str) -> list[str]:
@@ -271,65 +242,6 @@ def test_ctrl_c_leaves_a_readable_file_and_the_same_command_ends_it(
     same(resumed, whole)
     kept = part["run"]
     assert resumed["wall_time"][kept].tobytes() == part["wall_time"].tobytes()
-
-
-def test_half_a_line_is_cut_off_before_another_is_written(tmp_path: Path) -> None:
-    path = tmp_path / "x.parquet.journal"
-    rows = [Row(k, "completed", "", {"e": 0.1 * k}, 0.5) for k in range(3)]
-    journal = Journal(path)
-    journal.begin({"seed": 1})
-    journal.add(rows[0], {"e": Measure(0.0, "m", "error")})
-    journal.close()
-    for row, half in zip(
-        rows[1:], ('{"row": {"run"', '{"described": {"é'), strict=True
-    ):
-        with path.open("a", encoding="utf-8") as file:
-            file.write(half)
-        journal = Journal(path)
-        assert journal.rows == rows[: row.run]
-        journal.add(row, {})
-        journal.close()
-    journal = Journal(path)
-    assert journal.rows == rows
-    assert journal.identity == {"seed": 1}
-    assert journal.described == {"e": Measure(0.0, "m", "error")}
-    journal.remove()
-    path.write_text('{"swe')  # killed in the first line
-    journal = Journal(path)
-    assert (journal.rows, journal.identity) == ([], None)
-    journal.remove()
-
-
-def test_killed_between_the_file_and_the_journal(file: Path, tmp_path: Path) -> None:
-    """Rows in both count once."""
-    out = tmp_path / "both.parquet"
-    whole = hsp.sweeps.sweep(MOVING, OVER, overrides=QUICK, workers=1)
-    journal = Journal(journal_of(out))
-    journal.begin(whole.meta["identity"])
-    for row in whole.rows():
-        journal.add(row, {})
-    journal.close()
-    whole.save(out)
-    again = hsp.sweeps.sweep(MOVING, OVER, overrides=QUICK, out=out)
-    same(again, whole)
-    assert again["wall_time"].tobytes() == whole["wall_time"].tobytes()
-
-
-def test_a_worker_that_dies_costs_nothing(whole: Sweep) -> None:
-    killed = []
-
-    def kill_one(done: int, total: int, failures: int) -> None:
-        if done == 2 and not killed:
-            workers = psutil.Process().children()
-            killed.extend(workers)
-            workers[0].kill()
-
-    over = {"null_space.gain": "1:20:20"}
-    found = hsp.sweeps.sweep(
-        MOVING, over, overrides=SLOWER, workers=1, on_progress=kill_one
-    )
-    assert killed
-    same(found, whole)
 
 
 def test_a_run_that_kills_its_workers_is_a_row_and_tried_again_another_time(

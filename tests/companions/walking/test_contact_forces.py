@@ -73,20 +73,6 @@ def test_wrenches_that_push_on_a_robot_at_rest_are_found(name):
         assert out.wrenches[frame] == pytest.approx(wrench, abs=1e-8)
 
 
-def test_only_what_is_missing_is_estimated_and_that_is_said():
-    experiment = load_experiment("whole_body/solo12_trunk")
-    robot, q = experiment.robot, experiment.q0
-    measured = {"FL_FOOT": np.arange(6.0)}
-    given = Measurement(0, 0.0, q, np.zeros(robot.nv), wrenches=measured)
-    running = ContactForces().begin(experiment.controller, None)
-    out = running.update(given)
-    assert out.wrenches["FL_FOOT"] is measured["FL_FOOT"]
-    assert out.estimated == {"FR_FOOT", "HL_FOOT", "HR_FOOT"}
-    assert out.wrenches.keys() == set(CASES["whole_body/solo12_trunk"])
-    every = ContactForces(instead=True).begin(experiment.controller, None)
-    assert len(every.update(given).estimated) == 4
-
-
 def test_a_robot_without_contacts_is_refused():
     robot = load_experiment("whole_body/solo12_trunk").robot
     flying = Controller(robot, [JointPosture(joints=["FL_HAA"])], base="flying")

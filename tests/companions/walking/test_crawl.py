@@ -13,13 +13,6 @@ NAMES = ("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT")
 FEET = [BallContact(name, radius=0.0165) for name in NAMES]
 
 
-def test_all_its_tasks_are_of_the_first_level():
-    made = Crawl(speed=0.05).parts(Robot.load("solo12"), [], FEET)
-    tasks = {task.name: task for task in made.tasks}
-    assert set(tasks) == {"trunk", "height", "center_of_mass", *NAMES}
-    assert {task.priority for task in made.tasks} == {1}
-
-
 @pytest.mark.parametrize(
     ("contacts", "message"),
     [

@@ -1,15 +1,12 @@
 """What a leg does to the centre of pressure: against Pinocchio's inverse dynamics."""
 
-from itertools import pairwise
-
 import numpy as np
 import pinocchio as pin
 import pytest
 
 from hsp_control import load_experiment
 from hsp_control.companions.walking.footsteps import Footstep
-from hsp_control.companions.walking.leg_reaction import LegReaction, reaction_of
-from hsp_control.companions.walking.pendulum import GRAVITY, Phase, plan_dcm
+from hsp_control.companions.walking.leg_reaction import LegReaction
 from hsp_control.companions.walking.swing import Swing
 
 pytest.importorskip("example_robot_data")
@@ -77,34 +74,6 @@ def test_a_leg_that_swings_moves_the_centre_of_pressure(talos, side, axis):
     whole = np.eye(3)
     whole[:2, :2] = R
     assert R @ turned._first[side] @ whole.T == pytest.approx(legs._first[side])
-
-
-def test_legs_make_the_pendulum_longer(talos):
-    """The feet push at c - (z + κ g) c'' / g, in the mean of both directions."""
-    _, state, legs = talos
-    found = []
-    for axis in (0, 1):
-        wanted = np.zeros(18)
-        wanted[12 + axis] = 1.0
-        # The ground is 1 m below: a point mass pushes at -1 m / g.
-        found.append(-pressed(state, rows_of(state, 1.0), wanted)[axis] * GRAVITY - 1.0)
-    assert legs.pendulum(state) == pytest.approx(np.mean(found), abs=1e-9)
-    assert 0.02 < legs.pendulum(state) < 0.3
-
-
-def test_a_reaction_is_a_plan_of_short_lines():
-    """η against the closed form of phases that follow each other, backwards."""
-    points = np.random.default_rng(4).normal(scale=0.05, size=(9, 2))
-    points[-1] = 0.0
-    reaction = reaction_of(points, 1.0, 0.07, W)
-    phases = [Phase(0.07, a, b) for a, b in pairwise(points)]
-    starts = plan_dcm(phases, W)
-    for k, start in enumerate(starts):
-        assert reaction.shift(1.0 + 0.07 * k) == pytest.approx(start, abs=1e-12)
-        assert reaction.point(1.0 + 0.07 * k) == pytest.approx(points[k], abs=1e-12)
-    for late in (1.0 + 0.07 * 8, 3.0):
-        assert not reaction.shift(late).any()
-        assert not reaction.point(late).any()
 
 
 def test_the_reaction_to_a_swing_obeys_the_pendulum(talos):

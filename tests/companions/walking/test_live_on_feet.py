@@ -1,12 +1,11 @@
 """Robots on feet in a live loop: what is measured, how they stand, stop and fall."""
 
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
-from live_rigs import panda, start, watched
+from live_rigs import panda, start
 from numpy.typing import NDArray
 
 import hsp_control as hsp
@@ -30,7 +29,7 @@ from hsp_control.live import (
     run_loop,
 )
 from hsp_control.live.bearing_feet import BearingFeet
-from hsp_control.live.state_reader import DeadReckoning, valid_measurement
+from hsp_control.live.state_reader import valid_measurement
 from hsp_control.live.udp import SensorLayout
 
 pytest.importorskip("example_robot_data")
@@ -208,18 +207,6 @@ def test_what_a_plan_or_an_estimator_misses_is_said_before_the_run() -> None:
         )
 
 
-@pytest.mark.system
-@pytest.mark.slow
-def test_a_measured_force_is_fed_back(tmp_path: Path) -> None:
-    wipes = hsp.load_experiment("forces/panda_wipe", "simulation.duration=0.3")
-    report, _ = live(wipes, tmp_path / "wipe.journal", duration=0.3)
-    assert report.ended == "completed", report.reason
-    log, run = hsp.Rollout.load(tmp_path / "wipe.journal"), wipes.run()
-    for name in ("contact.wiper.measured", "contact.wiper.integral", "tau"):
-        np.testing.assert_allclose(log[name][:30], run[name][:30], rtol=1e-6, atol=1e-7)
-    assert run["contact.wiper.measured"][20:].min() > 1.0
-
-
 # --- the feet and the safe stop ------------------------------------------------------
 
 
@@ -247,39 +234,6 @@ def test_joints_and_feet_exert_the_force_of_a_safe_stop() -> None:
     held = feet.joint_effort(state, robot.inverse_dynamics(state.q, rest, rest))
     law = experiment.controller.compute(state).tau
     assert np.abs(held).max() < 3.0 * np.abs(law).max() + 1.0
-
-
-@pytest.mark.system
-def test_feet_that_are_not_pressed_do_not_bear() -> None:
-    experiment = trotting()
-    feet = BearingFeet(experiment.robot, experiment.controller.contacts)
-    q, v = experiment.q0, experiment.v0
-    pressed = {name: np.zeros(6) for name in FEET}
-    pressed["HL_FOOT"][2], pressed["HR_FOOT"][2] = 2.0, -2.0  # noise may pull
-    feet.feel(Measurement(1, 0.0, q, v, wrenches=pressed))
-    assert [each.frame for each in feet.contacts] == ["HL_FOOT"]
-    assert feet.hold
-    feet.feel(Measurement(1, 0.0, q, v))  # no sensors: their schedules count
-    assert len(feet.contacts) == 4
-    feet.lose()
-    assert not feet.hold
-    wall = replace(experiment.controller.contacts[0], normal=[1.0, 0.0, 0.5])
-    assert not BearingFeet(experiment.robot, [wall]).hold, "a wall may only be pushed"
-    assert BearingFeet(panda(), ()).hold
-
-
-@pytest.mark.system
-def test_a_floating_base_that_is_not_measured_moves_on_as_it_moved() -> None:
-    experiment, h = trotting(), 0.001
-    reckoning = DeadReckoning(experiment.robot, h)
-    v = experiment.v0.copy()
-    v[0] = 0.5
-    reckoning.correct(0.0, experiment.q0, v)
-    for _ in range(10):
-        reckoning.predict(np.zeros(experiment.robot.nv))
-    np.testing.assert_array_equal(reckoning.state.v, v)
-    moved = experiment.robot.difference(experiment.q0, reckoning.state.q)
-    np.testing.assert_allclose(moved, 10 * h * v, atol=1e-12)
 
 
 @pytest.mark.system
@@ -322,21 +276,6 @@ def test_a_state_with_sensors_comes_back() -> None:
     ):
         with pytest.raises(HardwareError, match=message):
             valid_measurement(layout.unpack(numbers[:size], panda()), panda(), 0.001)
-
-
-@pytest.mark.system
-def test_the_wire_carries_what_the_robot_measures() -> None:
-    """Of a simulated robot on feet; one without sensors sends what it always did."""
-    robot = simulated_robot(trotting())
-    assert SensorLayout.of(robot.measured()) == SensorLayout(FEET, "base_link")
-    assert SensorLayout.of(watched().measured()) == SensorLayout()
-    before = robot.measured()
-    assert not any(wrench.any() for wrench in before.wrenches.values())
-    robot.advance([robot.tau])
-    after = robot.measured()
-    assert sum(wrench[2] for wrench in after.wrenches.values()) > 0.0
-    assert after.inertial is not None
-    assert after.t == 0.001
 
 
 @pytest.mark.system

@@ -37,15 +37,6 @@ def test_a_phase_obeys_the_equation_of_the_divergent_component():
     assert phase.first_dcm(last, W) == pytest.approx(first, abs=1e-14)
 
 
-def test_a_plan_is_continuous_and_ends_at_rest():
-    phases = some_phases()
-    starts = plan_dcm(phases, W)
-    for k, phase in enumerate(phases):
-        end = phase.dcm(starts[k], phase.duration, W)
-        following = starts[k + 1] if k + 1 < len(starts) else phases[-1].end
-        assert end == pytest.approx(following, abs=1e-12)
-
-
 def test_integration_of_the_pendulum_stays_with_the_closed_form():
     """c'' = ω² (c - p), by Runge and Kutta, against ξ = c + c'/ω of the plan."""
     phases = some_phases()
@@ -83,16 +74,6 @@ def test_the_error_that_bounded_feedback_leaves(error, t):
     assert error_after(error, t, W, gain, reach) == pytest.approx(x, abs=1e-6, rel=1e-4)
     if abs(error) < reach:
         assert abs(error_after(error, t, W, gain, reach)) <= abs(error)
-
-
-def test_feedback_within_the_sole_is_a_task_with_these_gains():
-    """c'' = ω² (c - p - (1 + k/ω) ε) is e'' + (ω + k) e' + ω k e = 0."""
-    k, rng = 4.0, np.random.default_rng(2)
-    c, c_dot, r, r_dot, p = rng.normal(size=(5, 2))
-    error = dcm_of(c, c_dot, W) - dcm_of(r, r_dot, W)
-    ours = W**2 * (c - p - (1 + k / W) * error)
-    e, e_dot = r - c, r_dot - c_dot
-    assert ours == pytest.approx(W**2 * (r - p) + (W + k) * e_dot + W * k * e)
 
 
 def test_a_phase_takes_as_long_as_the_component_needs():

@@ -37,14 +37,6 @@ def test_a_way_ends_where_it_leaves_the_polygon():
     assert 50 < left < 200
 
 
-def test_a_way_from_the_boundary_outwards_ends_at_once():
-    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
-    at = np.array([1.0, 0.5])
-    assert np.array_equal(last_inside(square, at, np.array([2.0, 0.7])), at)
-    inwards = np.array([0.5, 0.7])
-    assert np.array_equal(last_inside(square, at, inwards), inwards)
-
-
 def test_soles_hold_every_divergent_component_that_is_within_them():
     """ξ' = ω (ξ - p) with p along the error: to the middle, straight.
 

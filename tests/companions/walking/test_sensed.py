@@ -72,56 +72,6 @@ def test_it_ends_when_the_ground_is_gone_but_not_at_once():
     assert task.weight(0.0711) == 1.0
 
 
-def test_what_is_not_wanted_fades_and_returns_only_when_it_is():
-    experiment, running = told(
-        "{force: 2, wanted: [[null, 1], [2, null]], ramp: 0.1, starts: true, "
-        "task: foot}"
-    )
-    contact, task = feel(experiment, running, 0.5, 9.0)
-    assert contact.is_on
-    contact, task = feel(experiment, running, 1.0, 9.0)
-    assert contact.weight(1.05) == pytest.approx(0.5)
-    assert contact.active(1.09)
-    assert task.weight(1.09) == 0.0
-    contact, task = feel(experiment, running, 1.05, 9.0)
-    assert task.weight(1.09) == 0.0
-    contact, task = feel(experiment, running, 1.11, 9.0)
-    assert not contact.active(1.11)
-    assert task.is_on
-    contact, task = feel(experiment, running, 1.5, 9.0)
-    assert not contact.active(1.5)
-    contact, task = feel(experiment, running, 2.0, 9.0)
-    assert contact.active(2.0)
-    assert not task.is_on
-
-
-def test_height_is_enough():
-    experiment, running = told("{height: 0.02}")
-    contact, _ = feel(experiment, running, 0.0, None)
-    assert contact.is_on  # it stands on the ground, 0.0165 m
-    experiment, running = told("{height: 0.01}")
-    contact, _ = feel(experiment, running, 0.0, None)
-    assert not contact.is_on
-    height = running.log_channels()["plan.front_left.height"].value
-    assert height == pytest.approx(0.0165, abs=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("height", "force", "bears"),
-    [(0.02, 2.9, False), (0.01, 3.0, False), (0.02, 3.0, True)],
-)
-def test_with_height_and_force_both_must_be_felt(height, force, bears):
-    experiment, running = told(f"{{force: 3, height: {height}}}")
-    contact, _ = feel(experiment, running, 0.0, force)  # it stands at 0.0165 m
-    assert contact.is_on == bears
-
-
-def test_a_force_that_nothing_measures_is_said():
-    experiment, running = told("{force: 3}")
-    with pytest.raises(PlanError, match=r"plan.contacts.front_left.force: nothing mea"):
-        feel(experiment, running, 0.0, None)
-
-
 @pytest.mark.parametrize(
     ("rule", "message"),
     [

@@ -4,13 +4,11 @@ import numpy as np
 import pytest
 
 from hsp_control.common.rotations import log3, turn
-from hsp_control.companions.walking import Walk
 from hsp_control.companions.walking.footsteps import (
     Footstep,
     Stance,
     Velocity,
     between,
-    near,
 )
 from hsp_control.companions.walking.polygon import convex_hull, nearest_inside
 from hsp_control.companions.walking.quintic import Motion, to_rest
@@ -18,9 +16,7 @@ from hsp_control.companions.walking.step_adjustment import (
     WEIGHT_DCM,
     WEIGHT_TIME,
     adjust,
-    shift_gain,
 )
-from hsp_control.companions.walking.step_planner import StepPlanner
 from hsp_control.companions.walking.swing import APPROACH, DESCENT, Swing
 
 H = 1e-5
@@ -100,23 +96,6 @@ def test_a_redirected_swing_stays_smooth(t, end):
     assert swing.position(landed).position == pytest.approx([0.4, 0.0, 0.1], abs=1e-9)
 
 
-def test_steps_at_a_velocity_go_on_at_this_velocity():
-    place, side, v = Footstep(1.0, 2.0, 0.7), 1.0, Velocity(0.3, 0.0, 0.0)
-    following = STANCE.next(place, side, v, 0.8)
-    assert place.local(following.point) == pytest.approx([0.24, 0.17])
-    after = STANCE.next(following, -side, v, 0.8)
-    assert place.local(after.point) == pytest.approx([0.48, 0.0], abs=1e-12)
-
-
-@pytest.mark.parametrize(("width", "arm"), [(0.17, 0.1), (0.3, 0.15)])
-def test_feet_that_turn_accelerate_as_those_that_walk(width, arm):
-    """They are half a width beside the middle; less than 0.1 m counts as that."""
-    walk = Walk(speed=0.5, turn=9.0, acceleration=0.4, swing=0.6, double_support=0.15)
-    planner = StepPlanner(walk, STANCE._replace(width=width), "a biped")
-    first = planner._next_velocity(Velocity(0.0, 0.0, 0.0), 0.0, 0)
-    assert first == pytest.approx((0.3, 0.0, 0.3 / arm))
-
-
 def test_steps_on_a_circle_stay_on_it():
     v, foot = Velocity(0.2, 0.0, 0.5), Footstep(0.0, 0.085, 0.0)
     side, middles = -1.0, []
@@ -142,13 +121,6 @@ def test_a_step_keeps_away_from_the_other_foot_and_within_reach():
     assert place.local(far.point) == pytest.approx([0.6, -0.4])
 
 
-def test_full_turns_do_not_count_between_feet():
-    a, b = Footstep(0.0, 0.0, 3.1), Footstep(0.0, 0.2, -3.1)
-    assert between(a, b).yaw == pytest.approx(np.pi)
-    assert near(0.1, 4 * np.pi) == pytest.approx(0.1 + 4 * np.pi)
-    assert near(-3.0, 3.0) == pytest.approx(2 * np.pi - 3.0)
-
-
 def test_the_nearest_point_of_a_hull():
     corners = convex_hull(
         np.array([[0, 0], [2, 0], [2, 1], [0, 1], [1, 0.5], [1, 0.0]])
@@ -164,20 +136,6 @@ def test_the_nearest_point_of_a_hull():
         found = nearest_inside(hull, point)
         # The projection onto a convex set: no corner is on the other side of it.
         assert ((hull - found) @ (point - found)).max() < 1e-9
-
-
-def test_a_step_without_a_push_stays_where_it_is():
-    planned, wanted = Footstep(0.3, 0.1, 0.2), np.array([0.25, 0.05])
-    p = np.array([0.0, -0.08])
-
-    def dcm_at(T):  # reaches what is wanted after 0.3 s
-        return p + (wanted - p) * np.exp(3.3 * (T - 0.3))
-
-    found = adjust(
-        planned, 0.3, (0.1, 0.5), dcm_at, wanted, shift_gain(3.3, 0.2), lambda u: u
-    )
-    assert found.target == pytest.approx(planned, abs=1e-12)
-    assert found.remaining == 0.3
 
 
 def test_no_place_and_no_time_is_better_than_those_of_an_adjusted_step():
@@ -219,15 +177,3 @@ def test_a_push_is_answered_by_place_and_where_that_ends_by_time():
     held = adjust(planned, 0.3, (0.1, 0.5), dcm_at, wanted, shift, least)
     assert held.target.y <= 0.12
     assert held.remaining < free.remaining < 0.3  # before it gets farther
-
-
-def test_the_divergent_component_shifts_less_than_the_step():
-    """The double support begins at the other foot, which does not move."""
-    from hsp_control.companions.walking.pendulum import Phase, plan_dcm
-
-    a, b, far = np.zeros(2), np.array([0.3, 0.17]), np.array([0.05, 0.02])
-    first = [
-        plan_dcm([Phase(0.2, a, u), Phase(5.0, u, u)], 3.3)[0] for u in (b, b + far)
-    ]
-    assert first[1] - first[0] == pytest.approx(shift_gain(3.3, 0.2) * far, rel=1e-5)
-    assert shift_gain(3.3, 0.0) == 1.0

@@ -102,11 +102,6 @@ def test_barriers_let_legs_swing():
     assert load_experiment(TROT, "limits=none").controller.limits is None
 
 
-def test_an_arm_cannot_trot():
-    with pytest.raises(PlanError, match=r"^plan: panda cannot trot: it has no free-fl"):
-        Trot().parts(Robot.load("panda"), [], [])
-
-
 def test_what_the_robot_cannot_do_is_said_before_it_runs():
     with pytest.raises(PlanError, match=r"plan: at 3 m/s a foot is 0.525 m before and"):
         load_experiment(TROT, "plan.speed=3")
@@ -130,14 +125,3 @@ def test_the_velocity_may_change_and_ends():
         Trot(velocity=Hold([0.1]))
     with pytest.raises(PlanError, match=r"contact_force is 0.25 robot weights; must"):
         Trot(contact_force=0.25)
-
-
-def test_a_recorded_velocity_is_read_with_the_configuration(tmp_path):
-    record = tmp_path / "driven.jsonl"
-    record.write_text('{"at": 0.1, "value": [0.2, 0, 0]}\n', encoding="utf-8")
-    given = f"plan.velocity={{type: stream, source: {record}}}"
-    plan = load_experiment(TROT, "plan.speed=0", given).scenario.plan
-    (message,) = plan.velocity.messages
-    assert message["value"] == [0.2, 0.0, 0.0]
-    with pytest.raises(HspControlError, match=r"plan.velocity.source: .*absent.jsonl"):
-        load_experiment(TROT, "plan.speed=0", given.replace("driven", "absent"))

@@ -6,13 +6,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from hsp_control import Controller, FramePose, Gains, Robot, load_experiment
+from hsp_control import FramePose, Gains, Robot, load_experiment
 from hsp_control.common.exceptions import FallError, HspControlError, PlanError
 from hsp_control.companions.walking import Walk
-from hsp_control.companions.walking.foot import Foot
 from hsp_control.constraints.contacts import BallContact, SurfaceContact
 from hsp_control.control.falling import FallDetector
-from hsp_control.control.measurement import Measurement
 from hsp_control.tasks import CenterOfMass
 from hsp_control.trajectories import Hold, Schedule, Stops
 from hsp_control.trajectories.switch import Switch
@@ -152,12 +150,6 @@ def test_what_the_robot_cannot_do_is_said_before_it_runs(overrides, message):
     assert message in str(caught.value)
 
 
-def test_a_controller_of_other_parts_is_refused(talos):
-    experiment = load_experiment("whole_body/talos_circle")
-    with pytest.raises(PlanError, match="has no task 'left_foot': make it of the plan"):
-        Walk().begin(experiment.controller)
-
-
 def test_falls_are_found(talos):
     q = talos.home()
     start = talos.state(0.0, q, np.zeros(talos.nv))
@@ -184,41 +176,6 @@ def test_falls_are_found(talos):
             knees[talos.velocity_index(f"leg_{side}_{joint}_joint")] = angle
     with pytest.raises(FallError, match=r"its centre of mass is at \d+ % of its first"):
         detector.check(moved(knees))
-
-
-@pytest.mark.parametrize("heading", [0.0, 1.0, np.pi, -3.1])
-def test_a_walk_may_begin_in_any_direction(talos, heading):
-    """Also backwards, where the yaw of one foot is π, and that of the other -π."""
-    experiment = load_experiment(WALK)
-    step = np.zeros(talos.nv)
-    step[5] = heading
-    robot = experiment.robot
-    state = robot.state(0.0, robot.integrate(experiment.q0, step), np.zeros(robot.nv))
-    running = experiment.scenario.plan.begin(experiment.controller)
-    running.update(Measurement(0, 0.0, state.q, state.v))
-    trunk = {task.name: task for task in experiment.controller.tasks}["trunk"]
-    frame = state.frame("base_link")
-    assert trunk.followed.sample(0.0).rotation == pytest.approx(frame.rotation)
-    target = running.log_channels()["plan.footstep"].value
-    ahead = frame.rotation.T @ (np.array([*target[:2], 0.0]) - state.q[:3])
-    assert ahead[0] > 0.1
-    assert abs(target[2] - heading) % (2 * np.pi) == pytest.approx(0.0, abs=1e-3)
-
-
-def test_a_footstep_is_the_middle_of_a_sole(talos):
-    """Wherever the frame's origin is: also beside it, as on a narrow ankle."""
-    frame = SurfaceContact("left_sole_link", **SOLE, center=[0.02, 0.01, 0.0])
-    given = {"left_foot": replace(frame, name="left_foot"), "right_foot": FEET[1]}
-    made = Walk().parts(talos, [], list(given.values()))
-    controller = Controller(talos, made.tasks, contacts=made.contacts)
-    foot, turned = Foot("left_foot", controller), np.zeros(talos.nv)
-    turned[5] = 0.6
-    q = talos.integrate(talos.home(), turned)
-    foot.begin(talos.state(0.0, q, np.zeros(talos.nv)), 0.6)
-    assert foot.corners(1.0).mean(axis=0) == pytest.approx(foot.place.point)
-    origin = foot.origin_of(foot.place)
-    state = talos.state(0.0, q, np.zeros(talos.nv))
-    assert origin.point == pytest.approx(state.position("left_sole_link")[:2])
 
 
 GIVEN = "plan={type: walk, footsteps: %s}"

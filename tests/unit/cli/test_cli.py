@@ -5,8 +5,6 @@ import json
 import os
 import re
 import signal
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable
@@ -20,7 +18,7 @@ from mjcf_texts import CELL
 
 from hsp_control import Rollout, __version__
 from hsp_control.cli import doctor, main
-from hsp_control.cli.interrupts import PATIENCE, DeferredInterrupt
+from hsp_control.cli.interrupts import DeferredInterrupt
 from hsp_control.cli.options import companions
 
 MOVING = "paper/4_moving_obstacle"
@@ -39,17 +37,6 @@ def test_run_leaves_a_log_that_numpy_alone_reads(
         meta = json.loads(str(columns["meta"]))
     assert meta["config"]["simulation"]["duration"] == 0.1
     assert meta["columns"]["tau"]["unit"] == "N·m"
-
-
-def test_run_tells_its_speed_and_its_memory(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["run", MOVING, "--out", str(tmp_path), *SHORT]) == 0
-    printed = capsys.readouterr().out
-    assert "times real time (0.1 s in " in printed
-    with np.load(tmp_path / "4_moving_obstacle.npz") as log:
-        size = sum(log[name][0].nbytes for name in log.files if name != "meta")
-    assert f"log            {size} bytes per row" in printed
 
 
 def test_run_tells_a_program_what_it_did(
@@ -117,18 +104,6 @@ def test_check_counts_what_contacts_and_tasks_leave(
     assert told["null_space"]["degrees_of_freedom"] == freedom
 
 
-def test_what_a_run_lacks_is_null_and_not_nan(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """The task begins after the run's first rows: its error is NaN there."""
-    late = ["--set", "tasks.tip.schedule={intervals: [[0.05, null]], ramp: 0.01}"]
-    arguments = ["run", MOVING, "--out", str(tmp_path), "--json", *SHORT, *late]
-    assert main([*arguments, "--no-view"]) == 0
-    text = capsys.readouterr().out
-    assert "NaN" not in text
-    assert json.loads(text)["tracking.tip.rms"] is None
-
-
 def test_the_summary_tells_of_a_target_out_of_reach(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -157,27 +132,6 @@ def test_plot_draws_beside_the_log(
     printed = capsys.readouterr().out
     assert all(f"Figure: {figure}" in printed for figure in figures)
     assert all(figure.stat().st_size > 10_000 for figure in figures)
-
-
-@pytest.mark.slow
-def test_plot_draws_relative_angles_when_asked(tmp_path: Path) -> None:
-    main(["run", MOVING, "--out", str(tmp_path), *SHORT])
-    log, folders = str(tmp_path / "4_moving_obstacle.npz"), ("absolute", "relative")
-    for folder in folders:
-        options = ["--relative"] if folder == "relative" else []
-        assert main(["plot", log, "--out", str(tmp_path / folder), *options]) == 0
-    absolute, relative = (
-        (tmp_path / folder / "4_moving_obstacle-paper.png").read_bytes()
-        for folder in folders
-    )
-    assert absolute != relative
-
-
-def test_check_says_what_it_found(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["check", MOVING]) == 0
-    text = capsys.readouterr().out
-    assert "planar3r: nq = 6, nv = 3" in text
-    assert f"{MOVING}: OK" in text
 
 
 def test_check_warns_of_motors_that_cannot_hold_the_robot(
@@ -393,26 +347,6 @@ def test_ctrl_c_does_not_wait_for_a_row_that_never_comes(
     log = Rollout.load(tmp_path / "4_moving_obstacle.npz")
     assert log.status == "interrupted"
     assert len(log) == 1
-
-
-@pytest.mark.slow
-def test_a_log_is_written_whatever_is_pressed_meanwhile() -> None:
-    with DeferredInterrupt() as interrupts:
-        interrupts.ignore_first()
-        _thread.interrupt_main()
-        time.sleep(1.5 * PATIENCE)
-    assert interrupts.requested
-
-
-@pytest.mark.process
-def test_the_module_is_the_command() -> None:
-    ran = subprocess.run(
-        [sys.executable, "-m", "hsp_control", "--version"],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert ran.stdout.startswith("hsp ")
 
 
 def test_help_is_printed_without_a_command(capsys: pytest.CaptureFixture[str]) -> None:

@@ -5,7 +5,7 @@ import io
 import pytest
 from rich.console import Console
 
-from hsp_control.cli import consoles, robot_table
+from hsp_control.cli import consoles
 
 
 @pytest.mark.parametrize("terminal", [True, False])
@@ -19,10 +19,3 @@ def test_only_a_terminal_shows_what_is_being_done(
         print("a result")
     assert ("Drawing [a] ... 0:00:00" in text.getvalue()) is terminal
     assert capsys.readouterr().out == "a result\n"  # a pipe gets it untouched
-
-
-def test_as_many_robots_are_announced_as_are_listed(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(robot_table, "_row", lambda name, source: name)
-    assert robot_table.count() == len(list(robot_table.rows()))

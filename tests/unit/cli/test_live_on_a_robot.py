@@ -59,15 +59,6 @@ def test_it_begins_where_the_robot_is(tmp_path: Path) -> None:
 
 
 @pytest.mark.system
-def test_a_robot_that_does_not_know_where_it_is_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(command(tmp_path, "lost")) == 2
-    told = capsys.readouterr().err
-    assert "panda_joint1 is nan from the configuration's start" in told
-
-
-@pytest.mark.system
 def test_a_fault_is_one_line_of_the_errors(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from hsp_control.cli.pages import OpeningPage, draw_before
 from hsp_control.common import adapters, kernels
-from hsp_control.common.exceptions import SimulationError, ViewerError
+from hsp_control.common.exceptions import SimulationError
 from hsp_control.config.loaded_scenario import load_scenario
 from hsp_control.config.source import read_document
 from hsp_control.visualization.viewer import Recorder, Viewer, browser
@@ -59,22 +59,6 @@ def test_it_opens_at_the_first_kernel_and_says_how_many(said: Said) -> None:
     assert said.page.opened
 
 
-def test_with_nothing_to_compile_it_opens_when_all_is_ready(said: Said) -> None:
-    with said.page.compiling():
-        pass
-    assert said.events == []  # a mistake is then said without a page
-    said.page.ready()
-    said.page.ready()
-    assert said.events == ["http://x/", "browser"]
-
-
-def test_a_page_that_is_ready_is_told_no_more(said: Said) -> None:
-    with said.page.compiling():
-        said.page.ready()
-        compiled()
-    assert said.events == ["http://x/", "browser"]
-
-
 def fail_at_last(page: OpeningPage, *events: Callable[[], object]) -> None:
     with page.compiling():
         for event in events:
@@ -89,23 +73,6 @@ def test_an_open_page_says_why_the_rest_failed(said: Said) -> None:
     with pytest.raises(SimulationError):
         fail_at_last(said.page, compiled)
     assert said.events[-1] == "why"
-
-
-def test_a_page_that_is_ready_says_itself_what_failed(said: Said) -> None:
-    with pytest.raises(SimulationError):
-        fail_at_last(said.page, compiled, said.page.ready)
-    assert said.events[-1] == ""
-
-
-def test_a_server_that_has_ended_stops_no_compilation(said: Said) -> None:
-    def ended(_: str) -> None:
-        raise ViewerError("the viewer is closed")
-
-    page = OpeningPage("http://x/", Namespace(browser=False), said.events.append, ended)
-    with page.compiling():
-        compiled()
-    assert said.events == ["http://x/"]
-    assert not page.opened
 
 
 def test_the_robot_is_drawn_at_its_start_before_any_kernel_is_compiled(

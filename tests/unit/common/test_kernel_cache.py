@@ -145,12 +145,6 @@ def test_a_read_only_installation_keeps_its_code_in_the_user_s_cache(
     assert not list(read_only.rglob("*.nb?"))
 
 
-def test_a_folder_of_one_s_own(read_only: Path, tmp_path: Path) -> None:
-    cache = str(tmp_path / "cache")
-    assert run(read_only, NUMBA_CACHE_DIR=cache).stdout.strip() == "0"
-    assert run(read_only, NUMBA_CACHE_DIR=cache).stdout.strip() == "1"
-
-
 @pytest.mark.system
 def test_the_machine_code_of_a_wheel(installed: Path, tmp_path: Path) -> None:
     """It is used where nothing else is kept, and only for what it was made of."""

@@ -34,26 +34,6 @@ def _elements(a: Array, b: Array) -> float:
 
 
 @kernel
-def _chosen(a: Array, n: int) -> float:
-    """Assign in branches and loops, and use what only some of them assign."""
-    last = 0.0
-    for i in range(n):
-        x = a[i]
-        if x > 0.0:
-            y = x * 2.0
-            last = y
-        elif x < -1.0:
-            y = -x
-        else:
-            continue
-        last += y
-    first = abs(a[0])
-    while first < 10.0:
-        first = first * 2.0 + 1.0
-    return last + first
-
-
-@kernel
 def _swapped(pair: Pair) -> Pair:
     a, b, scale = pair
     return Pair(b, a[1:], scale + 1.0)
@@ -90,14 +70,6 @@ def test_elements_lie_where_numpy_has_them(layout: str) -> None:
     value = _elements(a, written)
     assert value == _plain(_elements)(a, expected)
     np.testing.assert_array_equal(written, expected)
-
-
-@pytest.mark.parametrize("first", [3.0, -0.5, -2.0])
-def test_a_variable_has_the_value_that_was_assigned_last(first: float) -> None:
-    """Whichever branch assigned it."""
-    a = np.array([first, 1.0, -3.0, 0.0, -4.0, 2.0])
-    for n in range(1, 7):
-        assert _chosen(a, n) == _plain(_chosen)(a, n)
 
 
 @pytest.mark.parametrize("scale", [1.0, 2.0])

@@ -33,7 +33,7 @@ from hsp_control import (
     Robot,
     RobotState,
 )
-from hsp_control.common import kernels, native
+from hsp_control.common import kernels
 from hsp_control.control.actuation import Status
 from hsp_control.geometry import Proximity, Scene, link_shapes
 from hsp_control.geometry.proximity import CoalDistances
@@ -210,25 +210,6 @@ def test_all_tasks_and_fields_are_the_same_without_the_compiler() -> None:
         np.testing.assert_allclose(
             plain[name], values, rtol=1e-12, atol=1e-12 * scale, err_msg=name
         )
-
-
-def test_a_bound_kernel_follows_its_arrays_and_takes_the_time() -> None:
-    a, out = np.zeros(2), np.zeros(2)
-    call = native.bind(_scale, a, out, timed=True)
-    a[:] = [1.0, 2.0]
-    call(3.0)
-    np.testing.assert_array_equal(out, [3.0, 6.0])
-    call(0.5)
-    np.testing.assert_array_equal(out, [0.5, 1.0])
-    strided = np.arange(4.0)[::2]
-    native.bind(_scale, strided, out, 2.0)()
-    np.testing.assert_array_equal(out, [0.0, 4.0])
-
-
-@kernels.kernel
-def _scale(a: Any, out: Any, by: float) -> None:
-    for i in range(a.shape[0]):
-        out[i] = by * a[i]
 
 
 def test_what_is_bound_to_one_state_or_sample_is_not_given_to_another() -> None:
@@ -438,11 +419,3 @@ def test_a_step_allocates_nothing(chain: Robot) -> None:
     peak, left = allocated(compute, 500)
     assert peak < VECTOR
     assert left < 50
-
-
-@pytest.mark.slow
-def test_allocations_are_seen() -> None:
-    """Both tests can fail: a vector of freedoms is seen, and what stays is seen."""
-    kept = []
-    assert allocated(lambda: np.zeros(JOINTS), 100)[0] >= VECTOR
-    assert allocated(lambda: kept.append([1]), 100)[1] >= 100

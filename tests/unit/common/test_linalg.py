@@ -1,13 +1,7 @@
 """Kernels against NumPy, rank loss included, and compiled against uncompiled."""
 
-import inspect
-import json
-import os
-import subprocess
-import sys
 from collections.abc import Callable
 from fractions import Fraction
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,20 +9,9 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from places import ROOT
 
-from hsp_control import (
-    Controller,
-    FrameOrientation,
-    FramePosition,
-    Gains,
-    Hold,
-    Robot,
-    TargetPosture,
-)
 from hsp_control.common import linalg
 from hsp_control.common.linalg import (
-    add_rows,
     cholesky,
     multiply,
     multiply_transposed,
@@ -37,23 +20,13 @@ from hsp_control.common.linalg import (
     smallest_singular_value_bound,
     solve_lower,
     solve_lower_transposed,
-    solve_rows,
-    solve_rows_transposed,
     triangularise_rows,
 )
-from hsp_control.law import CONSTANT, IDENTITY, law, raise_covector
-from hsp_control.null_space.metrics import (
-    CoordinatesMetric,
-    IdentityMetric,
-    MassMatrixMetric,
-    Metric,
-)
+from hsp_control.law import CONSTANT, law
 from hsp_control.robot import kinematics, valid_state
 from hsp_control.tasks import TaskSample
-from hsp_control.trajectories import HoldOrientation
 
 Array = NDArray[np.float64]
-HERE = Path(__file__).parent
 EPS = float(np.finfo(float).eps)
 
 seeds = st.integers(0, 2**32 - 1)
@@ -101,16 +74,6 @@ def test_products(seed: int, n: int, m: int, scale: float) -> None:
     assert (np.abs(transposed - A.T @ y) <= bound).all()
 
 
-@given(seeds, sizes, sizes)
-def test_add_rows(seed: int, n: int, m: int) -> None:
-    """Rows beyond the weights do not count, nor entries beyond out."""
-    rows, weights, out = normal(seed, m + 2, n + 1), normal(seed + 1, m), np.ones(n)
-    rows[m:], rows[:, n] = np.nan, np.nan
-    add_rows(weights, rows, out)
-    bound = 2 * (m + 1) * EPS * (1.0 + np.abs(rows[:m, :n]).T @ np.abs(weights))
-    assert (np.abs(out - 1.0 - rows[:m, :n].T @ weights) <= bound).all()
-
-
 # --- triangles -----------------------------------------------------------------------
 
 
@@ -128,15 +91,6 @@ def test_cholesky(seed: int, n: int, exponent: float, scale: float) -> None:
     close(L @ L.T, A, 4 * n * EPS * scale)
     # The factor itself is as uncertain as A's condition number says.
     close(L, np.linalg.cholesky(A), 10 * n * EPS * np.sqrt(scale) * 10.0**-exponent)
-
-
-@given(seeds, st.integers(2, 9), st.floats(1e-6, 1e6))
-def test_cholesky_refuses_an_indefinite_matrix(seed: int, n: int, size: float) -> None:
-    values = np.ones(n)
-    values[-1] = -size
-    U = orthogonal(seed, n, n)
-    A = (U * values) @ U.T
-    assert not cholesky(0.5 * (A + A.T), junk(n, n))
 
 
 @pytest.mark.parametrize(
@@ -168,40 +122,6 @@ def test_triangular_solves(seed: int, n: int, exponent: float) -> None:
     assert (np.abs(L.T @ y - b) <= bound * np.abs(L).T @ np.abs(y)).all()
 
 
-def test_triangular_solves_read_the_lower_triangle_only() -> None:
-    L = np.tril(normal(2, 4, 4)) + 3 * np.eye(4)
-    dirty = L + np.triu(np.full((4, 4), np.nan), 1)
-    b = normal(3, 4)
-    for solve, matrix in ((solve_lower, L), (solve_lower_transposed, L.T)):
-        x = b.copy()
-        solve(dirty, x)
-        close(x, np.linalg.solve(matrix, b), 1e-13)
-
-
-def test_rows_are_solved_one_by_one() -> None:
-    L, X = np.tril(normal(2, 4, 4)) + 3 * np.eye(4), normal(3, 5, 4)
-    for solve, inverse in (
-        (solve_rows, np.linalg.inv(L.T)),
-        (solve_rows_transposed, np.linalg.inv(L)),
-    ):
-        solved = X.copy()
-        solve(L, solved)
-        close(solved, X @ inverse, 1e-13)
-
-
-@pytest.mark.parametrize("n", [1, 3, 7])
-def test_raising_a_covector(n: int) -> None:
-    """W⁻¹ c with W = L Lᵀ; nothing to do for the identity."""
-    B, covector = normal(n, n, n), normal(n + 1, n)
-    W = B @ B.T + np.eye(n)
-    raised = covector.copy()
-    raise_covector(raised, np.linalg.cholesky(W), CONSTANT)
-    close(W @ raised, covector, 1e-13)
-    kept = covector.copy()
-    raise_covector(kept, np.linalg.cholesky(W), IDENTITY)
-    np.testing.assert_array_equal(kept, covector)
-
-
 # --- orthogonalisation ---------------------------------------------------------------
 
 
@@ -231,31 +151,6 @@ def test_orthonormalise(
     assert bound * np.sqrt(m) * allowed >= least
 
 
-@given(seeds, st.integers(2, 9), st.data())
-def test_orthonormalise_at_rank_loss(seed: int, n: int, data: st.DataObject) -> None:
-    """What is left after the rank is rounding, and the bound says so."""
-    m = data.draw(st.integers(2, n))
-    rank = data.draw(st.integers(0, m - 1))
-    J = normal(seed, m, rank) @ normal(seed + 1, rank, n)
-    Q, X = junk(m, n), junk(m, m)
-    bound = orthonormalise_rows(J, Q, X)
-    scale = max(1.0, np.abs(J).max())
-    assert bound <= 100 * EPS * scale * n
-    norms = np.linalg.norm(Q, axis=1)
-    assert ((np.abs(norms - 1.0) < 4 * n * EPS) | (norms == 0.0)).all()
-    close(Q[:rank] @ Q[:rank].T, np.eye(rank), 10 * n * EPS)
-
-
-def test_orthonormalise_a_zero_row() -> None:
-    J = normal(4, 3, 5)
-    J[1] = 0.0
-    Q, X = junk(3, 5), junk(3, 3)
-    assert orthonormalise_rows(J, Q, X) == 0.0
-    np.testing.assert_array_equal(Q[1], 0.0)
-    np.testing.assert_array_equal(X[1], 0.0)
-    close(Q[::2] @ Q[::2].T, np.eye(2), 1e-15)
-
-
 def test_no_rows_are_orthonormal_also_in_plain_python() -> None:
     plain = getattr(orthonormalise_rows, "py_func", orthonormalise_rows)
     for each in (orthonormalise_rows, plain):
@@ -276,14 +171,6 @@ def test_triangularise_rows(
     size = np.abs(Y).max(initial=0.0) ** 2
     close(T @ T.T, Y @ Y.T, 20 * n * m * EPS * size)
     np.testing.assert_allclose(determinant, np.prod(np.diag(T) ** 2), rtol=1e-13)
-
-
-def test_orthonormalise_twice_is_needed() -> None:
-    """Läuchli's matrix: one sweep of Gram-Schmidt leaves rows at 60 degrees."""
-    J = np.vstack([np.ones(3), 1e-9 * np.eye(3)]).T.copy()
-    Q, X = junk(3, 4), junk(3, 3)
-    orthonormalise_rows(J, Q, X)
-    close(Q @ Q.T, np.eye(3), 1e-15)
 
 
 @given(seeds, sizes, st.data(), scales)
@@ -309,16 +196,6 @@ def test_orthogonalise_rows(
     kept = norms > 1e-13 * max(norms.max(), 1e-300)
     off = cosines[np.ix_(kept, kept)] - np.eye(int(kept.sum()))
     assert np.abs(off).max(initial=0.0) < 1e-12
-
-
-@pytest.mark.parametrize("exponent", range(-320, -60, 20))
-def test_a_row_of_rounding_is_no_row(exponent: int) -> None:
-    """What is left of it may be so small that its square, or a quotient, is none."""
-    Y = np.vstack([normal(1, 5), 10.0**exponent * normal(2, 2, 5)])
-    turned, U = Y.copy(), junk(3, 3)
-    orthogonalise_rows(turned, U)
-    close(U @ U.T, np.eye(3), 20 * EPS)
-    close(turned, U @ Y, 20 * EPS)
 
 
 @given(st.lists(st.integers(-999, 999), min_size=8, max_size=8), st.integers(20, 60))
@@ -447,89 +324,6 @@ def test_compiled_equals_uncompiled(name: str) -> None:
     for mine, other in zip(flat(compiled), flat(plain), strict=True):
         # Rounding: compiled sums are added in another order, and fused.
         np.testing.assert_allclose(mine, other, rtol=1e-13, atol=1e-13)
-
-
-def test_every_kernel_of_linalg_has_arguments() -> None:
-    source = inspect.getsource(linalg)
-    assert source.count("@kernel") == len([k for k in KERNELS if k in vars(linalg)])
-    for name in KERNELS:
-        assert arguments(name)
-
-
-METRICS: dict[str, Callable[[int], Metric]] = {
-    "identity": lambda nv: IdentityMetric(),
-    "constant": lambda nv: CoordinatesMetric(np.tril(np.ones((nv, nv)))),
-    "mass_matrix": lambda nv: MassMatrixMetric(),
-}
-SINGULAR = np.zeros(7)  # the Panda upright: rank 5 of 6
-
-
-def step_results() -> dict[str, list[float]]:
-    """Return one whole controller step for each metric, in general and singular."""
-    panda, rng = Robot.load("panda"), np.random.default_rng(20)
-    home, v = panda.home(), rng.standard_normal(7)
-    at = panda.state(0.0, panda.integrate(home, 0.1 * v), v)
-    frame = at.frame("panda_tcp")
-    gains = Gains(25.0, 10.0)
-    tasks = (
-        FramePosition(
-            "panda_tcp", Hold(frame.position + 0.1), gains=gains, largest_error="none"
-        ),
-        FrameOrientation(
-            "panda_tcp",
-            HoldOrientation(frame.rotation),
-            gains=gains,
-            largest_error="none",
-        ),
-    )
-    field = TargetPosture(home, weights=3.0)
-    results = {}
-    for name, metric in METRICS.items():
-        controller = Controller(
-            panda,
-            tasks,
-            field,
-            metric=metric(7),
-            singularity_threshold=0.01,
-            limits=None,
-        )
-        for where, q in (("general", home), ("singular", SINGULAR)):
-            state = panda.state(0.2, q, v)
-            out = controller.compute(state)
-            diagnosis = controller.diagnose()
-            results[f"{name} {where}"] = [
-                *(*out.tau, *out.acceleration, *out.null_space_error),
-                *(*out.task.acceleration, *diagnosis.singular_values),
-                *(*controller.flow(0.2, q), float(bool(out.damped))),
-            ]
-    return results
-
-
-@pytest.mark.process
-def test_a_controller_step_is_the_same_without_the_compiler() -> None:
-    """NUMBA_DISABLE_JIT=1 runs the very same functions, as plain Python."""
-    environment = os.environ | {
-        "NUMBA_DISABLE_JIT": "1",
-        "PYTHONPATH": os.pathsep.join(map(str, (HERE, ROOT / "tests/support", ROOT))),
-    }
-    code = (
-        "import json, test_linalg as t; assert not hasattr(t.multiply, 'py_func'); "
-        "print(json.dumps(t.step_results()))"
-    )
-    run = subprocess.run(
-        [sys.executable, "-W", "error", "-c", code],
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    plain, compiled = json.loads(run.stdout), step_results()
-    assert plain.keys() == compiled.keys()
-    assert len(plain) == 6
-    for name, values in compiled.items():
-        assert values[-1] == ("singular" in name)  # damped there, and only there
-        # 1e-12 of efforts up to 1e3: sums are the same, hypot's last bit is not.
-        np.testing.assert_allclose(plain[name], values, rtol=1e-12, atol=1e-11)
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 12))

@@ -42,14 +42,6 @@ def test_only_what_python_calls_is_made_ready_to_run() -> None:
     assert (overloads(_halved), overloads(_scaled)) == (0, 1)
 
 
-def test_a_kernel_serves_arrays_of_several_kinds() -> None:
-    for dtype in (np.float64, np.float32):
-        x = np.array([8.0, 2.0], dtype=dtype)
-        assert bind(_twice, x)() == 9.0
-        rows = np.array([[8.0, 1.0], [2.0, 1.0]], dtype=dtype)
-        assert bind(_twice, rows[:, 0])() == 9.0
-
-
 def test_a_mistake_in_one_is_numba_s_error() -> None:
     import numba
 

@@ -2,10 +2,9 @@
 
 import copy
 import gc
-import pickle
 import weakref
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +20,6 @@ from hsp_control.common.step_plan import (
     CallSequence,
     StepPlan,
     TimeWindow,
-    merged,
     steps,
 )
 
@@ -115,23 +113,6 @@ def test_a_call_keeps_its_arrays_alive_and_lets_them_go() -> None:
 
 
 @compiled
-@pytest.mark.parametrize("way", ["deepcopy", "pickle"])
-def test_a_copy_is_of_the_copied_arrays(way: str) -> None:
-    """And not of the addresses: the originals may be gone."""
-    log = np.zeros(4)
-    held = {"log": log, "call": bind(_note, log, 3.0)}
-    held["sequence"] = sequence([Timed(held["call"], -np.inf, 1.0)])
-    if way == "pickle":
-        copied = pickle.loads(pickle.dumps(held))
-    else:
-        copied = copy.deepcopy(held)
-    assert copied["call"]() == 3.0
-    assert copied["sequence"](0.0) == 3.0
-    assert called(copied["log"]) == [3.0, 3.0]
-    assert called(log) == []
-
-
-@compiled
 def test_calls_are_made_in_turn_and_when_it_is_time() -> None:
     log = np.zeros(9)
     first, last = bind(_note, log, 1.0), bind(_note, log, 2.0)
@@ -188,18 +169,6 @@ def test_steps_are_references_then_what_reads_them_then_the_law() -> None:
     assert called(log) == [101.0, 1.0, 7.0, 2.0, 3.0, 4.0]
 
 
-@compiled
-def test_native_calls_that_follow_one_another_are_one() -> None:
-    log = np.zeros(20)
-    notes = [bind(_note, log, float(k)) for k in range(5)]
-    found = steps(
-        [StepPlan((), tuple(notes[:2])), StepPlan((), tuple(notes[2:4]))], notes[4]
-    )
-    assert len(found) == 1
-    assert isinstance(found[0], NativeCall)
-    assert found[0](0.0) == 4.0
-
-
 @pytest.mark.parametrize("plain", [False, True])
 def test_calls_are_made_once_at_a_stamp(plain: bool) -> None:
     """Also by a copy, which counts the stamps of its own array."""
@@ -247,44 +216,6 @@ def test_calls_are_made_only_if_something_was_found(plain: bool) -> None:
     assert copied() == 6.0
     assert called(own) == [1.0, 2.0]
     assert called(log) == []
-
-
-@compiled
-def test_native_parts_of_a_call_of_the_time_are_merged() -> None:
-    """Windows of time included; with one part in Python the call stays as it is."""
-    log = np.zeros(9)
-    early = TimeWindow(bind(_note_time, log, 1.0, timed=True), 0.0, 1.0)
-    always = bind(_note_time, log, 20.0, timed=True)
-    follow = merged(CallSequence(early, CallSequence(always)))
-    assert isinstance(follow, NativeCall)
-    follow(0.5)
-    assert called(log) == [1.5, 20.5]
-    follow(1.0)
-    assert called(log) == [21.0]
-    mixed = CallSequence(early, lambda t: None)
-    assert merged(mixed) is mixed
-
-
-class _Pair(NamedTuple):
-    matrix: Array
-    vector: Array
-
-
-@kernel
-def _apply(pair: _Pair, factors: tuple[float, float], out: Array) -> None:
-    """Write the product, scaled."""
-    for i in range(pair.matrix.shape[0]):
-        out[i] = 0.0
-        for j in range(pair.matrix.shape[1]):
-            out[i] += factors[0] * factors[1] * pair.matrix[i, j] * pair.vector[j]
-
-
-def test_records_are_arguments() -> None:
-    pair, out = _Pair(np.arange(6.0).reshape(2, 3).T[:2], np.zeros(2)), np.zeros(2)
-    call = bind(_apply, pair, (2.0, 3.0), out)
-    pair.vector[:] = [1.0, -2.0]
-    call()
-    np.testing.assert_array_equal(out, 6.0 * pair.matrix @ pair.vector)
 
 
 @compiled

@@ -2,12 +2,12 @@
 
 import pytest
 import yaml
-from hypothesis import example, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenario_document import GOOD, Scenario, read
 
 from hsp_control.common.exceptions import ConfigError
-from hsp_control.common.suggestions import did_you_mean, listing, nearest
+from hsp_control.common.suggestions import did_you_mean, nearest
 
 # --- names ---------------------------------------------------------------------------
 
@@ -20,12 +20,6 @@ def test_the_nearest_name_is_suggested() -> None:
     assert did_you_mean("xyz", frames) == ""
     assert nearest("", frames) is None
     assert nearest("a", []) is None
-
-
-def test_long_lists_of_names_are_cut() -> None:
-    assert listing("abc") == "a, b, c"
-    assert listing("abcdefg", limit=3) == "a, b, c, ... (7 in all)"
-    assert listing([]) == ""
 
 
 # --- anything else is success or one ConfigError -------------------------------------
@@ -106,12 +100,3 @@ def test_mutated_data(data: dict[str, object]) -> None:
 @settings(max_examples=100, deadline=None)
 def test_mutated_overrides(path: str, value: object) -> None:
     check(GOOD, f"{path}={yaml.safe_dump(value, default_flow_style=True)}")
-
-
-@pytest.mark.slow
-@given(st.text())
-@settings(max_examples=100, deadline=None)
-@example("fields.\u00b2=1")
-@example("'=1")
-def test_any_override(text: str) -> None:
-    check(GOOD, text, f"{text}=1", f"tasks.{text}")

@@ -3,23 +3,13 @@
 from pathlib import Path
 
 import pytest
-from scenario_document import GOOD, Gains, Line, Scenario, message
+from scenario_document import GOOD, message
 
 from hsp_control.common.exceptions import ConfigError
 from hsp_control.config.document import Document
-from hsp_control.config.validation import validate
 from hsp_control.config.yaml_reader import MAX_SIZE, MAX_VALUES
 
 # --- what is read --------------------------------------------------------------------
-
-
-def test_a_good_text_becomes_the_model() -> None:
-    scenario = validate(Document.parse(GOOD), Scenario)
-    assert scenario.tasks["hand"].gains == scenario.tasks["elbow"].gains
-    assert scenario.tasks["hand"].gains == Gains(kp=100.0, kd=20.0)
-    assert isinstance(scenario.tasks["elbow"].trajectory, Line)
-    assert scenario.frames is not None
-    assert scenario.frames.root == {"tool.tip": [0.0, 0.0, 16.0]}
 
 
 @pytest.mark.parametrize(
@@ -69,22 +59,6 @@ def test_every_key_path_has_a_location() -> None:
     # What is missing is missing in its nearest ancestor.
     assert document.location(("tasks", "hand", "gains", "ki", 3)) == "panda.yaml:5"
     assert document.location(("nothing",)) == "panda.yaml:1"
-
-
-def test_the_data_are_copies() -> None:
-    document = Document.parse("a: &x [1]\nb: *x")
-    data = document.to_dict()
-    data["a"].append(2)
-    assert data["b"] == [1]
-    assert document.to_dict() == {"a": [1], "b": [1]}
-
-
-def test_contains() -> None:
-    document = Document.parse(GOOD)
-    assert ("fields", 1, "middle", "joint") in document
-    assert ("fields", 2) not in document
-    assert ("fields", "type") not in document
-    assert ("robot", 0) not in document
 
 
 # --- what is not YAML, or more than data ---------------------------------------------

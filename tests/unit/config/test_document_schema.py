@@ -219,21 +219,3 @@ def test_several_mistakes_are_listed_in_the_order_of_the_file() -> None:
         "  panda.yaml:6: fields.1.weight: 'b' is text; expected a number\n"
         "  ... (2 not shown)"
     )
-
-
-def test_the_others_follow_one_a_line() -> None:
-    assert message("robot: a\nsteps: x\nview: y") == (
-        "panda.yaml:2: steps: 'x' is text; expected an integer\n"
-        "and 1 more:\n"
-        "  panda.yaml:3: view: 'y' is text; expected true or false"
-    )
-
-
-def test_keys_missing_together_are_one_mistake() -> None:
-    class Empty(Part):
-        first: int
-        second: int
-        third: int = 0
-
-    expected = "missing keys 'first', 'second'; required here: first, second"
-    assert message("third: 1", model=Empty) == f"panda.yaml:1: {expected}"

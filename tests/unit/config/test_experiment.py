@@ -118,13 +118,6 @@ def test_limits_that_are_all_commented_out_are_not_none(tmp_path: Path) -> None:
     )
 
 
-def test_the_same_run_from_yaml_and_from_python(tmp_path: Path) -> None:
-    file = tmp_path / "mine.yaml"
-    file.write_text(yaml.safe_dump(PANDA))
-    from_yaml, from_data = load_experiment(file), load_experiment(PANDA)
-    np.testing.assert_array_equal(from_yaml.run().q, from_data.run().q)
-
-
 def test_a_run_is_repeated_from_its_own_log(tmp_path: Path) -> None:
     first = load_experiment(MOVING, "simulation.duration=0.2").run()
     log = first.save(tmp_path / "run.npz")
@@ -151,26 +144,6 @@ def test_a_log_of_a_robot_file_can_be_repeated_from_elsewhere(
     log = load_experiment(tmp_path / "arm.yaml").run().save(tmp_path / "arm.npz")
     monkeypatch.chdir("/")
     assert load_experiment(log).robot.nv == 3
-
-
-def test_flow_starts_without_a_transient() -> None:
-    experiment = load_experiment(MOVING, "start.velocity=flow", "simulation.duration=1")
-    rollout = experiment.run()
-    assert (
-        np.abs(rollout["task.tip.error"]).max() < 1e-7
-    )  # the start is printed to 1e-8
-    assert rollout["null_space_norm"].max() < 1e-9
-
-
-def test_metrics_and_postures_from_yaml() -> None:
-    matrix = [[2.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0]]
-    for metric in ({"type": "constant", "matrix": matrix},
-                   {"type": "constant", "matrix": [2, 1, 1]}):  # fmt: skip
-        given = load_experiment(MOVING, f"null_space.metric={metric}").controller.metric
-        assert isinstance(given, metrics.ConstantMetric)
-        np.testing.assert_array_equal(given.W, np.diag([2.0, 1, 1]))
-    data = changed("tasks", {"p": {"type": "joint_posture", "reference": "home"}})
-    assert load_experiment(data).controller.tasks[0].rows == 7
 
 
 # Each row: what is changed, the class of the error, and what its message says.
@@ -239,17 +212,6 @@ def test_every_mistake_is_named(
         load_experiment(file)
     assert message in str(caught.value)
     assert check_place(caught.value, file)
-
-
-def test_periods_that_do_not_fit_are_named() -> None:
-    message = r"^configuration: simulation: .* is not a whole multiple"
-    with pytest.raises(exceptions.SimulationError, match=message):
-        load_experiment(changed("simulation.log_period", 0.0015))
-
-
-def test_unknown_configuration_names_the_nearest() -> None:
-    with pytest.raises(exceptions.ConfigError, match=r"did you mean 'paper/2_rest'\?"):
-        load_experiment("paper/2_rset")
 
 
 def test_a_log_made_from_python_holds_no_configuration(tmp_path: Path) -> None:

@@ -8,11 +8,10 @@ import pytest
 import yaml
 from robot_texts import ARM, INERTIA
 
-from hsp_control import Experiment, FramePosition, Rollout, load_experiment
+from hsp_control import Rollout, load_experiment
 from hsp_control.cli import main
 from hsp_control.common.exceptions import ConfigError, ConfigurationError, ModelError
 from hsp_control.robot import RobotDescription
-from hsp_control.simulation import InitialState, StartPose
 
 IIWA: dict[str, Any] = {
     "robot": {"name": "iiwa14"},
@@ -36,27 +35,6 @@ def test_auto_is_regular_for_the_tasks_and_recorded(tmp_path: Path) -> None:
     repeated = load_experiment(log)
     np.testing.assert_array_equal(repeated.q0, experiment.q0)
     assert repeated.scenario.start.configuration is not None
-
-
-def test_auto_is_the_same_in_all_spellings_and_every_time() -> None:
-    spelled = [
-        load_experiment({**IIWA, "start": start}).q0
-        for start in ("auto", {"joints": "auto"}, "auto")
-    ]
-    tasks = list(load_experiment({**IIWA, "start": "auto"}).scenario.tasks.values())
-    spelled.append(Experiment("iiwa14", tasks, start="auto").q0)
-    spelled.append(Experiment("iiwa14", tasks, start=InitialState("auto")).q0)
-    for q0 in spelled[1:]:
-        np.testing.assert_array_equal(q0, spelled[0])
-
-
-def test_another_place_than_the_tasks() -> None:
-    """The tip stands where it shall, though its task tracks one axis only."""
-    along = FramePosition("tip", axes="x")
-    start = StartPose(frame="tip", position=(1.5, 1.0, 0.0))
-    experiment = Experiment("planar3r", [along], start=InitialState(pose=start))
-    state = experiment.robot.state(0.0, experiment.q0, np.zeros(3))
-    np.testing.assert_allclose(state.position("tip"), [1.5, 1.0, 0.0], atol=1e-8)
 
 
 def test_an_orientation_counts_if_it_is_given() -> None:

@@ -2,7 +2,6 @@
 
 import json
 import re
-from collections import Counter
 from collections.abc import Iterator
 from typing import Any
 
@@ -44,33 +43,6 @@ def numeric(about: Any) -> bool:
     return about.get("type") in ("number", "integer") or any(map(numeric, inner))
 
 
-def keywords(schema: Any) -> Iterator[str]:
-    """Yield the keywords of a schema, those of what is inside included."""
-    if not isinstance(schema, dict):
-        return
-    for key, value in schema.items():
-        yield key
-        if key in ("properties", "patternProperties", "$defs"):
-            for each in value.values():
-                yield from keywords(each)
-        elif key in ("anyOf", "oneOf", "allOf", "prefixItems"):
-            for each in value:
-                yield from keywords(each)
-        elif key in ("items", "additionalProperties", "propertyNames"):
-            yield from keywords(value)
-
-
-def references(schema: Any) -> Iterator[str]:
-    """Yield the names of the definitions that a schema refers to."""
-    if isinstance(schema, dict):
-        if "$ref" in schema:
-            yield schema["$ref"].removeprefix("#/$defs/")
-        schema = list(schema.values())
-    if isinstance(schema, list):
-        for each in schema:
-            yield from references(each)
-
-
 def test_everything_has_a_description() -> None:
     assert [name for name, each in DEFINITIONS.items() if "title" not in each] == []
     texts = {name: each.get("description") for name, each in DEFINITIONS.items()}
@@ -105,20 +77,6 @@ def test_what_a_unit_is(text: str, has_one: bool) -> None:
     assert bool(UNIT.search(text)) is has_one
 
 
-STANDARD = """
-$defs $ref $schema additionalProperties anyOf const default description enum
-exclusiveMaximum exclusiveMinimum items maxItems maxLength maxProperties maximum
-minItems minLength minProperties minimum oneOf pattern patternProperties prefixItems
-properties propertyNames required title type
-"""
-
-
-def test_it_has_the_keywords_of_json_schema_only() -> None:
-    """Pydantic writes ``lt`` where it does not see through its own validators."""
-    known = {*STANDARD.split(), "discriminator"}  # the latter is OpenAPI's, for editors
-    assert set(keywords(SCHEMA)) <= known
-
-
 def test_defaults_fit_their_own_schema() -> None:
     for name, about in PROPERTIES:
         if "default" in about:
@@ -138,21 +96,6 @@ def families() -> Iterator[Family]:
         ours = cls.__module__.startswith("hsp_control.")
         if ours and cls.family is not None and cls.family.base is cls:
             yield cls.family
-
-
-def test_each_part_is_defined_once_and_used() -> None:
-    """So the schema grows with the number of parts, not with their combinations."""
-    definitions = SCHEMA["$defs"]
-    assert set(references(SCHEMA)) == set(definitions)
-    titles = Counter(
-        each["title"] for name, each in definitions.items() if "Added" not in name
-    )
-    assert set(titles.values()) == {1}
-    parts = {m.__name__ for family in families() for m in family.members.values()
-             if m.__module__.startswith("hsp_control.")}  # fmt: skip
-    assert len(parts) > 40
-    assert parts <= set(titles)
-    assert len(json.dumps(SCHEMA)) < 240_000
 
 
 # -- names ----------------------------------------------------------------------------

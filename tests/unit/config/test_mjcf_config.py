@@ -6,11 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 from mjcf_texts import CELL
 from places import ROOT
 
-from hsp_control import Experiment, Robot, load_experiment
+from hsp_control import Robot, load_experiment
 from hsp_control.common.exceptions import (
     AccessError,
     FrameNotFoundError,
@@ -22,7 +21,7 @@ from hsp_control.common.exceptions import (
 )
 from hsp_control.robot import RobotDescription
 from hsp_control.robot.description.access import only_within
-from hsp_control.simulation.plants.mujoco import MujocoPlant, MujocoScenePlant
+from hsp_control.simulation.plants.mujoco import MujocoScenePlant
 
 pytest.importorskip("mujoco")
 
@@ -64,37 +63,6 @@ def test_a_configuration_runs_in_its_scene(folder: Path) -> None:
     rollout.save(path)
     again = load_experiment(path).run()
     np.testing.assert_array_equal(again.q, rollout.q)
-
-
-def test_locked_joints_are_there_in_the_scene(folder: Path) -> None:
-    path = write(folder, "keyframe: home", "keyframe: home, locked: {f: 0.03}")
-    experiment = load_experiment(path)
-    assert experiment.robot.source.locked == {"f": 0.03}
-    assert isinstance(experiment.plant, MujocoScenePlant)
-    experiment.plant.reset(0.0, experiment.q0, experiment.v0)
-    assert experiment.plant.data.qpos[4] == 0.03
-
-
-def test_it_is_the_robot_that_python_makes(folder: Path) -> None:
-    """By description, by keywords, and on the plant that is made of any robot."""
-    description = RobotDescription(
-        mjcf=folder / "cell.xml", root="base", joints=["j1", "j2"], gravity=(0, 0, 0)
-    )
-    robot = Robot.load(description)
-    assert robot.joint_names == ("j1", "j2")
-    assert sorted(robot.source.locked) == ["f", "j3", "j4"]
-    assert not robot.model.gravity.linear.any()
-    experiment = load_experiment(
-        write(folder, "{type: mujoco_scene, contacts: [ball]}", "mujoco")
-    )
-    assert isinstance(experiment.plant, MujocoPlant)
-    written = yaml.safe_load(experiment.to_yaml())["robot"]
-    assert written["root"] == "base"
-    assert written["mjcf"] == str(folder / "cell.xml")
-    again = Experiment(
-        RobotDescription(**written), [*experiment.scenario.tasks.values()]
-    )
-    assert again.robot.joint_names == experiment.robot.joint_names
 
 
 def test_the_plant_may_be_another_mjcf_or_no_mjcf(folder: Path) -> None:

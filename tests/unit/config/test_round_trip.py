@@ -105,21 +105,6 @@ def test_a_configuration_equals_what_it_becomes_as_data(
     assert not list(SCHEMA.iter_errors(data))
 
 
-@pytest.mark.parametrize("name", bundled_configs())
-def test_without_defaults_nothing_is_added(name: str) -> None:
-    """Only what the file says: other keys would be defaults."""
-
-    def within(inner: Any, outer: Any) -> bool:
-        if isinstance(inner, dict):
-            return all(k in outer and within(v, outer[k]) for k, v in inner.items())
-        return not isinstance(inner, list) or (
-            len(inner) == len(outer) and all(map(within, inner, outer))
-        )
-
-    written = Document.read(bundled_configs()[name]).to_dict()
-    assert within(plain_data(SCENARIOS[name]), written)
-
-
 def test_with_defaults_no_key_is_missing() -> None:
     data = plain_data(SCENARIOS["everything"], defaults=True)
     assert set(data) == {field.name for field in fields(Scenario)}
@@ -133,45 +118,11 @@ def test_with_defaults_no_key_is_missing() -> None:
     assert plain_data(empty, defaults=True)["contacts"] == {}
 
 
-def test_a_name_stands_once() -> None:
-    """As the key of a mapping, and inside only where there is no key."""
-    data = plain_data(SCENARIOS["everything"], defaults=True)
-    assert "name" not in data["tasks"]["hand"]
-    assert "name" not in data["scene"]["obstacles"]["ball"]
-    assert data["changes"][0]["task"]["name"] == "eye"
-    scene = Scene([Obstacle("ball", Sphere(0.1), Hold([0, 0, 1]))])
-    assert scene.to_dict() == {
-        "obstacles": {
-            "ball": {
-                "shape": {"type": "sphere", "radius": 0.1},
-                "center": {"type": "hold", "point": [0, 0, 1]},
-            }
-        }
-    }
-
-
-def test_a_part_says_what_yaml_would_say() -> None:
-    task = FramePosition("tip", name="hand", gains=Gains(1, [2, 2, 2]))
-    assert task.to_dict() == {
-        "type": "frame_position",
-        "frame": "tip",
-        "name": "hand",
-        "gains": {"kp": 1.0, "kv": [2.0, 2.0, 2.0]},
-    }
-
-
 def test_what_only_python_can_say_is_named() -> None:
     cost = FunctionCost(lambda q, t: 0.0)
     model = NullSpaceSettings(fields=[cost])
     with pytest.raises(ConfigError, match=r"^fields\.0: YAML has no name for Function"):
         plain_data(model)
-
-
-def test_a_log_keeps_the_configuration() -> None:
-    short = "simulation.duration=0.02"
-    experiment = load_experiment("paper/4_moving_obstacle", short)
-    config = json.loads(json.dumps(experiment.run().config))
-    assert validate(Document(config, {}, "log"), Scenario) == experiment.scenario
 
 
 # -- experiments ----------------------------------------------------------------------

@@ -132,19 +132,3 @@ def test_every_mistake_is_named(
     tmp_path: Path,
 ) -> None:
     check(changed(base, path, value), error, message, tmp_path / "mine.yaml")
-
-
-def test_a_floating_base_needs_support(tmp_path: Path) -> None:
-    data = changed(changed(SOLO, "contacts", REMOVED), "start", REMOVED)
-    message = "no motor moves the free-flyer root of solo12: declare contacts, or"
-    check(data, "ContactError", message, tmp_path / "mine.yaml")
-
-
-def test_start_too_near_an_obstacle(tmp_path: Path) -> None:
-    ball = {"shape": {"type": "sphere", "radius": 0.1},
-            "center": {"type": "hold", "point": [0.3, 0.0, 0.65]}}  # fmt: skip
-    limit = [{"type": "obstacles", "minimum": 0.4}]
-    data = changed(PANDA, "scene", {"obstacles": {"ball": ball}})
-    data["limits"] = {"distances": limit}
-    message = "start: the start is outside the limits: "
-    check(data, "LimitError", message, tmp_path / "mine.yaml")

@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from runs import check_errors, check_null_space, continuous, held
+from runs import check_errors, check_null_space, continuous
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
@@ -266,33 +266,6 @@ def test_forces_are_permitted_up_to_the_friction_cone() -> None:
     assert not support.permits(np.array([0.0, 0.0, -1.0, 0.0, 0.0, 5.0]))  # it pulls
 
 
-def test_the_log_says_how_much_friction_is_used() -> None:
-    """The largest ‖f_t‖/(μ f_n) of a sole's corners, each sole with its own μ."""
-    robot, frictions = talos(), (0.4, 0.9)
-    contacts = [
-        sole(frame, friction=mu) for frame, mu in zip(SOLES, frictions, strict=True)
-    ]
-    state = robot.state(0.0, robot.home(), np.zeros(robot.nv))
-    aside = state.centroidal.position + np.array([0.002, 0.005, 0.0])
-    controller = hsp.Controller(
-        robot,
-        [hsp.CenterOfMass(hsp.Hold(aside), gains=GAINS)],
-        contacts=contacts,
-        limits=None,
-    )
-    plant = ContactPlant(robot, [RigidContact(frame) for frame in SOLES])
-    log = held(controller, robot.home(), duration=0.002, plant=plant)
-    for k in range(len(log)):
-        out = controller.compute(robot.state(log.t[k], log.q[k], log.v[k]))
-        for frame, mu, forces in zip(
-            SOLES, frictions, out.forces.reshape(2, 4, 3), strict=True
-        ):
-            ratios = [np.hypot(x, y) / (mu * z) for x, y, z in forces if z > 1e-3]
-            assert 0.01 < max(ratios) <= 1.0
-            used = log[f"contact.{frame}.friction_used"][k]
-            assert used == pytest.approx(max(ratios), rel=1e-6)
-
-
 def test_propositions_hold_for_a_humanoid() -> None:
     """On the constrained plant both levels' errors obey their equation."""
     controller = standing()
@@ -324,28 +297,6 @@ def test_null_space_decays_on_the_constrained_plant() -> None:
     rollout = continuous(controller, robot.home(), v0, **how)
     check_null_space(rollout, 6.0, least=0.5, rtol=1e-6)
     assert np.abs(rollout["task.hand.error"]).max() < 1e-7
-
-
-def test_in_the_air_only_what_is_possible_is_asked() -> None:
-    """A flying robot: no effort at the root, the centre of mass falls, arms move."""
-    robot = talos()
-    posture = hsp.JointPosture(
-        robot.integrate(robot.home(), 0.1 * np.ones(robot.nv)), gains=GAINS
-    )
-    controller = hsp.Controller(robot, [posture], base="flying", limits=None)
-    state = robot.state(0.0, robot.home(), np.zeros(robot.nv))
-    out = controller.compute(state)
-    assert not out.tau[:6].any()
-    wanted = state.inverse_dynamics(out.acceleration)
-    assert_allclose(wanted[:6], 0.0, atol=1e-8 * np.abs(wanted).max())
-    mass = state.centroidal
-    fall = mass.jacobian @ out.acceleration + mass.jacobian_dot @ state.v
-    assert_allclose(fall, [0.0, 0.0, -9.81], atol=1e-8)
-    assert_allclose(
-        out.task.jacobian[controller.task_rows["posture"]] @ out.acceleration,
-        out.task.acceleration[controller.task_rows["posture"]],
-        atol=1e-8,
-    )
 
 
 # --- what is refused -----------------------------------------------------------------

@@ -4,7 +4,6 @@
 """
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from typing import Any
 
@@ -12,7 +11,7 @@ import numpy as np
 import pytest
 from controller_cases import panda
 
-from hsp_control import Hold, Limits, Obstacle, Robot, RobotState, Sphere
+from hsp_control import Hold, Limits, Obstacle, Robot, Sphere
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import (
     FieldError,
@@ -30,7 +29,6 @@ from hsp_control.constraints.limits import (
     RobotLimits,
     Scaled,
     SelfDistance,
-    StaticEffort,
 )
 from hsp_control.geometry.scene import Scene
 from hsp_control.geometry.shapes import Box
@@ -82,17 +80,6 @@ def test_by_default_they_are_the_robots_own() -> None:
     assert limits.static_effort is None
 
 
-def test_what_no_motor_moves_has_no_limit_of_its_own() -> None:
-    limits = of(talos())
-    for each in (limits.effort, limits.velocity, -limits.lower, limits.upper):
-        assert np.isinf(each[:6]).all()
-        assert np.isfinite(each[6:]).any()
-    motors = np.isfinite(limits.effort)
-    largest = limits.effort[motors].max()
-    np.testing.assert_array_equal(limits.effort_rate[motors], 500.0 * largest)
-    assert np.isinf(limits.effort_rate[~motors]).all()
-
-
 def test_the_rate_of_efforts_is_one_for_all_joints_of_a_unit() -> None:
     limits = of(fingers())
     sliding = np.array(fingers().units) == "m"
@@ -100,24 +87,6 @@ def test_the_rate_of_efforts_is_one_for_all_joints_of_a_unit() -> None:
     np.testing.assert_array_equal(limits.effort_rate[~sliding], 11.0 * 87.0)
     largest = limits.effort[sliding].max()
     np.testing.assert_array_equal(limits.effort_rate[sliding], 11.0 * largest)
-
-
-def test_none_is_no_limit() -> None:
-    limits = of(
-        panda(), effort="none", effort_rate=None, velocity=None, position="none"
-    )
-    for each in (limits.effort, limits.velocity, -limits.lower, limits.upper):
-        assert (each == np.inf).all()
-    assert (limits.effort_rate == np.inf).all()
-    assert (limits.motion.jerk == np.inf).all()
-
-
-def test_a_joint_that_hardly_moves_has_a_small_margin() -> None:
-    """0.005, and a tenth of a range that is small: a suspension has 10 mm in all."""
-    upper = [0.004, *np.arange(1.0, 7.0)]
-    limits = of(panda(), position=PositionRange(-0.006, upper))
-    np.testing.assert_allclose(upper - limits.motion.upper, [1e-3] + 6 * [0.005])
-    np.testing.assert_allclose(limits.motion.lower + 0.006, [1e-3] + 6 * [0.005])
 
 
 def test_one_number_or_one_for_each() -> None:
@@ -143,28 +112,6 @@ def test_one_number_or_one_for_each() -> None:
     np.testing.assert_array_equal(limits.lower, np.full(7, -1.0))
     np.testing.assert_array_equal(limits.motion.upper, numbers - 0.25)
     assert limits.motion.bandwidth == limits.bandwidth == 7.0
-
-
-def test_a_part_of_the_robots_own() -> None:
-    own = of(panda())
-    scaled = {"panda_joint3": 0.5, "panda_joint1": 2.0}
-    limits = of(panda(), effort=Scaled(0.3), velocity=Scaled(scaled))
-    np.testing.assert_array_equal(limits.effort, 0.3 * own.effort)
-    factors = [2.0, 1.0, 0.5, 1.0, 1.0, 1.0, 1.0]
-    np.testing.assert_array_equal(limits.velocity, factors * own.velocity)
-    assert np.isinf(of(talos(), effort=Scaled(0.5)).effort[:6]).all()
-
-
-def test_numbers_for_some_joints() -> None:
-    """Also for those that have no limit of their own."""
-    own = of(panda()).effort
-    some = ByJoint({"panda_joint3": 200.0, "panda_joint1": 5})
-    expected = [5.0, own[1], 200.0, *own[3:]]
-    np.testing.assert_array_equal(of(panda(), effort=some).effort, expected)
-    continuous = Robot.load("bravo7_no_ee")
-    assert np.isinf(of(continuous).velocity[[0, 3, 5]]).all()
-    limits = of(continuous, velocity=ByJoint({"joint4": 1.5}))
-    np.testing.assert_array_equal(limits.velocity, [np.inf, 0.5, 0.5, 1.5, 0.5, np.inf])
 
 
 def test_positions_of_some_joints() -> None:
@@ -267,15 +214,6 @@ def test_start_outside_the_limits_names_the_joint() -> None:
         limits.check_start(panda().home(), fast)
 
 
-def test_start_too_near() -> None:
-    near = Obstacle("ball", Sphere(0.1), Hold([0.3, 0.0, 0.5]))
-    limits = of(panda(), near, distances=[ObstacleDistance(0.05)])
-    with pytest.raises(LimitError, match=r"to ball are .* must be at least 0.05 m"):
-        limits.check_start(panda().home(), np.zeros(7))
-    far = of(panda(), near, distances=[ObstacleDistance(0.05, links=["panda_link1"])])
-    far.check_start(panda().home(), np.zeros(7))
-
-
 # --- distances -----------------------------------------------------------------------
 
 
@@ -323,82 +261,3 @@ def test_distance_rows_are_its_second_derivative(kind: str) -> None:
     chosen = np.flatnonzero(near + 0.5 * np.minimum(rate, 0.0) < 0.2)
     assert len(chosen) == len(A) > 0
     np.testing.assert_allclose(A @ a - b, barrier[chosen], rtol=0, atol=1e-3)
-
-
-@pytest.mark.parametrize("kind", DISTANCES)
-def test_placing_twice_is_placing_once(kind: str) -> None:
-    start = at_home(panda(), [ball(), table()])
-    once = DISTANCES[kind].placed(start)
-    assert once.placed(start) == once
-    assert once.placed(at_home(panda())) == once  # it needs no scene any more
-    assert DISTANCES[kind].placed(start) == once
-
-
-def test_all_obstacles_of_the_scene() -> None:
-    placed = ObstacleDistance(0.3).placed(at_home(panda(), [ball(), table()]))
-    assert placed == ObstacleDistance(0.3, obstacles=[ball(), table()])
-    with pytest.raises(FieldError, match="the scene has no obstacle"):
-        ObstacleDistance().placed(at_home(panda()))
-
-
-def limited_states(count: int) -> list[RobotState]:
-    rng = np.random.default_rng(7)
-    return [
-        panda().state(
-            rng.uniform(0.0, 2.0),
-            panda().integrate(panda().home(), 0.3 * rng.standard_normal(7)),
-            0.3 * rng.standard_normal(7),
-        )
-        for _ in range(count)
-    ]
-
-
-def all_rows(limits: RobotLimits, state: RobotState) -> list[Array]:
-    assert limits.static_effort is not None
-    nowhere = np.zeros(0, dtype=np.int64)
-    pairs = [each.rows(state, limits.bandwidth) for each in limits.distances]
-    pairs.append(limits.static_effort.rows(state, limits.bandwidth, nowhere))
-    return [array for pair in pairs for array in pair]
-
-
-def limits_with_rows() -> RobotLimits:
-    distances = tuple(DISTANCES.values())
-    return of(panda(), ball(), table(), distances=distances, static_effort=0.3)
-
-
-def test_one_value_in_many_threads() -> None:
-    shared, states = limits_with_rows(), limited_states(4)
-    alone = [all_rows(limits_with_rows(), state) for state in states]
-
-    def again(k: int) -> bool:
-        return all(
-            np.array_equal(array, same)
-            for _ in range(40)
-            for array, same in zip(all_rows(shared, states[k]), alone[k], strict=True)
-        )
-
-    with ThreadPoolExecutor(4) as threads:
-        assert all(threads.map(again, range(4)))
-
-
-# --- postures that motors can hold ---------------------------------------------------
-
-
-def test_static_effort_leaves_out_what_no_motor_holds() -> None:
-    """Roots, motors without a limit, and those between the root and a contact."""
-    robot = panda()
-    state = robot.state(0.0, robot.home(), np.zeros(7))
-    effort = np.full(7, 1.0)
-    A, b = StaticEffort(effort, 1.0).rows(state, 10.0, np.zeros(0, dtype=np.int64))
-    assert len(A) == len(b) > 2
-    fewer, _ = StaticEffort(effort, 1.0).rows(state, 10.0, np.array([1, 3]))
-    assert len(fewer) == len(A) - 2
-    effort[5] = np.inf
-    fewer, _ = StaticEffort(effort, 1.0).rows(state, 10.0, np.array([1, 3]))
-    assert len(fewer) == len(A) - 3
-    robot = talos()
-    state = robot.state(0.0, robot.home(), np.zeros(robot.nv))
-    limit = of(robot, effort=1e-3, static_effort=1.0).static_effort
-    assert limit is not None
-    A, _ = limit.rows(state, 10.0, np.zeros(0, dtype=np.int64))
-    assert 0 < len(A) <= robot.nv - 6

@@ -165,39 +165,6 @@ def test_in_the_end_it_is_as_if_built_that_way(name: str, seed: int) -> None:
     )
 
 
-@pytest.mark.parametrize("name", ROBOTS)
-@given(seeds)
-@quick
-def test_the_order_of_the_calls_does_not_count(name: str, seed: int) -> None:
-    line = Line(name, seed)
-    changes = line.draw(15)
-    shuffled = tuple(changes[k] for k in line.rng.permutation(len(changes)))
-    times = np.linspace(0.0, SPAN + 0.6, 40)
-    np.testing.assert_array_equal(
-        line.efforts(line.controller(changes), times),
-        line.efforts(line.controller(shuffled), times),
-    )
-
-
-@pytest.mark.parametrize("name", ROBOTS)
-@given(seeds)
-@quick
-def test_a_change_made_in_time_is_the_same_as_one_made_before(
-    name: str, seed: int
-) -> None:
-    line = Line(name, seed)
-    changes = line.draw(15)
-    times = np.arange(0.0, SPAN + 0.6, 5e-2)
-    before = line.efforts(line.controller(changes), times)
-    controller, waiting = line.controller(), list(changes)
-    tau = []
-    for t in times:
-        while waiting and waiting[0].at < t + 5e-2:
-            controller.change(waiting.pop(0))
-        tau.append(controller.compute(t, *line.motion(t)).tau)
-    np.testing.assert_allclose(tau, before, rtol=0.0, atol=1e-9)
-
-
 @pytest.mark.parametrize(
     "duplicate", [copy.deepcopy, lambda each: pickle.loads(pickle.dumps(each))]
 )
@@ -249,33 +216,6 @@ def gains(frequency: float) -> hsp.Gains:
     return hsp.Gains(natural_frequency=frequency)
 
 
-TURNED = hsp.FrameOrientation(
-    "panda_tcp", hsp.trajectories.HoldOrientation([3.0, 0.4, 0.1]), name="turned"
-)
-
-
-def test_the_removal_of_a_scheduled_task_does_not_switch_it_on() -> None:
-    schedule = hsp.trajectories.Schedule([(2.0, 5.0)], ramp=0.3)
-    both, one = Trial(), Trial()
-    both.controller.at(0.0).ramp(0.0).add(replace(TURNED, schedule=schedule))
-    both.controller.at(3.0).ramp(0.3).remove("turned")
-    for t in np.linspace(0.0, 1.9, 6):
-        np.testing.assert_array_equal(
-            both.controller.compute(t, both.q, both.v).tau,
-            one.controller.compute(t, one.q, one.v).tau,
-        )
-    assert both.largest_step(lambda k: None, 3.6) < 0.4
-
-
-def test_a_start_in_the_past_begins_now_with_the_whole_ramp(panda: Trial) -> None:
-    def act(k: int) -> None:
-        if k == 500:
-            panda.controller.at(0.1).ramp(0.3).gains("hand", gains(20.0))
-
-    assert panda.largest_step(act, 0.9) < 0.3
-    assert panda.controller.changes[0].at == pytest.approx(0.499)
-
-
 @pytest.mark.parametrize(
     ("make", "message"),
     [
@@ -314,34 +254,3 @@ def test_impossible_changes(
         make(panda.controller)
     assert panda.controller.changes == ()
     panda.largest_step(lambda k: None, 0.01)
-
-
-def test_a_removal_of_what_is_gone_by_then_is_refused(panda: Trial) -> None:
-    panda.controller.at(1.0).add(TURNED)
-    with pytest.raises(hsp.errors.ControllerError, match="no task 'turned'"):
-        panda.controller.at(0.5).gains("turned", gains(3.0))
-
-
-def test_a_contact_that_is_lifted_equals_one_whose_schedule_ends() -> None:
-    """But for the last tenth of its force, where its motion is set free already."""
-    robot = hsp.Robot.load("solo12")
-    feet = [name for name in robot.frame_names if name.endswith("_FOOT")]
-    trunk = hsp.FramePose("base_link", name="trunk")
-
-    def standing(**lifted: Any) -> hsp.Controller:
-        contacts = [hsp.contacts.PointContact(foot) for foot in feet]
-        contacts[0] = replace(contacts[0], **lifted)
-        return hsp.Controller(
-            robot, [trunk], contacts=contacts, start=robot.home(), limits=None
-        )
-
-    changed = standing()
-    changed.at(0.5).ramp(0.4).contact(feet[0], bears=False)
-    scheduled = standing(schedule=hsp.trajectories.Schedule([(None, 0.9)], ramp=0.4))
-    for t in (*np.linspace(0.0, 0.8, 9), 1.0, 1.1, 1.2):
-        np.testing.assert_allclose(
-            changed.compute(t, robot.home(), np.zeros(robot.nv)).forces,
-            scheduled.compute(t, robot.home(), np.zeros(robot.nv)).forces,
-            rtol=1e-9,
-            atol=1e-9,
-        )

@@ -14,23 +14,17 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from runs import check_null_space
 from scipy.integrate import quad, solve_ivp
-from task_cases import placed
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.control.changes import AddTask, ChangeGains, RemoveTask
 from hsp_control.null_space.differences import rate_along_flow
 from hsp_control.null_space.fields import FieldSample
-from hsp_control.null_space.fields.field import terms_of
 from hsp_control.robot.integrators import Dop853
-from hsp_control.simulation.recorder import Recorder
 from hsp_control.trajectories import HoldOrientation, Lissajous, Spin
 from hsp_control.trajectories.timing import smooth_step
 
 K_N = 4.0
 START, RAMP = 0.2, 0.3
-KEPT = 1.0
-"""How long a controller remembers a change after its end [s]."""
 W0 = 10.0
 GAINS = hsp.Gains(natural_frequency=W0)
 COUPLED = hsp.Gains(
@@ -126,15 +120,6 @@ def swaying() -> hsp.TargetPosture:
     """A posture that moves in time."""
     sway = Lissajous(np.full(7, 0.2), np.linspace(1.0, 4.0, 7), None, np.zeros(7))
     return replace(posture(), displacement=sway)
-
-
-def test_one_field_of_several_is_exchanged_and_keeps_its_weight() -> None:
-    law = controller()
-    law.at(0.0).ramp(0.1).field(posture(), hsp.JointCentering(weight=0.5))
-    law.at(0.5).ramp(0.1).exchange(posture().name, replace(posture(), name="other"))
-    law.compute(0.6 + KEPT + 1e-9, panda().home(), np.zeros(7))
-    found = {term.name: term.weight for term in terms_of(law.field)}
-    assert found == {"joint_centering": 0.5, "other": 2.0}
 
 
 CHANGES: dict[str, Callable[[hsp.Controller], Any]] = {
@@ -297,110 +282,4 @@ def efforts(law: hsp.Controller, times: Array) -> Array:
     return np.array([law.compute(t, q, v).tau for t in times])
 
 
-def still(*more: hsp.Task, **options: Any) -> hsp.Controller:
-    """Return a controller whose effort changes with the state alone."""
-    task = replace(hand(), trajectory=hsp.Hold([0.5, 0.1, 0.4]))
-    options = {"null_space_gain": K_N, **options}
-    return hsp.Controller(
-        panda(), [task, *more], hsp.JointCentering(), **({"limits": None} | options)
-    )
-
-
-FINAL: dict[
-    str, tuple[Callable[[], hsp.Controller], Any, Callable[[], hsp.Controller]]
-] = {
-    "gains": (
-        still,
-        lambda change: change.gains("hand", COUPLED),
-        lambda: hsp.Controller(
-            panda(),
-            [replace(still().tasks[0], gains=COUPLED)],
-            hsp.JointCentering(),
-            null_space_gain=K_N,
-            limits=None,
-        ),
-    ),
-    "null-space gain": (
-        still,
-        lambda change: change.null_space_gain(9.0),
-        lambda: still(null_space_gain=9.0),
-    ),
-    "add": (still, lambda change: change.add(TURNED), lambda: still(TURNED)),
-    "remove": (lambda: still(TURNED), lambda change: change.remove("turned"), still),
-}
-
-
-@pytest.mark.parametrize("what", FINAL)
-@pytest.mark.parametrize("ramp", [RAMP, 0.0])
-def test_efforts_go_over_as_the_ramp_does(what: str, ramp: float) -> None:
-    """At one state: (1 - s) times the old effort plus s times the new; a ramp of 0 s is
-    a jump at its time."""
-    before, change, after = FINAL[what]
-    law = before()
-    change(law.at(START).ramp(ramp))
-    times = np.linspace(0.0, 0.8, 41)
-    s = np.array([share(t) if ramp else float(t >= START) for t in times])[:, None]
-    (old,), (new,) = efforts(before(), times[:1]), efforts(after(), times[:1])
-    assert np.abs(new - old).max() > 0.1
-    expected = (1.0 - s) * old + s * new
-    np.testing.assert_allclose(efforts(law, times), expected, rtol=0, atol=1e-10)
-    # To the last bit where nothing changes any more.
-    np.testing.assert_array_equal(efforts(law, times[times > 0.6])[0], new)
-
-
 # --- what is on the time line --------------------------------------------------------
-
-
-def test_calls_can_be_chained_and_are_values() -> None:
-    law = controller()
-    law.at(2.0).ramp(0.5).gains("hand", COUPLED).add(TURNED).remove("hand")
-    law.at(1.0).gains("hand", GAINS)
-    turned = placed(TURNED, panda())
-    assert law.changes == (
-        ChangeGains("hand", GAINS, at=1.0),
-        ChangeGains("hand", COUPLED, at=2.0, ramp=0.5),
-        AddTask(turned, at=2.0, ramp=0.5),
-        RemoveTask("hand", at=2.0, ramp=0.5),
-    )
-    given = controller(changes=law.changes)
-    assert given.changes == law.changes
-    times = np.linspace(0.0, 3.0, 16)
-    np.testing.assert_array_equal(efforts(given, times), efforts(law, times))
-    assert [task.name for task in given.tasks] == ["turned"]
-    assert law.weight_of("turned", 2.25) == pytest.approx(0.5)
-    with pytest.raises(hsp.errors.ControllerError, match="no task 'hand'"):
-        law.weight_of("hand", 0.0)
-
-
-def test_the_log_has_the_terms_of_both_and_of_tasks_that_come() -> None:
-    law = controller()
-    other = hsp.FramePosition(
-        "panda_link4",
-        hsp.Hold([0.3]),
-        gains=hsp.Gains(natural_frequency=5.0),
-        name="elbow",
-        axes="x",
-    )
-
-    def change(recorder: Recorder) -> None:
-        done = len(recorder.rows(0)["t"])
-        if done == 3:
-            law.at(0.03).ramp(0.03).field(posture())
-        if done == 5:
-            law.at(0.05).ramp(0.02).add(other)
-
-    options: dict[str, Any] = {"control_period": 0.001, "log_period": 0.01}
-    log = hsp.simulate(law, panda().home(), duration=1.15, on_row=change, **options)
-    assert log.meta["tasks"]["elbow"]["rows"] == 1
-    for name, first in (("field.target_posture.g", 3), ("task.elbow.error", 5)):
-        seen = np.isfinite(log[name]).all(axis=1)
-        assert not seen[:first].any()
-        assert seen[first + 1 :].all()
-    # What is drawn has a place before it came: where it first was.
-    place = log["task.elbow.actual"]
-    assert (place[:5] == place[5]).all()
-    # The old field's share is gone from the log when it is gone from the sum.
-    np.testing.assert_array_equal(log["field.joint_centering.g"][6:100], 0.0)
-    assert np.isnan(log["field.joint_centering.g"][-1]).all()
-    assert np.isfinite(log["field.g"]).all()
-    assert log["singular_values"].shape[1] == 4

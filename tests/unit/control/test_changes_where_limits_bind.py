@@ -19,7 +19,6 @@ from hsp_control.control.compensation import Command, Compensation, FrictionFeed
 from hsp_control.control.planned import Switched
 from hsp_control.trajectories import HoldOrientation, Schedule
 from hsp_control.trajectories.switch import Switch
-from hsp_control.trajectories.timing import smooth_step
 
 ROBOTS = ["planar3r", "panda", "iiwa14", "ur5", "xarm7"]
 START, RAMP = 0.2, 0.3
@@ -227,22 +226,6 @@ def lifted(controller: hsp.Controller, contact: str) -> None:
     controller.at(START + RAMP - 0.1).ramp(0.1).contact(contact, bears=True)
 
 
-@pytest.mark.parametrize("limited", [False, True])
-@given(seed=seeds)
-@many
-def test_a_contact_that_is_lifted_and_bears_again(limited: bool, seed: int) -> None:
-    """The motion that it stops is set free, and stopped, without a jump."""
-    case = Case("panda", seed)
-    tip = hsp.contacts.SlidingContact(
-        case.robot.end_effector, force=hsp.contacts.CommandedForce(20.0), name="tip"
-    )
-    limits = case.limits() if limited else None
-    controller = case.controller(case.other(), contacts=[tip], limits=limits)
-    lifted(controller, "tip")
-    case.binds = not limited
-    case.assert_continuous(controller)
-
-
 ABOUT = np.append(np.linspace(-1e-6, 1e-6, 20), -0.5 * FINEST)
 """Where to look about an edge; the last 1e-9 s contain it [s]."""
 OF_LEGS = 5e-6
@@ -297,18 +280,6 @@ def standing(seed: int, **schedules: Schedule) -> tuple[hsp.Controller, Array, A
         limits=hsp.Limits(effort={"scale": 0.6}),
     )
     return controller, robot.home(), 0.2 * rng.standard_normal(robot.nv)
-
-
-@given(seed=seeds)
-@many
-def test_a_foot_with_a_schedule(seed: int) -> None:
-    """A task moves it while it is lifted; it begins where the contact ends."""
-    contact, task = handed_over()
-    controller, q, v = standing(seed, contact=contact, task=task)
-    for t in np.add.outer(HANDED, ABOUT).ravel():
-        before = controller.compute(t, q, v).tau
-        after = controller.compute(t + FINEST, q, v).tau
-        np.testing.assert_allclose(after, before, rtol=0, atol=OF_LEGS)
 
 
 @given(seed=seeds)
@@ -404,29 +375,6 @@ def test_a_mixture_keeps_the_limits(name: str, seed: int) -> None:
         assert (np.abs(out.tau) <= limits.effort).all()
         assert (out.acceleration >= bounds.a_lower - 1e-6).all()
         assert (out.acceleration <= bounds.a_upper + 1e-6).all()
-
-
-@pytest.mark.parametrize("name", ROBOTS)
-@pytest.mark.parametrize("ramp", [RAMP, 0.0])
-@given(seed=seeds)
-@many
-def test_limits_go_over_as_the_ramp_does(name: str, ramp: float, seed: int) -> None:
-    """At one state: (1 - s) times the effort within the old limits plus s times the one
-    without; a ramp of 0 s is a jump at its time."""
-    case = Case(name, seed)
-    limits = case.limits()
-    hand = case.hand()
-    controller, old = (case.controller(hand, limits=limits) for _ in range(2))
-    new = case.controller(hand, limits=None)
-    controller.at(START).ramp(ramp).limits(None)
-    before, after = (case.effort(each, 0.0) for each in (old, new))
-    assume(case.binds)
-    for t in (0.1, START, START + 0.1, START + 0.2, START + RAMP, 1.0):
-        s = smooth_step(t, START, ramp)[0] if ramp else float(t >= START)
-        expected = (1.0 - s) * before + s * after
-        found = case.effort(controller, t)
-        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
-    assert controller.limits is None
 
 
 def test_what_opposes_friction_fades_with_the_tasks() -> None:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from controller_cases import panda
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from runs import check_null_space, continuous
 
@@ -110,40 +110,6 @@ def test_the_closed_form_is_the_optimum(without_support: int, seed: int) -> None
 
 
 # --- the law does not notice ---------------------------------------------------------
-
-
-@given(seeds)
-@settings(max_examples=10)
-def test_the_law_is_the_same_with_and_without_a_force(seed: int) -> None:
-    """a and e_N are equal bit for bit; M a + N = Sᵀτ + F f with the commanded f."""
-    state = random_state(talos(), seed)
-    outputs = {}
-    for pressed in (0.0, 10.0):
-        controller = leaning(wall(CommandedForce([0.0, 0.0, pressed])))
-        out = outputs[pressed] = controller.compute(state)
-        assume(out.status in (Status.EXACT, Status.REDISTRIBUTED))
-        support = controller.active_stack.support
-        rest = state.inverse_dynamics(out.acceleration) - out.tau
-        rest = rest - support.map @ out.forces
-        assert np.abs(rest).max() < 1e-6  # [N] of 900 N
-        assume(abs(out.forces[-1] - pressed) < 5e-3)  # or the wall must hold the robot
-    np.testing.assert_array_equal(outputs[0.0].acceleration, outputs[10.0].acceleration)
-    np.testing.assert_array_equal(
-        outputs[0.0].null_space_error, outputs[10.0].null_space_error
-    )
-    assert np.abs(outputs[0.0].tau - outputs[10.0].tau).max() > 0.01
-
-
-def test_other_forces_are_found_within_the_programme() -> None:
-    """Where least forces leave the cones, the soles' change, and the command stays."""
-    state = talos().state(0.0, talos().home(), np.zeros(talos().nv))
-    controller = leaning(wall(CommandedForce([0.0, 0.0, 40.0])), friction=0.2)
-    out = controller.compute(state)
-    assert out.status == Status.REDISTRIBUTED
-    np.testing.assert_allclose(out.forces[-3:], [0.0, 0.0, 40.0], atol=2e-2)
-    assert not controller.active_stack.support.permits(
-        controller.active_stack.support.forces
-    )
 
 
 def test_a_force_that_nothing_can_balance_gives_way_before_the_law() -> None:

@@ -1,12 +1,9 @@
 """Check what the controller returns, without memory, near singularities too."""
 
-from copy import deepcopy
-
 import numpy as np
 import pinocchio as pin
 import pytest
 from controller_cases import (
-    EXACT,
     METRICS,
     assert_same,
     circle,
@@ -20,7 +17,7 @@ from controller_cases import (
 from numpy.testing import assert_allclose, assert_array_equal
 
 import hsp_control as hsp
-from hsp_control import Controller, FramePosition, Limits, Rest, TargetPosture
+from hsp_control import Controller, FramePosition, Limits, TargetPosture
 from hsp_control.common.exceptions import ControllerError
 from hsp_control.control.actuation import Status
 from hsp_control.null_space.fields import Uncontrolled
@@ -47,40 +44,6 @@ def test_effort_is_m_a_plus_n(kind: str) -> None:
         a = panda().forward_dynamics(q, v, out.tau)
         size = np.abs(out.acceleration).max()
         assert_allclose(a, out.acceleration, rtol=0, atol=1e-11 * size)
-
-
-def test_tasks_are_stacked_in_order() -> None:
-    tasks = [hold_orientation(), track(axes="xyz", name="origin")]
-    controller = Controller(panda(), tasks, singularity_threshold=EXACT, limits=None)
-    t, q, v = states(1)[0]
-    state = panda().state(t, q, v)
-    out = controller.compute(state)
-    assert controller.task_rows == {
-        "panda_tcp_orientation": slice(0, 3),
-        "origin": slice(3, 6),
-    }
-    for task in tasks:
-        where = controller.task_rows[task.name]
-        for stacked, own in zip(out.task, task.evaluate(state), strict=True):
-            assert_array_equal(stacked[where], own)
-    residual = out.task.jacobian @ out.acceleration + out.task.jacobian_dot @ v
-    scale = np.abs(out.task.acceleration).max()
-    assert_allclose(residual, out.task.acceleration, rtol=0, atol=1e-12 * scale)
-
-
-def test_defaults_are_rest_the_identity_and_ten() -> None:
-    plain = Controller(panda(), [track()], limits=None)
-    said = Controller(
-        panda(),
-        [track()],
-        Rest(),
-        metric=hsp.metrics.IdentityMetric(),
-        null_space_gain=10.0,
-        limits=None,
-    )
-    state = panda().state(*states(1)[0])
-    assert_same(contents(plain.compute(state)), contents(said.compute(state)))
-    assert_array_equal(plain.null_space_gain, 10.0 * np.eye(7))
 
 
 @metrics
@@ -159,48 +122,6 @@ def test_a_step_in_one_call_is_the_step_in_many() -> None:
     kinds = {Status.EXACT, Status.LIMITED, Status.RELAXED}
     assert found >= {(Status.EXACT, False), (Status.EXACT, True)}
     assert {status for status, _ in found} == kinds
-
-
-def test_an_output_belongs_to_the_caller() -> None:
-    """Later steps do not write into it, unless it is given to them."""
-    controller = Controller(
-        panda(), [track(), hold_orientation()], TargetPosture(), limits=None
-    )
-    first, second, third = states(3)
-    out = controller.compute(*first)
-    before = deepcopy(contents(out))
-    other = controller.compute(*second)
-    assert_same(contents(out), before)
-    expected = contents(controller.compute(*third))
-    assert controller.compute(*third, out=other) is other
-    assert_same(contents(other), expected)
-    assert_same(contents(out), before)
-
-
-# --- no memory -----------------------------------------------------------------------
-
-
-@metrics
-def test_same_state_same_effort(kind: str) -> None:
-    """Whatever was computed before: elsewhere, near a singularity, or an error."""
-    tasks = [track(), hold_orientation()]
-    field = TargetPosture(panda().home())
-    controller = Controller(panda(), tasks, field, metric=METRICS[kind](7), limits=None)
-    fresh = Controller(panda(), tasks, field, metric=METRICS[kind](7), limits=None)
-    somewhere, *others = states(6, seed=2)
-    state = panda().state(*somewhere)
-    expected = contents(controller.compute(state))
-    assert_same(contents(controller.compute(state)), expected)
-    for t, q, v in others:
-        controller.compute(panda().state(t, q, v))
-        controller.diagnose()
-    upright = panda().state(0.0, np.zeros(7), np.ones(7))
-    assert controller.compute(upright).damped
-    controller.flow(0.7, others[0][1])
-    assert_same(contents(controller.compute(state)), expected)
-    # Another controller of the same tasks and field does not disturb, nor a new state.
-    assert_same(contents(fresh.compute(panda().state(*somewhere))), expected)
-    assert_same(contents(controller.compute(state)), expected)
 
 
 # --- near singularities --------------------------------------------------------------

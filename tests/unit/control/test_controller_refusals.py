@@ -26,7 +26,6 @@ from hsp_control.common.exceptions import (
     FieldError,
     FrameNotFoundError,
     GainError,
-    ImmutableError,
     LimitError,
     MetricError,
     NonFiniteError,
@@ -155,45 +154,6 @@ def test_refuses(options: Parts, error: type[Exception], message: str) -> None:
     assert isinstance(caught.value, hsp.HspControlError)
     not_there = error is FrameNotFoundError
     assert isinstance(caught.value, LookupError if not_there else ValueError)
-
-
-def test_a_gain_is_judged_in_its_metric() -> None:
-    """The gain that is refused in one metric passes in another, and conversely."""
-    hsp.Controller(panda(), [track()], null_space_gain=indefinite_gain())
-    # W K_N symmetric positive definite, K_N + K_Nᵀ indefinite.
-    K_hat = np.eye(7)
-    K_hat[0, 1] = K_hat[1, 0] = 0.9
-    K_N = np.linalg.solve(np.diag(W1), K_hat)
-    assert np.linalg.eigvalsh(K_N + K_N.T)[0] < 0.0
-    hsp.Controller(panda(), [track()], null_space_gain=K_N, metric=ConstantMetric(W1))
-    with pytest.raises(GainError):
-        hsp.Controller(panda(), [track()], null_space_gain=K_N)
-
-
-def test_as_many_rows_as_freedoms_are_allowed() -> None:
-    (posture,) = hsp.Controller(panda(), [hsp.JointPosture(gains=GAINS)]).tasks
-    assert posture.rows == 7
-
-
-@pytest.mark.parametrize(
-    ("name", "instead"),
-    [
-        ("tasks", r"use at\(t\).add\(task\) and at\(t\).remove\(name\)"),
-        ("limits", r"use at\(t\).limits\(...\)"),
-        ("state", "call compute"),
-        ("robot", "build another one"),
-    ],
-)
-def test_what_it_is_made_of_cannot_be_assigned(name: str, instead: str) -> None:
-    controller = hsp.Controller(panda(), [track()])
-    with pytest.raises(ImmutableError, match=f"^Controller.{name} cannot.*{instead}"):
-        setattr(controller, name, getattr(controller, name))
-
-
-def test_the_gain_in_force_is_a_copy() -> None:
-    controller = hsp.Controller(panda(), [track()], null_space_gain=3.0)
-    controller.null_space_gain[:] = 7.0
-    np.testing.assert_array_equal(controller.null_space_gain, 3.0 * np.eye(7))
 
 
 # --- NaN never comes out -------------------------------------------------------------

@@ -121,23 +121,6 @@ def test_springs_yield_as_a_body_with_stops(seed: int) -> None:
     assert (reaction[at_bound] * got[at_bound] <= 1e-8).all()
 
 
-@given(seeds)
-@settings(max_examples=10)
-def test_a_level_below_springs_costs_as_much_as_they_do(seed: int) -> None:
-    rng, robot = np.random.default_rng(seed), panda()
-    elbow = hsp.FramePosition("panda_link4", hsp.Hold([0.1, 0.2, 0.5]), priority=2)
-    for below in ([], [elbow]):
-        controller = on_springs(hsp.Limits(), *below)
-        q = robot.random_configuration(rng)
-        controller.compute(0.0, q, rng.standard_normal(7))
-        resolution = controller.active_stack.resolution
-        H = limit_oracle.deviation_cost(resolution, False, robot.size)
-        np.testing.assert_allclose(inverse_cost(resolution) @ H, np.eye(7), atol=1e-5)
-        if not below:
-            W = resolution.problem.metric.W
-            np.testing.assert_allclose(H, W, rtol=0, atol=1e-10)
-
-
 def straight_elbow(limits: hsp.Limits | None) -> hsp.Controller:
     """Return a hand's pose above an elbow's position: 9 rows on 7 joints."""
     gains = hsp.Gains(natural_frequency=10.0)

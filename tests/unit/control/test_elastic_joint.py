@@ -97,23 +97,6 @@ def test_a_simulated_joint_obeys_the_loop_s_polynomial(
     check_that_it_is_the_loop(x, loop, other, rounding=1e-11)
 
 
-def growth(joint: ElasticJoint, delay: int, rate: float = 5.0) -> float:
-    """Return the rate [1/s] of the slowest motion of the loop of the documents."""
-    one = np.eye(1)
-    loop = LinearLoop(
-        OMEGA**2 * one, 2.0 * OMEGA * one, rate * OMEGA**2 * one, H, 0, delay,
-        joint=joint,
-    )  # fmt: skip
-    return float(np.log(loop.radius()) / H)
-
-
-def test_a_very_stiff_joint_is_rigid() -> None:
-    one = np.eye(1)
-    rigid = LinearLoop(OMEGA**2 * one, 2.0 * OMEGA * one, 2e3 * one, H, 0, 2)
-    expected = np.log(rigid.radius()) / H
-    assert growth(elastic("motor", 1e9), 2) == pytest.approx(expected, rel=1e-3)
-
-
 @pytest.mark.parametrize("delay", [0, 2])
 def test_where_it_is_measured_decides(delay: int) -> None:
     """Without damping in the joint, small gains brake or drive the joint's own mode.

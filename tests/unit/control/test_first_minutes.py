@@ -18,13 +18,9 @@ import hsp_control as hsp
 from hsp_control.cli.main import main
 from hsp_control.common.exceptions import ConfigurationError, ControllerError
 from hsp_control.control.first_state import (
-    FAR,
     JUMP,
-    NEAR,
     StartWarning,
-    check_angles,
     warn_of_jump,
-    warn_of_slow_efforts,
 )
 from hsp_control.control.first_state import REST as REST_SPEED
 
@@ -60,30 +56,6 @@ def test_degrees_are_asked_about_at_the_first_state_and_after_a_restart() -> Non
     assert_same(contents(law.compute(0.0, home, REST)), before)
 
 
-@given(st.integers(0, 2**32 - 1), st.sampled_from(["panda", "iiwa14", "ur5"]))
-def test_which_angles_are_refused(seed: int, name: str) -> None:
-    """Within twice the range nothing is; beyond it the joint is named."""
-    robot, rng = load(name), np.random.default_rng(seed)
-    lower, upper = robot.position_limits()
-    middle, most = 0.5 * (lower + upper), np.maximum(FAR * (upper - lower), NEAR)
-    q = middle + rng.uniform(-1.0, 1.0, robot.nv) * 0.999 * most
-    check_angles(robot, q)
-    j = rng.integers(robot.nv)
-    q[j] = middle[j] + rng.choice([-1.0, 1.0]) * 1.001 * most[j]
-    with pytest.raises(ConfigurationError, match=re.escape(robot.dof_names[j])):
-        check_angles(robot, q)
-
-
-@pytest.mark.parametrize("name", ["planar3r", "panda_fingers", "talos_arm_free_flyer"])
-def test_joints_without_a_range_of_angles_are_exempt(name: str) -> None:
-    robot = load(name)
-    lower, upper = robot.position_limits()
-    exempt = ~np.isfinite(upper - lower) | (np.array(robot.units) == "m")
-    assert exempt.any()
-    away = np.where(exempt, 1000.0, 0.0)
-    check_angles(robot, robot.integrate(robot.home(), away))
-
-
 # --- the first effort ---------------------------------------------------------------
 
 
@@ -105,14 +77,6 @@ def test_a_jump_of_a_tenth_of_a_limit_is_warned_of(seed: int, name: str) -> None
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         warn_of_jump(robot, q, rest + 0.1, gravity + jump)
-
-
-def test_a_floating_base_is_not_looked_at() -> None:
-    robot = load("talos_arm_free_flyer")
-    rest = np.zeros(robot.nv)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        warn_of_jump(robot, robot.home(), rest, rest + 1e6)
 
 
 FIRST_EFFORT = (
@@ -168,31 +132,6 @@ def test_the_commands_warn_of_the_first_effort(
     assert "first effort" not in capsys.readouterr().err
 
 
-# --- efforts that are slower than gravity -------------------------------------------
-
-
-@given(seed=st.integers(0, 2**32 - 1))
-def test_what_gravity_may_need_is_what_it_changes_by(seed: int) -> None:
-    """The fastest change along a turn of each joint alone; it is a sine."""
-    robot = panda()
-    rng = np.random.default_rng(seed)
-    q, rest, needed = robot.random_configuration(rng), np.zeros(7), np.zeros(7)
-    angles = np.linspace(0.0, 2.0 * np.pi, 721)
-    for i in range(7):
-        turned = [robot.integrate(q, a * np.eye(7)[i]) for a in angles]
-        tau = [robot.inverse_dynamics(each, rest, rest)[i] for each in turned]
-        needed[i] = np.abs(np.diff(tau)).max() / angles[1]
-    limits = hsp.Limits(velocity=1.0, effort_rate=1.001 * needed.max())
-    placed = hsp.Controller(robot, [track()], limits=limits, start=robot.home()).limits
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        warn_of_slow_efforts(robot, q, placed)
-    limits = hsp.Limits(velocity=1.0, effort_rate=0.999 * needed.max())
-    placed = hsp.Controller(robot, [track()], limits=limits, start=robot.home()).limits
-    with pytest.warns(StartWarning):
-        warn_of_slow_efforts(robot, q, placed)
-
-
 # --- one thread at a time -----------------------------------------------------------
 
 CALLS = (
@@ -227,14 +166,6 @@ def test_a_field_that_calls_its_own_controller_is_told(call: Any) -> None:
             law.compute(*form)
         armed = False
         assert_same(contents(law.compute(t, q, v)), before)  # the lock is free again
-
-
-def test_a_field_may_call_another_controller() -> None:
-    other = holding()
-    law = holding(
-        field=hsp.FunctionCost(lambda s: float(other.compute(s.t, s.q, s.v).tau[0]))
-    )
-    assert np.isfinite(law.compute(*states(1)[0]).tau).all()
 
 
 def test_another_thread_waits() -> None:

@@ -1,14 +1,10 @@
 """Check the flow: a start on it has no transient, and robots become it."""
 
-from typing import ClassVar
-
 import numpy as np
 import pytest
 from controller_cases import (
     EXACT,
-    GAINS,
     METRICS,
-    TCP,
     circle,
     hold_orientation,
     metrics,
@@ -20,9 +16,8 @@ from runs import continuous
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.law import CONSTANT
 from hsp_control.null_space.fields import FunctionField
-from hsp_control.null_space.metrics import Metric, MetricSample
+from hsp_control.null_space.metrics import MetricSample
 
 
 def swaying_posture(state: hsp.RobotState) -> Array:
@@ -82,36 +77,3 @@ def test_robot_becomes_the_flow(kind: str) -> None:
     assert gaps[-1] < 1e-8
     # The flow itself is not at rest: the robot follows something that moves.
     assert np.abs(rollout.v[-1]).max() > 0.1
-
-
-def test_hold_still() -> None:
-    """A robot at rest at its posture and its point stays there: a = 0, tau = N."""
-    home = panda().home()
-    point = panda().state(0.0, home, np.zeros(7)).position(TCP).copy()
-    task = hsp.FramePosition(TCP, hsp.Hold(point), gains=GAINS)
-    field = hsp.TargetPosture(home)
-    for kind in METRICS:
-        controller = hsp.Controller(panda(), [task], field, metric=METRICS[kind](7))
-        state = panda().state(0.0, home, np.zeros(7))
-        out = controller.compute(state)
-        np.testing.assert_allclose(out.acceleration, 0.0, rtol=0, atol=1e-12)
-        np.testing.assert_allclose(out.tau, state.nonlinear_effects, rtol=0, atol=1e-12)
-        np.testing.assert_allclose(controller.flow(0.0, home), 0.0, rtol=0, atol=1e-14)
-
-
-def test_constant_form_is_asked_for_no_rate() -> None:
-    """A metric that declares itself constant is not differentiated."""
-
-    class Growing(Metric):
-        form: ClassVar[int] = CONSTANT
-
-        def evaluate(self, state: hsp.RobotState, out: MetricSample) -> MetricSample:
-            out.W_dot[:] = np.nan  # nobody may read it
-            return out
-
-    controller = hsp.Controller(panda(), [track()], metric=Growing())
-    plain = hsp.Controller(panda(), [track()])
-    state = panda().state(*states(1)[0])
-    np.testing.assert_allclose(
-        controller.compute(state).tau, plain.compute(state).tau, rtol=1e-13, atol=1e-12
-    )

@@ -62,14 +62,6 @@ def test_the_error_decays_at_its_rate() -> None:
     assert np.abs(log["task.turn.error"]).max() < 1e-6
 
 
-def test_the_integral_is_bounded() -> None:
-    feedback = Compensation(force_feedback=ForceFeedback(50.0, bound=2.0))
-    log = run(pressing(), feedback, 5.0)
-    assert log["contact.press.integral"].max() == pytest.approx(2.0)
-    felt = log[f"plant.contact.{TIP}.force"][:, 2]
-    assert felt[-1] == pytest.approx(17.0, abs=0.01)
-
-
 def test_the_integral_rests_where_the_command_gives_way() -> None:
     """A motor at its limit cannot press harder: nothing winds up."""
     state = panda().state(0.0, panda().home(), np.zeros(7))
@@ -103,13 +95,6 @@ def test_an_estimate_needs_no_sensor() -> None:
     assert air["contact.press.estimated"][-1] == pytest.approx(0.0, abs=0.5)
 
 
-def test_a_new_run_begins_anew() -> None:
-    controller = pressing()
-    feedback = Compensation(force_feedback=ForceFeedback(8.0))
-    first, second = (run(controller, feedback, 5.0, duration=0.1) for _ in range(2))
-    np.testing.assert_array_equal(first.tau, second.tau)
-
-
 @pytest.mark.parametrize(
     ("newtons", "parts", "message"),
     [
@@ -140,9 +125,3 @@ def test_what_cannot_be_fed_back(
 ) -> None:
     with pytest.raises(CompensationError, match=message):
         Command(pressing(newtons), Compensation(**parts))
-
-
-def test_a_contact_without_a_sensor() -> None:
-    command = Command(pressing(), Compensation(force_feedback=ForceFeedback()))
-    with pytest.raises(CompensationError, match="no sensor measures the force at"):
-        command.effort(0.0, panda().home(), np.zeros(7), H)

@@ -126,52 +126,6 @@ def test_speeds_may_be_held_against_a_steady_force(seed: int, steady: float) -> 
     np.testing.assert_allclose(a_lower + down, plain[0], rtol=0, atol=1e-11)
 
 
-@pytest.mark.parametrize("drift", [-1e4, 1e4])
-def test_a_drift_moves_a_limit_by_a_tenth_of_the_range_at_most(drift: float) -> None:
-    limits = of(panda(), velocity=None, bandwidth=8.0)
-    q, v = panda().home(), np.zeros(7)
-    plain, drifting = bounds(limits, q, v), bounds(limits, q, v, 0.0, drift)
-    span = limits.motion.upper - limits.motion.lower
-    moved = [(new - old) / 64.0 for new, old in zip(drifting, plain, strict=True)]
-    np.testing.assert_allclose(
-        moved[0 if drift < 0.0 else 1], -np.sign(drift) * span / 10.0
-    )
-    assert not moved[1 if drift < 0.0 else 0].any()
-    assert (drifting[0] < drifting[1]).all()
-
-
-def test_too_fast_is_slowed_down_more_steeply() -> None:
-    """Beyond the guarded speed the barrier is four times as steep."""
-    limits = of(panda(), velocity=1.0, position=None, bandwidth=8.0)
-    guarded = limits.motion.velocity[0]
-    for excess, slope in ((-0.01, 16.0), (0.01, 64.0)):
-        _, a_upper = bounds(limits, panda().home(), np.full(7, guarded + excess))
-        np.testing.assert_allclose(a_upper, -slope * excess, rtol=1e-12)
-        a_lower, _ = bounds(limits, panda().home(), np.full(7, -guarded - excess))
-        np.testing.assert_allclose(a_lower, slope * excess, rtol=1e-12)
-
-
-def test_the_margin_of_the_speed_covers_an_error_up_to_half_the_speed() -> None:
-    """And a quarter more, since it may grow until the next period ends."""
-    limits = of(panda(), velocity=1.0, effort_rate=None, position=None, bandwidth=8.0)
-    guarded, v = limits.motion.velocity[0], np.full(7, 0.4)
-    for error, speed in ((3.2, guarded - 0.0625), (1e3, 0.5 * guarded)):
-        a_lower, a_upper = bounds(limits, panda().home(), v, error)
-        np.testing.assert_allclose(a_upper, 16.0 * (speed - v), rtol=1e-12)
-        np.testing.assert_allclose(a_lower, 16.0 * (-speed - v), rtol=1e-12)
-
-
-@given(seeds)
-def test_bounds_never_cross(seed: int) -> None:
-    """Position has priority over velocity and acceleration: a range always remains."""
-    rng = np.random.default_rng(seed)
-    limits = of(panda(), acceleration=rng.uniform(0.1, 5.0))
-    lower, upper = panda().position_limits()
-    q = lower + (upper - lower) * rng.uniform(-0.2, 1.2, 7)
-    a_lower, a_upper = bounds(limits, q, rng.normal(0.0, 5.0, 7))
-    assert (a_lower <= a_upper).all()
-
-
 # --- the step ------------------------------------------------------------------------
 
 
@@ -189,23 +143,6 @@ def test_without_an_active_limit_the_qp_gives_the_law(seed: int) -> None:
     out, same = free.compute(state), limited.compute(state)
     assert same.status == Status.EXACT
     np.testing.assert_array_equal(same.tau, out.tau)
-
-
-def test_a_controller_keeps_the_robot_s_own_limits_unless_told_otherwise() -> None:
-    """Also an effort that is asked for beside a singularity."""
-    robot = panda()
-    far = hsp.FramePosition(
-        "panda_tcp", hsp.Hold([3.0, 0.0, 0.5]), largest_error="none"
-    )
-    own = hsp.Controller(robot, [far])
-    free = hsp.Controller(robot, [far], limits=None)
-    most = robot.model.effortLimit
-    assert own.limits is not None
-    assert free.limits is None
-    np.testing.assert_array_equal(own.limits.effort, most)
-    there = 0.0, robot.home(), np.zeros(7)
-    assert (np.abs(own.compute(*there).tau) <= most).all()
-    assert (np.abs(free.compute(*there).tau) > most).any()
 
 
 # --- along motions -------------------------------------------------------------------
@@ -255,18 +192,6 @@ def test_no_limit_is_violated(seed: int) -> None:
     assert (rollout["status"] == Status.LIMITED).any()  # limits did bind
     worst = violations(rollout, limits)
     assert max(worst.values()) <= 1e-8, worst
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("period", [0.002, 0.005, 0.01])
-@pytest.mark.parametrize("seed", [14, 30])
-def test_speed_limits_are_kept_at_any_period(seed: int, period: float) -> None:
-    """Seeds that exceed them by 0.6 and 2.7 % with a constant margin."""
-    controller, limits, q0 = limit_rich(seed)
-    rollout = held(controller, q0, period, duration=0.8)
-    used = np.abs(rollout["v"]) / limits.velocity
-    assert used.max() <= 1.0
-    assert used.max() > 0.9
 
 
 @pytest.mark.slow

@@ -16,12 +16,10 @@ from hsp_control.control.compensation import (
 )
 from hsp_control.control.compensation.linear_loop import (
     LoadedLoop,
-    field_slope,
     loaded_loop,
 )
-from hsp_control.null_space.fields import FunctionField
 from hsp_control.robot.integrators import Rk4
-from hsp_control.simulation.plants.model_changes import Inertias, Payload, changed
+from hsp_control.simulation.plants.model_changes import Payload, changed
 from hsp_control.simulation.plants.sensors import SensorDelay
 
 ARM = hsp.Robot.load("panda", gravity=[0.0, 0.0, 0.0])
@@ -150,19 +148,6 @@ def test_what_is_told_is_the_boundary_and_the_advice_works() -> None:
     assert worse.radius > 1.0
 
 
-def test_with_the_model_s_bodies_it_is_the_loops_of_its_parts() -> None:
-    """The spectrum of the whole is that of the task, and that of the null space."""
-    made = holding(3.0 * hsp.TargetPosture(Q0))
-    parts = Compensation(integral_action=IntegralAction(5.0))
-    loop = whole(made, parts, 2).with_part(0.0)
-    state = ARM.state(0.0, Q0, np.zeros(7))
-    one, rest = np.eye(3), np.eye(4)
-    task = type(loop)(400.0 * one, 40.0 * one, 2000.0 * one, H, 0, 2, parts)
-    free = type(loop)(30.0 * rest, 13.0 * rest, 0.0 * rest, H, 0, 2, parts)
-    assert loop.radius() == pytest.approx(max(task.radius(), free.radius()), abs=1e-9)
-    assert made.stack(state).jacobian.shape == (3, 7)
-
-
 def test_configurations_with_a_payload_are_warned_of_it() -> None:
     """2 kg are borne at a rate of 5 1/s; 3 kg, which the arm carries, are not at 7."""
     document: dict[str, Any] = {
@@ -186,32 +171,3 @@ def test_configurations_with_a_payload_are_warned_of_it() -> None:
     assert "it is 5.26 times as heavy at the tasks" in found.message
     driven = document | {"compensation": {}, "simulation": {"duration": 0.02}}
     assert not hsp.load_experiment(driven, "plant.payload.mass=3").rate_findings
-
-
-def test_a_plant_that_is_much_lighter_is_no_less_than_nothing() -> None:
-    """1.5 times a difference of -80 % would be a robot of negative mass."""
-    light = changed(ARM, [Inertias(0.2)])
-    strong = Compensation(integral_action=IntegralAction(7.0))
-    made = holding(frequency=80.0)
-    assert not check_rate(made, Q0, H, strong, plant=light)
-    assert not check_rate(made, Q0, H, strong, sensor_delay=2)
-    # The same loop with five times the gains.
-    (found,) = check_rate(made, Q0, H, strong, sensor_delay=2, plant=light)
-    assert re.search(r"it is 0\.2 times as heavy .* grows", found.message)
-
-
-def test_saddles_of_the_field_are_no_instability() -> None:
-    """The field leaves a point in the null space, as it shall; the load is borne."""
-    away = holding(
-        FunctionField(
-            lambda state: 0.5 * (state.q - Q0), rate_function=lambda s: 0.5 * s.v
-        )
-    )
-    state = ARM.state(0.0, Q0, np.zeros(7))
-    A = -field_slope(away, state)
-    np.testing.assert_allclose(A, -0.5 * np.eye(7), atol=1e-6)
-    mild = Compensation(integral_action=IntegralAction(3.0))
-    assert not check_rate(away, Q0, H, mild, plant=loaded())
-    strong = Compensation(integral_action=IntegralAction(7.0))
-    (found,) = check_rate(away, Q0, H, strong, plant=loaded())
-    assert found.path == ("compensation", "integral_action")

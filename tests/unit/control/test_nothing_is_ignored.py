@@ -1,6 +1,5 @@
 """Whatever is assigned, given or asked for counts, or is refused."""
 
-import threading
 from collections.abc import Mapping
 from typing import Any
 
@@ -69,17 +68,6 @@ def test_no_attribute_can_be_assigned() -> None:
                 setattr(part, name, 1.0)
 
 
-def test_no_array_can_be_written_except_feedback() -> None:
-    for part in everything(panda(limits=hsp.Limits())):
-        if isinstance(part, hsp.Controller):
-            continue
-        for name in public(part):
-            value = getattr(part, name)
-            if isinstance(value, np.ndarray) and value.size:
-                with pytest.raises(ValueError, match="read-only"):
-                    value[...] = 0.0
-
-
 @pytest.mark.parametrize(
     ("t", "q", "v", "message"),
     [
@@ -135,28 +123,3 @@ def test_a_foreign_state_gives_the_same_effort() -> None:
     other = hsp.Robot.load("panda").state(0.0, state.q, state.v)
     with pytest.raises(hsp.errors.ControllerError, match="another robot object"):
         controller.compute(other)
-
-
-def test_threads_with_a_controller_each_and_with_one_together() -> None:
-    """Parts are shared; so may be a controller: each call is one step of its own."""
-    shared = panda()
-    q, v = shared.robot.home(), np.zeros(7)
-    shared.compute(0.0, q, v)
-    times = np.linspace(0.0, 1.0, 200)
-    wanted = [shared.compute(t, q, v).tau for t in times]
-    own = [hsp.Controller(shared.robot, [shared.tasks[0]], shared.field) for _ in "ab"]
-    failures: list[str] = []
-
-    def compute(controller: hsp.Controller) -> None:
-        for t, tau in zip(times, wanted, strict=True):
-            if not np.array_equal(controller.compute(t, q, v).tau, tau):
-                failures.append(f"differs at t = {t}")
-
-    threads = [
-        threading.Thread(target=compute, args=[each]) for each in (*own, shared, shared)
-    ]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert failures == []

@@ -32,7 +32,7 @@ from hsp_control.control.compensation import (
     VelocityFilter,
     check_rate,
 )
-from hsp_control.control.compensation.linear_loop import LinearLoop, _coupled
+from hsp_control.control.compensation.linear_loop import LinearLoop
 from hsp_control.control.compensation.rate_check import null_space_rates, rate_findings
 from hsp_control.null_space.fields import TargetPosture, Uncontrolled
 from hsp_control.null_space.metrics import MassMatrixMetric
@@ -90,29 +90,6 @@ def test_the_limits_of_theory(make: Any, limit: float) -> None:
     """Closed forms of the limits, in units of 1/h, to five digits."""
     assert make(limit * (1.0 - 1e-5) / H).radius() <= 1.0 + 1e-9
     assert make(limit * (1.0 + 1e-5) / H).radius() > 1.0 + 1e-7
-
-
-@pytest.mark.parametrize(
-    "loop",
-    [
-        pd(300.0),
-        pd(300.0, ki=500.0),
-        pd(300.0, effort_delay=1, sensor_delay=1),
-        pd(300.0, effort_delay=2, compensation=Compensation(predictor=Predictor(2))),
-    ],
-)
-def test_memory_that_is_not_used_does_not_decide(loop: LinearLoop) -> None:
-    """The radius is taken without zeros of the whole matrix, and only without those."""
-    whole = loop.transition()
-    assert len(_coupled(whole)) < len(whole)
-    expected = np.abs(np.linalg.eigvals(whole)).max()
-    assert loop.radius() == pytest.approx(expected, rel=1e-6)  # a double eigenvalue
-
-
-def test_an_integral_is_stable_up_to_routh_where_the_rate_is_high() -> None:
-    for share, stable in ((0.99, True), (1.01, False)):
-        loop = pd(1.0, ki=share * 2.0)  # ω0 h = 1e-3: as good as continuous
-        assert (loop.radius() < 1.0) is stable
 
 
 @pytest.mark.parametrize("heavy", [1.0, 3.0])
@@ -310,26 +287,6 @@ def test_the_advice_on_a_compensator_works(
     check_rate(made, Q0, H, make(best), effort_delay=delay)
 
 
-def test_what_misses_the_rule_is_said_and_not_refused() -> None:
-    found = check_rate(holding(frequency=250.0, gain=300.0), Q0, H)
-    assert [finding.path for finding in found] == [
-        ("tasks", "hand", "gains"),
-        ("null_space", "gain"),
-    ]
-    assert "is 0.25; at most 0.2 is recommended" in found[0].message
-    assert "K_N of at most 200 1/s, or a control_period of at most 0.000667 s" in (
-        found[1].message
-    )
-    (stiff,) = check_rate(holding(stiffness=400.0), Q0, H)
-    assert stiff.path == ("null_space", "fields")
-    assert "the field's stiffness times the period is 0.4" in stiff.message
-    (late,) = check_rate(holding(frequency=150.0), Q0, H, effort_delay=1)
-    assert "is 0.15; at most 0.1 is recommended" in late.message
-    assert not check_rate(holding(frequency=150.0), Q0, H)
-    predicted = Compensation(predictor=Predictor(1))
-    assert not check_rate(holding(frequency=150.0), Q0, H, predicted)
-
-
 def test_a_field_s_slope_is_taken_in_the_null_space_and_the_metric() -> None:
     """TargetPosture has the Hessian 1; over M it is the slope of -M⁻¹∇f."""
     state = PANDA.state(0.0, Q0, np.zeros(7))
@@ -404,12 +361,6 @@ def test_mistakes_are_told_where_they_stand(
 ) -> None:
     with pytest.raises(hsp.HspControlError, match=message):
         load_experiment(config(**sections))
-
-
-def test_the_check_can_be_left_out_and_asks_nothing_without_a_period() -> None:
-    wild = config(null_space={"gain": 2500})
-    load_experiment(wild, "simulation.check_rate=false")
-    load_experiment(wild, "simulation.control_period=null")
 
 
 def test_the_command_line_says_what_is_close(

@@ -7,12 +7,12 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
-from clearance_cases import load, placed, still
+from clearance_cases import load, placed
 from numpy.typing import NDArray
 from odd_robots import FACES, OCTAHEDRON, write_stl
 
 from hsp_control import Obstacle, Robot
-from hsp_control.geometry import LinkShape, Proximity, link_shapes
+from hsp_control.geometry import LinkShape, Proximity
 from hsp_control.geometry.shapes import (
     Box,
     Capsule,
@@ -220,25 +220,6 @@ def test_nothing_is_nan_where_a_normal_has_no_direction(
         values = robot.state(state.t, state.q, state.v)
         assert np.isfinite(field.gradient(values)).all()
         assert np.isfinite(field.gradient_rate(values)).all()
-
-
-def test_a_pair_that_is_named_twice_counts_once() -> None:
-    """As do obstacles; the distances stay beside the pairs that they belong to."""
-    robot = load("panda")
-    links = link_shapes(robot)
-    once = Proximity(robot, links, [], [(1, 10), (0, 5), (2, 9)])
-    twice = Proximity(robot, links, [], [(1, 10), (0, 5), (5, 0), (1, 10), (2, 9)])
-    state = still(robot)
-    np.testing.assert_array_equal(once.measure(state), twice.measure(state))
-    np.testing.assert_array_equal(
-        once.gradient(state, np.ones(3)), twice.gradient(state, np.ones(3))
-    )
-    ball = Obstacle("ball", Sphere(0.1), Hold([0.4, 0.2, 0.6]))
-    one, two = (ObstacleClearance([ball] * k, influence=1.0) for k in (1, 2))
-    # A vectorised sum may depend, by rounding, on where its arrays lie in memory.
-    assert one.value(state) == pytest.approx(two.value(state), rel=1e-14)
-    assert one.value(state) > 0.1
-    np.testing.assert_allclose(one.gradient(state), two.gradient(state), rtol=1e-13)
 
 
 def test_meshes_hulls_clouds_and_terrain(tmp_path: Path) -> None:

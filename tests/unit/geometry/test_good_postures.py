@@ -1,12 +1,8 @@
 """Good postures: regular, within limits, clear, and near the middle."""
 
-import logging
-from pathlib import Path
-
 import numpy as np
 import pinocchio as pin
 import pytest
-from odd_robots import collision, odd_robot
 
 from hsp_control import Robot
 from hsp_control.common.exceptions import ConfigurationError, FrameNotFoundError
@@ -48,15 +44,6 @@ def test_an_arm_that_is_straight_in_the_middle_bends_few_joints() -> None:
     assert (np.abs(found.q - 0.5 * (lower + upper)) < 0.46 * (upper - lower)).all()
 
 
-def test_a_middle_that_is_good_is_taken() -> None:
-    robot = Robot.load("panda")
-    found = PostureSearch(robot, hand(robot)).find(LEAST)
-    np.testing.assert_allclose(
-        found.q, np.mean(robot.position_limits(), axis=0), atol=1e-12
-    )
-    assert found.eccentricity < 1e-12
-
-
 def test_it_keeps_clear_of_obstacles() -> None:
     """A ball where the hand would be, by the choice without it."""
     robot = Robot.load("iiwa14")
@@ -69,21 +56,6 @@ def test_it_keeps_clear_of_obstacles() -> None:
     assert touched.pair.endswith("to ball")
     assert not touched.clear
     assert search.find(LEAST).clear
-
-
-def test_what_overlaps_as_capsules_only_is_no_collision(tmp_path: Path) -> None:
-    """A ball above a plate, which is inside the plate's capsule; then in the plate."""
-    box = '<box size="0.4 0.4 0.02"/>'
-    robot = odd_robot(tmp_path, arm=collision(box, xyz="0 0 0", rpy="0 0 0"))
-    q = robot.neutral()
-    for height, depth in ((0.1, 0.0), (0.02, 0.01)):
-        ball = Obstacle("ball", Sphere(0.02), Hold([0.0, 0.0, 0.3 + height]))
-        search = PostureSearch(robot, [("hand", (0, 1))], [ball])
-        assert search.judge(q).distance < -0.02
-        found, pair = search.overlap(q)
-        assert found == pytest.approx(depth, abs=1e-6)
-        assert pair == "arm to ball"
-    assert PostureSearch(robot, [("hand", (0, 1))]).overlap(q) == (0.0, "")
 
 
 def test_a_pose_is_reached_in_a_good_posture() -> None:
@@ -118,13 +90,3 @@ def test_what_cannot_be_found_is_said_with_numbers() -> None:
         blocked.find(LEAST)
     with pytest.raises(FrameNotFoundError, match="did you mean 'tip'"):
         search.find_with(far._replace(frame="tpi"), LEAST)
-
-
-def test_shapes_that_cannot_be_read_are_warned_about(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
-    robot = odd_robot(tmp_path, arm=collision('<mesh filename="nowhere.stl"/>'))
-    with caplog.at_level(logging.WARNING):
-        search = PostureSearch(robot, [("hand", (0, 1))])
-    assert "are not checked for collisions" in caplog.text
-    assert search.judge(robot.home()).distance == np.inf

@@ -8,20 +8,15 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
-from clearance_cases import ends, load, outside, placed, still, turned
+from clearance_cases import ends, load, outside, placed, turned
 from odd_robots import FACES, OCTAHEDRON, collision, odd_robot, write_stl
 
-from hsp_control import Obstacle, Robot
+from hsp_control import Obstacle
 from hsp_control.common.exceptions import ModelError, SceneError
 from hsp_control.geometry import link_shapes
 from hsp_control.geometry.shapes import (
     Box,
-    Capsule,
-    Cylinder,
-    HalfSpace,
-    HeightField,
     Mesh,
-    PointCloud,
     Sphere,
 )
 from hsp_control.null_space.fields import ObstacleClearance, SelfClearance
@@ -52,25 +47,6 @@ def test_shapes_hang_where_pinocchio_puts_them(name: str, proxy: str) -> None:
     ):  # fmt: skip
         assert shape.link == full.frames[item.parentFrame].name
         np.testing.assert_allclose(own.homogeneous, theirs.homogeneous, atol=1e-12)
-
-
-def test_hulls_are_the_meshes_hulls() -> None:
-    """Convex, and as wide as the mesh in every direction."""
-    robot = load("ur5")
-    rng = np.random.default_rng(15)
-    directions = rng.normal(size=(50, 3))
-    meshes, hulls = link_shapes(robot, "meshes"), link_shapes(robot, "hulls")
-    for mesh, hull in zip(meshes, hulls, strict=True):
-        np.testing.assert_array_equal(
-            mesh.placement.homogeneous, hull.placement.homogeneous
-        )
-        if isinstance(mesh.geometry, coal.Box):
-            assert isinstance(hull.geometry, coal.Box)
-            continue
-        assert isinstance(hull.geometry, coal.Convex)
-        of_mesh = np.array(mesh.geometry.vertices()) @ directions.T
-        of_hull = np.array(hull.geometry.points()) @ directions.T
-        np.testing.assert_allclose(of_hull.max(axis=0), of_mesh.max(axis=0), atol=1e-9)
 
 
 def test_boxes_lone_cylinders_and_balls(tmp_path: Path) -> None:
@@ -188,40 +164,3 @@ def test_a_robot_without_geometry_gets_capsules_and_one_warning(
     np.testing.assert_allclose(ends(arm)[:2], [[0, 0, 0], [0.4, 0, 0]], atol=1e-15)
     assert (hand.link, hand.joint, hand.geometry.radius) == ("bend", 2, 0.05)
     np.testing.assert_array_equal(hand.placement.homogeneous, np.eye(4))
-
-
-def test_robots_without_geometry_keep_clear_of_each_other(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
-    """Each is given capsules where it stands, beside one that has its own."""
-    robot, panda = odd_robot(tmp_path), load("panda")
-    there = pin.SE3(turned(0.0, 0.0, 1.0), np.array([2.0, 0.0, 0.1]))
-    both = Robot.combine({"odd": (robot, there), "arm": (panda, pin.SE3.Identity())})
-    with caplog.at_level(logging.WARNING):
-        shapes = link_shapes(both)
-    assert len(shapes) == 3 + 13
-    assert [record.getMessage() for record in caplog.records] == [
-        "odd_odd has no collision geometry: using capsules of radius 0.05 m between "
-        "its joints"
-    ]
-    stand = next(shape for shape in shapes if shape.link == "odd_universe")
-    np.testing.assert_allclose(
-        ends(stand)[:2], [[2.0, 0.0, 0.1], [2.0, 0.0, 0.4]], atol=1e-12
-    )
-    pairs = SelfClearance(influence=5.0).proximity(still(both)).pairs
-    names = {frozenset((shapes[i].link, shapes[j].link)) for i, j in pairs}
-    assert frozenset(("odd_universe", "arm_panda_link1")) in names
-    assert frozenset(("odd_universe", "odd_turn")) not in names
-    assert frozenset(("odd_universe", "odd_bend")) in names
-
-
-def test_shapes_say_how_far_they_reach() -> None:
-    assert Sphere(0.2).bounding_radius == 0.2
-    assert Capsule(0.1, 0.4).bounding_radius == pytest.approx(0.3)
-    assert Cylinder(0.3, 0.8).bounding_radius == pytest.approx(0.5)
-    assert Box((0.2, 0.4, 0.4)).bounding_radius == pytest.approx(0.3)
-    assert HalfSpace().bounding_radius == np.inf
-    assert PointCloud([[0.0, 0.3, 0.4]], 0.1).bounding_radius == pytest.approx(0.7)
-    assert HeightField((0.6, 0.8), [[0, 0], [0, 1.2]]).bounding_radius == pytest.approx(
-        1.3
-    )

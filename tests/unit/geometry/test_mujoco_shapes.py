@@ -112,25 +112,6 @@ def test_contype_and_group_decide_what_collides_and_what_is_seen() -> None:
     assert [s.geometry.radius for s in link_shapes(only_affinity)] == [0.3]
 
 
-def test_a_material_gives_the_colour_unless_the_geom_does() -> None:
-    rest = "<asset><material name='m' rgba='0 1 0 1'/></asset>"
-    colors = [
-        read_visuals(scene(f"<geom size='.1' material='m' {own}/>", rest))[0].color
-        for own in ("", "rgba='0 0 1 .5'")
-    ]
-    assert colors == [(0.0, 1.0, 0.0, 1.0), (0.0, 0.0, 1.0, 0.5)]
-
-
-def test_the_floor_and_other_bodies_are_no_part_of_the_robot() -> None:
-    model = mujoco.MjModel.from_xml_string(CELL)
-    robot = Robot.from_mujoco(model, "base", ARM)
-    links = [shape.link for shape in link_shapes(robot)]
-    assert links == ["base", "shoulder", "upper", "lower", "hand", "finger"]
-    # The finger is locked: it is fixed to the joint of the hand.
-    by_link = {shape.link: shape.joint for shape in link_shapes(robot)}
-    assert by_link["finger"] == by_link["hand"] == robot.model.getJointId("j4")
-
-
 def test_excluded_pairs_are_not_checked() -> None:
     pairs = []
     for exclude in ("", "<exclude body1='hand' body2='base'/>"):

@@ -106,27 +106,6 @@ def test_conflict_leaves_the_upper_level_exact(
 
 
 @given(seeds)
-def test_more_rows_than_freedoms(seed: int) -> None:
-    """Two levels of five rows on seven joints: the first exact, the second's rest."""
-    x = numbers(seed, 7, 7, IDENTITY)
-    extra = np.random.default_rng(seed).standard_normal((2, 3, 7))
-    x = x._replace(
-        J=np.vstack([x.J, extra[0]]),
-        J_dot=np.vstack([x.J_dot, extra[1]]),
-        a_x=np.arange(10.0),
-    )
-    a, e_N, _ = resolve(x, IDENTITY, levels=[5, 5])
-    # Three rows of the second level are blocked: rounding, grown by 2/threshold² = 2e4.
-    atol = 1e-9 * max(1.0, float(np.abs(a).max()))
-    np.testing.assert_allclose(
-        x.J[:5] @ a + x.J_dot[:5] @ x.v, x.a_x[:5], rtol=0, atol=atol
-    )
-    expected, _ = lexicographic(x, [5, 5])
-    np.testing.assert_allclose(e_N, 0.0, rtol=0, atol=1e-8)
-    np.testing.assert_allclose(a, expected, rtol=1e-6, atol=1e-6)
-
-
-@given(seeds)
 def test_priorities_meet_the_stack_where_they_take_over(seed: int) -> None:
     """Either side of the threshold: the same acceleration, so nothing jumps."""
     x = numbers(seed, 4, 7, IDENTITY)
@@ -191,15 +170,3 @@ def test_propositions_hold_per_level(kind: str) -> None:
     check_errors(rollout, 8.0, "hand", "wrist", atol=1e-8)
     assert np.abs(rollout["task.rival.error"][-1]) > 0.03
     check_null_space(rollout, 4.0, least=0.05, rtol=1e-6)
-
-
-def test_levels_are_the_tasks_of_one_priority() -> None:
-    """Numbers may be left out; within a level the order is the user's."""
-    controller = conflicting("identity")
-    names = [[task.name for task in level] for level in controller.levels]
-    assert names == [["hand"], ["wrist", "rival"]]
-    assert [task.name for task in controller.tasks] == ["hand", "wrist", "rival"]
-    hand, wrist, rival = controller.tasks
-    spread = [replace(rival, priority=70), replace(hand, priority=3), wrist]
-    levels = hsp.Controller(panda(), spread, limits=None).levels
-    assert [task.name for (task,) in levels] == ["wrist", "hand", "rival"]

@@ -256,31 +256,6 @@ def test_coordinates_metric_is_equation_13_in_those_coordinates(name: str) -> No
 
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("kind", METRICS)
-def test_identity_behind_the_short_form(name: str, kind: str) -> None:
-    """(J#J'J# + (J#)')J x = P W⁻¹(J'ᵀJ#ᵀW - W'J#J)x, (J#)' by differences."""
-    c = case(name)
-    metric = METRICS[kind](c.robot.nv)
-    state = c.robot.state(0.3, c.q, c.v)
-    t = terms(c, state, metric)
-    x = t.g - c.v
-
-    def J_sharp_at(s: float) -> Array:
-        there = terms(c, state.ahead(s), metric)
-        return oracles.pseudo_inverse(there.J, there.W)
-
-    J_sharp, J_sharp_dot = J_sharp_at(0.0), slope(J_sharp_at, step_of(c.v))
-    left = (J_sharp @ t.J_dot @ J_sharp + J_sharp_dot) @ t.J @ x
-    P = np.eye(c.robot.nv) - J_sharp @ t.J
-    bend = t.J_dot.T @ J_sharp.T @ t.W - t.W_dot @ J_sharp @ t.J
-    right = P @ np.linalg.solve(t.W, bend @ x)
-    # Rounding of the differences, 1e-11, and of W⁻¹: cond(M) is up to 5e6 (Tiago).
-    scale = max(1.0, np.abs(left).max()) * (1e-9 + 1e-14 * np.linalg.cond(t.W))
-    assert_allclose(left, right, rtol=0, atol=scale)
-    assert np.abs(left).max() > 0.01  # there is something to see
-
-
-@pytest.mark.parametrize("name", CASES)
-@pytest.mark.parametrize("kind", METRICS)
 def test_projector_and_error_in_the_metric(name: str, kind: str) -> None:
     """W P = PᵀW, P² = P, P W⁻¹Jᵀ = 0; e_N = P(g - v) and ‖x‖² = ‖e_N‖² + ‖x - e_N‖²."""
     c = case(name)
@@ -358,16 +333,3 @@ def test_law_of_a_rank_deficient_task(kind: str) -> None:
         assert_allclose(
             getattr(spatial, name), getattr(flat, name), rtol=1e-12, atol=1e-12
         )
-
-
-def test_a_task_that_takes_every_freedom_leaves_no_null_space() -> None:
-    """J square: P = 0, e_N = 0, and the field changes nothing."""
-    c = case("panda")
-    task = placed(hsp.JointPosture(c.posture, gains=GAINS), c.robot)
-    state = c.robot.state(0.3, c.q, c.v)
-    full = c._replace(tasks=[task])
-    for kind in METRICS:
-        out = controller(full, METRICS[kind](7), 7.0).compute(state)
-        assert_allclose(out.null_space_error, 0.0, rtol=0, atol=1e-13)
-        expected = task.evaluate(state).acceleration
-        assert_allclose(out.acceleration, expected, rtol=0, atol=1e-11)

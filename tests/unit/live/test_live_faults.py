@@ -220,18 +220,6 @@ def test_each_fault_of_a_measurement_is_named(kind: str, tmp_path: Path) -> None
     assert (np.diff(logged.t) < longest).all()  # also where the robot's clock jumps
 
 
-@pytest.mark.parametrize("end", ["lower", "upper"])
-def test_positions_may_be_beyond_a_limit_by_their_margin(end: str) -> None:
-    monitor = MeasurementMonitor(panda(), None, SETTINGS, PERIOD)
-    outwards = -1.0 if end == "lower" else 1.0
-    limit, v = getattr(own_limits(panda()), end)[1], np.zeros(7)
-    for share, fits in ((-2.0, True), (-0.5, True), (0.9, True), (1.1, False)):
-        q = start().copy()
-        q[1] = limit + outwards * share * SETTINGS.position_margin
-        found = monitor.violation(Measurement(1, 0.0, q, v))
-        assert (found is None) == fits, share
-
-
 @pytest.mark.parametrize("states", [1, 3])
 def test_a_jump_is_farther_than_the_greatest_speed_over_the_gap(states: int) -> None:
     """Also where the clock stands still: the numbers of the states count."""
@@ -243,21 +231,6 @@ def test_a_jump_is_farther_than_the_greatest_speed_over_the_gap(states: int) -> 
         q = start() + way * np.eye(7)[3]
         found = monitor.jump(Measurement(4 + states, 0.5, q, np.zeros(7)))
         assert (found is None) == fits, factor
-
-
-def test_a_robot_at_rest_is_not_frozen() -> None:
-    """Its brakes hold it: the same state to the last bit, and a velocity of 0."""
-    still = always(replaced(q=start(), v=np.zeros(7)), 1)
-    patient = LiveSettings(stop=QUICK, velocity_margin=99.0)  # it is not held here
-    report = run(Rig(watched(patient), still), duration=0.1, settings=patient)
-    assert report.ended == "completed", report.reason
-
-
-def test_a_clock_that_runs_while_kernels_compile_is_no_jump() -> None:
-    robot = rig(always(shifted(t=5.0), 2))  # the first read comes before compiling
-    report = run(robot)
-    assert report.ended == "completed", report.reason
-    assert report.t < 1.0  # and the safe stop
 
 
 def test_buffers_that_the_driver_reuses_are_copied() -> None:
@@ -389,19 +362,6 @@ def test_whatever_an_effort_source_does(what: str, given_: Any, tmp_path: Path) 
     assert logged.meta["message"] == report.reason  # also where a row failed
 
 
-@pytest.mark.parametrize("says", [True, False])
-def test_an_effort_that_could_not_be_written_does_not_count(says: bool) -> None:
-    """The rate counts from what the robot has, also after writes that failed."""
-    robot = Failing("write", RuntimeError("busy"), BEGIN, 15)
-    if not says:
-        robot.tricks = always(replaced(applied=None), 1)
-    report = run(robot)
-    assert report.reason == "the effort cannot be sent: RuntimeError: busy"
-    assert_safe(robot, report)
-    assert report.at_rest
-    assert robot.robot.reason == "the loop has ended"  # which saw no jump
-
-
 # --- the operator --------------------------------------------------------------------
 
 
@@ -437,16 +397,6 @@ def test_a_second_signal_leaves_it_to_the_robot() -> None:
     assert robot.robot.phase is Phase.HOLDING
 
 
-def test_the_programs_own_handlers_stay() -> None:
-    seen: list[int] = []
-    before = signal.signal(signal.SIGTERM, lambda number, _: seen.append(number))
-    try:
-        run(rig(), on_period=lambda t: os.kill(os.getpid(), signal.SIGTERM))
-    finally:
-        signal.signal(signal.SIGTERM, before)
-    assert len(seen) > 100
-
-
 # --- the report ----------------------------------------------------------------------
 
 
@@ -470,20 +420,3 @@ def test_completed_means_at_rest(standstill: float) -> None:
     else:
         moved = "the duration is over; then the robot still moved at 0.3"
         assert told == ("fault", moved)
-
-
-def test_a_line_that_fails_in_the_safe_stop_is_no_completion() -> None:
-    def lost(found: Measurement) -> Measurement:
-        raise RuntimeError("the cable")
-
-    for trick, reason in (
-        (lost, "RuntimeError: the cable"),
-        (missing, "for 21 periods"),
-    ):
-        robot = rig(always(trick, 160))  # the safe stop begins at the 152nd read
-        report = run(robot)
-        assert report.ended == "fault"
-        assert report.reason.startswith("the duration is over; then no ")
-        assert reason in report.reason
-        assert report.silent
-        assert not report.at_rest

@@ -122,19 +122,3 @@ def test_a_disk_that_is_full_for_a_moment_leaves_a_whole_journal(
     columns, meta = read_journal(path)
     assert meta == {"what": 1, "status": "stopped", "message": "the disk is full"}
     np.testing.assert_array_equal(columns["a"], [1.0])
-
-
-def test_a_log_that_cannot_be_ended_is_in_the_report(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def fail(*_: object, **__: object) -> None:
-        raise LogError("the disk is gone")
-
-    monkeypatch.setattr(JournalWriter, "write_end", fail)
-    report = run(tmp_path / "a.journal")
-    assert report.ended == "fault"
-    assert report.reason == (
-        "the duration is over; the log cannot be ended: the disk is gone"
-    )
-    assert report.at_rest
-    assert isinstance(report.error, LogError)

@@ -34,7 +34,7 @@ from hsp_control import (
     TargetPosture,
     simulate,
 )
-from hsp_control.common.exceptions import HardwareError, HspControlError, LiveError
+from hsp_control.common.exceptions import HardwareError, LiveError
 from hsp_control.constraints.limits import PositionRange
 from hsp_control.control.changes import Changes
 from hsp_control.control.compensation import Command
@@ -49,7 +49,6 @@ from hsp_control.live import (
     StopSettings,
     run_loop,
 )
-from hsp_control.null_space.fields import FunctionField
 
 Array = NDArray[np.float64]
 AT_REST = 0.02
@@ -102,48 +101,6 @@ def test_it_is_the_simulation_then_stops(tmp_path: Path) -> None:
     assert run["live.phase"][-1] == Phase.HOLDING
 
 
-def test_a_users_effort_source_is_used_and_restarted() -> None:
-    class Halved(Command):
-        restarts = 0
-
-        def restart(self) -> None:
-            self.restarts += 1
-            super().restart()
-
-        def effort(self, t: float, q: Array, v: Array, period: float) -> Array:
-            tau = super().effort(t, q, v, period)
-            return gravity(q) + 0.5 * (tau - gravity(q))
-
-    source = Halved(law())
-    rig = Rig()
-    run_loop(source, rig, duration=0.05)
-    # When it was made, before the rehearsal of a few steps, and when the run began.
-    assert source.restarts == 3
-    state = panda().state(0.0, start(), np.zeros(7))
-    full = law().compute(state).tau
-    np.testing.assert_allclose(rig.sent[0], gravity(start()) + 0.5 * (
-        full - gravity(start())
-    ), atol=1e-9)  # fmt: skip
-
-
-def test_the_controller_receives_the_applied_effort() -> None:
-    applied: list[Array] = []
-
-    class Recording(Command):
-        def applied(self, tau: Array, period: float) -> None:
-            applied.append(np.array(tau))
-            super().applied(tau, period)
-
-    settings = LiveSettings(compensates_gravity=True, effort_rate=50.0)
-    rig = Rig(watched(settings))
-    run_loop(Recording(law()), rig, duration=0.05, settings=settings)
-    applied, sent = applied[: len(rig.sent)], np.array(rig.sent)
-    # tau = sent + g(q); at the start, where it barely moves, g is the start's.
-    np.testing.assert_allclose(applied[0], sent[0] + gravity(start()), atol=1e-9)
-    # And the rate binds at first: the law wants to start at once.
-    assert np.abs(sent[0]).max() == pytest.approx(50.0 * PERIOD)
-
-
 def test_a_first_effort_that_jumps_is_warned_of_before_it_is_sent() -> None:
     rig, sent = Rig(), []
 
@@ -155,14 +112,6 @@ def test_a_first_effort_that_jumps_is_warned_of_before_it_is_sent() -> None:
         warnings.showwarning = show
         run_loop(law(gains=Gains(natural_frequency=20.0)), rig, duration=0.01)
     assert sent[0] == 0
-
-
-def test_a_rate_that_gravity_outruns_is_warned_of() -> None:
-    """As before a simulation."""
-    message = "panda_joint2' may change by 300 N·m/s, but gravity by"
-    limits = hsp.Limits(effort_rate=300.0, velocity={"joints": {"panda_joint2": 30.0}})
-    with pytest.warns(StartWarning, match=message):
-        run_loop(law(limits=limits), Rig(), duration=0.01)
 
 
 def test_a_stream_that_falls_silent_stops_the_robot_safely() -> None:
@@ -194,59 +143,6 @@ def test_tau_less_gravity_is_the_same_motion() -> None:
 
 
 # --- whatever happens: the safe stop -------------------------------------------------
-
-
-def test_a_gap_that_is_allowed_is_held_over_and_counted() -> None:
-    tricks = always(missing, 200, 20) | always(missing, 300, 3)
-    rig = Rig(tricks=tricks)
-    report = run_loop(law(), rig, duration=0.5)
-    assert report.ended == "completed"
-    assert report.deadlines.without_state == 23
-    assert report.deadlines.skipped_states == 23
-    # The first read is not answered, the second is by the first effort: 200 by 198.
-    held = np.array(rig.sent)[197:219]
-    still = np.abs(np.diff(held, axis=0)).max(axis=1) == 0.0
-    np.testing.assert_array_equal(still, [True] * 20 + [False])
-
-
-def test_without_any_state_the_model_stops_it_and_the_loop_falls_silent() -> None:
-    rig = Rig(tricks=always(missing, 200))
-    report = run_loop(law(), rig, duration=5.0)
-    assert report.ended == "fault"
-    assert report.silent
-    # What the model reckoned was true: plant and model are one here, and the robot
-    # had come to rest under the efforts sent blind, before its watchdog could know.
-    predicted = LiveSettings().prediction_time / PERIOD
-    assert len(rig.sent) == pytest.approx(199 + predicted, abs=3)
-    assert report.speed < 0.05
-    assert np.abs(rig.robot.v).max() < AT_REST
-
-
-def bad_field(t: float, what: Any) -> FunctionField:
-    def g(state: hsp.RobotState) -> Array:
-        if state.t < t:
-            return np.zeros(7)
-        if isinstance(what, Exception):
-            raise what
-        return np.full(7, what)
-
-    return FunctionField(g, rate_function=lambda _: np.zeros(7))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("what", [np.nan, ZeroDivisionError("by zero")])
-def test_a_law_that_fails_ends_in_the_safe_stop(what: Any, tmp_path: Path) -> None:
-    controller = law(bad_field(0.2, what))
-    rig, log = Rig(), tmp_path / "run.journal"
-    report = run_loop(controller, rig, duration=5.0, log=log)
-    assert report.ended == "fault"
-    assert isinstance(report.error, HspControlError | ZeroDivisionError)
-    assert_held(rig, report)
-    run = Rollout.load(log)
-    ran = run["live.phase"] == Phase.RUNNING
-    assert np.isfinite(run["field.g"][ran]).all()
-    assert np.isnan(run["field.g"][~ran]).all()  # nobody asked the law again
-    assert np.isfinite(run.q).all()
 
 
 def interrupt(found: Measurement) -> Measurement:
@@ -451,21 +347,6 @@ def test_a_floating_base_that_nothing_holds_is_refused() -> None:
 def test_settings_that_are_none(options: dict[str, Any], message: str) -> None:
     with pytest.raises(LiveError, match=message):
         run_loop(law(), Rig(), **options)
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: LiveSettings(missing=-1), "LiveSettings: missing: -1 is negative"),
-        (lambda: LiveSettings(prediction_time=np.nan), "prediction_time: .nan is not"),
-        (lambda: LiveSettings(effort_rate="fast"), "effort_rate: 'fast'"),
-        (lambda: StopSettings(rest_speed=0.0), "StopSettings: rest_speed: 0"),
-        (lambda: StopSettings(damping=np.inf), "damping: .inf is not"),
-    ],
-)
-def test_numbers_that_are_none(make: Callable[[], object], message: str) -> None:
-    with pytest.raises(LiveError, match=message):
-        make()
 
 
 def test_a_robot_that_is_silent_or_unfit_is_not_started() -> None:

@@ -1,7 +1,6 @@
 """The robot's side: what it accepts, how it stops, and which effort it says it has."""
 
 from collections.abc import Iterable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,22 +8,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from live_rigs import PERIOD, Array, Rig, law, panda, start, watched
 
-from hsp_control import Gains, Limits, Robot, Rollout
+from hsp_control import Gains, Robot
 from hsp_control.control.compensation import Command, Compensation, MomentumObserver
 from hsp_control.live import (
-    Link,
     LiveSettings,
     Measurement,
     Phase,
     SimulatedRobot,
-    UdpHardware,
     run_loop,
 )
-from hsp_control.live.effort_limiter import EffortLimiter
-from hsp_control.live.link import Kind
-from hsp_control.robot.integrators import Rk4, SemiImplicitEuler
+from hsp_control.robot.integrators import SemiImplicitEuler
 from hsp_control.simulation.plants import IntegratedPlant, RigidBodyPlant
-from hsp_control.simulation.plants.model_changes import Payload, changed
 
 RATE = 500.0
 RATED = LiveSettings(effort_rate=RATE)
@@ -72,35 +66,6 @@ def test_efforts_beyond_its_limits_stop_it(
     assert robot.phase is Phase.HOLDING
     assert np.isfinite(taus).all()
     assert np.abs(robot.v).max() < 0.01
-
-
-@pytest.mark.parametrize("compensates", [False, True])
-def test_it_stops_within_its_own_rate_and_effort(compensates: bool) -> None:
-    """From full motion, where an unlimited stop would jump by more than 10 N·m."""
-    settings = LiveSettings(effort_rate=RATE, compensates_gravity=compensates)
-    robot, free = watched(settings), watched()
-    for each in (robot, free):
-        each.v = np.array([1.0, -0.8, 0.5, 0.9, 1.0, -1.0, 1.0])
-        each.plant.reset(0.0, each.q, each.v)
-    held = np.zeros(7) if compensates else gravity(start())
-    taus = fed(robot, [held])
-    jumps = np.abs(np.diff(fed(free, [gravity(start())]), axis=0))
-    assert robot.reason.startswith("the watchdog")
-    steps = np.abs(np.diff(taus, axis=0))
-    # Gravity, which the motors add, changes by less than 0.1 N·m in a period.
-    assert steps.max() <= RATE * PERIOD + 0.1 * compensates + 1e-9
-    assert jumps.max() > 10.0
-    assert np.abs(robot.v).max() < 0.01
-
-
-def test_a_joint_that_is_too_fast_stops_it() -> None:
-    robot = watched()
-    tau = gravity(start())
-    tau[6] += 2.0  # the last link is light
-    taus = fed(robot, [tau] * 100)
-    assert robot.reason.startswith("panda_joint7 moves at 3.0")  # 0.2 in a period
-    assert "its speed is limited to 2.871" in robot.reason  # 10 % above 2.61
-    assert len(taus) < 2000
 
 
 @settings(max_examples=60)
@@ -233,86 +198,6 @@ def test_a_robot_never_rejects_an_effort_over_a_bad_line(
     assert np.abs(np.diff(robot.in_force, axis=0)).max() <= 0.1 * (1.0 + 1e-6)
 
 
-def test_the_controller_is_told_what_the_robot_has() -> None:
-    told: list[Array] = []  # last, before each effort
-
-    class Recording(Command):
-        last = np.zeros(7)
-
-        def effort(self, t: float, q: Array, v: Array, period: float) -> Array:
-            told.append(self.last)
-            return super().effort(t, q, v, period)
-
-        def applied(self, tau: Array, period: float) -> None:
-            self.last = tau.copy()
-            super().applied(tau, period)
-
-    settings = LiveSettings(effort_rate=200.0, velocity_margin=9.0)
-    robot = Lossy(settings, says=True, every=11)
-    quick = law(gains=Gains(natural_frequency=20.0))
-    report = run_loop(Recording(quick), robot, duration=0.1, settings=settings)
-    assert report.ended == "completed", report.reason
-    running = told[-100:]  # after the steps that compile
-    has = np.array(robot.in_force[: len(running) - 1])
-    np.testing.assert_array_equal(running[1:], has)
-    assert not np.array_equal(has, robot.sent[: len(has)])
-
-
-@given(seed=st.integers(0, 2**32 - 1), compensates=st.booleans())
-def test_the_limiter_keeps_the_rate_from_both(seed: int, compensates: bool) -> None:
-    rng = np.random.default_rng(seed)
-    most, step = 40.0, RATE * PERIOD
-    chosen = LiveSettings(
-        effort_rate=RATE, effort=most, compensates_gravity=compensates
-    )
-    limiter = EffortLimiter(panda(), chosen, PERIOD)
-    limiter.reset(start())
-    borne = gravity(start()) if compensates else np.zeros(7)
-    for _ in range(20):
-        before = limiter.sent.copy()
-        known = before + rng.choice([0.0, 0.7, 1.5, 30.0, 1e300]) * rng.choice(
-            [-step, step], 7
-        )
-        changed = limiter.robot_has(known)
-        assert changed is (not np.array_equal(known, before))
-        assert limiter.apply(100.0 * rng.standard_normal(7), start())
-        assert (np.abs(limiter.sent + borne) <= most + 1e-9).all()
-        true = np.clip(known, -most - borne, most - borne)
-        assert (np.abs(limiter.sent - true) <= step + 1e-9).all()
-        near = np.abs(true - before) <= 2.0 * step
-        assert (np.abs(limiter.sent - before)[near] <= step + 1e-9).all()
-
-
-def test_the_log_has_what_the_robot_says(tmp_path: Path) -> None:
-    robot, log = Lossy(RATED, says=True, every=11), tmp_path / "run.journal"
-    run_loop(law(), robot, duration=0.1, settings=RATED, log=log, log_period=PERIOD)
-    logged = Rollout.load(log)
-    has = logged["live.applied"]
-    assert np.isnan(has[0]).all()  # its brakes held it
-    np.testing.assert_array_equal(has[1:100], robot.in_force[:99])
-
-
-def test_a_state_packet_carries_it() -> None:
-    hardware = UdpHardware(panda(), PERIOD)
-    link = Link(hardware.session, peer=hardware.address)
-    numbers = np.arange(21.0)
-    try:
-        for sent in (14, 21, 17):
-            link.send(Kind.STATE, numbers[:sent])
-            found = hardware.read(5.0)
-            assert found is not None
-            np.testing.assert_array_equal(found.v, numbers[7:14])
-            if sent == 14:
-                assert found.applied is None
-            else:  # one of a wrong size is the loop's to refuse
-                assert found.applied is not None
-                np.testing.assert_array_equal(found.applied, numbers[14:sent])
-    finally:
-        hardware.close()
-        hardware.drain()
-        link.close()
-
-
 def test_a_lost_effort_corrects_the_momentum_observer() -> None:
     """What is compensated counts from the applied effort, not from the sent one."""
     observer = Compensation(momentum_observer=MomentumObserver(200.0, cancel=False))
@@ -333,35 +218,3 @@ def test_a_lost_effort_corrects_the_momentum_observer() -> None:
         run_loop(command, Lossy(LiveSettings(), says, every=11), duration=0.1)
     # The plant is the model: nothing disturbs it but sampling.
     assert known.largest < 0.1 * unknown.largest
-
-
-def test_the_start_is_the_loop_s_whatever_the_robot_weighs() -> None:
-    """The brakes held it, so the first effort is not compared with any other."""
-    heavy = changed(panda(), [Payload(frame="panda_tcp", mass=3.0)])
-    plant = IntegratedPlant(RigidBodyPlant(heavy), Rk4(PERIOD))
-    robot = SimulatedRobot(plant, start(), np.zeros(7), PERIOD, settings=RATED)
-    assert robot.in_force is None
-    robot.advance([gravity(start())])
-    assert robot.phase is Phase.RUNNING
-    assert robot.in_force is not None
-    np.testing.assert_array_equal(robot.in_force, gravity(start()))
-
-
-def test_limits_that_fall_are_followed_by_the_rate() -> None:
-    """The effort in force may be beyond the controller's new limit, by far."""
-    pushing = np.array([0.0, 0.0, 0.0, 20.0, 0.0, 0.0, 0.0])
-
-    class Pushing(Command):
-        def effort(self, t: float, q: Array, v: Array, period: float) -> Array:
-            super().effort(t, q, v, period)
-            return gravity(q) + pushing * (t < 0.05)
-
-    chosen = LiveSettings(effort_rate=1000.0, velocity_margin=9.0)
-    source = Pushing(law(limits=Limits(effort=60.0)))
-    source.controller.at(0.04).ramp(0.0).limits(Limits(effort=25.0))
-    robot = Lossy(chosen, says=True, every=11)
-    report = run_loop(source, robot, duration=0.1, settings=chosen)
-    assert report.ended == "completed", report.reason
-    largest = np.abs(robot.in_force)[:, 3]
-    assert largest[:40].max() > 1.5 * 25.0
-    assert largest[80:].max() <= 25.0

@@ -4,19 +4,11 @@ import gc
 import os
 from typing import Any
 
-import numpy as np
 import pytest
 
 import hsp_control as hsp
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.live.real_time import no_garbage_collection, real_time_priority
-from hsp_control.live.report import Quantiles
-
-
-def test_quantiles_are_times_that_were_measured() -> None:
-    times = np.random.default_rng(0).permutation(np.arange(1.0, 10_001.0))
-    assert Quantiles.of(times) == (5001.0, 9901.0, 9991.0, 10_000.0)
-    assert Quantiles.of(np.array([3.0])) == (3.0, 3.0, 3.0, 3.0)
 
 
 def test_the_collector_is_away_and_comes_back() -> None:

@@ -1,19 +1,13 @@
 """The safe stop and what is around it: damping dissipates, hold holds."""
 
-from dataclasses import replace
-
 import numpy as np
-import pinocchio as pin
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from live_rigs import PERIOD, Rig, law, panda, start, watched
+from live_rigs import PERIOD, panda, start, watched
 from numpy.typing import NDArray
 
-from hsp_control import Limits
-from hsp_control.constraints.limits import own_limits
-from hsp_control.control.compensation import Command
-from hsp_control.live import LiveSettings, Phase, SafeStop, StopSettings, run_loop
+from hsp_control.live import LiveSettings, Phase, SafeStop, StopSettings
 from hsp_control.live.effort_limiter import EffortLimiter
 from hsp_control.live.report import Deadlines
 from hsp_control.live.safe_stop import largest_scale
@@ -111,19 +105,6 @@ def test_with_the_right_model_energy_falls_like_the_exponential() -> None:
     )
 
 
-def test_noise_that_hides_the_rest_ends_the_damping_all_the_same() -> None:
-    settings = StopSettings(longest_damping=0.05, hold=0.02)
-    stop = SafeStop(panda(), settings, FREE, PERIOD)
-    rng = np.random.default_rng(0)
-    phases = []
-    while not stop.done:
-        v = 0.1 * rng.standard_normal(7)
-        stop.effort(panda().state(0.0, start(), v))
-        phases.append(stop.phase)
-    assert phases.count(Phase.DAMPING) == 50
-    assert phases.count(Phase.HOLDING) == 20
-
-
 @given(seed=seeds)
 def test_the_share_is_the_greatest_that_fits(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -168,42 +149,6 @@ def test_the_limiter_keeps_both_limits_where_both_can_be(
     np.testing.assert_array_equal(limiter.sent, before)
 
 
-def test_the_limiter_follows_the_limits_of_the_controller() -> None:
-    half, most = np.full(7, 0.5), np.array([87.0] * 4 + [np.inf] * 3)
-    own = own_limits(panda())
-    first, second = replace(own, effort=half), replace(own, effort=most)
-    limiter = EffortLimiter(panda(), LiveSettings(), PERIOD, first)
-    upper = limiter.effort_limits  # what a safe stop was given
-    np.testing.assert_array_equal(upper, half)
-    limiter.follow(second)
-    np.testing.assert_array_equal(upper, most)
-    limiter.follow(None)
-    np.testing.assert_array_equal(upper, panda().model.effortLimit)
-    limited = EffortLimiter(panda(), LiveSettings(effort=3.0), PERIOD, first)
-    limited.follow(second)
-    np.testing.assert_array_equal(limited.effort_limits, np.full(7, 3.0))
-
-
-def test_a_run_s_efforts_are_limited_as_its_controller_s_are() -> None:
-    controller = law(limits=Limits(effort=45.0))
-
-    class Shaking(Command):
-        sign = 1.0
-
-        def effort(self, t: float, q: Array, v: Array, period: float) -> Array:
-            self.sign = -self.sign
-            shaking = np.array([0.0, 200.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-            return super().effort(t, q, v, period) + self.sign * shaking
-
-    controller.at(0.02).ramp(0.0).limits(Limits(effort=60.0))
-    rig = Rig()
-    report = run_loop(Shaking(controller), rig, duration=0.04)
-    assert report.ended == "completed", report.reason
-    sent = np.abs(rig.sent)[:, 1]
-    np.testing.assert_allclose(sent[:19], 45.0, rtol=1e-14)
-    np.testing.assert_allclose(sent[21:40], 60.0, rtol=1e-14)
-
-
 def test_reckoning_is_the_model_s_motion() -> None:
     q, v = at_random(3)
     reckoning = DeadReckoning(panda(), PERIOD)
@@ -230,15 +175,6 @@ def test_reckoning_is_the_model_s_motion() -> None:
 # --- the robot that watches itself ---------------------------------------------------
 
 
-def test_it_waits_under_its_brakes_until_the_first_effort() -> None:
-    robot = watched()
-    for _ in range(50):
-        robot.advance([])
-    assert (robot.phase, robot.t) == (Phase.WAITING, 0.0)
-    robot.advance([gravity(start())])
-    assert (robot.phase, robot.t) == (Phase.RUNNING, PERIOD)
-
-
 def test_its_watchdog_counts_and_forgives() -> None:
     robot = watched(LiveSettings(watchdog=5))
     tau = gravity(start()) + 0.3
@@ -257,31 +193,6 @@ def test_its_watchdog_counts_and_forgives() -> None:
     assert robot.done
     assert np.abs(robot.v).max() < 0.01
     assert robot.reason.startswith("the watchdog")
-
-
-def test_of_several_efforts_the_last_counts_and_none_may_be_nan() -> None:
-    robot = watched()
-    first, second = gravity(start()), gravity(start()) + 1.0
-    robot.advance([first, second])
-    np.testing.assert_array_equal(robot.tau, second)
-    robot.advance([np.full(7, np.inf)])
-    assert robot.phase is Phase.DAMPING
-    assert "not finite" in robot.reason
-    assert np.isfinite(robot.tau).all()
-
-
-def test_compensation_is_of_the_robot_s_own_mass() -> None:
-    heavy = changed(panda(), [Inertias(1.3, 1.0, [0.0, 0.0, 0.0])])
-    plant = IntegratedPlant(RigidBodyPlant(heavy), Rk4(PERIOD))
-    from hsp_control.live import SimulatedRobot
-
-    settings = LiveSettings(compensates_gravity=True)
-    robot = SimulatedRobot(plant, start(), np.zeros(7), PERIOD, settings=settings)
-    for _ in range(200):
-        robot.advance([np.zeros(7)])
-    g = np.array(pin.computeGeneralizedGravity(heavy.model, heavy._data, start()))
-    np.testing.assert_allclose(robot.tau, g, atol=1e-9)
-    assert np.abs(robot.v).max() < 1e-10
 
 
 # --- deadlines -----------------------------------------------------------------------

@@ -10,11 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from oracles import slope
 
-from hsp_control import Cost, Obstacle, RobotState
-from hsp_control.geometry import Proxy
+from hsp_control import Cost, Obstacle
 from hsp_control.geometry.shapes import Sphere
 from hsp_control.null_space.fields import FieldSample, ObstacleClearance
-from hsp_control.null_space.fields.barrier import CORE, barrier
+from hsp_control.null_space.fields.barrier import CORE
 from hsp_control.null_space.metrics import IdentityMetric, MetricSample
 from hsp_control.trajectories import Hold, UniformLine
 
@@ -67,17 +66,6 @@ def test_barrier_is_twice_continuously_differentiable(
     assert (np.abs(above - below) * units <= steepest * 2.0 * tiny).all()
 
 
-def test_barrier_grows_on_towards_contact_and_beyond() -> None:
-    """b falls and is convex in d everywhere within its influence, finite in depth."""
-    d = np.linspace(-1.0, 0.999, 4000)
-    slopes, curvatures = np.zeros((2, len(d)))
-    total = barrier(d, 1.0, slopes, curvatures)
-    assert np.isfinite(total)
-    assert (slopes < 0.0).all()
-    assert (curvatures > 0.0).all()
-    assert total == pytest.approx(sum(barrier_at(x, 1.0)[0] for x in d), rel=1e-13)
-
-
 # --- far away, and once per state ----------------------------------------------------
 
 
@@ -88,27 +76,6 @@ def evaluate(field: Cost, state: Any) -> FieldSample:
     sample = metric.evaluate(state, MetricSample.allocate(nv))
     out = FieldSample(np.full(nv, np.nan), np.full(nv, np.nan))
     return field.evaluate(state, sample, metric.form, out)
-
-
-@pytest.mark.parametrize("gap", [0.001, 0.04, 0.06, 0.2])
-def test_exactly_zero_beyond_the_influence(gap: float) -> None:
-    """Not small but 0, near the influence's edge as well, and g' with it.
-
-    At 1 mm the differences of the rate reach in or not: the barrier's edge is so flat
-    that what they see there is below 1e-6.
-    """
-    robot = load("panda")
-    state = robot.state(0.3, robot.home(), np.linspace(-0.3, 0.3, 7))
-    ball = Obstacle("ball", Sphere(0.1), Hold([0.5, 0.5, 0.5]))
-    d = ObstacleClearance([ball]).minimum_distance(state)
-    field = ObstacleClearance([ball], influence=d - gap)
-    g, g_dot = evaluate(field, state)
-    np.testing.assert_array_equal(g, 0.0)
-    np.testing.assert_array_equal(g_dot, 0.0)
-    assert field.value(state) == 0.0
-    within = ObstacleClearance([ball], influence=d + 0.05)
-    assert np.abs(evaluate(within, state).g).max() > 1e-4
-    assert np.abs(evaluate(within, state).g_dot).max() > 1e-4
 
 
 def test_the_rate_is_zero_however_quick_the_obstacle() -> None:
@@ -177,55 +144,3 @@ def test_distances_are_measured_once_per_state(calls: list[int]) -> None:
     del calls[:]
     evaluate(ObstacleClearance([ball], influence=1.0), state)
     assert not calls
-
-
-def test_distances_are_those_of_the_state_that_is_asked_for() -> None:
-    """Also where a state is gone and another has taken its place in memory."""
-    robot = load("panda")
-    field = ObstacleClearance([Obstacle("ball", Sphere(0.1), AIR)])
-    rng = np.random.default_rng(13)
-    postures = [robot.random_configuration(rng) for _ in range(8)]
-    passing = [
-        field.minimum_distance(robot.state(0.0, q, np.zeros(7))) for q in postures
-    ]
-    kept = [robot.state(0.0, q, np.zeros(7)) for q in postures]
-    assert passing == [field.minimum_distance(state) for state in kept]
-    assert len(set(passing)) == len(postures)
-
-
-@pytest.mark.parametrize("proxy", ["capsules", "hulls"])
-def test_what_is_measured_elsewhere_does_not_disturb(proxy: Proxy) -> None:
-    """Companions of a state, other states and other robots have memory of their own.
-
-    Distances, nearest points, gradient and rate stay the same to the last bit, although
-    the rate by hulls comes from distances at the companion.
-    """
-    field = ObstacleClearance(
-        [Obstacle("ball", Sphere(0.1), AIR)], influence=1.0, proxy=proxy
-    )
-    q, v = load("panda").home(), np.linspace(-0.5, 0.5, 7)
-
-    def found(state: RobotState) -> list[Any]:
-        proximity = field.proximity(state)
-        near = int(np.argmin(proximity.measure(state)))
-        return [
-            field.value(state),
-            field.minimum_distance(state),
-            *proximity.witness(near),
-            field.gradient(state),
-            field.gradient_rate(state),
-            *evaluate(field, state),
-        ]
-
-    state = load("panda").state(0.3, q, v)
-    expected = [np.array(each) for each in found(state)]
-    ahead = state.ahead(0.05)
-    moved = [np.array(each) for each in found(ahead)]
-    other = load("panda").state(0.3, q + 0.2, v)
-    found(load("iiwa14").state(0.3, load("iiwa14").home(), v))
-    found(other)
-    assert field.proximity(state) is field.proximity(state)
-    assert len({id(field.proximity(each)) for each in (state, ahead, other)}) == 3
-    for actual, wanted in zip(found(state), expected, strict=True):
-        np.testing.assert_array_equal(actual, wanted)
-    assert np.abs(moved[4] - expected[4]).max() > 1e-3

@@ -112,15 +112,3 @@ def test_a_start_in_contact_is_refused_where_the_configuration_says_so() -> None
         json.dumps(TOUCHING).replace("[0.2, 0.0, 0.7]", "[0.2, 0.3, 0.7]")
     )
     assert load_experiment(apart).run().status == "completed"
-
-
-def test_a_start_in_contact_with_itself_is_refused() -> None:
-    fields = [{"type": "self_clearance"}]
-    folded = {
-        "joints": {"panda_joint2": 1.7, "panda_joint4": -3.0, "panda_joint6": 0.0}
-    }
-    data = TOUCHING | {"null_space": {"fields": fields}, "start": folded}
-    with pytest.raises(
-        SceneError, match=r"the robot starts in contact: panda_\w+ to panda_\w+, "
-    ):
-        load_experiment(data)

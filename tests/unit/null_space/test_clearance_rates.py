@@ -32,7 +32,7 @@ from hsp_control.geometry.shapes import (
     Sphere,
 )
 from hsp_control.null_space.fields import ObstacleClearance
-from hsp_control.robot import Dop853, Rk4
+from hsp_control.robot import Dop853
 from hsp_control.robot.integrators import Integrator
 from hsp_control.trajectories import Hold, HoldOrientation, Lissajous, Spin, Trajectory
 
@@ -299,17 +299,3 @@ def test_the_null_space_error_is_exponential_beside_a_moving(which: str) -> None
     assert np.abs(rollout["field.g"][30:]).max() > 0.5  # it did push all the time
     assert rollout["distance.obstacle_clearance"].min() > 0.05
     assert np.abs(rollout["task.panda_tcp.error"]).max() < 1e-8
-
-
-class Frozen(ObstacleClearance):
-    """The same without ∂g/∂t."""
-
-    def gradient_rate(self, state: Any) -> Array:
-        return rate_at_one_time(self, state)
-
-
-@pytest.mark.slow
-def test_without_the_obstacles_velocity_it_is_not() -> None:
-    field = Frozen([LOOPS["ball"]], influence=0.3)
-    norm, expected, _ = run(field, 0.6, Rk4(0.005))
-    assert np.abs(norm - expected).max() > 0.3 * norm[0]

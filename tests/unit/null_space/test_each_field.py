@@ -1,7 +1,6 @@
 """Check what each field promises by itself, and sums of fields."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -9,21 +8,16 @@ from field_cases import draw, evaluate, metrics, placed, posture
 from field_oracles import (
     OBSTACLE,
     TIME,
-    frames_of,
     load,
-    plain,
-    point_distance,
     spread,
     swirl_field,
     target,
 )
-from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hsp_control import (
     Controller,
     FramePosition,
-    FunctionCost,
     JointCentering,
     Rest,
     Robot,
@@ -33,7 +27,6 @@ from hsp_control import (
 from hsp_control.common.exceptions import FieldError
 from hsp_control.null_space.fields import (
     FieldSum,
-    FunctionField,
     InverseCondition,
     Manipulability,
     ObstacleClearance,
@@ -43,23 +36,10 @@ from hsp_control.null_space.fields import (
     Transmission,
     Uncontrolled,
 )
-from hsp_control.null_space.fields.weight import Product, sample_weight
-from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric
+from hsp_control.null_space.fields.weight import Product
 from hsp_control.trajectories import Hold
 
 # --- members, one by one -------------------------------------------------------------
-
-
-def test_joint_centering_is_one_half_at_a_limit() -> None:
-    """Each joint at a limit costs ½ w; in the middle nothing, and the slope is 0."""
-    robot = load("panda")
-    field = JointCentering(weights=2.0)
-    low, high = robot.position_limits()
-    middle = robot.state(0.0, 0.5 * (low + high), np.zeros(7))
-    assert field.value(middle) == pytest.approx(0.0, abs=1e-30)
-    np.testing.assert_allclose(field.gradient(middle), 0.0, atol=1e-15)
-    for limit in (low, high):
-        assert field.value(robot.state(0.0, limit, np.zeros(7))) == pytest.approx(7.0)
 
 
 def test_joint_centering_draws_no_joint_faster_than_its_weight() -> None:
@@ -101,94 +81,10 @@ def test_target_posture_is_smooth_all_the_way_round() -> None:
     np.testing.assert_allclose(slopes[turn], slopes[0], atol=3 * step)
 
 
-def test_target_posture_holds_limited_joints_beyond_pi() -> None:
-    """A joint with limits is drawn back the way that it can go, never round."""
-    pytest.importorskip("example_robot_data")
-    robot = load("rolling ur5")  # joints from -2 pi to 2 pi
-    shoulder = robot.velocity_index("shoulder_pan_joint").start
-    moved = np.zeros(robot.nv)
-    moved[shoulder] = 5.0
-    state = robot.state(
-        0.0, robot.integrate(robot.neutral(), moved), np.zeros(robot.nv)
-    )
-    gradient = TargetPosture(robot.neutral()).gradient(state)
-    np.testing.assert_allclose(gradient, moved, rtol=0, atol=1e-14)
-
-
-def test_point_distance_returns_its_minimum_distance() -> None:
-    robot = load("planar3r")
-    field = point_distance("planar3r")
-    q, v = draw("planar3r", 8)
-    c = OBSTACLE.center.sample(TIME).position
-    positions = [plain("planar3r").position(q, f) for f in frames_of("planar3r")[:2]]
-    least = min(np.linalg.norm(p - c) for p in positions)
-    found = field.minimum_distance(robot.state(TIME, q, v))
-    assert found == pytest.approx(least, abs=1e-14)
-    assert Rest().minimum_distance(robot.state(TIME, q, v)) is None
-
-
-def test_given_derivatives_are_used() -> None:
-    """A gradient or rate that is given is not differenced, and its cost not called."""
-    robot = load("planar3r")
-    state = robot.state(0.0, robot.neutral(), np.ones(3))
-
-    def never(state: RobotState) -> Any:
-        raise AssertionError("called")
-
-    cost = FunctionCost(
-        never, gradient_function=lambda s: np.arange(3.0), rate_function=lambda s: s.v
-    )
-    g, g_dot = evaluate(cost, IdentityMetric(), state)
-    np.testing.assert_array_equal(g, [0.0, -1.0, -2.0])
-    np.testing.assert_array_equal(g_dot, [-1.0, -1.0, -1.0])
-    field = FunctionField(lambda s: np.arange(3.0), rate_function=lambda s: 2.0 * s.v)
-    g, g_dot = evaluate(field, MassMatrixMetric(), state)
-    np.testing.assert_array_equal(g, [0.0, 1.0, 2.0])
-    np.testing.assert_array_equal(g_dot, [2.0, 2.0, 2.0])
-
-
 # --- sums ----------------------------------------------------------------------------
 
 
 weights = st.floats(0.0, 1e3)
-
-
-@settings(max_examples=50, deadline=None, derandomize=True)
-@given(weights, weights, weights)
-def test_sums_are_linear(a: float, b: float, c: float) -> None:
-    robot = load("panda")
-    terms = [JointCentering(), posture("panda"), swirl_field("panda", rate=True)]
-    state = robot.state(TIME, *draw("panda", 30))
-    metric = metrics(robot)["constant"][0]
-    samples = [evaluate(field, metric, state) for field in terms]
-    found = evaluate(a * terms[0] + c * (b * terms[1] + terms[2]), metric, state)
-    factors = (a, c * b, c)
-    for k in range(2):
-        parts = [factor * s[k] for factor, s in zip(factors, samples, strict=True)]
-        size = 1.0 + sum(np.abs(part).max() for part in parts)
-        np.testing.assert_allclose(found[k], sum(parts), rtol=0, atol=1e-14 * size)
-
-
-def test_a_weight_is_a_part_of_the_field() -> None:
-    """It may be given to the field, to the sum, or written before them."""
-    robot, twice = load("panda"), 2.0 * posture("panda")
-    assert twice == posture("panda", weight=2.0)
-    assert 1.5 * twice == posture("panda", weight=3.0)
-    total = FieldSum([twice, Rest()], weight=3.0, name="both")
-    assert total == 3.0 * FieldSum([twice, Rest()], name="both")
-    assert total.weight == 1.0
-    assert [f.weight for f in total.terms] == [6.0, 3.0]
-    assert FieldSum([total, twice]).terms == (*total.terms, twice)
-    state = robot.state(TIME, *draw("panda", 31))
-    for found in (twice, posture("panda")):  # only a sum applies the weight
-        assert found.value(state) == posture("panda").value(state)
-    assert sample_weight(2.0, state) == (2.0, 0.0)
-    assert total.value(state) == 6.0 * twice.value(state)
-    metric = IdentityMetric()
-    g, g_dot = evaluate(total, metric, state)
-    alone = evaluate(twice, metric, state)
-    np.testing.assert_array_equal(g, 6.0 * alone.g)
-    np.testing.assert_array_equal(g_dot, 6.0 * alone.g_dot)
 
 
 # --- placing -------------------------------------------------------------------------

@@ -80,17 +80,6 @@ def test_field_and_its_rate(name: str, which: str, metric_name: str) -> None:
         assert np.abs(g_dot).max() > 1e-3  # else nothing was tested
 
 
-@pytest.mark.slow
-@every_field
-def test_the_field_does_not_depend_on_the_velocity(name: str, which: str) -> None:
-    robot, field = load(name), MEMBERS[which].build(name)
-    q, v = draw(name, 3)
-    for metric, _ in metrics(robot).values():
-        first = evaluate(field, metric, robot.state(TIME, q, v)).g
-        second = evaluate(field, metric, robot.state(TIME, q, -2.0 * v)).g
-        np.testing.assert_allclose(first, second, rtol=0, atol=0)
-
-
 # --- differences ---------------------------------------------------------------------
 
 
@@ -149,18 +138,3 @@ def test_rate_along_flow_of_anything() -> None:
     found = differences.rate_along_flow(lambda s: s.position(frame), fast)
     expected = fast.frame(frame).velocity[:3]
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-11 * 1e4)
-
-
-def test_differences_leave_the_state_as_it_was() -> None:
-    robot, frame = load("panda"), "panda_tcp"
-    q, v = draw("panda", 22)
-    state = robot.state(TIME, q, v)
-    before = state.frame(frame).jacobian.copy(), state.mass_matrix.copy()
-    differences.gradient(reach_value(frame), state)
-    differences.rate_along_flow(
-        lambda s: differences.gradient(reach_value(frame), s), state
-    )
-    np.testing.assert_array_equal(state.frame(frame).jacobian, before[0])
-    np.testing.assert_array_equal(state.mass_matrix, before[1])
-    np.testing.assert_array_equal(state.q, q)
-    assert state.t == TIME

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from field_cases import evaluate, placed
-from field_oracles import OBSTACLE, ValueOnly, load, target
+from field_oracles import OBSTACLE, ValueOnly, load
 from numpy.typing import NDArray
 
 from hsp_control import (
@@ -207,24 +207,3 @@ def test_errors(which: str) -> None:
         build()
     assert isinstance(caught.value, HspControlError)
     assert type(caught.value) is kind
-
-
-def test_a_user_s_own_exception_passes() -> None:
-    """What goes wrong in a user's function is told as it is."""
-
-    def fails(state: RobotState) -> float:
-        raise ZeroDivisionError("mine")
-
-    with pytest.raises(ZeroDivisionError, match=r"^mine$"):
-        used(FunctionCost(fails))
-
-
-def test_arguments_are_copied() -> None:
-    goal, w = target("planar3r"), np.ones(3)
-    field = TargetPosture(goal, weights=w)
-    state = arm().state(0.0, target("planar3r"), np.zeros(3))
-    goal[:] = arm().neutral()
-    w[:] = 7.0
-    np.testing.assert_allclose(field.gradient(state), 0.0, atol=1e-15)
-    moved = arm().state(0.0, arm().integrate(state.q, np.full(3, 0.1)), np.zeros(3))
-    np.testing.assert_allclose(field.gradient(moved), np.sin(0.1), rtol=1e-12)

@@ -37,7 +37,6 @@ from hsp_control.null_space.fields.jacobian_cost import (
     JacobianTerms,
     Rows,
 )
-from hsp_control.robot import ToolFrame
 
 Array = NDArray[np.float64]
 WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
@@ -327,48 +326,6 @@ def test_value_gradient_and_rate_at_random_states(
 # -- Pinocchio's kinematic Hessian, which needs no differences -------------------------
 
 
-def kinematic_hessian(robot: Robot, q: Array, joint: int) -> Array:
-    """Return ∂J/∂q_i of a joint's frame, shape (6, nv, nv), the last index i.
-
-    Pinocchio's tensor comes to Python with strides of C order over memory in Fortran's.
-    """
-    memory = data(robot)
-    pin.computeJointKinematicHessians(robot.model, memory, q)
-    tensor = pin.getJointKinematicHessian(robot.model, memory, joint, WORLD_ALIGNED)
-    return np.ravel(tensor, order="C").reshape(tensor.shape, order="F")
-
-
-@pytest.mark.parametrize("rows", ["position", "orientation", "pose"])
-@pytest.mark.parametrize("name", ["panda", "iiwa14", "talos_arm", "stanford"])
-def test_gradient_by_the_kinematic_hessian(
-    name: str, rows: str, load: Callable[[str], Robot]
-) -> None:
-    """∂(-½ log det G)/∂q_i = -tr(J⁺ ∂_iJ), to rounding: also 1e-4 off a singularity.
-
-    J and J⁺ by an SVD are good to ε κ², the gradient's unit is κ.
-    """
-    robot = load(name)
-    joint = robot.model.njoints - 1
-    frame = robot.model.names[joint]
-    field = Manipulability(frame, form="log", rows=rows)  # type: ignore[arg-type]
-    kept = {"position": [0, 1, 2], "orientation": [3, 4, 5], "pose": [*range(6)]}[rows]
-    sharpest = 0.0
-    for k, (q, v) in enumerate(states(robot, 8, seed=2)):
-        if k >= 4:  # ever nearer to a posture that is singular in many ways
-            q = robot.integrate(robot.neutral(), 10.0 ** (3 - k) * v)
-        J = frame_jacobian(robot, q, frame)[kept]
-        H = kinematic_hessian(robot, q, joint)[kept]
-        expected = -np.einsum("jk,kji->i", np.linalg.pinv(J), H)
-        sigma = np.linalg.svd(J)[1]
-        kappa = np.linalg.norm(frame_jacobian(robot, q, frame), 2) / sigma[-1]
-        sharpest = max(sharpest, kappa)
-        # The floor of 1e-6 under σ takes (1e-6/σ)² of the slope away.
-        tolerance = (1e-14 * kappa**2 + 2.0 * (1e-6 / sigma[-1]) ** 2) * kappa
-        close(field.gradient(robot.state(0.0, q, v)), expected, tolerance)
-    if name == "iiwa14":  # stretched out at zero; the others have offsets there
-        assert sharpest > 1e3
-
-
 # -- what the costs say ----------------------------------------------------------------
 
 
@@ -386,35 +343,6 @@ def test_the_planar_arm_in_closed_form(load: Callable[[str], Robot]) -> None:
         assert field.value(state) == pytest.approx(-np.sin(q2), abs=1e-10)
         close(field.gradient(state), [0.0, -np.cos(q2), 0.0], 1e-9)
         close(field.gradient_rate(state), [0.0, -0.7 * np.sin(q2), 0.0], 1e-8)
-
-
-def test_joints_beyond_the_frame_are_left_alone(load: Callable[[str], Robot]) -> None:
-    robot = load("panda")
-    ((q, v),) = states(robot, 1, seed=6)
-    state = robot.state(0.0, q, v)
-    for field in (
-        Manipulability("panda_link5", form="log"),
-        InverseCondition("panda_link5"),
-        Transmission("panda_link5", direction=[0.0, 0.0, 1.0]),
-    ):
-        np.testing.assert_array_equal(field.gradient(state)[5:], 0.0)
-        np.testing.assert_array_equal(field.gradient_rate(state)[5:], 0.0)
-        # Turning about the vertical changes nothing that the vertical does not.
-        assert abs(field.gradient(state)[0]) < 1e-11
-        assert np.abs(field.gradient(state)[1:5]).max() > 1e-3
-
-
-def test_isotropy_is_1_where_all_singular_values_agree() -> None:
-    """Two links of l and l/√2 at 135° are isotropic (Salisbury and Craig 1982)."""
-    tool = ToolFrame("link2", (2.0**-0.5, 0.0, 0.0))
-    robot = Robot.load("planar3r", tool_frames={"short": tool})
-    field = InverseCondition("short", axes="xy")
-    q = robot.integrate(robot.neutral(), np.array([0.4, 0.75 * np.pi, 0.0]))
-    state = robot.state(0.0, q, np.ones(3))
-    assert field.value(state) == pytest.approx(-1.0, abs=1e-12)
-    np.testing.assert_allclose(field.gradient(state), 0.0, atol=1e-11)
-    for q, _ in states(robot, 20, seed=7):
-        assert -1.0 < field.value(robot.state(0.0, q, np.zeros(3))) <= 0.0
 
 
 # -- singularities ---------------------------------------------------------------------

@@ -17,22 +17,11 @@ from hsp_control.null_space.fields import FieldSample
 from hsp_control.null_space.metrics import (
     ConstantMetric,
     CoordinatesMetric,
-    IdentityMetric,
     MassMatrixMetric,
     MetricSample,
 )
 
 seeds = st.integers(0, 2**32 - 1)
-
-
-def test_mass_matrix_metric() -> None:
-    robot = load("panda")
-    rng = np.random.default_rng(30)
-    state = robot.state(0.0, robot.random_configuration(rng), rng.standard_normal(7))
-    sample = MassMatrixMetric().evaluate(state, MetricSample.allocate(7))
-    np.testing.assert_array_equal(sample.W, state.mass_matrix)
-    np.testing.assert_array_equal(sample.W_dot, state.mass_matrix_rate)
-    np.testing.assert_allclose(sample.L @ sample.L.T, sample.W, rtol=0, atol=1e-15)
 
 
 def test_the_mass_matrix_over_the_robots_own_inertia() -> None:
@@ -111,16 +100,6 @@ def test_coordinates_that_are_singular_but_for_rounding(seed: int, n: int) -> No
         CoordinatesMetric(A[:, 1:])
 
 
-def test_constant_metric_keeps_a_copy() -> None:
-    W = np.eye(3)
-    metric = ConstantMetric(W)
-    W[:] = 0.0
-    np.testing.assert_array_equal(metric.W, np.eye(3))
-    np.testing.assert_array_equal(ConstantMetric([1.0, 2.0]).W, np.diag([1.0, 2.0]))
-    with pytest.raises(ValueError, match="read-only"):
-        metric.W[0, 0] = 2.0
-
-
 def test_coordinates_of_the_robot_s_source() -> None:
     """θ = A q of the planar arm are the absolute angles of its links."""
     robot = load("planar3r")
@@ -134,23 +113,6 @@ def test_coordinates_of_the_robot_s_source() -> None:
     np.testing.assert_array_equal(metric.W[0], [3.0, 2.0, 1.0])
     with pytest.raises(MetricError, match="place the metric"):
         CoordinatesMetric().evaluate(start.state, MetricSample.allocate(3))
-
-
-def test_metrics_are_checked_for_the_robot() -> None:
-    robot = load("panda")
-    start = Start(robot.state(0.0, robot.home(), np.zeros(7)), Scene())
-    for metric in (IdentityMetric(), MassMatrixMetric(), ConstantMetric(np.ones(7))):
-        assert metric.placed(start) == metric
-    for wrong, message in (
-        (ConstantMetric(np.ones(6)), r"^matrix: the metric has shape \(6, 6\); the ro"),
-        (
-            CoordinatesMetric(np.eye(3)),
-            r"^matrix: the metric has shape \(3, 3\); the r",
-        ),
-        (CoordinatesMetric(), "^panda defines no joint coordinates; give matrix$"),
-    ):
-        with pytest.raises(MetricError, match=message):
-            wrong.placed(start)
 
 
 def test_a_metric_s_own_evaluate_is_compiled() -> None:

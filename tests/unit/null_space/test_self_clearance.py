@@ -91,38 +91,6 @@ def test_pairs_of_links_that_are_watched() -> None:
     assert field.minimum_distance(home) > 0.0
 
 
-def test_pairs_between_robots_are_all_kept() -> None:
-    """Neither the SRDFs nor the chains say anything about links of two robots."""
-    panda, iiwa = load("panda"), load("iiwa14")
-    beside = pin.SE3(turned(0.0, 0.0, np.pi), np.array([1.1, 0.0, 0.0]))
-    both = Robot.combine({"a": (panda, pin.SE3.Identity()), "b": (iiwa, beside)})
-    watched = names(both)
-    mine = {shape.link for shape in link_shapes(panda)}
-    theirs = {shape.link for shape in link_shapes(iiwa)}
-    for a in mine:
-        for b in theirs:
-            standing = a == "panda_link0" and b == "iiwa_link_0"
-            assert (frozenset((f"a_{a}", f"b_{b}")) in watched) is not standing
-    own = {frozenset(f"a_{x}" for x in pair) for pair in names(panda)}
-    own |= {frozenset(f"b_{x}" for x in pair) for pair in names(iiwa)}
-    across = {pair for pair in watched if len({name[0] for name in pair}) == 2}
-    assert watched - across == own
-    assert own
-
-
-def test_pairs_that_overlap_at_home_are_left_out() -> None:
-    """Shoulders 15 cm apart, 9 cm thick: there is no keeping them clear."""
-    panda = load("panda")
-    near = pin.SE3(turned(0.0, 0.0, np.pi), np.array([-0.15, 0.0, 0.0]))
-    both = Robot.combine({"a": (panda, pin.SE3.Identity()), "b": (panda, near)})
-    field = SelfClearance()
-    watched = names(both)
-    assert frozenset(("a_panda_link1", "b_panda_link1")) not in watched
-    assert frozenset(("a_panda_link0", "b_panda_link1")) not in watched
-    assert frozenset(("a_panda_link1", "b_panda_hand")) in watched
-    assert field.minimum_distance(still(both)) > 0.0
-
-
 @pytest.mark.slow
 def test_each_robot_is_the_others_moving_obstacle() -> None:
     """Gradient and rate of the pairs between two arms that both move."""

@@ -6,23 +6,17 @@ many threads.
 
 import copy
 import pickle
-import sys
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields, replace
-from functools import cache
-from threading import Barrier
 from typing import Any
 
 import numpy as np
 import pytest
 from clearance_cases import AIR, load
-from field_cases import evaluate, placed
+from field_cases import evaluate
 from numpy.typing import NDArray
-from pydantic import TypeAdapter
 from values import assert_documented, assert_is_a_value
 
-from hsp_control import NullSpaceField, Obstacle, Robot, RobotState, geometry
+from hsp_control import NullSpaceField, Obstacle, RobotState, geometry
 from hsp_control import trajectories as paths
 from hsp_control.declaration import Part
 from hsp_control.geometry import Scene, shapes
@@ -30,7 +24,7 @@ from hsp_control.geometry.start import Start
 from hsp_control.law import VARYING
 from hsp_control.null_space import fields as null_space_fields
 from hsp_control.null_space import metrics
-from hsp_control.null_space.fields import FieldSum, Ramp
+from hsp_control.null_space.fields import Ramp
 from hsp_control.null_space.metrics import MassMatrixMetric, Metric, MetricSample
 
 Array = NDArray[np.float64]
@@ -99,15 +93,6 @@ MODULES = (null_space_fields, metrics, geometry, shapes, paths)
 NAMES = {key: value for module in MODULES for key, value in vars(module).items()}
 
 
-def test_no_member_and_no_field_is_left_out() -> None:
-    """Fields that only Python can give, such as a weight of the state, are not here."""
-    assert set(EXAMPLES) == set(members())
-    for name, member in members().items():
-        given = {key for arguments in EXAMPLES[name] for key in arguments}
-        declared = {field.name for field in fields(member)}  # type: ignore[arg-type]
-        assert given == declared - ({"weight"} if name == "uncontrolled" else set())
-
-
 @every_member
 def test_members_are_values(name: str) -> None:
     """The `repr` is the call that makes an equal value; any one field counts."""
@@ -129,29 +114,6 @@ def test_members_are_values(name: str) -> None:
                 changed = member(**rest)
             assert changed != value, key
     assert len({repr(value) for value in examples(name)}) == len(EXAMPLES[name])
-
-
-@every_member
-def test_a_mapping_makes_an_equal_value(name: str) -> None:
-    """What YAML says: lists for arrays, a mapping for a ramp, names for obstacles."""
-    assert NullSpaceField.family is not None
-    base: Any = NullSpaceField if name in NullSpaceField.family.members else Metric
-    adapter: TypeAdapter[Any] = TypeAdapter(base)
-    for arguments in EXAMPLES[name]:
-        named = {key: plain(value) for key, value in arguments.items()}
-        value = members()[name](**named)
-        ramp = {"initial": 0.5, "final": 2, "start": 0.3, "duration": 1}
-        given = named | ({"weight": ramp} if "weight" in named else {})
-        assert adapter.validate_python({"type": name, **given}) == value
-
-
-def plain(value: Any) -> Any:
-    """Return a value as YAML gives it, obstacles by their names."""
-    if isinstance(value, Obstacle):
-        return value.name
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    return [plain(each) for each in value] if isinstance(value, list | tuple) else value
 
 
 @every_member
@@ -208,111 +170,3 @@ def used(part: NullSpaceField | Metric, state: RobotState) -> list[Array]:
 
 
 # --- threads -------------------------------------------------------------------------
-
-
-@cache
-def with_fingers() -> Robot:
-    """Return another robot with the Panda's names; one finger mimics the other."""
-    return Robot.load("panda", locked={}, mimic=False)
-
-
-OF_ANY_ROBOT: dict[str, Callable[[], NullSpaceField | Metric]] = {
-    "rest": null_space_fields.Rest,
-    "uncontrolled": null_space_fields.Uncontrolled,
-    "joint_centering": null_space_fields.JointCentering,
-    "limit_barrier": lambda: null_space_fields.LimitBarrier(1.0),
-    "equal_joint_angles": lambda: null_space_fields.EqualJointAngles(
-        ["panda_joint1", "panda_joint3", "panda_joint5"]
-    ),
-    "point_distance": lambda: null_space_fields.PointDistance(
-        ["panda_hand", "panda_link4"], BALL
-    ),
-    "manipulability": lambda: null_space_fields.Manipulability(rows="pose"),
-    "inverse_condition": lambda: null_space_fields.InverseCondition(),
-    "transmission": lambda: null_space_fields.Transmission(direction=[0, 0, 1]),
-    "obstacle_clearance": lambda: null_space_fields.ObstacleClearance(
-        [BALL, BOX], influence=1.0
-    ),
-    "obstacle_clearance, hulls": lambda: null_space_fields.ObstacleClearance(
-        [BOX], influence=1.0, proxy="hulls"
-    ),
-    "self_clearance": lambda: null_space_fields.SelfClearance(0.5),
-    "identity": metrics.IdentityMetric,
-    "mass_matrix": metrics.MassMatrixMetric,
-    "a sum": lambda: (
-        Ramp(final=2.0, duration=1.0) * null_space_fields.JointCentering()
-        + 0.5 * null_space_fields.ObstacleClearance([BALL], influence=1.0)
-        + null_space_fields.StateWeight(lambda s: 1.0 + s.t * s.t)
-        * null_space_fields.Manipulability()
-    ),
-    "a function": lambda: null_space_fields.FunctionCost(
-        lambda s: float(np.sin(s.t) * s.position("panda_hand") @ [1.0, 2.0, 3.0])
-    ),
-    # These have numbers for 7 joints: both robots have 7.
-    "target_posture": lambda: null_space_fields.TargetPosture(
-        np.linspace(-0.5, 0.5, 7)
-    ),
-    "constant": lambda: metrics.ConstantMetric(W),
-    "coordinates": lambda: metrics.CoordinatesMetric(np.tril(np.ones((7, 7)))),
-}
-
-
-def robots_for(which: str) -> tuple[Robot, Robot]:
-    """Return two robots that a part fits, with other shapes if it can be."""
-    if which in {"target_posture", "constant", "coordinates"}:
-        return load("panda"), load("iiwa14")
-    return load("panda"), with_fingers()
-
-
-def test_every_member_is_in_two_threads() -> None:
-    assert set(members()) <= set(OF_ANY_ROBOT)
-
-
-@pytest.mark.parametrize("which", OF_ANY_ROBOT)
-def test_two_threads_share_a_part(which: str, request: pytest.FixtureRequest) -> None:
-    """Each has a state of another robot; together they find what each finds alone."""
-    robots = robots_for(which)
-    rng = np.random.default_rng(17)
-    visits = {
-        robot: [
-            (0.1 * k, robot.random_configuration(rng), rng.normal(size=robot.nv))
-            for k in range(15)
-        ]
-        for robot in robots
-    }
-
-    def visit(part: NullSpaceField | Metric, robot: Robot) -> list[list[Array]]:
-        state = RobotState(robot)
-        return [used(part, state.update(*where)) for where in visits[robot]]
-
-    expected = [visit(OF_ANY_ROBOT[which](), robot) for robot in robots]
-    shared, together = OF_ANY_ROBOT[which](), Barrier(2)
-
-    def at_once(robot: Robot) -> list[list[Array]]:
-        together.wait()
-        return visit(shared, robot)
-
-    interval = sys.getswitchinterval()
-    request.addfinalizer(lambda: sys.setswitchinterval(interval))
-    sys.setswitchinterval(1e-6)
-    with ThreadPoolExecutor(2) as pool:
-        found = list(pool.map(at_once, robots))
-    for one, other in zip(found, expected, strict=True):
-        for mine, wanted in zip(one, other, strict=True):
-            for actual, value in zip(mine, wanted, strict=True):
-                np.testing.assert_array_equal(actual, value)
-    if which not in {"rest", "uncontrolled", "identity", "constant", "coordinates"}:
-        first, second = (np.concatenate([x.ravel() for x in row[1]]) for row in found)
-        assert first.shape != second.shape or (first != second).any()
-
-
-def test_sums_are_values() -> None:
-    """They are in no family, since YAML has a list of fields instead."""
-    terms = [part for name in EXAMPLES for part in examples(name)]
-    field = FieldSum(
-        [term for term in terms if isinstance(term, NullSpaceField) and term.controls]
-    )
-    assert_is_a_value(field, NAMES)
-    robot = load("panda")
-    state = robot.state(0.0, robot.home(), np.zeros(7))
-    assert placed(field, state, [BALL, BOX]) != field

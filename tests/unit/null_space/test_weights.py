@@ -3,8 +3,6 @@
 import re
 from collections.abc import Callable
 from functools import cache
-from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from oracles import gradient, slope
+from oracles import slope
 
 from hsp_control import (
     Controller,
@@ -43,7 +41,7 @@ from hsp_control.null_space.fields import (
     StateWeight,
     Weight,
 )
-from hsp_control.null_space.fields.weight import Product, sample_weight
+from hsp_control.null_space.fields.weight import sample_weight
 from hsp_control.null_space.metrics import (
     ConstantMetric,
     IdentityMetric,
@@ -84,16 +82,6 @@ def random_state(robot: Robot, seed: int, t: float = 0.8) -> RobotState:
     rng = np.random.default_rng(seed)
     q = robot.random_configuration(rng)
     return robot.state(t, q, 0.7 * rng.normal(size=robot.nv))
-
-
-def along(
-    state: RobotState, function: Callable[[RobotState], Any], step: float
-) -> Array:
-    """Return d/dt of a function along (q ⊕ s v, t + s), by sixth order."""
-    robot, q, v = state.robot, state.q.copy(), state.v.copy()
-    return slope(
-        lambda s: function(robot.state(state.t + s, robot.integrate(q, s * v), v)), step
-    )
 
 
 # -- weights ---------------------------------------------------------------------------
@@ -154,17 +142,6 @@ def test_a_weight_of_the_state_and_its_rate() -> None:
         assert w_dot == pytest.approx(
             np.cos(angle) * (2.0 + hand.velocity[0]), rel=0, abs=1e-10
         )
-
-
-def test_products_of_weights() -> None:
-    state = at(0.7)
-    ramp = Ramp(initial=0.0, final=2.0, start=0.0, duration=1.0)
-    of_time = StateWeight(lambda s: np.exp(-s.t))
-    w, w_dot = Product(ramp, of_time).sample(state)
-    (a, a_dot), (b, b_dot) = ramp.sample(state), of_time.sample(state)
-    assert (w, w_dot) == (a * b, a_dot * b + a * b_dot)
-    assert ConstantWeight(3.0).sample(state) == (3.0, 0.0)
-    assert ConstantWeight(0).sample(state) == (0.0, 0.0)
 
 
 # -- sums ------------------------------------------------------------------------------
@@ -240,25 +217,6 @@ def test_each_terms_share_is_kept_and_they_add_up() -> None:
         value += w * term.value(state)
     assert field.value(state) == pytest.approx(value, rel=1e-14)
     assert not samples[-1].g.any()  # of weight 0
-
-
-def test_sums_are_flattened_and_weights_multiplied() -> None:
-    """2 (a + 3 b) + ramp c has the three terms 2 a, 6 b and ramp c."""
-    a, b, c = JointCentering(), Rest(), TargetPosture("home")
-    ramp = Ramp(initial=1.0, final=0.0, start=0.0, duration=1.0)
-    field = 2 * (a + 3.0 * b) + ramp * c
-    assert field.terms == (2.0 * a, 6.0 * b, ramp * c)
-    state = at(0.5)
-    assert [sample_weight(term.weight, state) for term in field.terms] == [
-        (2.0, 0.0),
-        (6.0, 0.0),
-        ramp.sample(state),
-    ]
-    assert (2.0 * (ramp * c)).weight == Ramp(
-        initial=2.0, final=0.0, start=0.0, duration=1.0
-    )
-    assert ramp.sample(state) == (0.5, -1.875)
-    assert field.name == "joint_centering + rest + target_posture"
 
 
 def test_the_log_tells_who_moves_the_arm() -> None:
@@ -372,102 +330,6 @@ def test_limit_barrier_value_gradient_and_rate(name: str, zone: float) -> None:
             field.gradient_rate(state), g_dot, rtol=0, atol=1e-10 * scale
         )
     assert grown > 2
-
-
-def test_limit_barrier_against_differences_and_in_its_core() -> None:
-    """Also at the limit itself and beyond, where its parabola goes on."""
-    robot = load("panda")
-    field = LimitBarrier(zone=0.5)
-    lower, upper = robot.position_limits()
-    fraction = np.array([0.02, 0.1, 0.999, 1.02, -0.01, 0.5, 0.9])
-    q = lower + fraction * (upper - lower)
-    v = np.linspace(-1.0, 1.0, 7)
-    state = robot.state(0.0, q, v)
-    by_value = gradient(lambda x: field.value(robot.state(0.0, q + x, v)), 7, 1e-4)
-    g = field.gradient(state)
-    np.testing.assert_allclose(g, by_value, rtol=1e-8, atol=1e-8)
-    rate = along(state, field.gradient, 1e-4)
-    np.testing.assert_allclose(field.gradient_rate(state), rate, rtol=1e-8, atol=1e-7)
-    assert g[5] == 0.0
-    assert (
-        g[[0, 1, 4]] < 0.0
-    ).all()  # the field -∇f leads upwards, off the lower limit
-    assert (g[[2, 3, 6]] > 0.0).all()
-    assert np.isfinite(g).all()
-
-
-@pytest.mark.parametrize("name", LIMITED)
-def test_limit_barrier_is_exactly_0_in_the_middle(name: str) -> None:
-    """Over the whole of the flat part, in value, field and rate, and then it grows."""
-    robot = load(*LIMITED[name])
-    field = LimitBarrier(zone=0.4)
-    half = half_range(robot)
-    rng = np.random.default_rng(4)
-    for part in (0.0, 0.3, -0.5999, 0.5999):
-        q = robot.integrate(robot.neutral(), middle(robot) + part * half)
-        state = robot.state(0.0, q, rng.normal(size=robot.nv))
-        assert field.value(state) == 0.0
-        g, g_dot = evaluate(field, IdentityMetric(), state)
-        np.testing.assert_array_equal(g, 0.0)
-        np.testing.assert_array_equal(g_dot, 0.0)
-    values = []
-    for part in (0.61, 0.7, 0.8, 0.9, 0.99):
-        q = robot.integrate(robot.neutral(), middle(robot) + part * half)
-        values.append(field.value(robot.state(0.0, q, np.zeros(robot.nv))))
-    assert all(y > 2.0 * x > 0.0 for x, y in pairwise(values))
-
-
-def test_limits_that_are_not_written_count_as_none(tmp_path: Path) -> None:
-    """A URDF's revolute joint without numbers has a range of 0 to 0, which is none."""
-    inertial = (
-        '<inertial><origin xyz="0.1 0.1 0"/><mass value="1"/>'
-        '<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>'
-    )
-    numbers = ('lower="-1" upper="2"', "")
-    links = "".join(f'<link name="l{k}">{inertial}</link>' for k in range(3))
-    joints = "".join(
-        f'<joint name="j{k}" type="revolute">'
-        f'<parent link="l{k}"/><child link="l{k + 1}"/>'
-        '<origin xyz="0.3 0 0"/><axis xyz="0 0 1"/>'
-        f'<limit {two} effort="1" velocity="1"/></joint>'
-        for k, two in enumerate(numbers)
-    )
-    file = tmp_path / "loose.urdf"
-    file.write_text(f'<robot name="loose">{links}{joints}</robot>')
-    robot = Robot.load(file)
-    state = robot.state(0.0, np.array([1.5, 0.5]), np.zeros(2))
-    g = LimitBarrier(zone=1.0).gradient(state)
-    assert g[0] > 0.0
-    assert g[1] == 0.0
-
-
-def test_the_field_keeps_a_pushed_joint_off_its_limit() -> None:
-    """A field that drives joint 4 up into its limit is balanced before it is there."""
-    robot = load("panda")
-    push = FunctionField(
-        lambda s: np.eye(7)[3] * 0.8, rate_function=lambda s: np.zeros(7), name="push"
-    )
-    upper = robot.position_limits()[1][3]
-    start = robot.home()
-    state = robot.state(0.0, start, np.zeros(7))
-    height = FramePosition(
-        "panda_tcp",
-        Hold(state.position("panda_tcp")[:1]),
-        gains=Gains(100, 20),
-        axes="y",
-    )
-    ends = {}
-    for name, field in (("with", push + 0.05 * LimitBarrier()), ("without", push)):
-        rollout = simulate(
-            Controller(robot, [height], field, limits=None),
-            start,
-            duration=6.0,
-            log_period=0.1,
-            integrator=Rk4(0.01),
-        )
-        ends[name] = rollout.q[:, 3].max() - upper
-    assert ends["without"] > 1.0
-    assert -0.5 < ends["with"] < -0.01
 
 
 # -- what cannot be --------------------------------------------------------------------

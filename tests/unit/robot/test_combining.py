@@ -1,7 +1,6 @@
 """Several robots as one: each block is the robot alone, where it was put."""
 
 import copy
-import pickle
 from collections.abc import Callable
 from functools import cache
 
@@ -26,7 +25,6 @@ from hsp_control.common.exceptions import (
     ModelError,
 )
 from hsp_control.common.resources import bundled_robots
-from hsp_control.geometry import link_shapes
 from hsp_control.robot.description.combining import Part, combine, placement
 from hsp_control.robot.description.sources import RobotSource
 from hsp_control.robot.integrators import Rk4
@@ -61,14 +59,6 @@ def alone(place: pin.SE3) -> Robot:
 
 
 ARMS = {"left": (slice(0, 7), LEFT), "right": (slice(7, 14), RIGHT)}
-
-
-def draw(seed: int) -> tuple[Array, Array, Array]:
-    """Return a configuration, a velocity and an acceleration of both arms."""
-    rng = np.random.default_rng(seed)
-    q = pair().random_configuration(rng)
-    v, a = rng.normal(size=(2, 14))
-    return q, v, a
 
 
 def test_placement_is_a_position_and_roll_pitch_yaw() -> None:
@@ -139,86 +129,6 @@ def test_combined_robots_do_not_mix() -> None:
             assert not moved.any()
     assert not M.any()  # nothing outside the blocks
     assert not M_dot.any()
-
-
-def test_names_and_limits() -> None:
-    both, panda = pair(), load("panda")
-    assert both.name == "panda+panda"
-    assert both.joint_names == tuple(
-        f"{arm}_{joint}" for arm in ARMS for joint in panda.joint_names
-    )
-    for arm, (own, _) in ARMS.items():
-        for name in panda.frame_names[1:]:
-            assert f"{arm}_{name}" in both.frame_names
-        assert both.velocity_index(f"{arm}_panda_joint4").start == own.start + 3
-        for what in ("upperEffortLimit", "upperVelocityLimit", "armature", "damping"):
-            ours, theirs = getattr(both.model, what), getattr(panda.model, what)
-            np.testing.assert_array_equal(ours[own], theirs)
-    assert both.frame_names.count("universe") == 1
-
-
-def test_gravity_is_the_robots_own() -> None:
-    weightless = {
-        name: (Robot.load(robot, gravity=(0.0, 0.0, 0.0)), HERE)
-        for name, robot in (("a", "panda"), ("b", "iiwa14"))
-    }
-    both = Robot.combine(weightless)
-    state = both.state(0.0, both.home(), np.zeros(both.nv))
-    np.testing.assert_allclose(state.nonlinear_effects, 0.0, rtol=0, atol=1e-12)
-
-
-@pytest.mark.parametrize("proxy", ["capsules", "spheres", "meshes"])
-def test_geometry_stands_where_the_robots_stand(proxy: str) -> None:
-    """Each shape of each arm, the base included, where the arm alone has it, moved."""
-    q, _, _ = draw(5)
-    shapes = link_shapes(pair(), proxy)  # type: ignore[arg-type]
-    own_shapes = link_shapes(load("panda"), proxy)  # type: ignore[arg-type]
-    assert len(shapes) == 2 * len(own_shapes)
-    data = pair().model.createData()
-    pin.forwardKinematics(pair().model, data, q)
-    for k, (arm, (own, place)) in enumerate(ARMS.items()):
-        single = load("panda").model.createData()
-        pin.forwardKinematics(load("panda").model, single, q[own])
-        of_arm = shapes[k * len(own_shapes) : (k + 1) * len(own_shapes)]
-        for ours, theirs in zip(of_arm, own_shapes, strict=True):
-            assert ours.link == f"{arm}_{theirs.link}"
-            there = place * (single.oMi[theirs.joint] * theirs.placement)
-            here = data.oMi[ours.joint] * ours.placement
-            np.testing.assert_allclose(here.homogeneous, there.homogeneous, atol=1e-13)
-            assert type(ours.geometry) is type(theirs.geometry)
-            for size in ("radius", "halfLength"):
-                one, other = (getattr(s.geometry, size, 0.0) for s in (ours, theirs))
-                assert one == other
-
-
-@pytest.mark.parametrize(
-    "duplicate",
-    [lambda robot: pickle.loads(pickle.dumps(robot)), copy.deepcopy],
-    ids=["pickle", "deepcopy"],
-)
-def test_copies_are_whole(duplicate: Callable[[Robot], Robot]) -> None:
-    """Dynamics, home and geometry, whose parts a copy has to know."""
-    twin, both = duplicate(pair()), pair()
-    q, v, a = draw(6)
-    one, two = both.state(0.0, q, v), twin.state(0.0, q, v)
-    np.testing.assert_array_equal(one.inverse_dynamics(a), two.inverse_dynamics(a))
-    np.testing.assert_array_equal(both.home(), twin.home())
-    assert [part.prefix for part in twin.parts] == ["left_", "right_"]
-    for part, place in zip(twin.parts, (LEFT, RIGHT), strict=True):
-        np.testing.assert_array_equal(part.placement.homogeneous, place.homogeneous)
-    for ours, theirs in zip(link_shapes(both), link_shapes(twin), strict=True):
-        assert (ours.link, ours.joint) == (theirs.link, theirs.joint)
-        np.testing.assert_array_equal(
-            ours.placement.homogeneous, theirs.placement.homogeneous
-        )
-
-
-def test_the_robots_that_are_combined_stay_as_they_were() -> None:
-    panda = Robot.load("panda")
-    frames = panda.frame_names
-    Robot.combine({"a": (panda, LEFT), "b": (panda, RIGHT)})
-    assert tuple(frame.name for frame in panda.model.frames) == frames
-    assert list(panda.model.names)[1:] == list(panda.joint_names)
 
 
 def test_each_arm_moves_as_if_alone() -> None:
@@ -301,9 +211,3 @@ def test_every_mistake_is_named(
     with pytest.raises(error) as caught:
         make()
     assert message in str(caught.value)
-
-
-def test_mimic_joints_combine_as_free_ones() -> None:
-    free = Robot.load("panda", locked={}, mimic=False)
-    both = Robot.combine({"a": (free, LEFT), "b": (load("panda"), RIGHT)})
-    assert both.nv == 9 + 7

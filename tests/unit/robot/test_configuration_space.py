@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from refused_robots import REFUSED
-from robot_cases import BUNDLED, ROBOTS, draw, load
+from robot_cases import BUNDLED, ROBOTS, load
 
 from hsp_control import Robot
 from hsp_control.common.exceptions import ConfigurationError, ShapeError
@@ -64,46 +64,6 @@ def test_unit_blocks() -> None:
     rng = np.random.default_rng(0)
     robot.check_configuration(robot.random_configuration(rng))
     np.testing.assert_array_equal(robot.home(), robot.neutral())
-
-
-def test_what_is_flat() -> None:
-    """All but a root that turns: elsewhere velocities are rates of coordinates."""
-    cases = ("planar3r", "panda_fingers", "solo12", "talos_arm_planar")
-    assert [load(case).flat for case in cases] == [True, True, False, False]
-
-
-@pytest.mark.parametrize("case", ROBOTS)
-def test_integrate_and_difference_undo_each_other(case: str) -> None:
-    robot, q, v, _ = draw(case, seed=23)
-    moved = robot.integrate(q, 0.5 * v)
-    robot.check_configuration(moved)
-    np.testing.assert_allclose(robot.difference(q, moved), 0.5 * v, rtol=0, atol=1e-13)
-
-
-@pytest.mark.parametrize("case", ["planar3r", "tiago", "tiago_pro", "solo12"])
-def test_joint_positions(case: str) -> None:
-    """The log from neutral; continuous joints as angles in (-π, π]."""
-    robot, rng = load(case), np.random.default_rng(24)
-    single = [j for j in robot.joints.values() if j.nv == 1]
-    angles = np.zeros(robot.nv)
-    for joint in single:
-        angles[joint.idx_v] = rng.uniform(-3.1, 3.1)
-    q = robot.integrate(robot.neutral(), angles)
-    np.testing.assert_allclose(robot.joint_positions(q), angles, rtol=0, atol=1e-14)
-
-    turned = angles.copy()
-    for joint in single:
-        if joint.nq == 2:  # winds twice: the angle comes back
-            turned[joint.idx_v] += 4.0 * np.pi
-    q = robot.integrate(robot.neutral(), turned)
-    # 1e-14 of the sine and cosine of up to 16 rad.
-    np.testing.assert_allclose(robot.joint_positions(q), angles, rtol=0, atol=1e-14)
-
-
-def test_half_a_turn_is_pi_and_not_minus_pi() -> None:
-    robot = load("planar3r")
-    q = np.array([-1.0, 0.0, 1.0, 0.0, 0.0, 1.0])
-    np.testing.assert_array_equal(robot.joint_positions(q), [np.pi, 0.0, np.pi / 2])
 
 
 @pytest.mark.slow
@@ -171,47 +131,6 @@ def test_random_and_home_configurations_are_within_limits(name: str) -> None:
     # The generator decides: the same seed draws the same.
     again = robot.random_configuration(np.random.default_rng(25))
     np.testing.assert_array_equal(again, drawn[0])
-
-
-def test_random_configurations_fill_the_space() -> None:
-    """Continuous joints go all the way round, limited ones from end to end."""
-    rng = np.random.default_rng(26)
-    for case in ("planar3r", "panda"):
-        robot = load(case)
-        lower, upper = robot.position_limits()
-        low = np.where(np.isfinite(lower), lower, -np.pi)
-        high = np.where(np.isfinite(upper), upper, np.pi)
-        drawn = [robot.random_configuration(rng) for _ in range(400)]
-        positions = np.array([robot.joint_positions(q) for q in drawn])
-        # Of 400 uniform draws none in a given twentieth at an end: 0.95^400 = 1e-9.
-        assert (positions.min(axis=0) < low + 0.05 * (high - low)).all()
-        assert (positions.max(axis=0) > high - 0.05 * (high - low)).all()
-
-
-def test_floating_root_is_drawn_in_a_unit_box_any_way_up() -> None:
-    robot, rng = load("solo12"), np.random.default_rng(27)
-    drawn = np.array([robot.random_configuration(rng)[:7] for _ in range(400)])
-    assert np.abs(drawn[:, :3]).max() <= 1.0
-    assert drawn[:, :3].min() < -0.9
-    assert drawn[:, :3].max() > 0.9
-    # Uniform on SO(3): E[R] = 0; the mean of 400 entries of R has deviation 0.03.
-    mean = np.mean([pin.Quaternion(q).matrix() for q in drawn[:, 3:]], axis=0)
-    assert np.abs(mean).max() < 0.15
-
-
-def test_neutral_is_every_joint_at_zero() -> None:
-    for case in ROBOTS:
-        robot = load(case)
-        neutral = robot.neutral()
-        robot.check_configuration(neutral)
-        assert not robot.joint_positions(neutral).any()
-
-
-def test_equal_limits_mean_none() -> None:
-    """A URDF that leaves limits out gives 0 to 0 (double_pendulum)."""
-    robot = Robot.load("double_pendulum")
-    assert np.isinf(robot.position_limits()).all()
-    assert robot.random_configuration(np.random.default_rng(0)).all()
 
 
 def test_lists_will_do() -> None:

@@ -9,7 +9,6 @@ from robot_texts import ARM, INERTIA
 from scipy.optimize import minimize
 
 from hsp_control import Robot
-from hsp_control.common.exceptions import ModelError
 from hsp_control.robot.description.inertias import (
     FLOOR,
     impossible_inertias,
@@ -26,17 +25,6 @@ def second_moments(tensor: np.ndarray) -> np.ndarray:
     return 0.5 * np.trace(tensor) * np.eye(3) - tensor
 
 
-def of_points(seed: int) -> np.ndarray:
-    """Return the inertia of some point masses about their centre, shape (3, 3)."""
-    rng = np.random.default_rng(seed)
-    points, masses = rng.standard_normal((5, 3)), rng.uniform(0.1, 1.0, 5)
-    points -= masses @ points / masses.sum()
-    return sum(
-        m * (x @ x * np.eye(3) - np.outer(x, x))
-        for m, x in zip(masses, points, strict=True)
-    )
-
-
 def of_no_body(seed: int) -> np.ndarray:
     """Return a symmetric matrix that violates the triangle inequality."""
     rng = np.random.default_rng(seed)
@@ -44,13 +32,6 @@ def of_no_body(seed: int) -> np.ndarray:
     low, middle = rng.uniform(-0.1, 1.0, 2)
     high = low + middle + rng.uniform(0.05, 2.0)
     return axes @ np.diag([low, middle, high]) @ axes.T
-
-
-@pytest.mark.parametrize("seed", SEEDS)
-def test_what_a_body_can_have_stays_to_the_last_bit(seed: int) -> None:
-    tensor = of_points(seed)
-    assert is_possible(tensor)
-    assert nearest_possible(tensor) is tensor
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -91,22 +72,6 @@ def test_projection_is_nearest_in_the_pseudo_inertia(seed: int) -> None:
     assert found.fun < np.linalg.norm(right - wrong) + 1e-3  # the search came near
 
 
-def test_projection_of_a_known_case() -> None:
-    """I = diag(1, 1, 4): Σ = diag(2, 2, -1), whose last entry becomes the floor.
-
-    Σ* = diag(x, x, k x) with k x = FLOOR (2 + k) x; x minimises 2(x - 2)² + (k x + 1)².
-    """
-    k = 2.0 * FLOOR / (1.0 - FLOOR)
-    x = (4.0 - k) / (2.0 + k**2)
-    expected = np.diag([x + k * x, x + k * x, 2.0 * x])
-    projected = nearest_possible(np.diag([1.0, 1.0, 4.0]))
-    np.testing.assert_allclose(projected, expected, rtol=1e-14, atol=1e-15)
-
-
-def test_nothing_is_left_of_moments_that_are_all_negative() -> None:
-    np.testing.assert_allclose(nearest_possible(-np.eye(3)), 0.0, atol=1e-15)
-
-
 HEAVY = INERTIA.replace('izz="0.1"', 'izz="0.5"')
 
 
@@ -139,12 +104,3 @@ def test_a_robot_is_loaded_with_projected_inertias(tmp_path: Path) -> None:
         changed.inertia, nearest_possible(np.diag([0.1, 0.1, 0.5])), rtol=1e-14
     )
     assert asked.model.inertias[2] == not_asked.model.inertias[2]
-
-
-def test_negative_moments_load_only_if_projected(tmp_path: Path) -> None:
-    path = write(tmp_path, INERTIA.replace('ixx="0.1"', 'ixx="-0.1"'))
-    message = "link 'upper': .* a principal moment is -0.1 .*; project_inertias: true"
-    with pytest.raises(ModelError, match=message):
-        Robot.load(path)
-    robot = Robot.load(path, project_inertias=True)
-    assert is_possible(robot.model.inertias[1].inertia)

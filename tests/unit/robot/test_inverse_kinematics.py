@@ -44,17 +44,6 @@ def test_a_place_that_the_robot_has_been_at_is_reached(
         np.testing.assert_allclose(there.rotation, place.rotation, atol=1e-8)
 
 
-def test_self_motion_goes_to_what_is_preferred() -> None:
-    """From a start elsewhere on the same self-motion it comes back."""
-    robot = Robot.load("iiwa14")
-    target = Target(robot.end_effector, place_at(robot, robot.home()), 6)
-    J = robot.state(0.0, robot.home(), np.zeros(7)).frame(target.frame).jacobian
-    away = robot.home() + 0.3 * np.linalg.svd(J)[2][6]
-    found = search(robot, target, away, robot.home())
-    assert found.converged
-    np.testing.assert_allclose(found.q, robot.home(), atol=0.01)
-
-
 def test_beyond_reach_it_comes_as_near_as_the_arm_is_long() -> None:
     robot = Robot.load("planar3r")
     tip = place_at(robot, robot.neutral()).translation

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from refused_robots import LATE_LEADER, NO_LEADER, REFUSED
-from robot_texts import ARM, BUNDLED, assert_same_placements, link, placements
+from robot_texts import ARM, assert_same_placements, link, placements
 
 from hsp_control import Robot
 from hsp_control.common import resources
@@ -31,22 +31,6 @@ def example(name: str) -> Robot:
 
 
 # --- by name -------------------------------------------------------------------------
-
-
-def test_bundled_robots_come_before_those_of_example_robot_data() -> None:
-    """Both have a panda; the bundled one locks its fingers."""
-    assert set(BUNDLED) <= set(bundled_robots())
-    assert Robot.load("panda").source.origin == "bundled"
-    if example_robots():
-        assert example_robots()["panda"].origin == "example-robot-data"
-
-
-def test_an_example_robot_and_its_packages() -> None:
-    robot = example("talos")
-    assert (robot.source.root, robot.nq, robot.nv) == ("free_flyer", 39, 38)
-    assert robot.source.origin == "example-robot-data"
-    assert robot.source.package_dirs[0].name == "share"
-    assert (robot.source.package_dirs[0] / "example-robot-data").is_dir()
 
 
 @pytest.mark.slow
@@ -112,45 +96,7 @@ def test_bundled_folder_of_a_wheel(
     assert Robot.load("arm").joint_names == ("shoulder", "elbow")
 
 
-def test_bundle_without_a_home_and_with_all_settings(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    arm = tmp_path / "robots" / "arm"
-    arm.mkdir(parents=True)
-    (arm / "arm.urdf").write_text(ARM)
-    (arm / "robot.yaml").write_text("locked: {elbow: 0.5}\nhome: [1]\n")
-    monkeypatch.setattr(resources, "_PACKAGE", tmp_path / "package")
-    robot = Robot.load("arm")
-    assert robot.joint_names == ("shoulder",)
-    np.testing.assert_array_equal(robot.home(), [1.0])
-    assert Robot.load("arm", locked={}).nv == 2
-    (arm / "robot.yaml").write_text("")
-    assert Robot.load("arm").nv == 2
-
-
 # --- by path -------------------------------------------------------------------------
-
-
-def test_path_as_text_as_path_and_in_the_home_folder(
-    write: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = write(ARM)
-    monkeypatch.setenv("HOME", str(path.parent))
-    for name in (path, str(path), "~/arm.urdf"):
-        robot = Robot.load(name)
-        assert (robot.name, robot.source.origin) == ("arm", "file")
-    monkeypatch.chdir(path.parent)
-    assert Robot.load("arm.urdf").nv == 2  # no separator: the ending tells
-    write(ARM, "arm.xml")
-    assert Robot.load("arm.xml").nv == 2
-    write(ARM, "without_ending")
-    assert Robot.load("./without_ending").nv == 2
-
-
-def test_model_is_the_urdfs(write: Callable[..., Path]) -> None:
-    """What comes out is Pinocchio's own reading of the file."""
-    path = write(ARM)
-    assert Robot.load(path).model == pin.buildModelFromUrdf(str(path))
 
 
 def test_package_folders_of_a_file(
@@ -194,10 +140,3 @@ def test_root(root: Any, nq: int, nv: int, write: Callable[..., Path]) -> None:
     moved = {name: pose.homogeneous @ M for name, M in standing.items()}
     assert_same_placements(moved, placements(robot.model, q))
     np.testing.assert_array_equal(robot.check_configuration(q), q)
-
-
-def test_source_names_the_root_unless_told_otherwise() -> None:
-    assert example("solo12").nv == 18
-    assert Robot.load("solo12", root="fixed").nv == 12
-    assert Robot.load("solo12", root="planar").nv == 15
-    assert Robot.load("talos_arm", root="free_flyer").nv == 13

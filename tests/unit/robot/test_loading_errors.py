@@ -5,7 +5,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import yaml
 from places import ROOT
@@ -18,7 +17,6 @@ from hsp_control.common.exceptions import (
     ModelError,
     RobotNotFoundError,
 )
-from hsp_control.geometry import link_shapes
 from hsp_control.robot import ToolFrame
 
 
@@ -105,16 +103,6 @@ def test_file_that_is_no_robot(
     assert str(path) in str(caught.value)
 
 
-def test_hint_to_load_mimic_joints_as_free_ones_helps(
-    write: Callable[..., Path],
-) -> None:
-    path = write(ARM.replace("</joint>", '<mimic joint="elbow"/></joint>', 1))
-    message = "'shoulder' mimics 'elbow', which comes after it in the tree.*mimic=False"
-    with pytest.raises(ModelError, match=message):
-        Robot.load(path)
-    assert Robot.load(path, mimic=False).nv == 2
-
-
 @pytest.mark.parametrize(
     ("name", "options"), [("bravo7_gripper", {}), ("romeo", {"mimic": False})]
 )
@@ -130,74 +118,10 @@ def test_hint_to_lock_joints_that_move_no_mass_helps(
     assert not set(hint["locked"]) & set(robot.joint_names)
 
 
-@pytest.mark.parametrize("last", ["wrist", "a_joint"])
-def test_joint_that_moves_no_mass_is_named(
-    last: str, write: Callable[..., Path]
-) -> None:
-    """A last joint with a massless link; the cure that is named helps."""
-    path = write(
-        robot_xml(
-            link("base", ""),
-            link("upper"),
-            link("hand", ""),
-            joint("shoulder", "base", "upper"),
-            joint(last, "upper", "hand"),
-        )
-    )
-    message = rf"no mass moves with {last}, .*, or lock .*: locked: {{{last}: 0\.0}}"
-    with pytest.raises(ModelError, match=message):
-        Robot.load(path)
-    assert Robot.load(path, locked={last: 0.0}).joint_names == ("shoulder",)
-
-
-def test_a_robot_without_any_mass(write: Callable[..., Path]) -> None:
-    with pytest.raises(ModelError, match=r"no link that moves has a mass: .*inertial"):
-        Robot.load(write(ARM.replace(INERTIA, "")))
-
-
-@pytest.mark.parametrize("number", ["0 ", "\n0", "1e-320"])
-def test_no_inertia_is_lost_to_how_a_number_is_written(
-    number: str, write: Callable[..., Path]
-) -> None:
-    """The parser drops the whole element at each of these."""
-    written = Robot.load(write(ARM.replace('ixy="0"', f'ixy="{number}"', 1)))
-    plain = Robot.load(write(ARM, "plain.urdf"))
-    assert written.model.inertias[1] == plain.model.inertias[1]
-
-
 def test_what_the_parser_leaves_out_is_an_error(write: Callable[..., Path]) -> None:
     text = ARM.replace('ixy="0"', "", 1)
     with pytest.raises(ModelError, match=r"leaves out a part of the model: .*upper\]"):
         Robot.load(write(text))
-
-
-def test_visuals_are_no_business_of_the_model(
-    write: Callable[..., Path], capfd: pytest.CaptureFixture[str]
-) -> None:
-    nameless = '<visual><geometry><box size="1 1 1"/></geometry><material/></visual>'
-    ball = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
-    robot = Robot.load(write(ARM.replace(INERTIA, INERTIA + nameless + ball, 1)))
-    assert len(link_shapes(robot)) == 1
-    assert capfd.readouterr().err == ""
-
-
-def test_massless_link_between_heavy_ones_is_no_error(
-    write: Callable[..., Path],
-) -> None:
-    assert Robot.load(write(ARM.replace(INERTIA, "", 1))).nv == 2
-
-
-def test_root_that_moves_no_mass(write: Callable[..., Path]) -> None:
-    """Two point masses on one line: to roll about it takes no effort."""
-    point = '<inertial><mass value="2"/><inertia ixx="0" ixy="0" ixz="0" iyy="0" '
-    point += 'iyz="0" izz="0"/></inertial>'
-    slide = joint("slide", "base", "slider", "prismatic").replace("0 0 1", "1 0 0")
-    slide = slide.replace('xyz="0.5 0.1 0.2" rpy="0.3 0.2 0.1"', 'xyz="1 0 0"')
-    path = write(robot_xml(link("base", point), link("slider", point), slide))
-    assert Robot.load(path).nv == 1
-    message = r"no mass moves with root_joint, .* an inertia, or root: fixed$"
-    with pytest.raises(ModelError, match=message):
-        Robot.load(path, root="free_flyer")
 
 
 def test_root_and_joint_that_do_the_same(write: Callable[..., Path]) -> None:
@@ -247,10 +171,3 @@ def test_option_that_does_not_fit(
     with pytest.raises(error, match=re.escape(message)) as caught:
         Robot.load(write(ARM), **options)
     assert isinstance(caught.value, HspControlError)
-
-
-def test_a_tool_frame_is_checked_when_it_is_made() -> None:
-    with pytest.raises(ModelError, match=r"^ToolFrame: translation: .* needs 3"):
-        ToolFrame("lower", (1.0, 2.0))
-    with pytest.raises(ModelError, match=r"^ToolFrame: rotation.*: .inf is not a fin"):
-        ToolFrame("lower", rotation=(0.0, np.inf, 0.0))

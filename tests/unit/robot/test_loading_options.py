@@ -34,23 +34,6 @@ def full_configuration(model: pin.Model, values: dict[str, float]) -> np.ndarray
 # --- mimic joints --------------------------------------------------------------------
 
 
-def test_mimic_fingers_of_the_panda() -> None:
-    """Fingers unlocked: one freedom with mimic, two without; locked by default."""
-    locked, leading, free = (
-        Robot.load("panda"),
-        Robot.load("panda", locked={}),
-        Robot.load("panda", locked={}, mimic=False),
-    )
-    assert [r.nv for r in (locked, leading, free)] == [7, 8, 9]
-    assert [r.mimics for r in (locked, leading, free)] == [False, True, False]
-    assert leading.joint_names[-1] == "panda_finger_joint1"
-    assert free.joint_names[-1] == "panda_finger_joint2"
-    q = np.array([0.1, -0.2, 0.3, -1.4, 0.5, 1.6, 0.7, 0.03])
-    assert_same_placements(
-        placements(leading.model, q), placements(free.model, np.append(q, 0.03))
-    )
-
-
 @pytest.mark.parametrize("kind", ["revolute", "continuous", "prismatic"])
 @pytest.mark.parametrize("multiplier", [1.0, 2.0, -1.5])
 def test_follower_is_at_multiplier_times_leader_plus_offset(
@@ -103,23 +86,6 @@ def test_locked_joint_stands_where_it_is_told(
     # 1e-12 of 1 to 10 kg m²: inertias of locked links are merged in another order.
     actual = pin.crba(robot.model, robot.model.createData(), q)
     np.testing.assert_allclose(actual, M, rtol=0, atol=1e-12)
-
-
-@pytest.mark.parametrize("kind", ["revolute", "continuous", "prismatic"])
-@pytest.mark.parametrize("value", [0.0, 0.9])
-def test_locking_a_leader_locks_its_follower(
-    kind: str, value: float, write: Callable[..., Path]
-) -> None:
-    path = write(gripper(kind))
-    robot = Robot.load(path, locked={"shoulder": value})
-    free = Robot.load(path, mimic=False)
-    assert robot.joint_names == ("elbow",)
-    assert not robot.mimics
-    values = {"shoulder": value, "elbow": -0.7, "follower": -1.5 * value + 0.3}
-    assert_same_placements(
-        placements(robot.model, np.array([-0.7])),
-        placements(free.model, full_configuration(free.model, values)),
-    )
 
 
 def test_followers_may_be_named_if_they_agree_with_their_leader(
@@ -183,19 +149,6 @@ def test_tool_frames_are_fixed_to_their_parents() -> None:
     assert not state.frame("camera").jacobian.any()
 
 
-def test_gravity() -> None:
-    """At rest N is the weight: N_i = -Σ_k m_k gᵀ ∂c_k/∂q_i, by the centre of mass."""
-    q, rest = Robot.load("panda").home(), np.zeros(7)
-    for gravity in (None, (0.0, 0.0, -9.81), (1.0, -2.0, 3.0), (0.0, 0.0, 0.0)):
-        robot = Robot.load("panda", gravity=gravity)
-        g = np.array((0.0, 0.0, -9.81) if gravity is None else gravity)
-        data = robot.model.createData()
-        J_com = pin.jacobianCenterOfMass(robot.model, data, q)
-        weight = -data.mass[0] * g @ J_com
-        effects = robot.state(0.0, q, rest).nonlinear_effects
-        np.testing.assert_allclose(effects, weight, rtol=0, atol=1e-12)
-
-
 def test_gravity_with_locked_joints_and_tools() -> None:
     robot = Robot.load(
         "panda",
@@ -245,10 +198,3 @@ def test_end_effector_frame(
 ) -> None:
     path = write(robot_xml(link("base", ""), *parts))
     assert end_effector_frame(Robot.load(path).model) == expected
-
-
-@pytest.mark.parametrize("name", BUNDLED)
-def test_the_end_effector_of_a_bundled_robot_would_be_found(name: str) -> None:
-    """Those of other known arms: tests/integration/test_every_robot.py."""
-    robot = Robot.load(name)
-    assert end_effector_frame(robot.model) == robot.source.end_effector

@@ -1,13 +1,10 @@
 """Robots from MuJoCo's models: the same mechanics as MuJoCo computes with."""
 
-import pickle
 import re
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -105,25 +102,6 @@ def test_a_model_that_mujoco_ships() -> None:
     assert differences(robot, model, model.qpos0).largest < TOLERANCE
 
 
-def test_inertias_are_rounded_like_mujocos() -> None:
-    """MuJoCo takes an inertial frame that is nearly the body's for the body's."""
-    inertial = (
-        "<inertial pos='{0} 0 {0}' quat='1 {1} 0 0' mass='1' diaginertia='1 2 2.5'/>"
-    )
-    for numbers in ((3e-7, 0.0), (0.0, 3e-7), (0.1, 3e-7), (3e-7, 3e-7)):
-        joint = "<joint type='ball'/>" + inertial.format(*numbers)
-        model = compiled(body(joint))
-        robot = Robot.from_mujoco(model)
-        assert differences(robot, model, model.qpos0).largest < TOLERANCE
-
-
-def test_gravity_is_the_scenes() -> None:
-    off = "<option gravity='0 0 -3'><flag gravity='disable'/></option>"
-    for rest, g in (("<option gravity='1 2 3'/>", [1.0, 2.0, 3.0]), (off, [0.0] * 3)):
-        robot = Robot.from_mujoco(compiled(body(rest=rest)))
-        np.testing.assert_array_equal(robot.model.gravity.linear, g)
-
-
 def test_coordinates_leave_the_rest_of_the_scene_alone() -> None:
     model = compiled(CELL)
     robot = Robot.from_mujoco(model, "base", ARM)
@@ -140,59 +118,6 @@ def test_coordinates_leave_the_rest_of_the_scene_alone() -> None:
 
 
 # --- names, postures, limits ---------------------------------------------------------
-
-
-def test_names_and_order_are_mujocos() -> None:
-    robot = Robot.from_mujoco(compiled(CELL), "base", ARM[::-1])
-    assert robot.joint_names == tuple(ARM)
-    assert {"base", "hand", "finger", "tip"} < set(robot.frame_names)
-    assert "ball" not in robot.frame_names
-    assert robot.name == "base"
-    assert Robot.from_mujoco(compiled(CELL)).name == "cell"
-    assert Robot.from_mujoco(compiled(body())).name == "scene"
-
-
-def test_what_has_no_name_gets_one() -> None:
-    text = """<mujoco><worldbody><body><joint/><geom size=".1"/><site/>
-      <body name="joint_1"><joint axis="1 0 0"/><geom size=".1" pos="0 .3 0"/>
-      <site name="joint_1"/></body></body></worldbody></mujoco>"""
-    robot = Robot.from_mujoco(compiled(text))
-    assert robot.joint_names == ("joint_0", "joint_1")
-    assert {"body_1", "site_0", "site:joint_1"} < set(robot.frame_names)
-
-
-def test_home_is_the_configuration_that_was_chosen() -> None:
-    model = compiled(CELL)
-    robot = Robot.from_mujoco(model, "base", ARM, keyframe="home")
-    np.testing.assert_allclose(robot.home(), [0.0, 0.5, 0.0, 1.0], atol=1e-15)
-    assert robot.source.locked == {"f": 0.02}
-    before = model.key_qpos.copy()
-    qpos = before[0].copy()
-    qpos[:4] += 0.01
-    moved = Robot.from_mujoco(model, "base", ARM, qpos=qpos, locked={"f": 0.03})
-    np.testing.assert_allclose(moved.home(), robot.home() + 0.01, atol=1e-15)
-    assert moved.source.locked == {"f": 0.03}
-    np.testing.assert_array_equal(model.key_qpos, before)
-
-
-def test_home_without_a_choice_is_within_the_limits() -> None:
-    text = body("<joint name='a' axis='0 1 0' range='10 30'/>")
-    home = Robot.from_mujoco(compiled(text)).home()
-    np.testing.assert_allclose(home, np.deg2rad(20.0), rtol=1e-12)
-
-
-def test_a_floating_robot_is_at_home_where_it_is_in_the_scene() -> None:
-    text = body("<freejoint/>").replace('name="bar"', 'name="bar" pos="1 2 3"')
-    robot = Robot.from_mujoco(compiled(text))
-    np.testing.assert_allclose(robot.home(), [1, 2, 3, 0, 0, 0, 1], atol=1e-15)
-    assert robot.unactuated == tuple(range(6))
-    assert robot.source.root == "free_flyer"
-
-
-def test_a_ball_joint_turns() -> None:
-    robot = Robot.from_mujoco(compiled(body("<joint name='neck' type='ball'/>")))
-    assert robot.dof_names == ("neck.roll", "neck.pitch", "neck.yaw")
-    assert robot.units == ("rad", "rad", "rad")
 
 
 MOTORS = [
@@ -252,34 +177,6 @@ def test_actuators_may_have_an_armature_and_a_damping() -> None:
     mujoco.mj_forward(model, data)
     viscous = JointFriction.of_model(robot).viscous
     assert data.qfrc_passive[0] == pytest.approx(-0.5 * viscous[0], rel=1e-12)
-
-
-def test_friction_and_position_limits_are_the_joints() -> None:
-    joint = (
-        "<joint name='a' axis='0 1 0' damping='.3' frictionloss='.2' limited='true' "
-        "range='-10 20'/>"
-    )
-    robot = Robot.from_mujoco(compiled(body(joint)))
-    friction = JointFriction.of_model(robot)
-    assert (friction.viscous[0], friction.coulomb[0]) == (0.3, 0.2)
-    limits = np.ravel(robot.position_limits())
-    np.testing.assert_allclose(limits, np.deg2rad([-10.0, 20.0]), rtol=1e-14)
-
-
-def test_a_robot_from_mujoco_can_be_pickled_combined_and_given_tools() -> None:
-    tool = {"pen": ToolFrame("tip", (0.0, 0.0, 0.1))}
-    robot = Robot.from_mujoco(compiled(CELL), "base", ARM, tool_frames=tool)
-    again = pickle.loads(pickle.dumps(robot))
-    state, other = (r.state(0.0, r.home(), np.zeros(4)) for r in (robot, again))
-    np.testing.assert_array_equal(state.position("pen"), other.position("pen"))
-    gap = state.position("pen") - state.position("tip")
-    assert np.linalg.norm(gap) == pytest.approx(0.1)
-    aside = pin.SE3(np.eye(3), np.array([0.0, 1.0, 0.0]))
-    pair = Robot.combine({"l": (robot, pin.SE3.Identity()), "r": (again, aside)})
-    two = pair.state(0.0, pair.home(), np.zeros(8))
-    np.testing.assert_allclose(
-        two.position("r_tip") - two.position("l_tip"), [0.0, 1.0, 0.0], atol=1e-15
-    )
 
 
 # --- what is left out ----------------------------------------------------------------
@@ -357,11 +254,6 @@ def test_what_does_not_touch_the_robot_is_not_named() -> None:
     assert Robot.from_mujoco(compiled(text), "base", ARM).source.omitted == ()
 
 
-def test_joints_above_the_root_are_named() -> None:
-    robot = Robot.from_mujoco(compiled(CELL), "lower", ["j3", "j4"])
-    assert robot.source.omitted == ("joints above the root j1, j2: they stand still",)
-
-
 def test_a_mocap_body_stands_still() -> None:
     mocap = "<worldbody><body name='target' mocap='true'/></worldbody>"
     robot = Robot.from_mujoco(compiled(body(rest=mocap)))
@@ -403,11 +295,3 @@ def test_mistakes(options: dict[str, Any], error: type, message: str) -> None:
     with pytest.raises(error, match=f"^{re.escape(message)}") as caught:
         Robot.from_mujoco(compiled(CELL), **options)
     assert isinstance(caught.value, HspControlError)
-
-
-def test_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    from hsp_control.robot.description.mujoco import constants
-
-    monkeypatch.setitem(sys.modules, "mujoco", None)
-    with pytest.raises(ModelError, match=r"pip install 'hsp_control\[mujoco\]'$"):
-        constants.import_mujoco()

@@ -48,29 +48,6 @@ def test_unknown_joint(joint: str, hint: str) -> None:
     assert isinstance(e.value, LookupError)
 
 
-def test_names_of_joints_and_freedoms() -> None:
-    """One name a freedom, in the order of velocities; the universe is no joint."""
-    assert load("planar3r").joint_names == ("joint1", "joint2", "joint3")
-    assert load("planar3r").dof_names == ("joint1", "joint2", "joint3")
-    fingers = load("panda_fingers")  # the follower has no freedom
-    assert fingers.joint_names[-2:] == ("panda_joint7", "panda_finger_joint1")
-    assert len(fingers.dof_names) == fingers.nv == 8
-
-    solo = load("solo12")
-    assert solo.joint_names[:2] == ("root_joint", "FL_HAA")
-    assert solo.dof_names[:7] == (
-        *(f"root_joint.{axis}" for axis in ("x", "y", "z", "roll", "pitch", "yaw")),
-        "FL_HAA",
-    )
-    assert len(solo.dof_names) == solo.nv
-    assert solo.velocity_index("root_joint") == slice(0, 6)
-    assert solo.velocity_index("FL_HAA") == slice(6, 7)
-
-    planar = load("talos_arm_planar")
-    assert planar.dof_names[:3] == ("root_joint.x", "root_joint.y", "root_joint.yaw")
-    assert planar.velocity_index("root_joint") == slice(0, 3)
-
-
 # --- persistence ---------------------------------------------------------------------
 
 
@@ -104,11 +81,3 @@ def test_pickle_and_deep_copy_round_trip(
     np.testing.assert_array_equal(
         other.forward_dynamics(q, v, v), robot.forward_dynamics(q, v, v)
     )
-
-
-def test_joint_coordinates() -> None:
-    """θ = A q: the planar arm's absolute angles; none for other robots."""
-    A = load("planar3r").joint_coordinates
-    assert A is not None
-    np.testing.assert_array_equal(A @ [1.0, 2.0, 4.0], [1.0, 3.0, 7.0])
-    assert load("panda").joint_coordinates is None

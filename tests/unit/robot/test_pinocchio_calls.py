@@ -64,19 +64,6 @@ def test_native_calls_equal_the_bindings(case: str) -> None:
 
 
 @compiled
-def test_a_copied_mass_matrix_is_whole() -> None:
-    """Of two calls in a row, too: CRBA, and what fills the other triangle."""
-    robot, q, _, rng = draw("panda", seed=25)
-    _, _, call = both("crba", robot.model, q)
-    copied = copy.deepcopy(call)
-    _, model, own, there = copied.recipe[0], *copied.recipe[1][1:]
-    there[:] = robot.random_configuration(rng)
-    copied()
-    expected = pin.crba(model, model.createData(), there)
-    np.testing.assert_array_equal(own.M, expected)
-
-
-@compiled
 def test_a_copied_call_computes_into_its_own_data() -> None:
     """A copy has its own model, data and arrays; the first call's stay as they are."""
     robot, q, v, rng = draw("panda", seed=22)
@@ -101,16 +88,6 @@ def test_what_is_not_packed_is_left_to_the_bindings() -> None:
     call = bind_pinocchio("crba", robot.model, native, q[:-1])
     with pytest.raises(ValueError, match="size"):
         call()
-
-
-def test_what_refuses_mimic_joints_is_left_to_the_bindings() -> None:
-    robot, q, v, _ = draw("tiago_pro", seed=25)
-    for what, arguments in (("coriolis", 2), ("centroidal", 2), ("aba", 3)):
-        vectors = (q, v, v)[:arguments]
-        call = bind_pinocchio(what, robot.model, robot.model.createData(), *vectors)
-        assert not isinstance(call, NativeCall)
-    with pytest.raises(RuntimeError, match="Mimic"):
-        bind_pinocchio("centroidal", robot.model, robot.model.createData(), q, v)()
 
 
 @pytest.fixture

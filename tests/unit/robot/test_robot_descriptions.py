@@ -7,11 +7,9 @@ import pytest
 from robot_texts import ARM
 
 from hsp_control import Robot
-from hsp_control.common.exceptions import AccessError, ModelError, RobotNotFoundError
+from hsp_control.common.exceptions import AccessError, RobotNotFoundError
 from hsp_control.robot import PlacedRobot, RobotDescription
-from hsp_control.robot.description import sources
 from hsp_control.robot.description.access import only_within
-from hsp_control.robot.description.sources import find_robot
 
 MODULE = """
 print("Cloning a repository...")
@@ -55,11 +53,6 @@ def test_by_name_and_by_description(capsys: pytest.CaptureFixture[str]) -> None:
     assert Robot.load(RobotDescription(parts=parts)).nv == 2 * named.nv
 
 
-def test_packages_are_looked_up_around_it(installed: Path) -> None:
-    folders = find_robot("arm_description").package_dirs
-    assert folders[:2] == (installed / "arm_package", installed)
-
-
 @pytest.mark.usefixtures("installed")
 def test_robots_that_it_does_not_have() -> None:
     with pytest.raises(RobotNotFoundError, match="no URDF of 'amr_description'; did"):
@@ -70,19 +63,3 @@ def test_robots_that_it_does_not_have() -> None:
         Robot.load("lost_description")
     with pytest.raises(AccessError, match="fetched from a network"):
         Robot.load("arm_description", access=only_within([]))
-
-
-def test_without_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sources, "find_spec", lambda _: None)
-    with pytest.raises(RobotNotFoundError, match="pip install robot_descriptions"):
-        Robot.load("gen3_description")
-
-
-def test_one_robot_has_one_origin() -> None:
-    message = "give one of name, description, mjcf and parts"
-    with pytest.raises(ModelError, match=message):
-        RobotDescription("panda", description="panda_description")
-    with pytest.raises(ModelError, match=message):
-        RobotDescription()
-    with pytest.raises(ModelError, match="give one of name and description"):
-        PlacedRobot()

@@ -1,6 +1,5 @@
 """The bundled robots are what their READMEs say, read by plain Pinocchio."""
 
-import importlib.metadata
 import re
 from pathlib import Path
 from typing import Any
@@ -32,17 +31,6 @@ EXPECTED = {
     "panda": (16.822132, (0.306891, 0.0, 0.486882)),
     "planar3r": (3.0, (0.0, 2.0, 0.0)),
 }
-# Stürz, Affolter and Smith (2017), identified on a real iiwa 14: mass [kg] and centre
-# of mass [m] of links 1 to 7, in the axes of the base, the arm upright.
-IDENTIFIED_IIWA14 = [
-    (3.947808, (0.0035, -0.001602, 0.328613)),
-    (4.502752, (-0.007671, 0.003551, 0.526693)),
-    (2.455197, (0.002246, 0.034918, 0.753478)),
-    (2.61155, (-0.000196, -0.038182, 0.832679)),
-    (3.410009, (-0.000054, 0.002367, 0.968664)),
-    (3.387949, (-0.000492, -0.027496, 1.20019)),
-    (0.506173, (0.03465, 0.023242, 1.251377)),
-]
 
 
 def urdf(name: str) -> Path:
@@ -69,50 +57,9 @@ def lock(model: pin.Model, settings: dict[str, Any]) -> pin.Model:
     return pin.buildReducedModel(model, ids, pin.neutral(model)) if ids else model
 
 
-def draw(model: pin.Model, rng: np.random.Generator) -> np.ndarray:
-    """Return a random configuration within the limits, any angle where none are."""
-    if model.nq == model.nv:
-        return rng.uniform(model.lowerPositionLimit, model.upperPositionLimit)
-    angles = rng.uniform(-np.pi, np.pi, model.nv)
-    return pin.integrate(model, pin.neutral(model), angles)
-
-
-def mass_matrix(model: pin.Model, data: pin.Data, q: np.ndarray) -> np.ndarray:
-    """Return the whole symmetric matrix; crba promises its upper half only."""
-    upper = np.triu(pin.crba(model, data, q))
-    return upper + np.triu(upper, 1).T
-
-
 def links(path: Path) -> list[ElementTree.Element]:
     """Return the <link> elements of a URDF."""
     return ElementTree.parse(path).getroot().findall("link")
-
-
-def origin(element: ElementTree.Element) -> pin.SE3:
-    """Return the pose that an element's <origin> gives."""
-    pose = element.find("origin")
-    attributes = {} if pose is None else pose.attrib
-    xyz, rpy = (
-        np.array(attributes.get(key, "0 0 0").split(), dtype=float)
-        for key in ("xyz", "rpy")
-    )
-    return pin.SE3(pin.rpy.rpyToMatrix(rpy), xyz)
-
-
-@pytest.fixture(scope="module")
-def panda_of_example_robot_data() -> Path:
-    """Return the folder of example-robot-data's panda URDFs, or skip."""
-    try:
-        package = importlib.metadata.distribution("example-robot-data")
-    except importlib.metadata.PackageNotFoundError:
-        pytest.skip("example-robot-data is not installed")
-    file = next(f for f in package.files or () if f.name == "panda.urdf")
-    return Path(str(package.locate_file(file))).resolve().parent
-
-
-def test_every_robot_is_listed_here() -> None:
-    """A robot added to the folder is added to these tests."""
-    assert sorted(path.parent.name for path in ROBOTS.glob("*/*.urdf")) == NAMES
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -189,132 +136,3 @@ def test_geometry_needs_no_other_file(name: str) -> None:
         assert geometry.ngeoms > 0
         for shape in geometry.geometryObjects:
             assert shape.meshPath in ("BOX", "CYLINDER", "SPHERE")
-
-
-def test_iiwa14_limits() -> None:
-    """KUKA's published figures, exactly."""
-    model = load("iiwa14")
-    assert list(model.names)[1:] == [f"iiwa_joint_{i}" for i in range(1, 8)]
-    position = np.deg2rad([170, 120, 170, 120, 170, 120, 175])
-    np.testing.assert_allclose(model.upperPositionLimit, position, rtol=1e-15)
-    np.testing.assert_allclose(model.lowerPositionLimit, -position, rtol=1e-15)
-    speed = np.deg2rad([85, 85, 100, 75, 130, 135, 135])
-    np.testing.assert_allclose(model.upperVelocityLimit, speed, rtol=1e-15)
-    assert model.upperEffortLimit.tolist() == [320, 320, 176, 176, 110, 40, 40]
-
-
-def test_iiwa14_flange() -> None:
-    """The flange is where a product of turns about base axes puts it.
-
-    Axes z, y, z, -y, z, y, z; lengths 360, 420, 400 and 126 mm. Tolerance 1e-14: a
-    dozen multiplications of numbers of order 1.
-    """
-    model, rng = load("iiwa14"), np.random.default_rng(3)
-    data, flange = model.createData(), model.getFrameId("iiwa_link_ee")
-    signs, axes = (1, 1, 1, -1, 1, 1, 1), "zyzyzyz"
-    for _ in range(100):
-        q = draw(model, rng)
-        turns = [
-            pin.utils.rotate(axis, float(sign * angle))
-            for axis, sign, angle in zip(axes, signs, q, strict=True)
-        ]
-        expected, rotation = np.array([0.0, 0.0, 0.36]), np.eye(3)
-        for first, length in ((0, 0.42), (2, 0.4), (4, 0.126)):
-            rotation = rotation @ turns[first] @ turns[first + 1]
-            expected = expected + rotation @ np.array([0.0, 0.0, length])
-        pin.framesForwardKinematics(model, data, q)
-        pose = data.oMf[flange]
-        np.testing.assert_allclose(pose.translation, expected, rtol=0, atol=1e-14)
-        approach = (rotation @ turns[6])[:, 2]
-        np.testing.assert_allclose(pose.rotation[:, 2], approach, rtol=0, atol=1e-14)
-
-
-def test_iiwa14_carries_the_weight_of_the_real_arm() -> None:
-    """Gravity torques agree with the arm identified on hardware to 3 % (have 1.9 %).
-
-    The other public inertias miss it by 14 % and 34 %: this is why these were chosen.
-    """
-    ours = load("iiwa14")
-    data = ours.createData()
-    pin.forwardKinematics(ours, data, pin.neutral(ours))
-    identified = ours.copy()
-    for joint, (mass, centre) in enumerate(IDENTIFIED_IIWA14, start=1):
-        lever = data.oMi[joint].actInv(np.array(centre))
-        identified.inertias[joint] = pin.Inertia(mass, lever, np.zeros((3, 3)))
-    rng = np.random.default_rng(4)
-    draws = [draw(ours, rng) for _ in range(300)]
-    mine, theirs = (
-        np.array([pin.computeGeneralizedGravity(m, m.createData(), q) for q in draws])
-        for m in (ours, identified)
-    )
-    assert np.linalg.norm(mine - theirs) < 0.03 * np.linalg.norm(theirs)
-
-
-def test_panda_fingertips() -> None:
-    """The tool frame is there."""
-    model = load("panda")
-    hand, tcp = (
-        model.frames[model.getFrameId(name)].placement
-        for name in ("panda_hand", "panda_tcp")
-    )
-    expected = pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.1034]))
-    assert hand.actInv(tcp).isApprox(expected, 1e-15)
-
-
-def test_panda_equals_example_robot_data(panda_of_example_robot_data: Path) -> None:
-    """Same dynamics, frames, limits and damping, fingers locked, at random states.
-
-    Tolerance 1e-12: the figures are the same but for a last digit of the fingers'
-    inertia (2.375e-6), so only rounding differs.
-    """
-    theirs = pin.buildModelFromUrdf(str(panda_of_example_robot_data / "panda.urdf"))
-    theirs, ours = lock(theirs, robot_yaml("panda")), load("panda")
-    assert list(theirs.names) == list(ours.names)
-    for key in (
-        "lowerPositionLimit",
-        "upperPositionLimit",
-        "upperVelocityLimit",
-        "upperEffortLimit",
-        "damping",
-    ):
-        assert getattr(ours, key).tolist() == getattr(theirs, key).tolist()
-    frames = [frame.name for frame in theirs.frames if ours.existFrame(frame.name)]
-    assert len(frames) == len(theirs.frames)
-    mine, other = ours.createData(), theirs.createData()
-    rng = np.random.default_rng(5)
-    for _ in range(100):
-        q, v = draw(ours, rng), rng.normal(size=7)
-        found = []
-        for model, data in ((ours, mine), (theirs, other)):
-            pin.framesForwardKinematics(model, data, q)
-            places = [data.oMf[model.getFrameId(name)].homogeneous for name in frames]
-            M, N = mass_matrix(model, data, q), pin.nonLinearEffects(model, data, q, v)
-            found.append(np.concatenate([np.ravel(each) for each in (M, N, places)]))
-        np.testing.assert_allclose(*found, rtol=0, atol=1e-12)
-
-
-def test_panda_capsules_and_meshes(panda_of_example_robot_data: Path) -> None:
-    """Spheres of example-robot-data's capsules, unmoved; every visual mesh exists."""
-    folder = panda_of_example_robot_data
-    spheres = {}
-    for path in (urdf("panda"), folder / "panda_collision.urdf"):
-        spheres[path] = [
-            (link.attrib["name"], *shape.attrib.values(), *origin(ball).translation)
-            for link in links(path)
-            for ball in link.findall("collision")
-            for shape in ball.findall("geometry/sphere")
-        ]
-    ours, theirs = (
-        {(name, float(radius), *np.round(c, 9)) for name, radius, *c in group}
-        for group in spheres.values()
-    )
-    assert ours == theirs
-    package = folder.parents[2]  # .../share/example-robot-data
-    meshes = [
-        mesh.attrib["filename"]
-        for link in links(urdf("panda"))
-        for mesh in link.iter("mesh")
-    ]
-    assert len(meshes) == 11
-    for mesh in meshes:
-        assert (package / mesh.removeprefix("package://example-robot-data/")).is_file()

@@ -11,9 +11,8 @@ from controller_cases import assert_same, contents, panda, states, track
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hsp_control import Controller, FunctionCost, RobotState, TargetPosture
+from hsp_control import Controller, RobotState, TargetPosture
 from hsp_control.common.exceptions import ImmutableError
-from hsp_control.null_space.fields import FunctionField
 
 ADVICE = (
     "cannot be assigned, as all terms belong to one t, q and v: call "
@@ -80,20 +79,3 @@ def test_a_copy_is_a_state_of_its_own(make: Callable[[Any], Any]) -> None:
     other.update(t + 1.0, q + 0.1, v)
     np.testing.assert_array_equal(law.state.q, q)
     np.testing.assert_array_equal(other.q, q + 0.1)
-
-
-def write(state: RobotState) -> Any:
-    state.q[:] = 0.3
-    return 0.0
-
-
-@pytest.mark.parametrize("field", [
-    FunctionCost(write),
-    FunctionCost(lambda s: 0.0, gradient_function=write),
-    FunctionField(write),
-    FunctionField(lambda s: np.zeros(7), rate_function=write),
-])  # fmt: skip
-def test_a_function_of_the_user_cannot_move_the_robot(field: Any) -> None:
-    law = Controller(panda(), [track()], field, limits=None)
-    with pytest.raises(ValueError, match="read-only"):
-        law.compute(*states(1)[0])

@@ -67,19 +67,6 @@ def test_order_of_questions_does_not_matter(case: str) -> None:
                 )
 
 
-def test_a_second_frame_does_not_move_the_first() -> None:
-    robot, q, v, _ = draw("panda", seed=14)
-    state = robot.state(0.0, q, v)
-    hand = state.frame("panda_hand")
-    before = [hand.position.copy(), hand.rotation.copy(), hand.jacobian.copy()]
-    state.frame("panda_link4")
-    state.frame("panda_hand")
-    for array, kept in zip(
-        (hand.position, hand.rotation, hand.jacobian), before, strict=True
-    ):
-        np.testing.assert_array_equal(array, kept)
-
-
 @pytest.mark.parametrize("case", ["planar3r", "panda", "panda_fingers", "solo12"])
 def test_companion_states_do_not_disturb(case: str) -> None:
     """`displaced` and `ahead` are states elsewhere; the state itself stays."""
@@ -110,16 +97,6 @@ def test_companion_states_do_not_disturb(case: str) -> None:
     np.testing.assert_array_equal(state.q, q)
     # Untouched, not merely recomputable: what was handed out still reads the same.
     assert_equal_terms(everything(state, name), before)
-
-
-def test_a_state_copies_what_it_is_given() -> None:
-    robot, q, v, _ = draw("panda", seed=17)
-    state = robot.state(0.0, q, v)
-    kept = q.copy()
-    q[:] = 0.0
-    v[:] = 0.0
-    np.testing.assert_array_equal(state.q, kept)
-    assert state.v.any()
 
 
 def test_arrays_outlive_the_state_that_they_came_from() -> None:
@@ -194,43 +171,6 @@ def test_bad_state_is_refused_and_leaves_the_old_one(what: str) -> None:
     np.testing.assert_array_equal(state.q, q)
     np.testing.assert_array_equal(state.v, v)
     assert_equal_terms(everything(state, name), before)
-
-
-@pytest.mark.parametrize("norm", [0.0, 0.9, 1.0 + 2e-6, 1.1])
-def test_cosine_and_sine_off_the_circle(norm: float) -> None:
-    robot = load("planar3r")
-    q, v = robot.neutral(), np.zeros(3)
-    q[2:4] *= norm
-    message = rf"q\[2:4\] = \[.*\] is a \(cos, sin\) pair of norm {norm:.6g}; needs"
-    with pytest.raises(ConfigurationError, match=message):
-        RobotState(robot).update(0.0, q, v)
-    with pytest.raises(ConfigurationError, match=message):
-        robot.check_configuration(q)
-
-
-def test_rounding_off_the_circle_passes() -> None:
-    """Integrators drift by rounding; 1e-7 is no error, and is kept as given."""
-    robot = load("planar3r")
-    q = robot.neutral()
-    q[2:4] *= 1.0 + 1e-7
-    np.testing.assert_array_equal(RobotState(robot).update(0.0, q, np.zeros(3)).q, q)
-
-
-@pytest.mark.parametrize(
-    "convert",
-    [
-        list,
-        lambda x: np.vstack([x, x]).T[:, 1],  # not contiguous
-    ],
-)
-def test_any_sequence_of_numbers_will_do(convert: Callable[[Array], Any]) -> None:
-    robot, q, v, _ = draw("solo12", seed=20)
-    name = robot.frame_names[-1]
-    expected = everything(robot.state(0.1, q, v), name)
-    state = RobotState(robot).update(0.1, convert(q), convert(v))
-    assert_equal_terms(everything(state, name), expected)
-    state = robot.state(0.1, convert(q), convert(v))
-    assert_equal_terms(everything(state, name), expected)
 
 
 # --- moves with calls that follow ----------------------------------------------------

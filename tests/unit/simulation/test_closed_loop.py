@@ -23,7 +23,6 @@ from hsp_control import (
     FramePosition,
     Gains,
     Robot,
-    Rollout,
     TargetPosture,
     simulate,
 )
@@ -32,12 +31,6 @@ from hsp_control.simulation.plants import RigidBodyPlant
 from hsp_control.trajectories import ComposedPose, Lissajous, Spin
 
 Array = NDArray[np.float64]
-
-
-@pytest.fixture(scope="module")
-def planar_run() -> Rollout:
-    """Return 0.5 s of the planar arm, logged every 10 ms."""
-    return simulate(planar_controller(), planar_start(), duration=0.5, integrator=EXACT)
 
 
 @pytest.mark.parametrize("which", ["planar3r", "panda"])
@@ -78,28 +71,6 @@ class Spy(RigidBodyPlant):
     def acceleration(self, t: float, q: Array, v: Array, tau: Array) -> Array:
         self.calls.append((t, tau.copy()))
         return super().acceleration(t, q, v, tau)
-
-
-def test_sampled_control_holds_the_effort() -> None:
-    """One effort a period, from beginning to end; the first is the logged one."""
-    plant = Spy(planar_controller().robot)
-    run = simulate(
-        planar_controller(),
-        planar_start(),
-        duration=0.04,
-        log_period=0.01,
-        control_period=0.0025,
-        integrator=Rk4(0.001),
-        plant=plant,
-    )
-    times = np.array([t for t, _ in plant.calls])
-    efforts = np.array([tau for _, tau in plant.calls])
-    changes = 1 + np.flatnonzero(np.abs(np.diff(efforts, axis=0)).max(axis=1) > 0.0)
-    np.testing.assert_allclose(
-        times[[0, *changes]], 0.0025 * np.arange(16), rtol=0, atol=1e-12
-    )
-    assert len(plant.calls) == 16 * 3 * 4  # 3 steps of 0.83 ms, 4 stages
-    np.testing.assert_array_equal(efforts[[0, *changes]][::4], run.tau[:4])
 
 
 def test_continuous_control_is_evaluated_in_every_stage() -> None:
@@ -180,38 +151,3 @@ def test_a_floating_robot_follows_the_law() -> None:
             distance(robot, (run.q[-1], run.v[-1]), (exact.q[-1], exact.v[-1]))
         )
     assert order(steps, errors) == pytest.approx(4.0, abs=0.3)
-
-
-def test_a_run_can_be_repeated(planar_run: Rollout) -> None:
-    """Bit for bit, with other things computed between; nothing is shared."""
-    q0 = planar_start()
-    state = planar_controller().robot.state(3.0, q0, np.ones(3))
-    planar_controller().compute(state)
-    again = simulate(planar_controller(), q0, duration=0.5, integrator=EXACT)
-    np.testing.assert_array_equal(q0, planar_start())
-    assert list(again.columns) == list(planar_run.columns)
-    for name, column in planar_run.columns.items():
-        np.testing.assert_array_equal(column, again[name], err_msg=name)
-        assert not np.shares_memory(column, again[name])
-
-
-def test_time_starts_when_it_is_told() -> None:
-    """Half of a run, and the other half from where it ended, are the whole."""
-    controller, q0 = planar_controller(), planar_start()
-    options: Any = {"duration": 0.2, "integrator": Rk4(0.005)}
-    first = simulate(controller, q0, start_time=1.0, **options)
-    second = simulate(controller, first.q[-1], first.v[-1], start_time=1.2, **options)
-    whole = simulate(controller, q0, start_time=1.0, **{**options, "duration": 0.4})
-    np.testing.assert_allclose(first.t, 1.0 + 0.01 * np.arange(21), rtol=0, atol=1e-14)
-    np.testing.assert_allclose(second.v[-1], whole.v[-1], rtol=0, atol=1e-12)
-    np.testing.assert_allclose(second.tau[0], first.tau[-1], rtol=0, atol=1e-10)
-    late = simulate(controller, q0, start_time=0.0, **options)
-    assert np.abs(late.tau[0] - first.tau[0]).max() > 0.1
-
-
-def test_progress(planar_run: Rollout) -> None:
-    fractions: list[float] = []
-    simulate(
-        planar_controller(), planar_start(), duration=0.1, on_progress=fractions.append
-    )
-    np.testing.assert_allclose(fractions, np.linspace(0.0, 1.0, 11), atol=1e-15)

@@ -18,7 +18,6 @@ from hsp_control.common.exceptions import (
 from hsp_control.robot.integrators import Dop853
 from hsp_control.simulation.plants import (
     ContactPlant,
-    Push,
     RigidBodyPlant,
     RigidContact,
 )
@@ -143,56 +142,6 @@ def test_contacts_are_switched_by_the_clock() -> None:
         assert wrench(plant, "FL_FOOT", at)[0].any() == holds
         assert not wrench(plant, "FR_FOOT", at)[0].any()
         assert np.allclose(a, free, atol=1e-9) != holds
-
-
-@pytest.mark.parametrize("kind", ["point", "surface"])
-def test_redundant_contacts_share_the_force(kind: Any) -> None:
-    """A foot held at its ankle too: the same motion, the force in all, none in vain."""
-    robot = load("talos")
-    foot, also = "left_sole_link", "leg_left_6_link"
-    one = ContactPlant(robot, [RigidContact(foot)])
-    both = ContactPlant(robot, [RigidContact(foot), RigidContact(also, kind)])
-    q, v = stance(one, 0)
-    tau = joint_effort(robot, 1)
-    expected = one.acceleration(0.0, q, v, tau)
-    found = both.acceleration(0.0, q, v, tau)
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-8 * abs(expected).max())
-    at = (0.0, q, v, tau)
-    alone, shared = wrench(one, foot, at), [wrench(both, f, at) for f in (foot, also)]
-    np.testing.assert_allclose(
-        shared[0][0] + shared[1][0], alone[0], rtol=1e-8, atol=1e-6
-    )
-    assert np.linalg.norm(shared) <= np.linalg.norm(alone)
-
-
-def test_what_a_solver_leaves_on_the_root_is_dropped() -> None:
-    plant = plant_of("solo12")
-    q, v = stance(plant, 0)
-    tau = joint_effort(plant.robot, 1)
-    left = tau.copy()
-    left[:6] = 5e-4
-    np.testing.assert_array_equal(
-        plant.acceleration(0.0, q, v, left), plant.acceleration(0.0, q, v, tau)
-    )
-
-
-def test_a_push_is_felt() -> None:
-    """It is an effort Jᵀ f on the joints and the root."""
-    name, push = "solo12", Push("base_link", (3.0, 0.0, 1.0), start=0.1, duration=0.2)
-    plant, pushed = plant_of(name), plant_of(name, pushes=[push])
-    q, v = stance(plant, 0)
-    tau = joint_effort(plant.robot, 1)
-    at_rest = plant.acceleration(0.0, q, v, tau)
-    np.testing.assert_array_equal(pushed.acceleration(0.05, q, v, tau), at_rest)
-    state = plant.robot.state(0.0, q, v)
-    a = pushed.acceleration(0.2, q, v, tau)
-    assert np.abs(a - at_rest).max() > 1.0
-    rest = state.inverse_dynamics(a) - tau
-    rest -= state.frame("base_link").jacobian[:3].T @ np.array([3.0, 0.0, 1.0])
-    for contact in pushed.contacts:
-        force, _ = wrench(pushed, contact.frame, (0.2, q, v, tau))
-        rest -= state.frame(contact.frame).jacobian[:3].T @ force
-    np.testing.assert_allclose(rest, 0.0, atol=1e-8)
 
 
 MISTAKES: list[tuple[Callable[[], object], type, str]] = [

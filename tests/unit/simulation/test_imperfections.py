@@ -10,7 +10,7 @@ import pytest
 
 from hsp_control import Controller, FramePosition, Gains, Robot, Rollout, simulate
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import FrameNotFoundError, SimulationError
+from hsp_control.common.exceptions import SimulationError
 from hsp_control.robot.description.sources import find_robot
 from hsp_control.robot.friction import Friction, JointFriction
 from hsp_control.robot.integrators import Dop853, Rk4
@@ -35,16 +35,13 @@ from hsp_control.simulation.plants.imperfect_plant import seeded_generator
 from hsp_control.simulation.plants.model_changes import (
     Inertias,
     ModelChange,
-    MotorInertia,
     Payload,
     changed,
 )
 from hsp_control.simulation.plants.sensors import (
-    DifferencedVelocity,
     Encoder,
     PositionNoise,
     Sensor,
-    SensorDelay,
     VelocityNoise,
 )
 from hsp_control.trajectories import Circle
@@ -76,30 +73,6 @@ def gravity(robot: Robot, q: Array) -> Array:
 
 
 # --- model changes -------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", ROBOTS)
-def test_heavier_bodies_scale_the_mass_matrix(name: str) -> None:
-    """M and N are linear in the inertias; the robot itself stays as it was."""
-    robot = load(name)
-    q, _ = some_state(robot)
-    M, N = mass_matrix(robot, q), gravity(robot, q)
-    heavier = changed(robot, [Inertias(mass_factor=1.2)])
-    np.testing.assert_allclose(mass_matrix(heavier, q), 1.2 * M, rtol=1e-12, atol=1e-14)
-    np.testing.assert_allclose(gravity(heavier, q), 1.2 * N, rtol=1e-12, atol=1e-12)
-    np.testing.assert_array_equal(mass_matrix(robot, q), M)
-    assert heavier.joint_names == robot.joint_names
-    assert heavier.frame_names == robot.frame_names
-
-
-def test_shifted_centres_and_harder_turning() -> None:
-    robot = load("panda")
-    other = changed(robot, [Inertias(inertia_factor=2.0, com_shift=(0.01, 0.0, -0.02))])
-    for k in range(1, robot.model.njoints):
-        before, after = robot.model.inertias[k], other.model.inertias[k]
-        assert after.mass == before.mass
-        np.testing.assert_allclose(after.lever - before.lever, [0.01, 0.0, -0.02])
-        np.testing.assert_allclose(after.inertia, 2.0 * before.inertia, atol=1e-15)
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -162,21 +135,6 @@ def test_a_payload_is_felt_where_it_is(name: str, frame: str) -> None:
     )
 
 
-def test_motors_add_to_the_diagonal_of_joints_alone() -> None:
-    robot = load("go2")
-    q, v = some_state(robot)
-    other = changed(robot, [MotorInertia(0.05), MotorInertia(0.01 * np.ones(18))])
-    expected = np.diag([0.01] * 6 + [0.06] * 12)
-    added = mass_matrix(other, q) - mass_matrix(robot, q)
-    np.testing.assert_allclose(added, expected, atol=1e-12)
-    tau = np.ones(18)
-    plant = RigidBodyPlant(other)
-    rest = tau - other.state(0.0, q, v).nonlinear_effects
-    np.testing.assert_allclose(
-        mass_matrix(other, q) @ plant.acceleration(0.0, q, v, tau), rest, atol=1e-8
-    )
-
-
 # --- friction ------------------------------------------------------------------------
 
 
@@ -206,18 +164,6 @@ def test_a_cart_slides_stops_and_sticks() -> None:
         assert moved(plant, 0.0, 1.0, push).tolist() == [0.0, 0.0]
     np.testing.assert_allclose(moved(plant, 0.0, 1.0, 5.0), [0.25, 0.5], rtol=1e-9)
     np.testing.assert_allclose(moved(plant, 0.0, 1.0, -5.0), [-0.25, -0.5], rtol=1e-9)
-
-
-def test_a_cart_in_oil_slows_down() -> None:
-    """v = v0 exp(-d t / m), to the second order of the step."""
-    robot = cart()
-    friction = JointFriction.of(robot, viscous=3.0)
-    errors = [
-        moved(StickingPlant(robot, friction, step), 1.0, 1.0, 0.0)[1] - np.exp(-1.5)
-        for step in (0.02, 0.01)
-    ]
-    assert abs(errors[1]) < 1e-5
-    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.01)
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -261,26 +207,6 @@ def test_a_step_obeys_coulombs_law_in_every_joint() -> None:
         assert (np.abs(force[~slips]) <= coulomb[~slips] + 0.05).all()
         stuck += int((~slips).sum())
     assert 20 < stuck < 120
-
-
-def test_mujocos_friction_is_the_same() -> None:
-    """A panda let go against friction in all joints: two engines, one motion."""
-    pytest.importorskip("mujoco")
-    from hsp_control.simulation.plants.mujoco import MujocoPlant
-
-    robot = load("panda")
-    friction = JointFriction.of(robot, coulomb=2.0, viscous=0.5)
-    q = robot.home()
-    tau = 0.5 * gravity(robot, q)
-    ends = []
-    for plant in (
-        StickingPlant(robot, friction, step=2e-4),
-        MujocoPlant(robot, friction=friction, timestep=2e-4, joint_limits=False),
-    ):
-        plant.reset(0.0, q, np.zeros(7))
-        ends.append(np.concatenate(plant.advance(0.0, 0.3, tau)))
-    assert np.abs(ends[0][:7] - q).max() > 0.1
-    np.testing.assert_allclose(*ends, rtol=0, atol=3e-3)
 
 
 # --- sensors -------------------------------------------------------------------------
@@ -338,32 +264,6 @@ def test_noise_has_its_size_and_its_seed(name: str) -> None:
         assert np.abs(robot.difference(q, own[0][0])[:6]).min() > 1e-6
 
 
-@pytest.mark.parametrize("name", ROBOTS)
-def test_differenced_velocity(name: str) -> None:
-    """Of an even motion it is the velocity; at first, and of a root, what is passed."""
-    robot = load(name)
-    q, v = some_state(robot)
-    wrong = np.full(robot.nv, 9.0)
-    states = [(robot.integrate(q, 0.01 * k * v), wrong) for k in range(4)]
-    found = [v_shown for _, v_shown in shown(DifferencedVelocity(), robot, states)]
-    np.testing.assert_array_equal(found[0], wrong)
-    expected = v.copy()
-    if name == "go2":
-        expected[:6] = 9.0
-    for rate in found[1:]:
-        np.testing.assert_allclose(rate, expected, rtol=1e-9)
-
-
-def test_a_late_sensor_shows_what_was() -> None:
-    robot = load("panda")
-    states = [some_state(robot, seed) for seed in range(5)]
-    late = shown(SensorDelay(2), robot, states)
-    for k, (q, v) in enumerate(late):
-        expected = states[max(0, k - 2)]
-        np.testing.assert_array_equal(q, expected[0])
-        np.testing.assert_array_equal(v, expected[1])
-
-
 # --- drives --------------------------------------------------------------------------
 
 
@@ -392,18 +292,6 @@ def test_a_saturated_drive() -> None:
     )
 
 
-def test_a_noisy_drive() -> None:
-    found = np.array(driven(EffortNoise(0.5), [np.ones(7)] * 2000, seed=1))
-    np.testing.assert_allclose(found.mean(axis=0), 1.0, atol=0.06)
-    np.testing.assert_allclose(found.std(axis=0), 0.5, rtol=0.1)
-
-
-@pytest.mark.parametrize("periods", [0, 1, 3])
-def test_a_late_drive(periods: int) -> None:
-    found = [effort[0] for effort in driven(EffortDelay(periods), EFFORTS)]
-    assert found == [1.0] * periods + [float(k) for k in range(1, 9 - periods)]
-
-
 def test_a_drive_that_loses_efforts() -> None:
     """Each is the commanded one, or what the last one was; the first is there."""
     efforts = [np.full(7, float(k)) for k in range(2000)]
@@ -413,18 +301,6 @@ def test_a_drive_that_loses_efforts() -> None:
         assert effort in (k, found[k - 1] if k else 0.0)
         lost += effort != k
     assert 0.25 < lost / 2000 < 0.35
-
-
-def test_what_a_drive_remembers_is_its_own() -> None:
-    """A controller writes into the same array at every step."""
-    for drive in (DroppedPeriods(0.5), EffortDelay(1)):
-        act = begun(drive)
-        shared, found = np.zeros(7), []
-        for k in range(20):
-            shared[:] = k
-            found.append(float(act(shared)[0][0]))
-        assert all(effort <= k for k, effort in enumerate(found))
-        assert any(effort < k for k, effort in enumerate(found))
 
 
 class Spy(SampledPlant):
@@ -452,30 +328,11 @@ def timeline(*drives: Drive, seed: int = 0) -> list[tuple[float, float, float]]:
     return spy.calls
 
 
-def test_jitter_lets_the_last_effort_act_longer() -> None:
-    calls = timeline(Jitter(0.6), seed=1)
-    assert calls[0] == (0.0, 1.0, 1.0)
-    assert len(calls) == 15
-    lateness = []
-    for k in range(1, 8):
-        (begin, switch, before), (again, end, after) = calls[2 * k - 1 : 2 * k + 1]
-        assert (begin, again, end) == (k, switch, k + 1.0)
-        assert (before, after) == (k, k + 1.0)
-        lateness.append(switch - begin)
-    assert 0.0 < min(lateness) < max(lateness) < 0.6
-    assert np.ptp(lateness) > 0.1
-
-
 def test_an_effort_later_than_its_period_begins_the_next() -> None:
     assert timeline(Jitter(1e9)) == [
         (0.0, 1.0, 1.0),
         *((float(k), k + 1.0, float(k)) for k in range(1, 8)),
     ]
-
-
-def test_drives_make_a_chain_in_their_order() -> None:
-    calls = timeline(EffortDelay(1), Saturation(5.0))
-    assert [effort for _, _, effort in calls] == [1, 1, 2, 3, 4, 5, 5, 5]
 
 
 # --- pushes --------------------------------------------------------------------------
@@ -544,22 +401,6 @@ def ideal() -> Rollout:
     return run()
 
 
-def test_without_imperfections_nothing_changes() -> None:
-    controller = panda_controller()
-    plain = simulate(
-        controller,
-        controller.robot.home(),
-        duration=0.5,
-        control_period=1e-3,
-        integrator=Rk4(1e-3),
-    )
-    imperfect = ideal()
-    for name in plain.columns:
-        np.testing.assert_array_equal(imperfect[name], plain[name], err_msg=name)
-    np.testing.assert_array_equal(imperfect["measured.q"], imperfect.q)
-    np.testing.assert_array_equal(imperfect["measured.v"], imperfect.v)
-
-
 def test_the_log_has_the_truth_beside_what_was_measured_and_what_acted() -> None:
     rollout, again = (
         run(
@@ -585,14 +426,6 @@ def test_the_log_has_the_truth_beside_what_was_measured_and_what_acted() -> None
     assert described["sensors"][1] == {"type": "VelocityNoise", "std": 0.02}
     assert described["drives"][0] == {"type": "EffortDelay", "periods": 1}
     assert described["seed"] == 5
-
-
-def test_a_plant_that_differs_is_written_down() -> None:
-    rollout = run(changes=[Payload("panda_tcp", 2.0)], duration=0.01)
-    bodies = rollout.meta["plant"]["bodies"]
-    own = load("panda").model.inertias[7].mass
-    assert bodies["panda_joint7"]["mass"] == pytest.approx(own + 2.0)
-    assert "bodies" not in run(duration=0.01).meta["plant"]
 
 
 # --- refusals ------------------------------------------------------------------------
@@ -638,11 +471,3 @@ REFUSED: list[tuple[Callable[[], object], str]] = [
 def test_imperfections_that_are_none(make: Any, message: str) -> None:
     with pytest.raises(SimulationError, match=message):
         make()
-
-
-def test_frames_that_do_not_exist() -> None:
-    message = "no frame 'panda_tpc'; did you mean"
-    with pytest.raises(FrameNotFoundError, match=rf"^frame: {message}"):
-        changed(load("panda"), [Payload("panda_tpc", 1.0)])
-    with pytest.raises(FrameNotFoundError, match=rf"^pushes.0.frame: {message}"):
-        RigidBodyPlant(load("panda"), [Push("panda_tpc")])

@@ -6,10 +6,9 @@ from scipy.linalg import expm
 from scipy.stats import chi2
 
 from hsp_control import Robot, load_experiment
-from hsp_control.common.exceptions import FrameNotFoundError
 from hsp_control.robot.integrators import Rk4
-from hsp_control.simulation.plants import ImperfectPlant, RigidBody
-from hsp_control.simulation.plants.sensors import Imu, SensorDelay
+from hsp_control.simulation.plants import RigidBody
+from hsp_control.simulation.plants.sensors import Imu
 
 pytest.importorskip("example_robot_data")
 SILENT = dict.fromkeys(
@@ -126,30 +125,3 @@ def test_noise_and_biases_have_the_sizes_that_were_declared():
     ]
     low, high = chi2.ppf([1e-4, 1.0 - 1e-4], 300)
     assert low < np.square(first).sum() / 0.25 < high
-
-
-def test_a_run_again_reads_the_same_and_a_delay_delays_it():
-    robot, states = tumbling()
-    rk4 = Rk4(step=1e-3)
-
-    def heard(*sensors):
-        plant = RigidBody(sensors=sensors, seed=4).build(robot, rk4)
-        assert isinstance(plant, ImperfectPlant)
-        found = []
-        plant.reset(*states[0])
-        for each in states:
-            plant.measure(*each)
-            found.append(plant.inertial())
-        return found
-
-    noisy, silent = Imu("base_link"), Imu("base_link", **SILENT)
-    for a, b in zip(heard(noisy), heard(noisy), strict=True):
-        assert np.array_equal(a.specific_force, b.specific_force)
-    exact, late = heard(silent), heard(silent, SensorDelay(3))
-    for a, b in zip(exact[2:], late[5:], strict=False):
-        assert a.angular_velocity == pytest.approx(b.angular_velocity)
-
-
-def test_its_frame_exists():
-    with pytest.raises(FrameNotFoundError, match=r"sensors.imu.frame: no frame 'bse"):
-        RigidBody(sensors=[Imu("bse_link")]).build(Robot.load("solo12"), Rk4(step=1e-3))

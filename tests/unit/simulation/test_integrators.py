@@ -13,18 +13,15 @@ from closed_loops import (
     distance,
     load,
     order,
-    planar_controller,
-    planar_start,
     start,
 )
 from numpy.typing import NDArray
 
-from hsp_control import Robot, simulate
+from hsp_control import Robot
 from hsp_control.common.exceptions import LogError, SimulationError
 from hsp_control.common.kernels import PLAIN
 from hsp_control.robot import integrators
 from hsp_control.robot.integrators import Dop853, Rk4, SemiImplicitEuler
-from hsp_control.robot.step_count import number_of_steps
 
 Array = NDArray[np.float64]
 
@@ -164,41 +161,6 @@ def test_whole_turns_need_new_charts(monkeypatch: pytest.MonkeyPatch) -> None:
     assert evaluations[-1] == pytest.approx(2.0 * np.pi / 5.0, abs=1e-2)
 
 
-@pytest.mark.parametrize("name", ROBOTS)
-def test_a_chart_is_the_manifold(name: str) -> None:
-    """y' of the chart is the motion's: d/dt (base ⊕ δ) moves with v."""
-    robot = load(name)
-    base, _ = start(robot, 5)
-    rng = np.random.default_rng(6)
-    chart = integrators.Chart(robot, base)
-    y, a = 0.8 * rng.normal(size=2 * robot.nv), rng.normal(size=robot.nv)
-    rate = chart.rate(y, a)
-    np.testing.assert_array_equal(rate[robot.nv :], a)
-    h = 1e-4
-    ahead, behind = (chart.point(y + s * h * rate)[0] for s in (1.0, -1.0))
-    v = robot.difference(behind, ahead) / (2.0 * h)
-    np.testing.assert_allclose(v, y[robot.nv :], rtol=0, atol=1e-7)
-
-
-def test_steps_are_equal_and_none_is_longer() -> None:
-    """An interval of 10 ms by steps of 3 ms: four of 2.5 ms, and it ends at its end."""
-    robot = load("planar3r")
-    q, v = start(robot, 7)
-    for method, stages in ((SemiImplicitEuler, 1), (Rk4, 4)):
-        times: list[float] = []
-
-        def dynamics(t: float, q: Array, v: Array, times: list[float] = times) -> Array:
-            times.append(t)
-            return np.zeros(3)
-
-        method(0.003).advance(robot, dynamics, 1.0, 1.01, q, v)
-        starts = [1.0, 1.0025, 1.005, 1.0075]
-        np.testing.assert_allclose(times[::stages], starts, rtol=0, atol=1e-14)
-        assert len(times) == 4 * stages
-    assert number_of_steps(0.3, 0.1) == 3  # 0.3/0.1 is 2.9999999999999996
-    assert number_of_steps(0.1, 0.3) == 1
-
-
 @pytest.mark.skipif(PLAIN, reason="plain Python has no native calls")
 @pytest.mark.parametrize("method", [Rk4, SemiImplicitEuler])
 def test_native_steps_are_those_that_are_made_one_by_one(method: Any) -> None:
@@ -223,17 +185,6 @@ def test_native_steps_are_those_that_are_made_one_by_one(method: Any) -> None:
     copy = pickle.loads(pickle.dumps(native.native))
     copy()  # it owns what it reads
     assert native.h[0] == pytest.approx(0.0025)
-
-
-def test_trials_that_stray_are_shortened() -> None:
-    """A trial step of 2 s overflows in its stages, before it could be judged."""
-    options: Any = {"duration": 2.0, "integrator": EXACT}
-    exact = simulate(planar_controller(), planar_start(), **options)
-    for log_period in (0.1, 2.0):
-        run = simulate(
-            planar_controller(), planar_start(), log_period=log_period, **options
-        )
-        np.testing.assert_allclose(run.v[-1], exact.v[-1], rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize(

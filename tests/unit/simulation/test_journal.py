@@ -1,8 +1,6 @@
 """The journal of a log: whatever ends its writer, all whole rows can be read."""
 
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -105,49 +103,6 @@ def test_a_changed_byte_ends_it_and_spoils_nothing_before(data: st.DataObject) -
         assert meta["what"] == "ä"
     finally:
         path.unlink(missing_ok=True)
-
-
-def test_columns_that_come_or_grow_hold_nan_before(tmp_path: Path) -> None:
-    journal = JournalWriter(tmp_path / "a.journal")
-    journal.write_heading({"t": np.zeros(0), "s": np.zeros((0, 1))}, {"heading": 1})
-    journal.write_row({"t": np.array([1.0]), "s": np.array([[2.0]])})
-    wider = {"t": np.array([3.0]), "s": np.array([[4.0, 5.0]]), "x": np.ones((1, 2, 2))}
-    assert not journal.describes(wider)
-    journal.write_heading(wider, {"heading": 2})
-    assert journal.describes(wider)
-    journal.write_row(wider)
-    journal.close()
-    columns, meta = read_journal(tmp_path / "a.journal")
-    assert meta["heading"] == 2
-    np.testing.assert_array_equal(columns["t"], [1.0, 3.0])
-    np.testing.assert_array_equal(columns["s"], [[2.0, np.nan], [4.0, 5.0]])
-    assert np.isnan(columns["x"][0]).all()
-    np.testing.assert_array_equal(columns["x"][1], np.ones((2, 2)))
-
-
-KILLED_WRITER = """
-import os, signal, sys
-from pathlib import Path
-import numpy as np
-from hsp_control.simulation.journal import JournalWriter
-journal = JournalWriter(Path(sys.argv[1]))
-journal.write_heading({"t": np.zeros(0)}, {})
-for k in range(1000):
-    journal.write_row({"t": np.array([float(k)])})
-    if k == 700:
-        os.kill(os.getpid(), signal.SIGKILL)
-"""
-
-
-@pytest.mark.process
-def test_a_killed_writer_loses_nothing_that_it_wrote(tmp_path: Path) -> None:
-    path = tmp_path / "a.journal"
-    done = subprocess.run(
-        [sys.executable, "-c", KILLED_WRITER, str(path)], check=False, timeout=120
-    )
-    assert done.returncode == -9
-    columns, _ = read_journal(path)
-    np.testing.assert_array_equal(columns["t"], np.arange(701.0))
 
 
 def test_continuous_joints_are_unwound(tmp_path: Path) -> None:

@@ -42,20 +42,6 @@ def test_rows_come_as_they_are_written(tmp_path: Path) -> None:
     writer.close()
 
 
-def test_the_last_row_stays_until_another_follows_a_new_heading(tmp_path: Path) -> None:
-    """Between the two writes a reader sees rows, and then a heading without any."""
-    writer, tail = JournalWriter(tmp_path / "a"), JournalTail(tmp_path / "a")
-    writer.write_heading(columns(0), {"status": "running"})
-    writer.write_row(columns(0))
-    writer.write_heading(columns(1, 4), {"status": "running"})
-    assert tail.read() == 1
-    np.testing.assert_array_equal(tail.rows(tail.count - 1)["q"], [[0.0, 0.0]])
-    writer.write_row(columns(1, 4))
-    assert tail.read() == 1
-    np.testing.assert_array_equal(tail.rows(0)["q"], [[1.0] * 4])
-    writer.close()
-
-
 @settings(max_examples=30, deadline=None)
 @given(cuts=st.lists(st.integers(0, 2000), max_size=8))
 def test_a_frame_that_is_half_written_waits(

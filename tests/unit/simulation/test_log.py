@@ -13,21 +13,17 @@ from numpy.typing import NDArray
 
 from hsp_control import (
     Controller,
-    FramePosition,
     Gains,
     JointPosture,
-    Obstacle,
     Rollout,
     load_experiment,
     simulate,
 )
 from hsp_control.cli import main
 from hsp_control.common.exceptions import LogError, ShapeError
-from hsp_control.geometry.scene import Scene
-from hsp_control.geometry.shapes import Sphere
 from hsp_control.null_space.metrics import MassMatrixMetric
 from hsp_control.robot.integrators import Rk4
-from hsp_control.trajectories import Hold, Lissajous
+from hsp_control.trajectories import Lissajous
 
 Array = NDArray[np.float64]
 
@@ -108,16 +104,6 @@ def test_joint_positions_of_continuous_joints_wind_up() -> None:
     np.testing.assert_allclose(run["joint_positions"], expected, rtol=0, atol=1e-7)
 
 
-def test_obstacles_are_logged() -> None:
-    center = Lissajous([0, 0.75, 0], [0, 3, 0], center=[-1, 1.7, 0])
-    scene = Scene([Obstacle("disk", Sphere(0.2), center)])
-    run = simulate(planar_controller(), planar_start(), duration=0.1, scene=scene)
-    expected = np.array([center.sample(t).position for t in run.t])
-    np.testing.assert_array_equal(run["obstacle.disk"], expected)
-    assert run.meta["obstacles"]["disk"]["radius"] == 0.2
-    assert "obstacle.disk" in run.meta["columns"]
-
-
 def test_a_run_can_be_measured_afterwards(planar_run: Rollout) -> None:
     """`measure` gives what the log has, and what it has not, at every row."""
     run, robot = planar_run, load("planar3r", gravity=False)
@@ -130,30 +116,7 @@ def test_a_run_can_be_measured_afterwards(planar_run: Rollout) -> None:
         run.measure(load("panda"), lambda state: state.t)
 
 
-@pytest.mark.parametrize(
-    ("name", "efforts"), [("planar3r", "N·m"), ("rolling ur5", "N or N·m")]
-)
-def test_efforts_have_the_units_of_their_joints(name: str, efforts: str) -> None:
-    """In the joints' order: a root or a rail that comes first pushes, in newtons."""
-    robot = load(name)
-    q0 = robot.integrate(robot.home(), np.full(robot.nv, 0.3))
-    start = robot.state(0.0, q0, np.zeros(robot.nv)).position(robot.end_effector)
-    gains = Gains(natural_frequency=5.0)
-    task = FramePosition(robot.end_effector, Hold(start[:2]), gains=gains, axes="xy")
-    run = simulate(Controller(robot, [task]), q0, duration=0.01)
-    assert run.meta["columns"]["tau"]["unit"] == efforts
-
-
 # --- the log's file ------------------------------------------------------------------
-
-
-def strict(text: str) -> Any:
-    """Parse JSON as the standard has it, without NaN and Infinity."""
-
-    def refuse(name: str) -> Any:
-        raise ValueError(f"{name} is not JSON")
-
-    return json.loads(text, parse_constant=refuse)
 
 
 def same(a: Rollout, b: Rollout) -> bool:
@@ -175,35 +138,6 @@ def test_round_trip(planar_run: Rollout, tmp_path: Path) -> None:
     assert repr(loaded) == "Rollout(51 rows, 0 to 0.5 s, completed)"
 
 
-def test_numpy_alone_reads_it(planar_run: Rollout, tmp_path: Path) -> None:
-    """No pickle inside; the names that always exist; the description is strict JSON."""
-    path = planar_run.save(tmp_path / "run.npz")
-    with np.load(path, allow_pickle=False) as archive:
-        columns = {name: archive[name] for name in archive.files}
-    assert {"meta", "t", "q", "v", "tau"} <= set(columns)
-    assert all(column.dtype != object for column in columns.values())
-    meta = strict(str(columns.pop("meta")))
-    assert meta["format"] == "hsp_control rollout 1"
-    assert meta["status"] == "completed"
-    assert {"columns", "robot", "tasks", "versions"} <= set(meta)
-    assert set(meta["columns"]) == set(columns)
-    assert meta["robot"]["dofs"] == ["joint1", "joint2", "joint3"]
-    for name, column in columns.items():
-        np.testing.assert_array_equal(column, planar_run[name], err_msg=name)
-
-
-def test_meta_is_the_user_s_too(tmp_path: Path) -> None:
-    run = simulate(
-        planar_controller(),
-        planar_start(),
-        duration=0.01,
-        meta={"config": {"title": "φ_N = 0, “quoted”"}, "note": [1, None, True]},
-    )
-    loaded = Rollout.load(run.save(tmp_path / "a name with spaces"))
-    assert loaded.config == {"title": "φ_N = 0, “quoted”"}
-    assert loaded.meta["note"] == [1, None, True]
-
-
 def test_a_column_that_is_not_there(planar_run: Rollout) -> None:
     assert "task.tip.error" in planar_run
     assert "task.tip.eror" not in planar_run
@@ -221,16 +155,6 @@ def short_log(tmp_path: Path) -> tuple[Rollout, bytes, Path]:
     run = simulate(planar_controller(), planar_start(), duration=0.02)
     data = run.save(tmp_path / "whole.npz").read_bytes()
     return run, data, tmp_path / "other.npz"
-
-
-def test_a_log_cut_short_is_refused(short_log: tuple[Rollout, bytes, Path]) -> None:
-    """At every 50th byte, and at the last few."""
-    _, data, path = short_log
-    ends = {*range(0, len(data), 50), *range(len(data) - 25, len(data))}
-    for end in sorted(ends):
-        path.write_bytes(data[:end])
-        with pytest.raises(LogError, match=r"other.npz: not a complete .npz log"):
-            Rollout.load(path)
 
 
 def test_a_log_with_a_wrong_byte_is_refused_or_whole(
@@ -305,17 +229,6 @@ def test_foreign_files(which: str, tmp_path: Path) -> None:
     path.write_bytes(make())
     with pytest.raises(LogError, match=rf"foreign.npz: {message}"):
         Rollout.load(path)
-
-
-def test_no_such_file(short_log: tuple[Rollout, bytes, Path]) -> None:
-    _, _, path = short_log
-    message = r"whloe.npz: no such file; did you mean 'whole.npz'\?$"
-    with pytest.raises(LogError, match=message):
-        Rollout.load(path.with_name("whloe.npz"))
-    with pytest.raises(LogError, match=r"gone.npz: no such file$"):
-        Rollout.load(path.parent / "nowhere" / "gone.npz")
-    with pytest.raises(LogError, match=r"not a complete .npz log"):
-        Rollout.load(path.parent)  # a folder
 
 
 def test_places_where_nothing_can_be_written(

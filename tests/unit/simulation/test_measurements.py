@@ -14,11 +14,9 @@ from hsp_control.simulation.control_chain import ControlChain
 from hsp_control.simulation.loops import sampled_loop
 from hsp_control.simulation.plants import (
     IntegratedPlant,
-    RigidBody,
     RigidContact,
     RigidContacts,
 )
-from hsp_control.simulation.plants.sensors import PositionNoise
 
 pytest.importorskip("example_robot_data")
 FEET = ("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT")
@@ -102,28 +100,6 @@ def test_rigid_contacts_measure_them_too():
     plant = part.build(robot, rk4)
     # The force is that of the end of a period, the balance its mean.
     momentum_balance(IntegratedPlant(plant, rk4), 2e-3)
-
-
-def test_sensors_of_other_things_leave_the_forces_as_they_are():
-    pytest.importorskip("mujoco")
-    experiment = load_experiment("whole_body/solo12_trunk")
-    part = experiment.scenario.plant
-    noisy = type(part)(contacts=part.contacts, sensors=[PositionNoise(1e-3)])
-    plant = noisy.build(experiment.robot, experiment.integrator)
-    plant.reset(0.0, experiment.q0, experiment.v0)
-    tau = np.zeros(experiment.robot.nv)
-    q, v = plant.advance(0.0, 0.001, tau)
-    theirs = plant.contact_wrenches(0.001, q, v, tau)
-    assert theirs.keys() == set(FEET)
-    for foot, wrench in plant.plant.contact_wrenches(0.001, q, v, tau).items():
-        assert theirs[foot] == pytest.approx(wrench)
-
-
-def test_a_plant_without_contacts_measures_none():
-    experiment = load_experiment("paper/2_rest")
-    plant = RigidBody().build(experiment.robot, experiment.integrator)
-    tau = np.zeros(experiment.robot.nv)
-    assert plant.contact_wrenches(0.0, experiment.q0, experiment.v0, tau) == {}
 
 
 def test_a_fall_is_said_and_stops_the_run():

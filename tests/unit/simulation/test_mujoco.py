@@ -1,8 +1,6 @@
 """MuJoCo as a plant: the same mechanics as Pinocchio's, and a ground to stand on."""
 
-import pickle
 import re
-import sys
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -21,11 +19,9 @@ from hsp_control.common.exceptions import (
 )
 from hsp_control.common.resources import bundled_robots
 from hsp_control.geometry.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere
-from hsp_control.robot import RobotState
 from hsp_control.robot.description.loading import load_model
 from hsp_control.robot.description.sources import find_robot
 from hsp_control.robot.friction import JointFriction
-from hsp_control.robot.integrators import Dop853
 from hsp_control.simulation.plants import Push
 from hsp_control.simulation.plants.mujoco import ContactShape, Ground, MujocoPlant
 
@@ -128,61 +124,6 @@ def test_states_go_there_and_back(name: str) -> None:
         assert np.abs(v - v_back).max() < 1e-13
 
 
-def test_joints_that_mimic_follow_their_leader() -> None:
-    """The tie is MuJoCo's own soft constraint: a tenth of a millimetre here."""
-    robot = load("baxter")
-    plant = MujocoPlant(robot)
-    q = robot.home()
-    plant.reset(0.0, q, np.zeros(robot.nv))
-    tau = robot.state(0.0, q, np.zeros(robot.nv)).nonlinear_effects.copy()
-    tau[robot.velocity_index("l_gripper_l_finger_joint")] += 0.1
-    plant.advance(0.0, 0.2, tau)
-    left, right = (
-        float(plant.data.joint(f"l_gripper_{side}_finger_joint").qpos[0])
-        for side in "lr"
-    )
-    assert left > 0.005
-    assert right == pytest.approx(-left, abs=1e-4)
-
-
-def test_a_joint_limit_holds() -> None:
-    """A panda pushed towards a limit goes past it without, and stays with it."""
-    robot = load("panda")
-    q = robot.home()
-    _, upper = robot.position_limits()
-    ends = []
-    for limited in (True, False):
-        plant = MujocoPlant(robot, joint_limits=limited)
-        plant.reset(0.0, q, np.zeros(7))
-        state = RobotState(robot)
-        x, v = q, np.zeros(7)
-        for k in range(500):
-            t = k * 0.001
-            effort = state.update(t, x, v).nonlinear_effects + 2.0 * np.eye(7)[5]
-            x, v = plant.advance(t, t + 0.001, effort)
-        ends.append(x[5] - upper[5])
-    assert ends[0] < 0.05
-    assert ends[1] > 0.3
-
-
-def test_dry_friction_sticks_and_viscous_friction_damps() -> None:
-    robot = load("panda")
-    q = robot.home()
-    hold = robot.state(0.0, q, np.zeros(7)).nonlinear_effects.copy()
-    push = np.eye(7)[6]
-
-    def moved(friction: JointFriction | None, effort: float) -> float:
-        plant = MujocoPlant(robot, friction=friction)
-        plant.reset(0.0, q, np.zeros(7))
-        return float(plant.advance(0.0, 0.2, hold + effort * push)[0][6] - q[6])
-
-    dry = JointFriction.of(robot, coulomb=0.5)
-    free = moved(None, 0.4)
-    assert abs(moved(dry, 0.4)) < 1e-4 * abs(free)
-    assert moved(dry, 0.9) == pytest.approx(free, rel=0.05)  # the others stick now
-    assert moved(JointFriction.of(robot, viscous=0.5), 0.4) < 0.5 * free
-
-
 # --- contacts ------------------------------------------------------------------------
 
 
@@ -270,28 +211,6 @@ def ball(radius: float = 0.1) -> Robot:
     return Robot(model, find_robot("planar3r"))
 
 
-@pytest.mark.parametrize("corners", [3, 4])
-def test_a_flat_mesh_is_a_contact(corners: int, tmp_path: Path) -> None:
-    """A plate's box has some height; three corners upright have no hull."""
-    places = np.array([[0, 0, 0], [0.2, 0, 0], [0.2, 0.1, 0], [0, 0.1, 0]])[:corners]
-    if corners == 3:
-        places = places[:, [0, 2, 1]]  # no sole: its capsule
-    lines = [f"v {x} {y} {z}" for x, y, z in places]
-    lines += [f"f 1 {k} {k + 1}" for k in range(2, corners)]
-    (tmp_path / "plate.obj").write_text("\n".join(lines) + "\n")
-    (tmp_path / "plate.urdf").write_text(
-        '<robot name="plate"><link name="base"/><link name="plate"><inertial>'
-        '<mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
-        '</inertial><collision><geometry><mesh filename="plate.obj"/></geometry>'
-        '</collision></link><joint name="lift" type="prismatic"><parent link="base"/>'
-        '<child link="plate"/><axis xyz="0 0 1"/>'
-        '<limit lower="-9" upper="9" effort="100" velocity="9"/></joint></robot>'
-    )
-    robot = Robot.load(tmp_path / "plate.urdf")
-    plant = MujocoPlant(robot, contacts=[ContactShape("plate")])
-    assert -0.1 < plant.clearance(robot.neutral()) <= 0.0
-
-
 def test_a_contact_force_is_the_grounds_on_the_robot_about_the_frame() -> None:
     """A block at rest under a frame beside it: f = m g, moment = r × f."""
     robot = ball()
@@ -345,28 +264,7 @@ def test_shapes_touch_where_they_are() -> None:
             assert found == pytest.approx(height + offset - 0.2, abs=1e-6), shape
 
 
-def test_a_push_gives_its_impulse() -> None:
-    """Half a second of 4 N on 2 kg, and of 0.01 N·m about z: m v = F T, I ω = M T."""
-    robot = ball()
-    robot.model.gravity.linear = np.zeros(3)
-    push = Push("body", (4.0, 0.0, 0.0), (0.0, 0.0, 0.01), start=0.1, duration=0.5)
-    plant = MujocoPlant(robot, pushes=[push])
-    q = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
-    plant.reset(0.0, q, np.zeros(6))
-    _, v = plant.advance(0.0, 1.0, np.zeros(6))
-    turned = 0.01 * 0.5 / (0.4 * 2.0 * 0.1**2)
-    speed = np.linalg.norm(v[:3])
-    assert speed == pytest.approx(4.0 * 0.5 / 2.0, rel=1e-9)
-    assert v[5] == pytest.approx(turned, rel=1e-9)
-
-
 # --- refusals ------------------------------------------------------------------------
-
-
-def test_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "mujoco", None)
-    with pytest.raises(SimulationError, match=r"pip install 'hsp_control\[mujoco\]'$"):
-        MujocoPlant(load("panda"))
 
 
 def test_a_floating_root_has_no_motor() -> None:
@@ -414,49 +312,11 @@ def test_settings_that_are_none(options: Any, kind: Any, message: str) -> None:
         MujocoPlant(load("panda"), **options)
 
 
-def test_two_shapes_of_one_frame_share_its_force() -> None:
-    """A foot of two balls, 0.1 and 0.3 m from the weight: one force, one moment."""
-    robot = ball()
-    contacts = [
-        ContactShape("body", Sphere(0.05), (x, y, 0.0))
-        for x, y in ((-0.1, 0.1), (-0.1, -0.1), (0.3, 0.0))
-    ]
-    plant = MujocoPlant(robot, contacts=contacts)
-    q = np.array([0.0, 0.0, 0.05, 0.0, 0.0, 0.0, 1.0])
-    plant.reset(0.0, q, np.zeros(6))
-    q, v = plant.advance(0.0, 1.0, np.zeros(6))
-    log_channels = plant.log_channels(1.0, q, v, np.zeros(6))
-    assert set(log_channels) == {
-        "plant.contact.body.force",
-        "plant.contact.body.moment",
-    }
-    force, moment = (
-        log_channels[f"plant.contact.body.{k}"].value for k in ("force", "moment")
-    )
-    np.testing.assert_allclose(force, [0.0, 0.0, 2.0 * 9.81], rtol=0, atol=1e-3)
-    np.testing.assert_allclose(moment, np.zeros(3), rtol=0, atol=1e-3)
-
-
 def test_clearance_is_of_contacts() -> None:
     with pytest.raises(
         SimulationError, match=r"^panda has no contacts with the ground"
     ):
         MujocoPlant(load("panda")).clearance(load("panda").home())
-
-
-def test_a_base_that_turns_is_pushed_in_its_own_axes() -> None:
-    """A planar root that turns through 1.2 rad while an effort is held."""
-    robot = zoo()
-    q = robot.neutral()
-    v = np.eye(robot.nv)[2] * 4.0
-    tau = np.eye(robot.nv)[0] * 10.0
-    exact = Dop853(1e-12, 1e-12).advance(
-        robot, lambda t, q, v: robot.forward_dynamics(q, v, tau), 0.0, 0.3, q, v
-    )
-    plant = MujocoPlant(robot, timestep=2.5e-4, integrator="RK4")
-    plant.reset(0.0, q, v)
-    _, found = plant.advance(0.0, 0.3, tau)
-    np.testing.assert_allclose(found, exact[1], rtol=0, atol=2e-2)
 
 
 def test_a_foot_that_cannot_touch_is_refused(tmp_path: Path) -> None:
@@ -486,23 +346,3 @@ def test_a_motion_that_diverges_is_an_error(
     ):
         plant.advance(0.0, 0.01, np.full(7, 1e14))
     assert not list(tmp_path.iterdir())
-
-
-def test_its_clock_begins_where_it_is_told() -> None:
-    plant = MujocoPlant(load("panda"))
-    plant.reset(3.0, plant.robot.home(), np.zeros(7))
-    plant.advance(3.0, 3.5, np.zeros(7))
-    assert plant.data.time == pytest.approx(3.5)
-
-
-def test_it_is_carried_to_another_process_with_its_state() -> None:
-    plant = MujocoPlant(load("panda"))
-    plant.reset(0.0, plant.robot.home(), np.zeros(7))
-    plant.advance(0.0, 0.1, np.zeros(7))
-    copy = pickle.loads(pickle.dumps(plant))
-    for ours, theirs in zip(
-        plant.advance(0.1, 0.2, np.ones(7)),
-        copy.advance(0.1, 0.2, np.ones(7)),
-        strict=True,
-    ):
-        np.testing.assert_array_equal(ours, theirs)

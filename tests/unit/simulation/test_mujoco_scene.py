@@ -1,6 +1,5 @@
 """A MuJoCo scene of one's own as a plant: the robot, its motors, and objects."""
 
-import copy
 import re
 from typing import Any
 
@@ -16,10 +15,7 @@ from hsp_control.common.exceptions import (
 )
 from hsp_control.robot.friction import JointFriction
 from hsp_control.simulation.plants import (
-    Encoder,
-    ImperfectPlant,
     MujocoScenePlant,
-    Push,
 )
 from hsp_control.simulation.plants.mujoco import MujocoPlant
 from hsp_control.trajectories import Circle
@@ -80,30 +76,6 @@ def test_efforts_go_through_the_motors_and_their_limits() -> None:
     np.testing.assert_allclose(data.qfrc_actuator[:4], [50.0, 0.0, 20.0, -10.0])
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        ('<motor name="m4".*?/>', ""),  # no motor
-        ('<motor name="m4".*?/>', '<motor joint="j4"/><motor joint="j4"/>'),
-        ('(name="m4")', r'\1 group="3"'),  # disabled below
-        ('gear="10"', 'gear="0"'),
-    ],
-)
-def test_efforts_are_applied_where_there_is_not_one_motor(
-    change: tuple[str, str],
-) -> None:
-    text = re.sub(*change, CELL)
-    robot, model, data = cell(text.replace('ctrl="0 0 0 0 .02"', ""))
-    model.opt.disableactuator = 1 << 3
-    plant = MujocoScenePlant(robot, model, data)
-    assert list(plant.motors) == [0, 1, 2]
-    assert plant.describe()["motors"] == ["j1", "j2", "j3"]
-    at_home(robot, plant)
-    plant.advance(0.0, 0.001, EFFORT)
-    np.testing.assert_array_equal(data.qfrc_applied[:4], [0.0, 0.0, 0.0, EFFORT[3]])
-    assert data.qfrc_actuator[3] == 0.0
-
-
 def test_the_rest_of_the_scene_lives_on() -> None:
     """The ball falls freely; the gripper's servo follows its own control."""
     robot, model, data = cell()
@@ -121,76 +93,6 @@ def test_the_rest_of_the_scene_lives_on() -> None:
     assert data.qpos[7] == pytest.approx(1.0 - fallen, rel=1e-9)
     assert data.qpos[4] > 0.02
     assert data.time == pytest.approx(end)
-
-
-def test_a_run_begins_where_the_data_was() -> None:
-    robot, model, data = cell()
-    data.qvel[BALL] = 0.5
-    plant = MujocoScenePlant(robot, model, data)
-    ends = []
-    for _ in range(2):
-        at_home(robot, plant)
-        for k in range(20):
-            plant.advance(0.001 * k, 0.001 * (k + 1), EFFORT)
-        ends.append(np.concatenate([data.qpos, data.qvel]))
-        data.ctrl[4], data.qpos[5] = 1.0, 2.0  # somebody plays with it
-    np.testing.assert_array_equal(*ends)
-
-
-def test_the_scene_keeps_its_timestep() -> None:
-    robot, model, data = cell()
-    plant = MujocoScenePlant(robot, model, data)
-    at_home(robot, plant)
-    plant.advance(0.0, 0.0025, EFFORT)  # three steps of 0.83 ms
-    assert data.time == pytest.approx(0.0025, rel=1e-12)
-    assert model.opt.timestep == 0.001
-
-
-def test_contact_forces_on_a_body_are_logged() -> None:
-    """The ball lies on the floor: once at rest, its weight, in the middle of it."""
-    robot, model, data = cell()
-    plant = MujocoScenePlant(robot, model, data, contacts=["ball", "hand"])
-    at_home(robot, plant)
-    hold = robot.state(0.0, robot.home(), np.zeros(4)).nonlinear_effects
-    q, v = plant.advance(0.0, 1.0, hold)
-    before = data.qacc_warmstart.copy()
-    channels = plant.log_channels(1.0, q, v, hold)
-    np.testing.assert_array_equal(data.qacc_warmstart, before)  # a look moves nothing
-    force = channels["plant.contact.ball.force"].value
-    np.testing.assert_allclose(force, [0.0, 0.0, 0.981], atol=1e-3)
-    moment = channels["plant.contact.ball.moment"].value
-    np.testing.assert_allclose(moment, 0.0, atol=1e-6)
-    np.testing.assert_array_equal(channels["plant.contact.hand.force"].value, 0.0)
-
-
-def test_two_bodies_of_the_scene_push_each_other_equally() -> None:
-    """The hand, pushed down on the ball: what one gets, the other gives."""
-    robot, model, data = cell()
-    state = robot.state(0.0, robot.home(), np.zeros(4))
-    finger = state.position("finger")
-    data.qpos[5:8] = finger
-    data.qpos[5] += 0.03
-    model.opt.gravity[:] = 0.0
-    model.geom_contype[0] = model.geom_conaffinity[0] = 0  # no floor
-    plant = MujocoScenePlant(robot, model, data, contacts=["ball", "finger", "hand"])
-    at_home(robot, plant)
-    channels = plant.log_channels(0.0, robot.home(), np.zeros(4), np.zeros(4))
-    names = ("ball", "finger", "hand")
-    forces = [channels[f"plant.contact.{name}.force"].value for name in names]
-    assert np.linalg.norm(forces[0]) > 0.1
-    np.testing.assert_allclose(np.sum(forces, axis=0), 0.0, atol=1e-12)
-
-
-def test_pushes_are_applied_besides_the_motors() -> None:
-    robot, model, data = cell()
-    push = Push("tip", force=(0.0, 10.0, 0.0), start=0.0, duration=1.0)
-    plant = MujocoScenePlant(robot, model, data, pushes=[push])
-    at_home(robot, plant)
-    plant.advance(0.0, 0.001, EFFORT)
-    state = robot.state(0.0, robot.home(), np.zeros(4))
-    expected = state.frame("tip").jacobian[:3].T @ [0.0, 10.0, 0.0]
-    np.testing.assert_allclose(data.qfrc_applied[:4], expected, atol=1e-12)
-    np.testing.assert_allclose(data.qfrc_actuator[:4], EFFORT, rtol=1e-12)
 
 
 def test_a_controller_tracks_in_the_scene() -> None:
@@ -214,19 +116,6 @@ def test_a_controller_tracks_in_the_scene() -> None:
     late = rollout.t > 1.0
     assert np.abs(rollout["task.tip.error"][late]).max() < 5e-4
     assert rollout.meta["plant"]["type"] == "MujocoScenePlant"
-
-
-def test_it_takes_sensors_and_can_be_copied() -> None:
-    robot, model, data = cell()
-    plant = MujocoScenePlant(robot, model, data)
-    ends = []
-    for each in (plant, copy.deepcopy(plant)):
-        imperfect = ImperfectPlant(each, [Encoder(1e-3)])
-        imperfect.reset(0.0, robot.home(), np.zeros(4))
-        x = imperfect.advance(0.0, 0.01, EFFORT)
-        measured = imperfect.measure(0.01, *x)
-        ends.append(np.concatenate([*x, *measured]))
-    np.testing.assert_array_equal(*ends)
 
 
 def test_a_motion_that_diverges_is_an_error() -> None:

@@ -9,7 +9,7 @@ import pytest
 from hsp_control import Robot
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.geometry.shapes import Box, HalfSpace, Sphere
-from hsp_control.simulation.plants import ContactShape, Ground, Solid
+from hsp_control.simulation.plants import ContactShape, Solid
 from hsp_control.simulation.plants.mujoco import MujocoPlant
 
 mujoco = pytest.importorskip("mujoco")
@@ -60,35 +60,6 @@ def test_what_is_loose_falls_onto_what_is_fixed() -> None:
     made.advance(0.1, 0.6, tau)
     assert made.data.body("solid/ball/0").xpos[2] == pytest.approx(0.6, abs=1e-3)
     assert made.model.body("solid/ball/0").mass[0] == pytest.approx(3.0)
-
-
-@pytest.mark.parametrize("slip_damping", [None, 30.0])
-def test_its_own_friction_counts(slip_damping: float | None) -> None:
-    """Not the ground's, which the robot's shapes have. It pushes along its normal."""
-    tip = panda().state(0.0, panda().home(), np.zeros(7)).position(TIP)
-    slope = Solid(
-        "slope",
-        Box([1.0, 1.0, 0.2]),
-        tip + np.array([np.sin(-0.2), 0.0, -np.cos(0.2)]) * 0.119,
-        [0.0, -0.2, 0.0],
-        friction=0.15,
-        slip_damping=slip_damping,
-        impedance=0.6,
-    )
-    made = plant(slope, ground=Ground(-1.0, 0.9))
-    made.reset(0.0, panda().home(), np.zeros(7))
-    tau = panda().state(0.0, panda().home(), np.zeros(7)).nonlinear_effects.copy()
-    q, v = made.advance(0.0, 0.002, tau)
-    (contact,) = made.data.contact
-    assert contact.friction[0] == 0.15
-    assert contact.solimp[0] == contact.solimp[1] == 0.6
-    asked = 0.0 if slip_damping is None else -0.6 * slip_damping
-    assert contact.solreffriction[1] == pytest.approx(asked)
-    force = made.contact_wrenches(0.002, q, v, tau)[TIP][:3]
-    normal = np.array([-np.sin(0.2), 0.0, np.cos(0.2)])
-    assert force @ normal > 0.0
-    across = force - (force @ normal) * normal
-    assert np.linalg.norm(across) <= 0.15 * (force @ normal) + 1e-9
 
 
 @pytest.mark.parametrize(("make", "message"), [

@@ -1,7 +1,6 @@
 """Check that many periods in one native call move the robot as one by one."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,12 +18,10 @@ from hsp_control import (
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.common.kernels import PLAIN
 from hsp_control.config import Experiment
-from hsp_control.constraints.limits import RobotLimits
 from hsp_control.control.changes import Changes
 from hsp_control.control.controller import Controller
 from hsp_control.robot.integrators import SemiImplicitEuler
 from hsp_control.simulation import loops
-from hsp_control.simulation.limit_excess import LimitExcess
 from hsp_control.trajectories import Hold
 
 if not PLAIN:
@@ -129,16 +126,6 @@ def test_periods_in_which_a_limit_binds_are_made_alone(counted: Counted) -> None
     assert ((made > 0) & (made < 8)).sum() >= 2
 
 
-def test_what_a_held_effort_teaches_is_the_same(counted: Counted) -> None:
-    """How far speeds were off widens the margin of a speed limit that binds later."""
-    slow = "panda_obstacle", "limits.velocity={scale: 0.3}"
-    theirs = counted.alone(short(*slow, duration=2.0).run)
-    ours = short(*slow, duration=2.0).run()
-    assert_same(ours, theirs)
-    assert (ours["status"] == 2).sum() > 10
-    assert sum(counted.many) > 1000
-
-
 def test_after_it_the_controller_is_at_its_last_step(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -159,30 +146,6 @@ def test_after_it_the_controller_is_at_its_last_step(
     # The effort of the last period was computed where that period began.
     expected = before + 1e-3 * np.maximum(made - 1, 0)
     np.testing.assert_allclose(after, expected, rtol=0, atol=1e-12)
-
-
-def test_no_state_between_two_rows_is_missed(
-    counted: Counted, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """What is seen beyond limits, here beyond 0.05 rad/s, is seen in each period."""
-
-    def strict(limits: RobotLimits | None) -> RobotLimits:
-        assert limits is not None
-        return replace(limits, velocity=np.full(7, 0.05))
-
-    arguments = LimitExcess._arguments
-    monkeypatch.setattr(
-        LimitExcess,
-        "_arguments",
-        lambda self, limits, q, v: arguments(self, strict(limits), q, v),
-    )
-    rows = "simulation.log_period=0.1"
-    theirs = counted.alone(short("panda_obstacle", rows, duration=3.0).run)
-    ours = short("panda_obstacle", rows, duration=3.0).run()
-    assert_same(ours, theirs)
-    at_rows = np.maximum(np.abs(ours.v) - 0.05, 0.0)
-    assert (ours["velocity_excess"] > at_rows + 1e-4).any()  # a peak between two rows
-    assert sum(counted.many) > 2000
 
 
 ELBOW = FramePosition("panda_link4", Hold(), axes="z", name="elbow")
@@ -267,15 +230,3 @@ def test_a_motion_that_diverges_stops_the_same_way(
     assert told[0] == told[1]
     assert ("diverged" if log_period == 0.05 else "not finite") in told[0]
     assert max(counted.many) > 1
-
-
-@pytest.mark.parametrize("override", [
-    "compensation.velocity_filter={cutoff: 100}",
-    "plant={type: rigid_body, sensors: {velocity_noise: 0.01}}",
-    "plant={type: rigid_body, pushes: [{frame: panda_link4, force: [1, 0, 0], "
-    "start: 0, duration: 1}]}",
-    "simulation.integrator={type: dop853}",
-])  # fmt: skip
-def test_what_is_not_native_is_made_alone(override: str, counted: Counted) -> None:
-    short("panda_obstacle", override, duration=0.05).run()
-    assert sum(counted.many) == 0

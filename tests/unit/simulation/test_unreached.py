@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 
 from hsp_control.simulation.unreached import (
-    REACHED,
     RESTING,
     STAYS,
     Unreached,
@@ -65,29 +64,6 @@ def test_what_moves_is_on_its_way() -> None:
     out = found(log(task__hand__error_rate=pushed)).out
     assert out[49] == out[-1] == 0.31
     assert not out[50 : 50 + STAY].any()
-
-
-def test_far_away_and_out_of_reach_are_not_both_said() -> None:
-    task = found(log(task__hand__bounded=np.full(len(T), 0.31)))
-    assert not (task.far & (task.out > 0.0)).any()
-    assert (task.far | (task.out > 0.0)).all()
-
-
-def test_an_orientation_alone_is_told_in_its_unit() -> None:
-    error = np.zeros((len(T), 6))
-    error[:, 4], error[:, 0] = 0.2, 0.9 * REACHED
-    task = found(log(task__hand__error=error))
-    assert task.words(-1) == "hand: target out of reach, 0.20 rad"
-
-
-def test_rows_in_parts_tell_the_same() -> None:
-    moved: dict[str, float] = {}
-    columns = log()
-    for k in range(0, len(T), 10):
-        rows = {name: values[k : k + 10] for name, values in columns.items()}
-        (task,) = unreached(rows, HAND, moved)
-    assert task.words(-1) == "hand: target out of reach, 0.31 m"
-    assert moved == {"hand position": 0.0, "hand orientation": 0.0}
 
 
 def test_a_task_that_is_off_and_a_log_that_says_little_say_nothing() -> None:

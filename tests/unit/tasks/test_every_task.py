@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from task_cases import (
-    CASES,
     GAINS,
     SECOND,
     TIME,
@@ -19,12 +18,11 @@ from task_cases import (
     every_task,
     load,
     place,
-    rows_in_the_frame,
     wobble,
 )
 
 from hsp_control import Gains, Pointing, Task
-from hsp_control.tasks import AngularMomentum, TaskSample
+from hsp_control.tasks import AngularMomentum
 
 Array = NDArray[np.float64]
 
@@ -56,19 +54,6 @@ def test_the_rows_move_as_the_robot_does(case: Case) -> None:
         np.testing.assert_allclose(
             sample.jacobian_dot, motion.derivative(jacobian), rtol=0, atol=1e-10
         )
-
-
-@pytest.mark.parametrize("case", [c for c in CASES if isinstance(c.family, Direction)])
-def test_pointing_rows_are_fixed_in_the_frame(case: Case) -> None:
-    """The same two orthonormal directions across the axis, wherever the robot is."""
-    motion, other = place(case, 3), place(case, 4)
-    task: Any = case.family.build(motion.robot, motion, 0.5, GAINS, 3)
-    C = rows_in_the_frame(task, motion)
-    np.testing.assert_allclose(C @ C.T, np.eye(2), rtol=0, atol=1e-13)
-    axis = np.array(case.family.axis) / np.linalg.norm(case.family.axis)
-    np.testing.assert_array_equal(task.axis, case.family.axis)
-    np.testing.assert_allclose(np.cross(*C), axis, rtol=0, atol=1e-13)
-    np.testing.assert_allclose(rows_in_the_frame(task, other), C, rtol=0, atol=1e-13)
 
 
 def gains_of(kind: str, rows: int, seed: int) -> tuple[Gains, Array, Array]:
@@ -183,23 +168,6 @@ def test_measure(case: Case) -> None:
         e = task.evaluate(state).error
         reference, actual = task.measure(state)
         case.family.check_measure(task, motion, reference, actual, e)
-
-
-@pytest.mark.slow
-@every_task
-def test_evaluate_writes_where_it_is_told_and_has_no_memory(case: Case) -> None:
-    """The same state gives the same bits, whatever was evaluated between."""
-    motion, other = place(case, 8), place(case, 9)
-    robot = motion.robot
-    task = case.family.build(robot, motion, 1.0, GAINS, 8)
-    here = robot.state(TIME, motion.q, motion.v)
-    first = task.evaluate(here)
-    out = TaskSample(*(np.full_like(array, np.nan) for array in first))
-    assert task.evaluate(robot.state(0.1, other.q, other.v), out) is out
-    assert task.evaluate(here, out) is out
-    for name, kept, written in zip(TaskSample._fields, first, out, strict=True):
-        np.testing.assert_array_equal(kept, written, err_msg=name)
-        assert not np.shares_memory(kept, written)
 
 
 # --- angular momentum ----------------------------------------------------------------

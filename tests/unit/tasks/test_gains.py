@@ -5,8 +5,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from hsp_control import Controller, Gains, JointPosture, Robot
 from hsp_control.common.exceptions import GainError
@@ -40,27 +38,6 @@ def test_a_change_leads_both_gains_to_the_new_ones() -> None:
         np.testing.assert_allclose(Kp, expected[0], rtol=1e-14)
         np.testing.assert_allclose(Kv, expected[1], rtol=1e-14)
         assert not offset.any()
-
-
-positive = st.floats(1e-3, 1e3)
-
-
-@settings(max_examples=100, deadline=None, derandomize=True)
-@given(positive, st.floats(0.05, 5.0))
-def test_gains_from_frequency(frequency: float, ratio: float) -> None:
-    """s² + Kv s + Kp has |s| = ω0, and real parts of -ζ ω0 in the mean."""
-    Kp, Kv = Gains(natural_frequency=frequency, damping_ratio=ratio).matrices(1)
-    roots = np.roots([1.0, Kv[0, 0], Kp[0, 0]])
-    assert np.prod(roots).real == pytest.approx(frequency**2, rel=1e-9)
-    assert np.sum(roots).real == pytest.approx(-2.0 * ratio * frequency, rel=1e-9)
-
-
-def test_gains_from_frequency_defaults_and_lists() -> None:
-    for kp, one in zip((9.0, 6.0), Gains(natural_frequency=3).matrices(1), strict=True):
-        np.testing.assert_array_equal(one, [[kp]])
-    Kp, Kv = Gains(natural_frequency=[2.0, 3.0], damping_ratio=[1.0, 0.5]).matrices(2)
-    np.testing.assert_array_equal(Kp, np.diag([4.0, 9.0]))
-    np.testing.assert_array_equal(Kv, np.diag([4.0, 3.0]))
 
 
 GAIN_ERRORS: dict[str, tuple[Callable[[], Any], str]] = {

@@ -4,7 +4,6 @@ The inertia and its rate are taken from plain Pinocchio and differences along a 
 never from the kernels that compute the gains.
 """
 
-import pickle
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -29,7 +28,7 @@ from task_cases import (
 )
 
 import hsp_control as hsp
-from hsp_control import Controller, FramePose, FramePosition, Gains, JointPosture
+from hsp_control import Controller, FramePosition, Gains, JointPosture
 from hsp_control.common.exceptions import (
     CompensationError,
     ControllerError,
@@ -198,34 +197,6 @@ def test_gains_at_a_state_are_those_of_the_step(case: Case) -> None:
     assert (kept < 1.0).any()
 
 
-def test_joint_impedance_of_all_joints_has_the_mass_matrix() -> None:
-    robot = hsp.Robot.load("panda")
-    spring = Impedance([600, 600, 600, 600, 250, 150, 50], damping=12.0)
-    task = JointPosture("home", impedance=spring)
-    controller = Controller(robot, [task], limits=None)
-    K = np.diag(np.array(spring.stiffness))
-    for away in (0.2, -0.1, 0.4):
-        q, v = robot.home() + away, np.linspace(-away, 0.5, 7)
-        output = controller.compute(0.0, q, v)
-        state = robot.state(0.0, q, v)
-        force = K @ robot.difference(q, robot.home()) - 12.0 * v
-        effort = force - 0.5 * state.mass_matrix_rate @ v + state.nonlinear_effects
-        np.testing.assert_allclose(output.tau, effort, rtol=1e-9, atol=1e-9)
-
-
-def test_modes_have_the_damping_ratio() -> None:
-    """At rest the error's modes are those of one ratio, whatever the inertia."""
-    robot = hsp.Robot.load("iiwa14")
-    spring = Impedance([500, 900, 300, 20, 30, 10], damping_ratio=0.4)
-    task = FramePose(impedance=spring, name="hand")
-    controller = Controller(robot, [task], limits=None)
-    controller.compute(0.0, robot.home(), np.zeros(7))
-    Kp, Kv, *_ = controller.feedback("hand")
-    eye, zero = np.eye(6), np.zeros((6, 6))
-    roots = np.linalg.eigvals(np.block([[zero, eye], [-Kp, -Kv]]))
-    np.testing.assert_allclose(-roots.real / np.abs(roots), 0.4, rtol=1e-6)
-
-
 def test_through_a_singularity() -> None:
     """A straight arm: gains stay finite, and the term in the inertia's rate fades."""
     robot = hsp.Robot.load("planar3r")
@@ -260,21 +231,6 @@ def test_a_singular_mass_matrix_is_not_a_number() -> None:
     )
     assert np.isnan(in_force.feedback.Kp[0, 0])
     assert np.isnan(in_force.feedback.Kv[0, 0])
-
-
-def test_fingers_that_mimic_each_other() -> None:
-    """Pinocchio has no Coriolis matrix then: M' is taken by differences."""
-    robot = hsp.Robot.load("panda", locked={})
-    assert robot.mimics
-    rng = np.random.default_rng(2)
-    q, v = robot.random_configuration(rng), 0.3 * rng.normal(size=robot.nv)
-    task = JointPosture("home", impedance=Impedance(100.0, damping=5.0))
-    controller = Controller(robot, [task], limits=None)
-    output = controller.compute(0.0, q, v)
-    state = robot.state(0.0, q, v)
-    force = 100.0 * robot.difference(q, robot.home()) - 5.0 * v
-    effort = force - 0.5 * state.mass_matrix_rate @ v + state.nonlinear_effects
-    np.testing.assert_allclose(output.tau, effort, rtol=1e-7, atol=1e-7)
 
 
 def bent(robot: hsp.Robot, bend: float) -> Array:
@@ -326,52 +282,6 @@ def test_stiffness_changes_without_a_jump() -> None:
     # A smooth step begins with its third power: no corner.
     begin = np.abs(effort(1.0 + 1e-3) - before).max()
     assert begin < 1e-6 * np.abs(after - before).max()
-
-
-def test_a_change_counts_from_what_is_in_force() -> None:
-    controller = panda_hand(impedance=Impedance(100.0))
-    at = controller.at(1.0).ramp(1.0)
-    at.impedance("hand", Impedance(300.0, damping_ratio=0.5))
-    q, v = controller.robot.home(), np.zeros(7)
-    state = controller.robot.state(0.0, q, v)
-    first = controller.tasks[0].feedback_at(state)
-    for t, scale, ratio in ((0.5, 1.0, 1.0), (1.5, 2.0, 0.75), (2.5, 3.0, 0.5)):
-        controller.compute(t, q, v)
-        Kp, Kv, *_ = controller.feedback("hand")
-        np.testing.assert_allclose(Kp, scale * first.Kp, rtol=1e-9)
-        np.testing.assert_allclose(Kv, ratio * np.sqrt(scale) * first.Kv, rtol=1e-9)
-
-
-def test_many_changes_overlap_and_a_copy_goes_on() -> None:
-    """No edge of a change is a jump, and a copy in the middle does the same."""
-    rng = np.random.default_rng(5)
-    controller = panda_hand(impedance=Impedance(300.0))
-    begins = np.sort(rng.uniform(0.0, 2.0, 30))
-    ramps = rng.uniform(0.1, 0.5, 30)
-    for at, ramp in zip(begins, ramps, strict=True):
-        stiffness = rng.uniform(100.0, 900.0, 3).tolist()
-        options: dict[str, Any] = [
-            {"damping_ratio": float(rng.uniform(0.3, 1.5))},
-            {"damping": float(rng.uniform(20.0, 60.0))},
-            {"largest_error": float(rng.uniform(0.01, 0.1))},
-        ][rng.integers(3)]
-        controller.at(at).ramp(ramp).impedance("hand", Impedance(stiffness, **options))
-    q, v = controller.robot.home(), np.linspace(-0.3, 0.3, 7)
-    edges = np.sort(np.concatenate([begins, begins + ramps]))
-    between = rng.uniform(0.0, 2.0, 60)
-
-    def steps(times: Array, gap: float) -> Array:
-        there = pickle.loads(pickle.dumps(controller))
-        pairs = [[there.compute(x, q, v).tau for x in (t, t + gap)] for t in times]
-        return np.abs(np.diff(pairs, axis=1)).max(axis=(1, 2))
-
-    assert steps(edges, 1e-5).max() < 0.05 * steps(np.sort(between), 1e-3).max()
-    for t in (0.0, 0.7, 1.3):
-        controller.compute(t, q, v)
-    copy = pickle.loads(pickle.dumps(controller))
-    for t in (1.3, 1.31, 1.8, 3.0):
-        mine, its = (each.compute(t, q, v).tau for each in (controller, copy))
-        np.testing.assert_array_equal(mine, its)
 
 
 def later(first: Impedance) -> Any:
@@ -439,10 +349,3 @@ def test_a_floating_base_is_refused() -> None:
     message = "tasks.tool0.impedance: ur5 has a free-flyer root: its inertia at a task"
     with pytest.raises(GainError, match=message):
         Controller(robot, [hand], base="driven")
-
-
-def test_a_clip_makes_room_for_a_hand() -> None:
-    """Friction of this size is cancelled, and a larger force is yielded to."""
-    observer = MomentumObserver(clip=2.0)
-    tasks = panda_hand(impedance=Impedance(1.0)).tasks
-    Compensation(momentum_observer=observer).check(hsp.Robot.load("panda"), tasks)

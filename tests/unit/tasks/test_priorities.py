@@ -1,11 +1,9 @@
 """Priorities that the user does not give: on a floating base, balance comes first."""
 
-from dataclasses import replace
 from typing import Any
 
-import numpy as np
 import pytest
-from task_cases import load, panda, placed
+from task_cases import load, placed
 
 from hsp_control import (
     CenterOfMass,
@@ -59,13 +57,6 @@ def test_on_a_floating_base_balance_comes_first(which: str, quadruped: Robot) ->
     assert priority_of(task, quadruped) == (1 if needed else 2)
 
 
-@pytest.mark.parametrize("which", CASES)
-@pytest.mark.parametrize("priority", [1, 2, 7])
-def test_a_given_priority_counts(which: str, priority: int, quadruped: Robot) -> None:
-    task = replace(CASES[which][0], priority=priority)
-    assert priority_of(placed(task, quadruped), quadruped) == priority
-
-
 @pytest.mark.parametrize(
     ("name", "root"), [("panda", None), ("ur5", "planar"), ("tiago_no_hand", None)]
 )
@@ -84,27 +75,6 @@ def test_without_a_floating_base_all_tasks_have_the_first(name: str, root: Any) 
         assert priority_of(placed(task, robot), robot) == 1
     given = placed(FramePosition(priority=3), robot)
     assert priority_of(given, robot) == 3
-
-
-@pytest.mark.parametrize(
-    ("name", "trunk"),
-    [
-        ("talos", {"root_joint", "torso_1_joint", "torso_2_joint"}),
-        ("solo12", {"root_joint"}),
-        ("panda", set()),
-    ],
-)
-def test_frames_of_the_trunk_keep_the_balance(name: str, trunk: set[str]) -> None:
-    """The base, and what carries two arms; not the head, nor a hand of many fingers."""
-    if name != "panda":
-        pytest.importorskip("example_robot_data")
-    robot = Robot.load(name)
-    for frame in robot.frame_names:
-        if frame == "universe":
-            continue
-        joint = robot.model.frames[robot.frame_id(frame)].parentJoint
-        needed = robot.model.names[joint] in trunk
-        assert FramePosition(frame).keeps_balance(robot) is needed, frame
 
 
 def test_a_controller_s_levels(quadruped: Robot) -> None:
@@ -128,17 +98,3 @@ def test_a_controller_s_levels(quadruped: Robot) -> None:
     # The placed tasks say what the user said, and no more.
     given = {task.name: task.priority for task in controller.tasks}
     assert given == {task.name: task.priority for task in tasks}
-
-
-def test_a_priority_may_be_given_on_a_fixed_base() -> None:
-    first, second = FramePosition(axes="x"), FrameOrientation(priority=2)
-    controller = Controller(panda(), [second, first])
-    assert [level[0].name for level in controller.levels] == [
-        "end_effector",
-        "end_effector_orientation",
-    ]
-    q, v = panda().home(), np.zeros(7)
-    together = Controller(panda(), [first, replace(second, priority=1)])
-    np.testing.assert_allclose(
-        controller.compute(0.0, q, v).tau, together.compute(0.0, q, v).tau, rtol=1e-12
-    )

@@ -131,34 +131,6 @@ def test_the_default_of_a_robot() -> None:
         )
 
 
-def test_everyday_forces_are_below_it() -> None:
-    """Springs stay linear at 40 N and more, at any stiffness."""
-    for name in ("panda", "iiwa14"):
-        force, moment = hsp.Robot.load(name).spring_force
-        assert force > 100.0
-        assert moment > 40.0
-
-
-@pytest.mark.parametrize(
-    ("efforts", "size", "expected"),
-    [
-        ((60.0, 20.0), 3.0, (40.0, 30.0)),
-        ((0.5, 0.2), 0.1, (10.0, 0.25)),
-        ((0.0, np.inf), 1.0, (np.inf, np.inf)),
-        ((0.0, 8.0), 1.0, (16.0, 4.0)),
-    ],
-)
-def test_arms_of_any_size(
-    efforts: tuple[float, float], size: float, expected: tuple[float, float],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:  # fmt: skip
-    """A planar arm of 3 m, a hand of 10 cm, and one whose motors nobody knows."""
-    robot = hsp.Robot.load("planar3r")
-    monkeypatch.setattr(type(robot), "size", size)
-    robot.model.effortLimit = np.array([*efforts, 0.0])
-    assert robot.spring_force == pytest.approx(expected)
-
-
 @pytest.mark.parametrize("force", [5.0, 20.0])
 def test_its_energy_falls(force: float) -> None:
     """E = ½ e'ᵀΛe' + U(e) falls by what is damped; within it nothing is different."""
@@ -192,28 +164,3 @@ def test_its_energy_falls(force: float) -> None:
     assert (np.diff(energy) <= 1e-12).all()
     lost = 2e-3 * 0.5 * (np.array(power)[1:] + np.array(power)[:-1])
     assert energy[0] - energy[-1] == pytest.approx(lost.sum(), rel=1e-4)
-
-
-def change_at_the_end(**declared: Any) -> float:
-    """Return the largest change of an effort in 1 ms, in the last of 4 s, of a Z1.
-
-    Its target is out of reach, and efforts are held for 10 ms. As a part of the limit.
-    """
-    robot = hsp.Robot.load("z1")
-    q0 = np.array([-0.22, 1.41, -1.64, -0.16, 0.27, -0.16, -0.53])
-    target = hsp.Hold([-0.27, -0.74, 1.67])
-    spring = hsp.Impedance(600.0, **declared)
-    hand = hsp.FramePosition("gripperStator", target, impedance=spring, name="hand")
-    run = hsp.simulate(
-        hsp.Controller(robot, [hand], hsp.JointCentering()), q0, duration=4.0,
-        control_period=0.01, log_period=0.01, integrator=hsp.integrators.Rk4(1e-3),
-    )  # fmt: skip
-    change = np.abs(np.diff(run["tau"], axis=0)) / robot.model.effortLimit / 10.0
-    return float(change[run.t[1:] > 3.0].max())
-
-
-def test_a_weak_arm_rests_whose_target_is_out_of_reach() -> None:
-    """With nothing but defaults; and it shakes without a largest force."""
-    pytest.importorskip("example_robot_data")
-    assert change_at_the_end() < 1e-3
-    assert change_at_the_end(largest_force="none") > 1e-3

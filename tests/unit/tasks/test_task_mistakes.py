@@ -125,8 +125,3 @@ def test_names() -> None:
     assert AngularMomentum().name == "angular_momentum"
     assert posture().name == "posture"
     assert posture(name="left-arm_2").name == "left-arm_2"
-
-
-def test_a_task_is_named_after_its_frame_as_a_column_may_be() -> None:
-    assert FramePosition("tip/1.0").name == "tip_1_0"
-    assert RelativePose("tip/1", reference="tip/2").name == "tip_1_from_tip_2"

@@ -43,7 +43,6 @@ from hsp_control.trajectories import (
     ComposedPose,
     HoldOrientation,
     HoldPose,
-    OrientationPath,
     ScrewInterpolation,
     Spin,
     UniformLine,
@@ -100,24 +99,6 @@ TASKS: dict[str, Task] = {
         reference="panda_link2", trajectory=Line([0.1, 0.2, 0.3], 1.0), blend=1.0
     ),
 }  # fmt: skip
-every_task = pytest.mark.parametrize("name", TASKS)
-
-
-@every_task
-def test_placing_twice_gives_an_equal_task(name: str) -> None:
-    """Also elsewhere: nothing is relative any more. The task itself is as before."""
-    task, before = TASKS[name], repr(TASKS[name])
-    placed = place(task)
-    assert type(placed) is type(task)
-    for again in (place(placed), place(placed, state(seed=5)), place(task)):
-        assert again == placed
-        assert hash(again) == hash(placed)
-        assert repr(again) == repr(placed)
-    assert repr(task) == before
-    assert getattr(placed, "frame", TCP) is not None
-    assert getattr(placed, "blend", None) is None
-    assert placed.name == task.name
-    assert placed.rows <= 7
 
 
 @pytest.mark.parametrize(
@@ -133,15 +114,6 @@ def test_what_is_omitted_is_where_the_robot_starts(name: str) -> None:
     error = placed.evaluate(here).error
     assert error.shape == (placed.rows,)
     np.testing.assert_allclose(error, 0.0, rtol=0, atol=1e-14)
-
-
-def test_the_end_effector_is_the_frame() -> None:
-    for robot in (panda(), load("iiwa14")):
-        for kind in (FramePose, FramePosition, FrameOrientation):
-            assert place(kind(), state(robot)).frame == robot.end_effector
-    assert place(FramePosition()).name == "end_effector"
-    assert place(RelativePose(reference="panda_link1")).frame == TCP
-    assert place(Pointing(direction=[1, 0, 0])).frame == TCP
 
 
 def test_relative_points_count_from_the_start() -> None:
@@ -166,16 +138,6 @@ def test_relative_points_count_from_the_start() -> None:
     assert place(AngularMomentum(), here).trajectory == Hold([0.0, 0.0, 0.0])
     about_zero = place(AngularMomentum(Circle(1, 2)), here).trajectory
     assert about_zero == Circle(1, 2, [0, 0, 0])
-
-
-def test_relative_orientations_are_those_of_the_start() -> None:
-    here = state()
-    R = here.frame(TCP).rotation.copy()
-    assert place(FrameOrientation(), here).trajectory == HoldOrientation(R)
-    turning = place(FrameOrientation(trajectory=Spin([1, 0, 0], 2.0)), here)
-    assert turning.trajectory == Spin([1, 0, 0], 2.0, rotation=R)
-    path = OrientationPath([np.eye(3), TURNED], [0.0, 1.0])
-    assert place(FrameOrientation(trajectory=path), here).trajectory == path
 
 
 def test_a_point_trajectory_of_a_pose_holds_the_orientation() -> None:
@@ -205,25 +167,6 @@ def test_a_point_trajectory_of_a_pose_holds_the_orientation() -> None:
         np.testing.assert_allclose(
             sample.error[3:], -pin.log3(R_d.T @ R_now), rtol=0, atol=1e-13
         )
-
-
-def test_a_pose_by_default_is_held() -> None:
-    here = state()
-    pose = pose_of(here, TCP)
-    held = ComposedPose(Hold(pose.translation), HoldOrientation(pose.rotation))
-    assert place(FramePose(), here).trajectory == held
-    only_turning = FramePose(trajectory=ComposedPose(orientation=Spin([0, 0, 1], 1.0)))
-    assert place(only_turning, here).trajectory == ComposedPose(
-        Hold(pose.translation), Spin([0, 0, 1], 1.0, rotation=pose.rotation)
-    )
-    screw = place(FramePose(trajectory=ScrewInterpolation(POINT, TURNED, 2.0)), here)
-    assert screw.trajectory == ScrewInterpolation(
-        POINT,
-        TURNED,
-        2.0,
-        start_position=pose.translation,
-        start_rotation=pose.rotation,
-    )
 
 
 @pytest.mark.parametrize("robot", ["panda", "planar3r"])
@@ -282,23 +225,6 @@ def test_a_blend_leads_from_rest_at_the_start_into_the_trajectory(robot: str) ->
         np.testing.assert_allclose(sample.error_rate, 0.0, rtol=0, atol=1e-14)
 
 
-def test_pointing_with_a_relative_reference_begins_where_the_axis_points() -> None:
-    here = state()
-    R = here.frame(TCP).rotation
-    for axis in ([0, 0, 1], [1, 0, 0], [0, 0, -2], [0.3, -2.0, 0.9]):
-        task = Pointing(trajectory=HoldOrientation(), axis=axis)
-        placed = place(task, here)
-        m = R @ axis / np.linalg.norm(axis)
-        R_d = placed.trajectory.sample(0.0).rotation
-        np.testing.assert_allclose(R_d[:, 2], m, rtol=0, atol=1e-15)
-        np.testing.assert_allclose(R_d.T @ R_d, np.eye(3), rtol=0, atol=1e-15)
-    assert place(Pointing(trajectory=Spin([1, 0, 0], 1)), here).trajectory == Spin(
-        [1, 0, 0], 1, rotation=R
-    )
-    still = Spin([1, 0, 0], 1, rotation=TURNED)
-    assert place(Pointing(trajectory=still, axis=[1, 0, 0])).trajectory == still
-
-
 # --- postures ------------------------------------------------------------------------
 
 
@@ -326,35 +252,7 @@ def test_postures_are_given_in_four_ways(name: str, root: Any) -> None:
     )
 
 
-def test_joints_keep_their_order() -> None:
-    joints = ["panda_joint4", "panda_joint2"]
-    placed = place(JointPosture(joints=joints, displacement=Hold([0.1, 0.2])))
-    assert placed.joints == tuple(joints)
-    here = state()
-    desired, actual = placed.measure(here)
-    np.testing.assert_array_equal(actual, here.q[[3, 1]])
-    np.testing.assert_allclose(desired - actual, [0.1, 0.2], rtol=0, atol=1e-15)
-
-
-def test_a_displacement_counts_from_the_posture() -> None:
-    placed = place(JointPosture(displacement=Hold()))
-    assert placed.displacement == Hold(np.zeros(7))
-    line = Line([0.1] * 7, 1.0, origin="start")
-    placed = place(JointPosture("home", displacement=line))
-    assert placed.displacement == Line([0.1] * 7, 1.0, start=[0.0] * 7)
-
-
 # --- by a controller -----------------------------------------------------------------
-
-
-def test_one_task_serves_several_starts() -> None:
-    task, states = FramePose(), [state(seed=k) for k in (1, 2, 3)]
-    controllers = [Controller(panda(), [task]) for _ in states]
-    for controller, here in zip(controllers, states, strict=True):
-        out = controller.compute(here.t, here.q, here.v)
-        np.testing.assert_allclose(out.task.error, 0.0, rtol=0, atol=1e-14)
-        assert controller.tasks == (place(task, here),)
-    assert task == FramePose()
 
 
 def test_the_first_state_is_the_start_unless_one_is_given() -> None:

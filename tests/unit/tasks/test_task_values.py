@@ -10,9 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pydantic import TypeAdapter
 from task_cases import panda, placed
-from values import assert_documented, assert_is_a_value
+from values import assert_is_a_value
 
 import hsp_control.tasks as tasks
 import hsp_control.trajectories as paths
@@ -128,43 +127,9 @@ def others(part: Part) -> Iterator[Part]:
 ALL = [each for part in EXAMPLES.values() for each in (part, *others(part))]
 
 
-def test_every_class_and_every_field_is_tried() -> None:
-    assert Task.family is not None
-    own = [
-        each
-        for each in Task.family.members.values()
-        if each.__module__.startswith("hsp_control.")
-    ]
-    assert set(MEMBERS) == {*own, Gains, Impedance}
-    assert set(EXAMPLES) == set(OTHERS) == set(MEMBERS)
-    for cls in MEMBERS:
-        assert_documented(cls)
-        tried = {name for each in ALONE.get(cls, []) for name in each.changed_fields()}
-        declared = {field.name for field in value_fields(cls)}
-        assert tried | set(OTHERS[cls]) == declared, cls
-
-
-def test_every_field_counts() -> None:
-    assert len(set(ALL)) == len(ALL)
-    for k, part in enumerate(ALL):
-        assert [each == part for each in ALL].count(True) == 1
-        assert ALL.index(part) == k
-
-
 @pytest.mark.parametrize("part", ALL, ids=repr)
 def test_tasks_and_gains_are_values(part: Part) -> None:
     assert_is_a_value(part, NAMES)
-
-
-@pytest.mark.parametrize("part", ALL, ids=repr)
-def test_a_mapping_makes_an_equal_part(part: Part) -> None:
-    """What YAML says of it, and what YAML makes of that."""
-    adapter: TypeAdapter[Any] = TypeAdapter(
-        Task if isinstance(part, Task) else type(part)
-    )
-    data = part.to_dict()
-    assert adapter.validate_python(data) == part
-    assert data.get("type") == part.yaml_type
 
 
 # --- what is refused -----------------------------------------------------------------
@@ -264,12 +229,6 @@ WRONG: dict[type[Part], Wrong] = {
 """For each field, wrong values and what is said about them."""
 
 
-def test_every_field_has_a_wrong_value() -> None:
-    assert set(WRONG) == set(MEMBERS)
-    for cls, fields in WRONG.items():
-        assert set(fields) == {field.name for field in value_fields(cls)}, cls
-
-
 @pytest.mark.parametrize(
     ("cls", "field", "value", "message"),
     [
@@ -324,19 +283,3 @@ def test_one_task_serves_many_states_of_many_robots_in_many_threads(cls: Any) ->
     for task, *_ in work:  # functions of the fields alone
         assert set(vars(task)) - fields <= {"_desired", "_axis", "_normals"}
         assert pickle.loads(pickle.dumps(task)) == task
-
-
-def test_feedback_is_the_callers_and_is_followed() -> None:
-    """Gains and offset that a controller gives; without them the task's own."""
-    robot = panda()
-    task = placed(FramePosition(gains=Gains(4.0, 4.0)), robot)
-    state = robot.state(0.0, robot.home() + 0.1, np.linspace(-1.0, 1.0, 7))
-    own = task.evaluate(state)
-    feedback = task.feedback()
-    feedback.Kp[:], feedback.Kv[:] = 9.0 * np.eye(3), 5.0 * np.eye(3)
-    feedback.offset[:] = [1.0, 2.0, 3.0]
-    other = task.evaluate(state, feedback=feedback)
-    extra = 5.0 * own.error + own.error_rate + [1.0, 2.0, 3.0]
-    np.testing.assert_allclose(other.acceleration, own.acceleration + extra, rtol=1e-12)
-    np.testing.assert_array_equal(task.evaluate(state).acceleration, own.acceleration)
-    assert task.feedback().Kp is not task.feedback().Kp

@@ -6,10 +6,8 @@ from copy import deepcopy
 import numpy as np
 import pytest
 
-from hsp_control import CenterOfMass, FramePose
+from hsp_control import FramePose
 from hsp_control.common.exceptions import TrajectoryError
-from hsp_control.common.rotations import log3, turn
-from hsp_control.constraints.contacts import PointContact
 from hsp_control.trajectories import ComposedPose, OrientationSample, TrajectorySample
 from hsp_control.trajectories.fed import Fed, FedOrientation
 from hsp_control.trajectories.switch import Switch
@@ -28,17 +26,6 @@ def test_between_two_writings_its_derivatives_fit_it():
     assert (after.velocity - before.velocity) / (2 * H) == pytest.approx(
         now.acceleration, abs=1e-8
     )
-
-
-def test_an_orientation_turns_on_as_its_rates_say():
-    reference, R, y = FedOrientation(), np.zeros((3, 3)), np.zeros(3)
-    turn(np.eye(3), np.array([0.3, -0.5, 0.2]), 1.0, R)
-    omega = np.array([0.4, 1.0, -0.7])
-    reference.write(1.0, R, omega, 2.0 * omega)
-    before, now, after = (reference.sample(1.2 + d * H) for d in (-1.0, 0.0, 1.0))
-    log3(after.rotation @ before.rotation.T, y)
-    assert y / (2 * H) == pytest.approx(now.angular_velocity, abs=1e-7)
-    assert now.angular_velocity == pytest.approx(1.4 * omega, abs=1e-15)
 
 
 def test_a_follower_reads_what_is_written_later():
@@ -80,15 +67,6 @@ def test_a_copy_of_a_task_goes_on_by_itself(copied):
     assert position.sample(2.0).position[0] == 2.0
 
 
-def test_a_copy_of_a_contact_goes_on_by_itself():
-    contact = PointContact("foot", schedule=Switch())
-    own = deepcopy(contact)
-    contact.schedule.throw(False, 1.0)
-    assert not contact.active(2.0)
-    assert own.active(2.0)
-    assert deepcopy(CenterOfMass(name="same")) == CenterOfMass(name="same")
-
-
 def test_a_switch_fades_and_then_goes():
     switch = Switch()
     assert switch.active(0.0)
@@ -116,8 +94,3 @@ def test_a_throw_during_a_ramp_continues_from_there():
     weights = [switch.weight(t) for t in np.linspace(0.3, 0.8, 501)]
     assert np.abs(np.diff(weights)).max() < 1.9 * before / 500
     assert weights[-1] == 0.0
-
-
-def test_a_switch_is_never_constant():
-    assert not Switch().constant
-    assert not PointContact("foot", schedule=Switch()).always

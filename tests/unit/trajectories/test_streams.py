@@ -2,7 +2,6 @@
 
 import copy
 import json
-import pickle
 import socket
 from collections.abc import Callable
 from typing import Any
@@ -14,18 +13,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hsp_control.common.exceptions import StreamError, TrajectoryError
-from hsp_control.common.rotations import jexp3, jexp3_dot
 from hsp_control.trajectories import (
     Stream,
     StreamOrientation,
     StreamPose,
     TrajectorySample,
 )
-from hsp_control.trajectories.piecewise_polynomial import QUINTIC
 from hsp_control.trajectories.streams import inbox
 from hsp_control.trajectories.streams.mailbox import read_recording
-from hsp_control.trajectories.streams.segments import _DERIVATIVES
-from hsp_control.trajectories.streams.waypoints import SenderClock, derivatives
+from hsp_control.trajectories.streams.waypoints import SenderClock
 
 H = 5e-4
 """Time between samples [s]."""
@@ -151,43 +147,6 @@ def test_poses_keep_their_bounds_whatever_is_sent(
     assert error < stream.angular_jerk * H * H / 4 + 1e-11
 
 
-def test_bounds_on_rotations_follow_from_those_on_rotation_vectors() -> None:
-    # |ω'| <= |y''| + |y'|²/π and |ω''| <= |y'''| + |y'||y''| + |y'|³/6; see `Chart`.
-    rng = np.random.default_rng(0)
-    J, dJ, step = np.zeros((3, 3)), np.zeros((3, 3)), 1e-5
-
-    def rate_of(y: Any, u: Any) -> np.ndarray:
-        jexp3_dot(y, u, dJ)
-        return dJ.copy()
-
-    worst = np.zeros(3)
-    for _ in range(5000):
-        y, u, w = rng.normal(size=(3, 3))
-        y *= 1.5 * np.pi * rng.random() / np.linalg.norm(y)
-        u, w = u / np.linalg.norm(u), w / np.linalg.norm(w)
-        jexp3(y, J)
-        curved = rate_of(y, u) @ u
-        mixed = 2 * rate_of(y, u) @ w + rate_of(y, w) @ u + np.cross(J @ u, J @ w)
-        twice = (rate_of(y + step * u, u) - rate_of(y - step * u, u)) @ u / (2 * step)
-        cubic = twice + np.cross(J @ u, curved)
-        norms = np.linalg.norm(J, 2), *map(np.linalg.norm, (curved, mixed, cubic))
-        assert norms[0] <= 1.0 + 1e-12
-        worst = np.maximum(worst, norms[1:])
-    assert (worst <= np.array([1 / np.pi, 1.0, 1 / 6]) + 1e-6).all()
-    assert (worst > np.array([0.31, 0.9, 0.15])).all()  # they are not too cautious
-
-
-def test_control_points_bound_a_quintic() -> None:
-    rng = np.random.default_rng(0)
-    u = np.linspace(0.0, 1.0, 2001)
-    for _ in range(200):
-        ends = rng.normal(size=(6, 1))
-        curve = np.polynomial.Polynomial((QUINTIC @ ends)[:, 0])
-        for k, matrix in enumerate(_DERIVATIVES, 1):
-            largest = np.abs(curve.deriv(k)(u)).max()
-            assert largest * (1 - 1e-9) <= np.abs(matrix @ ends).max() < 1.12 * largest
-
-
 # -- policies -------------------------------------------------------------------------
 
 
@@ -231,16 +190,6 @@ def test_the_newest_target_is_reached_at_rest() -> None:
     assert x[-1, 0] == pytest.approx(0.2, abs=1e-9)
     assert not rate[-1].any()
     assert not acceleration[-1].any()
-
-
-def test_a_near_target_is_reached_after_the_delay() -> None:
-    stream = Stream([0.0], delay=0.25).anchored(None)
-    x, _, _ = columns(
-        sampled(stream, 0.5, at_times((0.1, lambda: stream.send([1e-3]))))
-    )
-    arrival = round(0.35 / H)
-    assert x[arrival - 20, 0] < 1e-3 - 1e-9
-    assert x[arrival, 0] == pytest.approx(1e-3, abs=1e-9)
 
 
 def test_extrapolation_ends_and_the_reference_holds() -> None:
@@ -289,42 +238,7 @@ def test_a_chunk_replaces_the_rest_of_the_one_before() -> None:
     assert stream.counts()["late"] == 1
 
 
-def test_a_seam_between_chunks_is_bridged_from_what_the_reference_is() -> None:
-    stream = Stream([0.0] * 7, policy="interpolate", delay=0.05).anchored(None)
-    times = np.arange(1, 17) * 0.02
-    path = np.outer(0.3 * times, np.ones(7))
-    feed = at_times(
-        (0.1, lambda: stream.send_chunk(path, times, t=0.1)),
-        (0.2, lambda: stream.send_chunk(path + 0.03 + 0.07, times, t=0.2)),
-    )
-    x, rate, acceleration = columns(sampled(stream, 1.0, feed))
-    assert_derivatives(x, rate, acceleration, stream.jerk)
-    k = round(0.2 / H)
-    assert np.abs(np.diff(x, axis=0)[k : k + 10]).max() < 1e-3
-    assert x[-1, 0] == pytest.approx(path[-1, 0] + 0.1, abs=1e-9)
-
-
-def test_derivatives_of_a_parabola_are_exact() -> None:
-    rng = np.random.default_rng(0)
-    times = np.cumsum(rng.uniform(0.01, 0.1, 9))
-    c = rng.normal(size=(3, 2))
-    x = c[0] + np.outer(times, c[1]) + np.outer(times**2, c[2])
-    for k in range(1, 8):
-        for window in (0.0, 0.2):
-            value, slope, curve = derivatives(times, x, k, window)
-            assert np.allclose(value, x[k], atol=1e-12)
-            assert np.allclose(slope, c[1] + 2 * c[2] * times[k], atol=1e-10)
-            assert np.allclose(curve, 2 * c[2], atol=1e-8)
-
-
 # -- time, silence, runs --------------------------------------------------------------
-
-
-def test_without_a_message_it_stays_at_its_start() -> None:
-    stream = Stream().anchored([0.1, 0.2])
-    x, rate, _ = columns(sampled(stream, 0.2))
-    assert (x == [0.1, 0.2]).all()
-    assert not rate.any()
 
 
 def test_silence_holds_and_then_stops_with_the_time() -> None:
@@ -375,29 +289,6 @@ def test_what_was_recorded_gives_the_same_bits() -> None:
     assert json.loads(json.dumps(again.record)) == messages
 
 
-def test_copies_in_the_middle_of_a_run_go_on_alike_and_apart() -> None:
-    stream = Stream([0.0]).anchored(None)
-    sampled(stream, 0.3, at_times((0.1, lambda: stream.send([0.3]))))
-    copies = [copy.deepcopy(stream), pickle.loads(pickle.dumps(stream))]
-    for k in range(600, 700):
-        wanted = stream.sample(k * H)
-        for each in copies:
-            assert np.array_equal(each.sample(k * H), wanted)
-    stream.send([-0.3])
-    own, other = ([each.sample(t) for t in (0.4, 0.9)] for each in (stream, copies[1]))
-    assert own[1].position[0] < other[1].position[0] - 0.01
-
-
-def test_earlier_times_are_remembered() -> None:
-    stream = Stream([0.0]).anchored(None)
-    feed = at_times(
-        *((0.05 * k, lambda k=k: stream.send([0.01 * k])) for k in range(9))
-    )
-    samples = sampled(stream, 0.5, feed)
-    for k in (100, 500, 900):
-        assert np.array_equal(stream.sample(k * H), samples[k])
-
-
 def test_a_record_that_is_full_says_how_much_it_lost(monkeypatch: Any) -> None:
     monkeypatch.setattr(inbox, "MOST", 7)  # a value and its time each
     stream = Stream([0.0]).anchored(None)
@@ -405,41 +296,6 @@ def test_a_record_that_is_full_says_how_much_it_lost(monkeypatch: Any) -> None:
     sampled(stream, 0.2, feed)
     assert (len(stream.record), stream.unrecorded) == (3, 2)
     assert stream.counts()["taken"] == 5
-
-
-def test_the_first_message_after_silence_counts() -> None:
-    stream = Stream([0.0], hold_after=0.5).anchored(None)
-    feed = at_times(
-        (0.7, lambda: stream.send([0.05])), (1.7, lambda: stream.send([0.1]))
-    )
-    x, _, _ = columns(sampled(stream, 2.5, feed))
-    assert x[round(1.6 / H), 0] == pytest.approx(0.05)
-    assert x[-1, 0] == pytest.approx(0.1)
-
-
-def test_a_chunk_of_one_waypoint_replaces_the_plan() -> None:
-    stream = Stream([0.0], policy="interpolate", delay=0.05).anchored(None)
-    times = np.arange(1, 9) * 0.2
-    feed = at_times(
-        (0.1, lambda: stream.send_chunk((0.5 * times)[:, None], times)),
-        (0.5, lambda: stream.send_chunk([[0.0]], [0.4])),
-    )
-    x, _, _ = columns(sampled(stream, 2.0, feed))
-    assert x[-1, 0] == pytest.approx(0.0, abs=1e-9)
-
-
-@pytest.mark.parametrize("policy", POLICIES)
-def test_an_older_velocity_or_value_undoes_nothing(policy: Any) -> None:
-    stream = Stream([0.0], policy=policy, extrapolation=5.0).anchored(None)
-    feed = at_times(
-        (0.1, lambda: stream.send(velocity=[0.1], t=0.1)),
-        (0.3, lambda: stream.send(velocity=[0.0], t=0.3)),  # stop
-        (0.31, lambda: stream.send(velocity=[0.1], t=0.2)),
-        (0.32, lambda: stream.send([1.0], t=0.25)),
-    )
-    _, rate, _ = columns(sampled(stream, 1.0, feed))
-    assert abs(rate[-1, 0]) < 1e-9
-    assert stream.counts()["late"] == 2
 
 
 def test_a_target_that_no_motion_reaches_is_refused_and_the_reference_rests() -> None:
@@ -465,25 +321,6 @@ def test_a_time_that_is_forgotten_is_an_error_and_not_an_extrapolation() -> None
         stream.sample(0.0)
 
 
-def test_clocks_of_any_epoch_are_understood() -> None:
-    stream = Stream([0.0]).anchored(None)
-    feed = at_times((0.1, lambda: stream.send([0.1], t=1.7e9)))
-    x, _, _ = columns(sampled(stream, 1.0, feed))
-    assert x[-1, 0] == pytest.approx(0.1)
-
-
-def test_a_pickled_stream_hears_what_comes_next() -> None:
-    stream = Stream([0.0]).anchored(None)
-    for _ in range(5):
-        stream.send([0.01])
-    sampled(stream, 0.1)
-    other = pickle.loads(pickle.dumps(stream))
-    other.send([0.3])
-    for k in range(200, 4000):
-        x = other.sample(k * H)
-    assert x.position[0] == pytest.approx(0.3)
-
-
 def test_a_copy_changes_nothing_for_the_original() -> None:
     def run(preview: bool) -> np.ndarray:
         stream = Stream([0.0], policy="interpolate", delay=0.2).anchored(None)
@@ -499,32 +336,6 @@ def test_a_copy_changes_nothing_for_the_original() -> None:
         return columns(sampled(stream, 2.0, feed))[0]
 
     assert np.array_equal(run(False), run(True))
-
-
-def test_a_burst_costs_no_more_than_its_newest_part() -> None:
-    stream = Stream([0.0] * 7, policy="interpolate").anchored(None)
-    stream.sample(0.0)
-    for k in range(3000):
-        stream.send(np.full(7, 1e-5 * k), t=1e-4 * k)
-    sampled(stream, 1.0)
-    counts = stream.counts()
-    assert (counts["taken"], counts["late"]) == (3000, 3000 - 256)
-    assert stream.sample(1.5).position == pytest.approx(np.full(7, 0.02999))
-
-
-def test_dense_noise_is_smoothed_over_the_whole_window() -> None:
-    rng = np.random.default_rng(0)
-    stream = Stream(
-        [0.0], policy="interpolate", delay=0.2, smoothing=0.1, acceleration=100.0,
-        jerk=1e4,
-    ).anchored(None)  # fmt: skip
-    events = [
-        (t, lambda t=t: stream.send([0.1 * t + 1e-3 * rng.normal()], t=t))
-        for t in np.arange(0.0, 1.5, 0.004)
-    ]
-    x, _, _ = columns(sampled(stream, 1.5, at_times(*events)))
-    t = H * np.arange(len(x))
-    assert np.abs(x[:, 0] - 0.1 * (t - 0.2))[1500:].max() < 6e-4  # of 3 mm
 
 
 # -- bad input ------------------------------------------------------------------------
@@ -697,13 +508,3 @@ def test_a_port_is_free_again_when_its_stream_is_gone() -> None:
     source = f"udp://127.0.0.1:{free_port()}"
     for _ in range(3):
         Stream([0.0], source=source).anchored(None).sample(0.0)
-
-
-def test_a_flood_drops_the_oldest() -> None:
-    stream = Stream([0.0], delay=0.0).anchored(None)
-    stream.sample(0.0)
-    for k in range(10_000):
-        stream.send([k * 1e-6])
-    sampled(stream, 0.5)
-    assert stream.counts()["taken"] == 4096
-    assert stream.sample(1.0).position[0] == pytest.approx(9999e-6, abs=1e-9)

@@ -3,7 +3,6 @@
 import copy
 from collections.abc import Callable, Iterator
 from itertools import pairwise
-from math import cos, pi, sin
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from trajectory_cases import (
-    BLENDED_SPIN,
     CIRCLE,
     IDENTITY,
     LISSAJOUS,
@@ -24,7 +22,6 @@ from trajectory_cases import (
     R2,
     R3,
     SPIN,
-    TIMES,
     flat,
     screw,
     swinging,
@@ -36,7 +33,6 @@ from hsp_control.common.rotations import log3
 from hsp_control.declaration.quantities import Number
 from hsp_control.trajectories import (
     Blend,
-    BlendOrientation,
     CallableOrientation,
     CallableTrajectory,
     Circle,
@@ -50,7 +46,6 @@ from hsp_control.trajectories import (
     PiecewisePolynomial,
     PoseTrajectory,
     ScrewInterpolation,
-    Spin,
     Spline,
     Trajectory,
     TrajectorySample,
@@ -60,8 +55,6 @@ from hsp_control.trajectories import (
 Array = NDArray[np.float64]
 
 
-FINITE = [name for name, (_, knots) in MEMBERS.items() if knots]
-CROSSFADES = [name for name in FINITE if name.startswith("crossfade")]  # in motion
 # These move already, or still accelerate, where they meet a hold: documented.
 ROUGH = {"spline 3", "polynomial", "blend in motion", "blend orientation in motion"}
 
@@ -126,36 +119,6 @@ def test_motion_never_jumps(name: str) -> None:
             np.testing.assert_allclose(sped, h * (a[2] + b[2]) / 2, rtol=0, atol=1e-2)
 
 
-@pytest.mark.parametrize("name", FINITE)
-def test_motion_is_smooth_across_knots(name: str) -> None:
-    trajectory, knots = MEMBERS[name]
-    rough = {knots[0], knots[-1]} if name in ROUGH else set()
-    for knot in knots:
-        before = flat(trajectory.sample(knot - 1e-10))
-        after = flat(trajectory.sample(knot + 1e-10))
-        orders = 1 if knot in rough else 3
-        for i, (a, b) in enumerate(zip(before, after, strict=True)):
-            if i % 3 < orders:
-                np.testing.assert_allclose(a, b, rtol=0, atol=1e-6)
-
-
-@pytest.mark.parametrize(
-    "name", sorted(set(FINITE) - {"blend", "blend in motion", *CROSSFADES})
-)
-def test_ends_are_held_exactly(name: str) -> None:
-    trajectory, knots = MEMBERS[name]
-    ends = [(knots[0] - 3.0, knots[0] - 1e-9)]
-    if not name.startswith("blend"):
-        ends.append((knots[-1], knots[-1] + 5.0))
-    for one, other in ends:
-        held, still = trajectory.sample(one), trajectory.sample(other)
-        for a, b in zip(flat(held), flat(still), strict=True):
-            np.testing.assert_array_equal(a, b)
-        for _, rate, acceleration in parts(held):
-            assert not rate.any()
-            assert not acceleration.any()
-
-
 @every_member
 def test_writing_into_out_equals_a_fresh_sample(name: str) -> None:
     trajectory, _ = MEMBERS[name]
@@ -169,17 +132,6 @@ def test_writing_into_out_equals_a_fresh_sample(name: str) -> None:
             np.testing.assert_array_equal(a, b)
             assert np.isfinite(a).all()
             assert a.dtype == np.float64
-
-
-@every_member
-def test_samples_are_the_callers_own(name: str) -> None:
-    trajectory, _ = MEMBERS[name]
-    for t in (-0.5, 0.7, 3.0):
-        before = copy.deepcopy(trajectory.sample(t))
-        for array in flat(trajectory.sample(t)):
-            array.fill(7.0)
-        for a, b in zip(flat(before), flat(trajectory.sample(t)), strict=True):
-            np.testing.assert_array_equal(a, b)
 
 
 @pytest.mark.parametrize("name", POINT_MEMBERS)
@@ -208,34 +160,6 @@ def test_uncompiled_equals_compiled(name: str, monkeypatch: pytest.MonkeyPatch) 
             np.testing.assert_allclose(a, b, rtol=slack, atol=slack)
 
 
-def test_paper_circle() -> None:
-    for t in (0.0, 0.4, 2.0):
-        x, x_dot, x_ddot = CIRCLE.sample(t)
-        c, s = cos(3 * t), sin(3 * t)
-        np.testing.assert_allclose(x, [1 + c, 1 + s], rtol=1e-15)
-        np.testing.assert_allclose(x_dot, [-3 * s, 3 * c], rtol=1e-15)
-        np.testing.assert_allclose(x_ddot, [-9 * c, -9 * s], rtol=1e-15)
-
-
-@quick
-@given(st.integers(0, 10**6))
-def test_circle_turns_by_the_right_hand_about_its_normal(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    center, normal, start = rng.normal(size=(3, 3))
-    radius, rate, phase = rng.uniform(0.1, 3.0, 3)
-    for toward in (None, start):
-        circle = Circle(radius, rate, center, phase=phase, normal=normal, toward=toward)
-        x, x_dot, x_ddot = circle.sample(rng.uniform(-5, 5))
-        arm = x - center
-        assert np.linalg.norm(arm) == pytest.approx(radius)
-        omega = rate * normal / np.linalg.norm(normal)
-        np.testing.assert_allclose(x_dot, np.cross(omega, arm), atol=1e-12)
-        np.testing.assert_allclose(x_ddot, np.cross(omega, x_dot), atol=1e-12)
-    first = Circle(radius, rate, center, normal=normal, toward=start).sample(0.0)
-    assert start @ (first.position - center) > 0
-    assert start @ first.velocity == pytest.approx(0, abs=1e-12)
-
-
 @quick
 @given(st.integers(0, 10**6), st.integers(2, 8))
 def test_minimum_jerk_is_the_quintic_spline_at_rest(seed: int, count: int) -> None:
@@ -261,35 +185,6 @@ def test_orientations_have_three_notations(seed: int) -> None:
         np.testing.assert_allclose(held, R, rtol=0, atol=1e-15)
 
 
-def test_minimum_jerk_of_two_points_is_the_line() -> None:
-    line, jerk = (
-        Line([3, -1], 1.5, start=[0, 1], start_time=0.5),
-        MinimumJerk([[0, 1], [3, -1]], [0.5, 2]),
-    )
-    for t in np.linspace(0, 2.5, 20):
-        for a, b in zip(line.sample(t), jerk.sample(t), strict=True):
-            np.testing.assert_allclose(a, b, atol=1e-14)
-
-
-def test_spline_waypoints_and_bending() -> None:
-    """A cubic spline bends least: less than the smoother quintic, and vice versa."""
-    splines = {degree: Spline(POINTS, TIMES, degree) for degree in (3, 5, 7)}
-    for spline in splines.values():
-        for t, point in zip(TIMES, POINTS, strict=True):
-            np.testing.assert_allclose(spline.sample(t).position, point, atol=1e-12)
-    grid = np.linspace(TIMES[0] + 1e-9, TIMES[-1] - 1e-9, 4001)
-    bending, jerk = {}, {}
-    for degree, spline in splines.items():
-        x_ddot = np.array([spline.sample(t).acceleration for t in grid])
-        bending[degree] = np.square(x_ddot).mean()
-        jerk[degree] = np.square(np.diff(x_ddot, axis=0)).mean()
-    assert bending[3] < bending[5] < bending[7]
-    assert jerk[5] < jerk[7]
-    np.testing.assert_allclose(
-        splines[3].sample(TIMES[0] + 1e-12).velocity, 0, atol=1e-9
-    )
-
-
 @pytest.mark.parametrize(("rate", "tolerance"), [(1.0, 1e-10), (10.0, 5e-9)])
 def test_callable_is_as_accurate_as_it_says(rate: float, tolerance: float) -> None:
     circle = Circle(1, rate, [1, 1])
@@ -299,13 +194,6 @@ def test_callable_is_as_accurate_as_it_says(rate: float, tolerance: float) -> No
         np.testing.assert_allclose(
             found.acceleration, exact.acceleration, rtol=0, atol=tolerance
         )
-
-
-def test_callable_orientation_finds_the_exact_rates() -> None:
-    turning = CallableOrientation(lambda t: BLENDED_SPIN.sample(t).rotation)
-    exact_turn, found_turn = BLENDED_SPIN.sample(1.2), turning.sample(1.2)
-    for a, b in zip(found_turn, exact_turn, strict=True):
-        np.testing.assert_allclose(a, b, rtol=0, atol=1e-8)
 
 
 @quick
@@ -324,31 +212,6 @@ def test_blend_leads_from_the_start_into_the_trajectory(seed: int) -> None:
     for t in (t0 + 1.0001 * duration, t0 + 9.0):
         for a, b in zip(blend.sample(t), LISSAJOUS.sample(t), strict=True):
             np.testing.assert_array_equal(a, b)
-
-
-@quick
-@given(st.integers(0, 10**6))
-def test_blend_orientation_leads_on_whatever_the_turn(seed: int) -> None:
-    """The spin passes half a turn away from the start, several times."""
-    rng = np.random.default_rng(seed)
-    start = pin.exp3(pi * rng.uniform(-1, 1, 3))
-    velocity = rng.normal(size=3)
-    spin = Spin(rng.normal(size=3), rng.uniform(3.0, 9.0), rotation=R1)
-    blend = BlendOrientation(
-        spin, 2.0, rotation=start, start_angular_velocity=velocity, start_time=0.5
-    )
-    R, omega, omega_dot = blend.sample(0.5)
-    np.testing.assert_allclose(R, start, atol=1e-14)
-    np.testing.assert_allclose(omega, velocity, atol=1e-12)
-    np.testing.assert_allclose(omega_dot, np.zeros(3), atol=1e-11)
-    for t in (2.5001, 9.0):
-        for a, b in zip(blend.sample(t), spin.sample(t), strict=True):
-            np.testing.assert_array_equal(a, b)
-    fastest = 0.0
-    for one, other in pairwise(np.linspace(0.5, 2.6, 300)):
-        step = displacement(blend.sample(one).rotation, blend.sample(other).rotation)
-        fastest = max(fastest, float(np.linalg.norm(step)) / (other - one))
-    assert fastest < 40.0  # no jump
 
 
 @quick
@@ -383,13 +246,6 @@ def test_orientation_path_takes_the_shortest_turns() -> None:
     np.testing.assert_allclose(
         pin.log3(R1.T @ half), pin.log3(R1.T @ R2) / 2, atol=1e-14
     )
-
-
-def test_spin_turns_about_the_worlds_axis() -> None:
-    R, omega, omega_dot = Spin([0, 0, 7], 2.0, rotation=R1).sample(0.3)
-    np.testing.assert_allclose(R, pin.exp3(np.array([0, 0, 0.6])) @ R1, atol=1e-15)
-    np.testing.assert_array_equal(omega, [0, 0, 2])
-    np.testing.assert_array_equal(omega_dot, [0, 0, 0])
 
 
 def test_a_trajectory_of_ones_own() -> None:

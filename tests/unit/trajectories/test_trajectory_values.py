@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from numpy.typing import NDArray
 from trajectory_cases import (
     CIRCLE,
     IDENTITY,
@@ -27,8 +26,7 @@ from trajectory_cases import (
 from values import assert_is_a_value
 
 import hsp_control.trajectories as family
-from hsp_control.common.exceptions import ScheduleError, ShapeError, TrajectoryError
-from hsp_control.declaration.families import value_fields
+from hsp_control.common.exceptions import TrajectoryError
 from hsp_control.trajectories import (
     Blend,
     BlendOrientation,
@@ -57,8 +55,6 @@ from hsp_control.trajectories import (
     UniformLine,
 )
 
-Array = NDArray[np.float64]
-
 SCHEDULE = Schedule([(-np.inf, 1.0), (2.0, 4.0)], ramp=0.5)
 VALUES: dict[str, Any] = {
     **{name: member for name, (member, _) in MEMBERS.items()},
@@ -85,33 +81,6 @@ def test_trajectories_are_values(name: str) -> None:
     assert all(value != other for key, other in VALUES.items() if key != name)
 
 
-FORMS: dict[str, Callable[[Array], Any]] = {
-    "list": lambda x: x.tolist(),
-    "tuple of lists": lambda x: tuple(x.tolist()),
-    "float32": lambda x: x.astype(np.float32),
-    "integers": lambda x: x.astype(int),
-    "strided": lambda x: np.repeat(x, 3, axis=0)[::3],
-    "backwards": lambda x: x[::-1].copy()[::-1],
-    "masked": np.ma.array,
-}
-
-
-@pytest.mark.parametrize("form", FORMS)
-def test_all_forms_of_an_array_are_one_value(form: str) -> None:
-    points, times = np.array([[1.0, 2.0], [3.0, 5.0], [4.0, 0.0]]), np.arange(3.0)
-    given = FORMS[form]
-    for kind in (MinimumJerk, Stops, Spline):
-        value, plain = kind(given(points), given(times)), kind(points, times)
-        assert value == plain
-        assert hash(value) == hash(plain)
-        assert repr(value) == repr(plain)
-    assert Hold(given(times)) == Hold([0, 1, 2])
-    assert HoldOrientation(given(IDENTITY)) == HoldOrientation(IDENTITY)
-    assert OrientationPath(
-        given(np.stack([IDENTITY, IDENTITY[[1, 2, 0]]])), [0, 1]
-    ) == OrientationPath([IDENTITY, IDENTITY[[1, 2, 0]]], [0, 1])
-
-
 # --- wrong arguments ------------------------------------------------------------------
 
 NUMBER = ["fast", np.nan, -np.inf, None, True, [1.0], {}, 1j]
@@ -133,7 +102,6 @@ OPTIONAL_ROTATION = [
 ROTATION = [*OPTIONAL_ROTATION, None]
 CHILD = [None, 1.0, "circle", {}, {"type": "spyn"}, SCHEDULE, Circle]
 FUNCTION = [None, 1.0, "f"]
-ORIGIN = ["here", None, 1, "World"]
 # For each class: arguments that are right, and for each field all that is wrong.
 WRONG: dict[type, tuple[dict[str, Any], dict[str, list[Any]]]] = {
     Hold: ({"point": [1, 2, 3]}, {"point": OPTIONAL_VECTOR}),
@@ -247,61 +215,6 @@ def test_a_wrong_value_is_one_error_with_class_and_field(
         assert caught.value.__suppress_context__
 
 
-def test_every_field_of_every_member_is_given_wrong() -> None:
-    members = {type(member) for member, _ in MEMBERS.values()}
-    assert set(WRONG) == members
-    for kind, (_, wrong) in WRONG.items():
-        names = {field.name for field in value_fields(kind)}
-        assert set(wrong) == names - {"origin"}
-        if "origin" in names:
-            for value in ORIGIN:
-                with pytest.raises(TrajectoryError, match=f"^{kind.__name__}: origin"):
-                    kind(**{**WRONG[kind][0], "origin": value})
-
-
-SCHEDULES: dict[str, dict[str, Any]] = {
-    r"^Schedule: intervals\.0\.0: .* not a finite": {"intervals": [(np.nan, 1)]},
-    r"^Schedule: intervals\.0\.0: \.inf is not": {"intervals": [(np.inf, 1)]},
-    r"^Schedule: intervals\.0\.1: -\.inf is not": {"intervals": [(0, -np.inf)]},
-    r"^Schedule: intervals\.0: \[1\] has 1 entry, needs 2": {"intervals": [[1]]},
-    r"^Schedule: intervals\.1: .* has 3 entries, needs 2": {
-        "intervals": [(0, 1), (2, 3, 4)]
-    },
-    r"^Schedule: intervals\.0\.1: 'end' is text; expected a num": {
-        "intervals": [(0, "end")]
-    },
-    r"^Schedule: intervals\.0: 1": {"intervals": [1, 2]},
-    r"^Schedule: intervals: 'always'": {"intervals": "always"},
-    r"^Schedule: intervals: \[\]": {"intervals": []},
-    r"^Schedule: ramp: -1 is negative; must be at least 0": {
-        "intervals": [(0, 1)], "ramp": -1
-    },
-    r"^Schedule: ramp: nothing given": {"intervals": [(0, 1)], "ramp": None},
-    r"^Schedule: the interval from 1 to 1 s is empty": {"intervals": [(1, 1)]},
-    r"^Schedule: .* overlaps the previous one, which ends at 2 s": {
-        "intervals": [(0, 2), (1, 3)]
-    },
-    r"^Schedule: .* is shorter than its ramps, 0.6 s": {"intervals": [(0, 0.5)]},
-    r"^Schedule: missing key 'intervals'": {"ramp": 1},
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("message", SCHEDULES)
-def test_a_wrong_schedule_is_one_error(message: str) -> None:
-    with pytest.raises(ScheduleError, match=message):
-        Schedule(**SCHEDULES[message])
-
-
-def test_no_start_and_no_end_have_two_notations() -> None:
-    endless = Schedule([(None, 1), (2, None)])
-    for pairs in ([(-np.inf, 1), (2, np.inf)], np.array([[-np.inf, 1], [2, np.inf]])):
-        assert Schedule(pairs) == endless
-    assert endless.intervals == ((None, 1.0), (2.0, None))
-    assert endless.windows == ((-np.inf, 1.0), (2.0, np.inf))
-    assert Schedule.always().constant
-    assert not endless.constant
-
-
 # --- where the robot starts -----------------------------------------------------------
 
 START = np.array([0.3, -0.2, 0.5])
@@ -334,39 +247,6 @@ def test_an_omitted_point_is_where_the_robot_starts(kind: Any) -> None:
         assert not anchored.relative
         with pytest.raises(TrajectoryError, match=f"{name} is missing: nothing starts"):
             trajectory.anchored(None)
-
-
-@every_placed
-def test_points_are_counted_from_the_start(kind: Any) -> None:
-    given = WRONG[kind][0]
-    trajectory = kind(**given, origin="start")
-    assert_relative(trajectory, TrajectorySample.allocate(3))
-    assert trajectory.dimension == 3
-    anchored = trajectory.anchored(START.tolist())
-    moved = {name: START + given[name] for name in kind.points}
-    assert anchored == kind(**{**given, **moved})
-    assert anchored.origin == "world"
-    with pytest.raises(TrajectoryError, match=r"^origin: start is not available here"):
-        trajectory.anchored(None)
-    with pytest.raises(TrajectoryError, match=r"has 3 coordinates \[.*; needs 2"):
-        trajectory.anchored([1, 2])
-    if kind is Blend:  # only its own start is moved
-        return
-    for t in (0.0, 0.4, 1.3):
-        here, there = kind(**given).sample(t), anchored.sample(t)
-        np.testing.assert_allclose(there.position, here.position + START, atol=1e-14)
-        np.testing.assert_allclose(there.velocity, here.velocity, atol=1e-13)
-        np.testing.assert_allclose(there.acceleration, here.acceleration, atol=1e-12)
-
-
-@every_placed
-def test_points_in_the_world_stay(kind: Any) -> None:
-    trajectory = kind(**WRONG[kind][0])
-    assert not trajectory.relative
-    assert trajectory.anchored(START) is trajectory
-    assert trajectory.anchored(None) is trajectory
-    with pytest.raises(TrajectoryError, match="has 3 coordinates"):
-        trajectory.anchored([1, 2, 3, 4])
 
 
 def test_a_blend_begins_and_ends_about_the_start() -> None:
@@ -434,13 +314,6 @@ def test_an_omitted_rotation_is_that_of_the_start(trajectory: Any) -> None:
     )
 
 
-def test_a_blend_may_lead_into_an_orientation_of_the_start() -> None:
-    blend = BlendOrientation(Spin([0, 0, 1], 1.0), 1.5, rotation=R1)
-    assert_relative(blend, OrientationSample.allocate())
-    expected = BlendOrientation(Spin([0, 0, 1], 1.0, rotation=R2), 1.5, rotation=R1)
-    assert blend.anchored(R2) == expected
-
-
 POSES: dict[str, tuple[Any, Callable[[pin.SE3], Any]]] = {
     "hold": (HoldPose(), lambda M: HoldPose(M.translation, M.rotation)),
     "hold a rotation": (HoldPose(rotation=R1), lambda M: HoldPose(M.translation, R1)),
@@ -472,11 +345,3 @@ def test_poses_start_where_the_robot_starts(name: str) -> None:
     assert not anchored.relative
     assert anchored.anchored(pose(3)) == anchored
     anchored.sample(0.0)
-
-
-def test_a_follower_checks_the_memory_it_writes() -> None:
-    for trajectory in (CIRCLE, Hold([1, 2]), Blend(CIRCLE, 1.0, start=[0, 0])):
-        with pytest.raises(
-            ShapeError, match=r"has dimension 3; this .* has dimension 2"
-        ):
-            trajectory.follow(TrajectorySample.allocate(3))

@@ -5,14 +5,7 @@ import pytest
 
 from hsp_control import Rollout, load_experiment
 from hsp_control.config.experiment import Experiment
-from hsp_control.visualization.viewer import (
-    ComparedRun,
-    LiveView,
-    Recorder,
-    Viewer,
-    live,
-)
-from hsp_control.visualization.viewer.clip import CLOSED_SHARE, bands_of, spans_of
+from hsp_control.visualization.viewer.clip import bands_of, spans_of
 
 FAST = (
     "simulation.control_period=null",
@@ -29,12 +22,6 @@ def obstacle() -> tuple[Experiment, Rollout]:
 
 def altered(rollout: Rollout, **columns: np.ndarray) -> Rollout:
     return Rollout({**rollout.columns, **columns}, rollout.meta)
-
-
-def told(recorder: Recorder) -> dict[str, list[list[float]]]:
-    clip = recorder.command("/clip", "begin")
-    assert clip is not None
-    return {band["name"]: band["spans"] for band in clip["bands"]}
 
 
 @pytest.mark.parametrize(
@@ -102,57 +89,3 @@ def test_a_target_out_of_reach_is_told_with_its_distance(
     error[40:, 0] = 0.2
     _, out, _ = bands_of(altered(run, **away), None)
     assert out.caption == "hand: target out of reach, up to 0.31 m"
-
-
-def test_chattering_is_one_band(obstacle: tuple[Experiment, Rollout]) -> None:
-    _, run = obstacle
-    damped = np.arange(len(run)) % 2.0
-    duration = 1.1 * (run.t[1] - run.t[0]) / CLOSED_SHARE
-    (band,) = bands_of(altered(run, damped=damped), None, duration=duration)
-    assert band.name == "bounded at a singularity"
-    assert len(band.spans) == 1
-    (band,) = bands_of(altered(run, damped=damped), None)
-    assert len(band.spans) > 10
-
-
-def test_a_run_is_shown_with_its_bands(obstacle: tuple[Experiment, Rollout]) -> None:
-    experiment, run = obstacle
-    recorder = Recorder()
-    viewer = Viewer(experiment.robot, transport=recorder)
-    viewer.play(run, controller=experiment.controller)
-    assert told(recorder) == {"inside an influence zone": [[0.0, 0.5]]}
-    bounded = altered(run, damped=np.ones(len(run)))
-    viewer.compare(
-        [
-            ComparedRun("with", experiment.robot, run, experiment.controller),
-            ComparedRun("without", experiment.robot, bounded),
-        ]
-    )
-    assert told(recorder) == {
-        "with: inside an influence zone": [[0.0, 0.5]],
-        "without: bounded at a singularity": [[0.0, 0.5]],
-    }
-
-
-def test_bands_grow_with_a_run_that_is_computed(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Each part begins where the last one ended: the page makes one band of them."""
-    experiment = load_experiment("panda_obstacle", "simulation.duration=0.3", *FAST)
-    recorder = Recorder()
-    view = LiveView(Viewer(experiment.robot, transport=recorder), experiment)
-    monkeypatch.setattr(live, "MIN_PERIOD", 0.0)
-    monkeypatch.setattr(live, "MAX_PERIOD", 0.0)
-    rollout = experiment.run(on_row=view.on_row)
-    parts = [recorder.command("/clip", "begin")]
-    while (more := recorder.command("/clip", f"more {len(parts)}")) is not None:
-        parts.append(more)
-    assert len(parts) > 3
-    spans = [
-        span for part in parts if part for b in part["bands"] for span in b["spans"]
-    ]
-    starts, ends = (np.array(times) for times in zip(*spans, strict=True))
-    assert (starts[1:] <= ends[:-1]).all()
-    assert ends[-1] == pytest.approx(0.3)
-    view.finish(rollout)
-    assert told(recorder) == {"inside an influence zone": [[0.0, 0.3]]}

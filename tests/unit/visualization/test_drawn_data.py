@@ -1,8 +1,5 @@
 """Check that what is drawn is what the log says, predictions of e_N among it."""
 
-from pathlib import Path
-from typing import Any
-
 import matplotlib as mpl
 import numpy as np
 import pinocchio as pin
@@ -20,7 +17,6 @@ from drawn_logs import (
     spatial,
 )
 from matplotlib.axes import Axes
-from matplotlib.patches import Circle
 
 import hsp_control.visualization.plots as plots
 from hsp_control import (
@@ -53,7 +49,6 @@ from hsp_control.trajectories import Spin
 from hsp_control.visualization import palette
 from hsp_control.visualization.plots import (
     logged_geometry,
-    paths,
     views,
 )
 from hsp_control.visualization.viewer.targets import read_targets
@@ -134,15 +129,6 @@ def test_curves_over_time_are_columns(log: Rollout) -> None:
     np.testing.assert_array_equal(named(axes, "actual")[:, 1], log["null_space_norm"])
 
 
-def test_the_minimum_of_manipulability_is_marked(log: Rollout) -> None:
-    axes = drawn(plots.draw_manipulability, log)
-    np.testing.assert_array_equal(axes.lines[0].get_ydata(), log["manipulability"])
-    t, least = named(axes, "minimum")[0]
-    assert least == log["manipulability"].min()
-    assert log["manipulability"][log.t == t] == least
-    assert axes.get_ylim()[0] == 0.0
-
-
 def test_metres_and_radians_of_a_pose_are_apart(logs: dict[str, Rollout]) -> None:
     log = logs["pose"]
     axes = drawn(plots.draw_task_errors, log)
@@ -155,24 +141,6 @@ def test_metres_and_radians_of_a_pose_are_apart(logs: dict[str, Rollout]) -> Non
         np.testing.assert_allclose(named(axes, label)[:, 1], norm, rtol=1e-14)
     assert axes.get_ylabel().endswith("[m, rad]")
     assert axes.get_yscale() == "log"
-
-
-def test_each_type_of_task_has_its_unit(logs: dict[str, Rollout]) -> None:
-    units = {
-        part.label: part.unit
-        for name in ("several", "posture")
-        for part in log_series.task_errors(logs[name])
-    }
-    assert units == {
-        "xz": "m",
-        "panda_tcp_pointing tan of half the angle": "–",
-        "posture": "rad",
-        "turn": "rad",
-    }
-    robot = logs["posture"].meta["robot"] | {"units": ["rad"] * 7}
-    told = changed(logs["posture"], robot=robot)
-    assert log_series.task_errors(told)[0].unit == "rad"
-    assert log_series.effort_unit(told) == "N·m"
 
 
 def test_a_task_of_a_user_s_own_says_itself_what_is_drawn() -> None:
@@ -200,81 +168,6 @@ def test_a_task_of_a_user_s_own_says_itself_what_is_drawn() -> None:
     np.testing.assert_array_equal(path.desired[:, [0, 2, 1]], desired)
     (target,) = read_targets(log)
     np.testing.assert_array_equal(target.desired, path.desired)
-
-
-@pytest.mark.system
-@pytest.mark.parametrize("name", ["pose", "several", "posture", "obstacle"])
-def test_a_log_that_says_nothing_of_its_tasks_is_drawn(
-    logs: dict[str, Rollout], name: str, tmp_path: Path
-) -> None:
-    log = logs[name]
-    tasks: dict[str, Any] = {task: {} for task in log.meta["tasks"]}
-    bare = Rollout.load(changed(log, tasks=tasks).save(tmp_path / "bare.npz"))
-    assert not logged_geometry.task_paths(bare)
-    assert not read_targets(bare)
-    for part in log_series.task_errors(bare):  # a name, and all rows together
-        error = log[f"task.{log_series.task_names(log)[part.task]}.error"]
-        np.testing.assert_array_equal(part.norm, np.linalg.norm(error, axis=1))
-    for figure in both(bare):
-        figure.canvas.draw()
-
-
-def test_paths_are_the_logs_in_the_plane_of_the_robot(logs: dict[str, Rollout]) -> None:
-    log = logs["obstacle"]
-    axes = drawn(plots.draw_end_effector, log)
-    for label, column in (
-        ("desired", "task.tip.reference"),
-        ("actual", "task.tip.actual"),
-    ):
-        np.testing.assert_array_equal(named(axes, label), log[column])
-    centers = log["obstacle.disk"][:, :2]
-    (path,) = (line for line in axes.lines if line.get_color() == palette.OBSTACLE)
-    np.testing.assert_array_equal(path.get_xydata(), centers)
-    disks = [patch for patch in axes.patches if isinstance(patch, Circle)]
-    assert [disk.center for disk in disks] == [tuple(centers[-1]), tuple(centers[0])]
-    assert legend_texts(axes)[-1] == "obstacle"
-    assert {disk.radius for disk in disks} == {0.2}
-    assert axes.get_aspect() == 1.0
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("x [m]", "y [m]")
-
-
-def test_a_path_in_space_is_seen_from_a_slant(logs: dict[str, Rollout]) -> None:
-    log = logs["space"]
-    axes = drawn(plots.draw_end_effector, log)
-    view = views.oblique()
-    np.testing.assert_allclose(view.rows @ view.rows.T, np.eye(2), atol=1e-15)
-    for label in ("desired", "actual"):
-        column = "reference" if label == "desired" else "actual"
-        page = np.column_stack(view.project(log[f"task.panda_tcp.{column}"]))
-        np.testing.assert_array_equal(named(axes, label), page)
-    texts = {text.get_text() for text in axes.texts}
-    assert {"x [m]", "y [m]", "z [m]"} <= texts
-    front = drawn(plots.draw_end_effector, log, names="yz")
-    reference = log["task.panda_tcp.reference"]
-    np.testing.assert_array_equal(named(front, "desired"), reference[:, 1:])
-
-
-def test_tracked_axes_come_from_the_log(logs: dict[str, Rollout]) -> None:
-    (path,) = logged_geometry.task_paths(logs["several"])
-    assert path.axes == "xz"
-    desired = path.desired[:, [0, 2]]
-    np.testing.assert_array_equal(desired, logs["several"]["task.xz.reference"])
-    np.testing.assert_array_equal(path.desired[:, 1], path.actual[:, 1])
-    assert paths.path_view(logs["several"]).names == "xz"
-
-
-def test_frames_show_the_skeleton_at_their_time(logs: dict[str, Rollout]) -> None:
-    log = logs["obstacle"]
-    axes = drawn(plots.draw_frame, log, 70)
-    skeleton = log["skeleton"][70, :, :2]
-    assert axes.get_title(loc="left") == "t = 0.70 s"
-    (disk,) = (patch for patch in axes.patches if isinstance(patch, Circle))
-    assert disk.center == tuple(log["obstacle.disk"][70, :2])
-    points = [line.get_xydata() for line in axes.lines if line.get_marker() == "o"]
-    np.testing.assert_array_equal(np.concatenate(points), skeleton)
-    links = np.array([skeleton[[k - 1, k]] for k in (1, 2, 3)])
-    found = next(line for line in axes.lines if line.get_color() == palette.LINK)
-    np.testing.assert_array_equal(found.get_xydata().reshape(3, 3, 2)[:, :2], links)
 
 
 def test_frames_are_even_in_time_or_where_they_are_asked_for(
@@ -350,14 +243,6 @@ def test_obstacles_are_their_outlines(logs: dict[str, Rollout]) -> None:
         figure.canvas.draw()
 
 
-def test_a_mesh_is_a_dashed_ball_around_it(logs: dict[str, Rollout]) -> None:
-    about = {"shape": "Mesh", "parameters": {"file": "a.stl"}, "radius": 0.3}
-    (body,) = logged_geometry.logged_obstacles(
-        changed(logs["obstacle"], obstacles={"disk": about})
-    )
-    assert (body.radius, body.exact) == (0.3, False)
-
-
 # --- the prediction of e_N -----------------------------------------------------------
 
 
@@ -398,18 +283,3 @@ def test_a_matrix_gain_predicts_a_band_and_the_log_lies_in_it(
     untold = changed(run, metric_matrix=None)
     (unknown, *_) = legend_texts(drawn(plots.draw_null_space_error, untold))[::-1]
     assert unknown == "no prediction: $K_N$ is a matrix, $W$ not in the log"
-
-
-@pytest.mark.parametrize(
-    ("name", "why"),
-    [
-        ("uncontrolled", "no prediction: self-motion is not controlled"),
-        ("rest", "no prediction: starts with $e_N$ = 0"),
-    ],
-)
-def test_no_prediction_where_there_is_none(
-    logs: dict[str, Rollout], name: str, why: str
-) -> None:
-    axes = drawn(plots.draw_null_space_error, logs[name])
-    assert legend_texts(axes) == [r"actual $\Vert e_N \Vert_W$", why]
-    assert axes.get_ylim()[1] >= 1e-6  # rounding does not fill the axis

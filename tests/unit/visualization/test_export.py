@@ -5,14 +5,12 @@ import gzip
 import io
 import re
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import pytest
-import trimesh
 import umsgpack
 from hypothesis import given
 from hypothesis import strategies as st
@@ -30,15 +28,8 @@ from hsp_control.visualization.viewer.offline.clip_reduction import (
 )
 from hsp_control.visualization.viewer.offline.meshes import read_mesh
 from hsp_control.visualization.viewer.offline.scene_reduction import VERTEX_STEP
-from hsp_control.visualization.viewer.offline.triangle_meshes import (
-    sort_along_curve,
-    split_creases,
-    weld,
-)
 from hsp_control.visualization.viewer.packed.keyframes import (
     angle_error,
-    distance_error,
-    hold,
     keyframe_rows,
     linear,
     slerp,
@@ -160,32 +151,6 @@ def played(times: np.ndarray, keys: np.ndarray, rows: np.ndarray, how: Any) -> A
     return how(rows[keys[left]], rows[keys[right]], fraction[:, None])
 
 
-def test_thinned_keyframes_stay_within_the_bound_and_are_few() -> None:
-    values = np.column_stack([np.sin(T), 0.3 * np.cos(2.0 * T), T])
-    rounded = np.round(values / 2.5e-5) * 2.5e-5
-    keys = keyframe_rows(T, values, rounded, linear, distance_error(2e-4))
-    error = np.linalg.norm(played(T, keys, rounded, linear) - values, axis=1)
-    assert error.max() <= 2e-4
-    # A parabola of curvature c leaves its chord of length h by c h² / 8: with the
-    # strongest curvature, 1.6, everywhere that would be 310 keyframes; cutting where it
-    # is worst, not where it is best, may take twice as many.
-    assert len(keys) < 620
-    line = np.column_stack([T, -2.0 * T, 0.0 * T])
-    assert keyframe_rows(T, line, line, linear, distance_error(1e-9)).tolist() == [
-        0,
-        1000,
-    ]
-
-
-def test_a_jump_stays_a_jump() -> None:
-    values = np.where(T > 4.995, 1.0, 0.0)[:, None]
-    for how in (linear, hold):
-        keys = keyframe_rows(T, values, values, how, distance_error(0.25))
-        # Between two samples nobody knows when it was.
-        assert set(keys.tolist()) <= {0, 498, 499, 500, 501, 999, 1000}
-        np.testing.assert_array_equal(played(T, keys, values, how), values)
-
-
 def test_turning_is_thinned_on_the_sphere() -> None:
     steady = np.column_stack([0.0 * T, 0.0 * T, np.sin(1.5 * T), np.cos(1.5 * T)])
     keys = keyframe_rows(T, steady, steady, slerp, angle_error(1e-5))
@@ -207,44 +172,6 @@ def test_turning_is_thinned_on_the_sphere() -> None:
 
 
 # -- meshes ---------------------------------------------------------------------------
-
-
-def test_joined_triangles_keep_their_place() -> None:
-    box = trimesh.creation.box([1.0, 2.0, 3.0])
-    soup = np.asarray(box.triangles).reshape(-1, 3)
-    vertices, triangles = weld(soup, np.arange(36).reshape(-1, 3), 1e-6)
-    assert len(vertices) == 8
-    np.testing.assert_allclose(vertices[triangles], box.triangles)
-    sliver = np.array([[0, 1, 1], [0, 1, 2]])
-    assert len(weld(soup[:3], sliver, 1e-6)[1]) == 1
-
-
-def test_edges_stay_sharp_and_round_things_smooth() -> None:
-    box = trimesh.creation.box([1.0, 1.0, 1.0])
-    vertices, triangles = split_creases(np.array(box.vertices), np.array(box.faces))
-    assert len(vertices) == 24  # a corner has three normals
-    np.testing.assert_allclose(vertices[triangles], box.triangles)
-    ball = trimesh.creation.icosphere(subdivisions=3)
-    vertices, triangles = split_creases(np.array(ball.vertices), np.array(ball.faces))
-    assert len(vertices) == len(ball.vertices)
-
-
-def test_the_order_changes_and_nothing_else() -> None:
-    ball = trimesh.creation.icosphere(subdivisions=3)
-    vertices, triangles = sort_along_curve(
-        np.array(ball.vertices), np.array(ball.faces)
-    )
-    table = ArrayTable()
-    table.triangles(triangles)
-    np.testing.assert_array_equal(unpacked(table.entries[0]), triangles)
-
-    def rotations(corners: np.ndarray) -> set[bytes]:
-        first = np.lexsort(corners.transpose(2, 0, 1)[::-1], axis=1)[:, 0]
-        turn = (first[:, None] + np.arange(3)) % 3
-        turned = np.take_along_axis(corners, turn[:, :, None], axis=1)
-        return {row.tobytes() for row in np.ascontiguousarray(turned)}
-
-    assert rotations(vertices[triangles]) == rotations(np.array(ball.triangles))
 
 
 def mesh_of(robot: Robot, recorder_path: Path, **about: Any) -> dict[str, Any]:
@@ -567,12 +494,6 @@ def test_what_cannot_be_drawn_does_not_break_the_page(
     assert all(np.isfinite(unpacked(entry)).all() for entry in table.entries)
 
 
-def test_a_run_of_one_row_is_exported(planar: Rollout, tmp_path: Path) -> None:
-    columns = {name: column[:1] for name, column in planar.columns.items()}
-    page = export_html(Rollout(columns, planar.meta), tmp_path / "one.html")
-    assert content_of(page)["plots"]["panels"]
-
-
 def test_what_cannot_be_exported_is_said(
     planar: Rollout, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -597,16 +518,3 @@ def test_a_command_without_a_file_says_what_it_wants(
 ) -> None:
     assert main(["export", str(planar.save(tmp_path / "run.npz"))]) == 2
     assert "give a file with one of --html" in capsys.readouterr().err
-
-
-def test_capsules_need_no_mesh_reader(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for module in ("trimesh", "collada"):
-        monkeypatch.setitem(sys.modules, module, None)
-    rollout = load_experiment(PLANAR, "simulation.duration=0.2").run()
-    assert export_html(rollout, tmp_path / "page.html").is_file()
-    found = Robot.load("panda")
-    bare = Robot(found.model, replace(found.source, package_dirs=()))
-    config = load_experiment("panda_limits", "simulation.duration=0.1", *COARSE)
-    assert export_html(config.run(), tmp_path / "bare.html", robot=bare).is_file()

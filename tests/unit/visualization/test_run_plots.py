@@ -1,14 +1,13 @@
 """Check the plots of the live page: what is sent, how much of it, and to whom."""
 
-import numpy as np
 import pytest
 
 from hsp_control import Rollout, load_experiment
 from hsp_control.config import Experiment
 from hsp_control.simulation.recorder import Recorder as Rows
 from hsp_control.visualization.viewer import ComparedRun, InlineView, Recorder, Viewer
-from hsp_control.visualization.viewer.commands import PLOTS, remove_plots, unpack
-from hsp_control.visualization.viewer.latest_commands import LatestCommands, key_of
+from hsp_control.visualization.viewer.commands import PLOTS, unpack
+from hsp_control.visualization.viewer.latest_commands import key_of
 from hsp_control.visualization.viewer.run_plots import (
     PREVIEW_ROWS,
     plots_of,
@@ -50,21 +49,6 @@ def test_a_run_so_far_has_the_axis_of_the_whole_and_few_points(computed) -> None
     assert any(curve["predicted"] for curve in null_space["series"])
 
 
-def test_the_recorded_rows_are_not_changed_by_it(computed) -> None:
-    """Positions are unwrapped for the plots, in copies."""
-    experiment, log, _ = computed
-    rows = {name: values.copy() for name, values in log.columns.items()}
-    rows["joint_positions"] = (rows["joint_positions"] + np.pi) % (2.0 * np.pi)
-
-    class Recorded:
-        def rows(self, start: int) -> dict:
-            return {name: values[start:] for name, values in rows.items()}
-
-    before = rows["joint_positions"].copy()
-    plots_so_far(Recorded(), log.meta, experiment.robot, 1.5)
-    np.testing.assert_array_equal(rows["joint_positions"], before)
-
-
 def test_only_an_own_server_gets_them_and_a_notebook_never(computed) -> None:
     experiment, log, _ = computed
     recorder = Recorder()
@@ -80,13 +64,3 @@ def test_only_an_own_server_gets_them_and_a_notebook_never(computed) -> None:
         assert len(InlineView(recorder.scene).page) == pytest.approx(bare, rel=1e-3)
         viewer.play(log)  # a new stage has none, until they are sent again
         assert recorder.scene.get(key_of(PLOTS, "plots")) is None
-
-
-def test_removing_them_leaves_nothing_in_the_scene(computed) -> None:
-    experiment, log, _ = computed
-    scene = LatestCommands()
-    for _ in range(3):
-        plots_of([ComparedRun("", experiment.robot, log, None)]).keep_in(scene)
-        assert len(scene) == 1
-    remove_plots().keep_in(scene)
-    assert not len(scene)

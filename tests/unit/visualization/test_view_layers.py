@@ -9,15 +9,10 @@ import pytest
 from clips import Clip
 
 from hsp_control import (
-    Circle,
-    Controller,
     Experiment,
-    FramePosition,
     Robot,
     Rollout,
-    TargetPosture,
     load_experiment,
-    simulate,
 )
 from hsp_control.geometry.shapes import (
     Box,
@@ -40,14 +35,12 @@ from hsp_control.visualization.viewer import (
 )
 from hsp_control.visualization.viewer.commands import CAPTION, CLIP, unpack
 from hsp_control.visualization.viewer.controller_analysis import (
-    from_the_start,
     null_space_projector,
     terms_of_type,
 )
-from hsp_control.visualization.viewer.ellipsoid import SECONDS, principal_axes
+from hsp_control.visualization.viewer.ellipsoid import SECONDS
 from hsp_control.visualization.viewer.measured_links import Capsules, zone
-from hsp_control.visualization.viewer.motion import drawn_times, motion_of
-from hsp_control.visualization.viewer.obstacle_layer import obstacle_legend
+from hsp_control.visualization.viewer.motion import motion_of
 from hsp_control.visualization.viewer.run_drawing import LAYERS
 
 PLANAR, SPATIAL = "paper/4_moving_obstacle", "panda_obstacle"
@@ -172,13 +165,6 @@ def test_the_velocity_slips_into_its_field(
     assert gaps[-1] < 0.05 * gaps[0]
 
 
-def test_an_uncontrolled_null_space_has_no_field_to_show(recorder: Recorder) -> None:
-    experiment = load_experiment("paper/1_uncontrolled", "simulation.duration=0.5")
-    clip = drawn(experiment, experiment.run(), recorder)
-    assert clip.paths("/self_motion/velocity")
-    assert not clip.paths("/self_motion/field")
-
-
 @pytest.mark.parametrize("name", ["panda_manipulability", "tiago_reach"])
 def test_the_projector_is_the_laws_own(name: str) -> None:
     """In any metric P(g - v) is the e_N that the law computed."""
@@ -193,47 +179,6 @@ def test_the_projector_is_the_laws_own(name: str) -> None:
         np.testing.assert_allclose(
             P @ (output.field.g - state.v), output.null_space_error, atol=1e-9
         )
-
-
-def test_the_robot_of_the_view_may_be_another_object(recorder: Recorder) -> None:
-    robot = Robot.load("panda")
-    task = FramePosition(trajectory=Circle(0.1, 2.0))  # relative to the run's start
-    controllers = [
-        Controller(robot, [task], TargetPosture(robot.home() + 0.1)) for _ in range(2)
-    ]
-    run = simulate(controllers[0], robot.home(), duration=0.1)
-    clips = []
-    for controller in controllers:
-        viewer = Viewer(Robot.load("panda"), transport=recorder)
-        viewer.play(run, controller=controller)
-        clips.append(Clip(recorder))
-    paths = clips[0].paths("/self_motion")
-    assert paths
-    assert clips[1].paths("/self_motion") == paths
-    for path in paths:
-        first, second = (clip.values(path, "scale") for clip in clips)
-        np.testing.assert_allclose(first, second, atol=1e-12)
-
-
-def test_arrows_are_of_the_tasks_of_their_time(recorder: Recorder) -> None:
-    """Also of those that are gone at the end: the controller has forgotten them."""
-    robot = Robot.load("panda")
-    elbow = FramePosition("panda_link4", axes="z", name="elbow")
-    controller = Controller(robot, [FramePosition(), elbow], TargetPosture([0.5] * 7))
-    controller.at(0.1).ramp(0.0).remove("elbow")
-    run = simulate(controller, robot.home(), duration=1.5)
-    assert [task.name for task in controller.tasks] == ["end_effector"]
-    fresh = from_the_start(controller)
-    assert [task.name for task in fresh.tasks] == ["end_effector", "elbow"]
-    motion = motion_of(robot, run)
-    free = [
-        np.trace(null_space_projector(fresh, state))  # its rank: the free motions
-        for state in motion.states()
-    ]
-    wanted = np.where(motion.times < 0.1, 3.0, 4.0)
-    np.testing.assert_allclose(free, wanted, atol=1e-9)
-    Viewer(robot, transport=recorder).play(run, controller=controller)
-    assert [task.name for task in controller.tasks] == ["end_effector"]  # left alone
 
 
 # -- distances ------------------------------------------------------------------------
@@ -255,23 +200,6 @@ def test_bars_are_as_long_as_the_distances_in_the_log(
         # It ends on the ball.
         end = tip(clip, path, t) - rollout["obstacle.ball"][row]
         assert np.linalg.norm(end) == pytest.approx(0.1, abs=1e-5)
-
-
-def test_the_papers_cost_is_shown_from_the_nearest_joint_to_the_centre(
-    planar: tuple[Experiment, Rollout], recorder: Recorder
-) -> None:
-    experiment, rollout = planar
-    clip = drawn(experiment, rollout, recorder)
-    path = bar_of(clip)
-    assert "distance to the obstacle's centre" in names(recorder)
-    for row in (0, 75, 150):
-        t = float(rollout.t[row])
-        length = clip.value(path, "scale", t)[2]
-        assert length == pytest.approx(
-            rollout["distance.point_distance"][row], abs=1e-6
-        )
-        center = rollout["obstacle.disk"][row]
-        np.testing.assert_allclose(tip(clip, path, t), center, atol=1e-5)
 
 
 # -- the links that are measured ------------------------------------------------------
@@ -424,17 +352,6 @@ def test_a_zone_lies_at_the_influence_from_its_obstacle(
         assert distance == pytest.approx(influence, abs=slack + 2e-6)
 
 
-def test_zones_follow_their_obstacles(
-    spatial: tuple[Experiment, Rollout], recorder: Recorder
-) -> None:
-    experiment, rollout = spatial
-    clip = drawn(experiment, rollout, recorder)
-    assert recorder.paths("/influence") == ["/influence/ball"]
-    for row in (0, 50):
-        center = clip.value("/influence/ball", "position", float(rollout.t[row]))
-        np.testing.assert_allclose(center, rollout["obstacle.ball"][row], atol=1e-6)
-
-
 # -- the ellipsoid --------------------------------------------------------------------
 
 
@@ -452,33 +369,6 @@ def test_the_ellipsoid_is_the_image_of_the_ball_of_joint_speeds(
         R, scale = clip.pose(path, t)[:3, :3], clip.value(path, "scale", t)
         shape = R @ np.diag(scale**2) @ R.T / SECONDS**2
         np.testing.assert_allclose(shape, J @ J.T, atol=1e-5)
-
-
-def test_its_axes_turn_no_more_than_they_must() -> None:
-    """Also where two of them become equal, change places in length, or change signs."""
-    rng = np.random.default_rng(1)
-    frame = np.linalg.qr(rng.standard_normal((3, 3)))[0]
-    right = np.linalg.qr(rng.standard_normal((7, 7)))[0][:3]
-    last, _ = principal_axes(frame @ np.diag([1.0, 0.7, 0.5]) @ right, np.eye(3))
-    for s in np.linspace(0.7, 1.3, 200):
-        turned = pin.exp3(np.array([0.0, 0.5 * s, 0.0])) @ frame
-        J = turned @ np.diag([1.0, s, 0.5]) @ right
-        axes, lengths = principal_axes(J, last)
-        assert np.linalg.det(axes) == pytest.approx(1.0)
-        np.testing.assert_allclose(
-            axes @ np.diag(lengths**2) @ axes.T, J @ J.T, atol=1e-9
-        )
-        if s > 0.7:
-            assert np.linalg.norm(pin.log3(last.T @ axes)) < 0.01
-        last = axes
-
-
-def test_a_planar_arms_is_a_disk(
-    planar: tuple[Experiment, Rollout], recorder: Recorder
-) -> None:
-    clip = drawn(*planar, recorder)
-    scale = clip.value("/ellipsoid/tip", "scale", 1.0)
-    assert scale.min() == pytest.approx(0.02 * scale.max(), rel=1e-5)
 
 
 # -- contacts -------------------------------------------------------------------------
@@ -536,44 +426,6 @@ def test_each_layer_can_be_switched(
     assert Clip(recorder).paths("/self_motion")  # there, to be switched on
 
 
-def test_all_that_is_drawn_has_its_row(
-    spatial: tuple[Experiment, Rollout],
-    planar: tuple[Experiment, Rollout],
-    recorder: Recorder,
-) -> None:
-    for experiment, rollout in (spatial, planar):
-        drawn(experiment, rollout, recorder)
-        switched = [path for entry in legend(recorder) for path in entry["paths"]]
-        for path in recorder.paths("/"):
-            if recorder.command(path, "object") and not path.startswith("/lights"):
-                above = [p for p in switched if f"{path}/".startswith(f"{p}/")]
-                assert len(above) == 1, path
-
-
-def test_the_legend_tells_where_zones_begin_and_whose_obstacles_they_are(
-    spatial: tuple[Experiment, Rollout], recorder: Recorder
-) -> None:
-    drawn(*spatial, recorder)
-    rows = {entry["name"]: entry for entry in legend(recorder)}
-    assert rows["influence zone 0.4 m"]["paths"] == ["/influence/ball"]
-    assert rows["obstacle ball"]["paths"] == ["/obstacles"]
-    told = [entry.name for entry in obstacle_legend(["a", "b", "c", "d", "e"])]
-    assert told == ["obstacles a, b, c and 2 more"]
-    assert obstacle_legend([]) == []
-
-
-def test_dark_backgrounds_have_light_words(recorder: Recorder) -> None:
-    robot = Robot.load("planar3r")
-    for color, dark in (("#101820", True), ("#FFFFFF", False), ("#0072B2", True)):
-        Viewer(robot, transport=recorder, background=color, light=0.5)
-        caption = recorder.command(CAPTION, "caption")
-        assert caption is not None
-        assert caption["dark"] is dark
-        sky = recorder.command("/Background", "top_color")
-        assert sky is not None
-        assert round(255 * sky["value"][0]) == int(color[1:3], 16)
-
-
 # -- several runs ---------------------------------------------------------------------
 
 
@@ -612,45 +464,6 @@ def test_runs_of_one_robot_lie_over_each_other_as_ghosts(
     assert set(first["paths"]) == {"/paths/tip/actual", "/robot"}
     assert second["paths"] == ["/without"]
     assert "robot" not in {entry["name"] for entry in others}
-
-
-def test_side_by_side_they_keep_clear_of_each_other(
-    planar: tuple[Experiment, Rollout], recorder: Recorder
-) -> None:
-    clip, rest = comparison(planar, recorder, beside=True)
-    assert recorder.command("/without/robot", "ghost") is None
-    offset = recorder.transform("/without")[:3, 3]
-    right = planar[1]["skeleton"][..., 0].max()
-    assert offset[0] + min(0.0, rest["skeleton"][..., 0].min()) > right
-    assert np.abs(offset[1:]).max() < 1e-9
-    assert clip.paths("/without/targets")
-    # What comes after takes it all away.
-    viewer = Viewer(planar[0].robot, transport=recorder)
-    viewer._others = ["/without"]
-    viewer.draw_scene(planar[1])
-    assert not recorder.paths("/without")
-
-
-def test_runs_of_different_robots_stand_side_by_side(
-    planar: tuple[Experiment, Rollout],
-    spatial: tuple[Experiment, Rollout],
-    recorder: Recorder,
-) -> None:
-    viewer = Viewer(planar[0].robot, transport=recorder)
-    acts = [
-        ComparedRun(name, experiment.robot, rollout, experiment.controller)
-        for name, (experiment, rollout) in (("a", planar), ("b", spatial))
-    ]
-    viewer.compare(acts)
-    assert recorder.transform("/b")[0, 3] > 2.0
-    assert recorder.paths("/b/robot/panda_joint7")
-    (seconds,) = {n for n in names(recorder) if n.startswith("self-motion")}
-    assert seconds  # one scale for both
-    rows = {entry["name"]: entry["paths"] for entry in legend(recorder)}
-    assert rows["robot"] == ["/robot", "/b/robot"]
-    assert rows["actual path"] == ["/paths/tip/actual", "/b/paths/hand/actual"]
-    viewer.play(planar[1])
-    assert not recorder.paths("/b")
 
 
 # -- live -----------------------------------------------------------------------------
@@ -716,51 +529,6 @@ def test_a_run_is_shown_while_it_is_computed(monkeypatch: pytest.MonkeyPatch) ->
     assert Clip(transport).value("/paths/tip/actual", "length", 0.5) == 50
 
 
-def test_what_is_hidden_costs_the_run_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(live, "MIN_PERIOD", 0.0)
-    experiment = load_experiment(PLANAR, "simulation.duration=0.1")
-    transport = Watched()
-    off = dict.fromkeys(LAYERS, False)
-    viewer = Viewer(experiment.robot, transport=transport, show=off)
-    view = LiveView(viewer, experiment)
-    del transport.sent[:]
-    rollout = experiment.run(on_row=view.on_row)
-    moving = {track["path"] for c in transport.sent for track in c.get("tracks", ())}
-    assert moving == {f"/robot/joint{k}" for k in (1, 2, 3)}
-    assert not [c for c in transport.sent if c["type"] == "trail_more"]
-    view.finish(rollout)  # and then it is there, to be switched on
-    assert "/paths/tip/actual" in transport.paths("/paths")
-    rows = {entry["name"]: entry for entry in legend(transport)}
-    assert rows["actual path"]["shown"] is False
-
-
-def test_drawing_leaves_rows_out_so_that_it_stays_cheap(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    experiment = load_experiment(PLANAR, "simulation.duration=0.5")
-    transport = Watched()
-    view = LiveView(Viewer(experiment.robot, transport=transport), experiment)
-    clock = {"now": 100.0}
-    monkeypatch.setattr(live.time, "perf_counter", lambda: clock["now"])
-    monkeypatch.setattr(live.time, "thread_time", lambda: clock["now"])
-    monkeypatch.setattr(live.time, "sleep", None)
-    send = transport.send
-
-    def slow(commands: Any) -> None:
-        clock["now"] += 0.05  # drawing takes this long
-        send(commands)
-
-    monkeypatch.setattr(transport, "send", slow)
-
-    def on_row(recorder: Any) -> None:
-        clock["now"] += 0.01
-        view.on_row(recorder)
-
-    experiment.run(on_row=on_row)
-    pieces = [c for c in transport.sent if c["type"] == "clip"]
-    assert len(pieces) <= 2  # of 51 rows, each of which took 0.01 s
-
-
 def test_a_view_that_ends_does_not_end_the_run(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
@@ -771,18 +539,3 @@ def test_a_view_that_ends_does_not_end_the_run(
         rollout = experiment.run(on_row=view.on_row)
     assert rollout.status == "completed"
     assert "the run continues without a view" in caplog.text
-
-
-# -- its parts ------------------------------------------------------------------------
-
-
-def test_drawn_times_are_neither_too_near_nor_too_far() -> None:
-    rng = np.random.default_rng(0)
-    for _ in range(20):
-        times = np.cumsum(rng.exponential(0.02, 50))
-        drawn = drawn_times(times, 0.01, 0.033)
-        assert (drawn[0], drawn[-1]) == (times[0], times[-1])
-        gaps = np.diff(drawn)
-        assert gaps.max() <= 0.033 + 1e-9
-        assert (gaps[:-2] >= 0.01 - 1e-9).mean() > 0.95
-    assert drawn_times(np.array([3.0]), 0.01, 0.03).tolist() == [3.0]
