@@ -1,9 +1,8 @@
 """What a log holds of the terms of a field, which may change during a run."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.identity_cache import IdentityCache
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.controller import Controller
 from hsp_control.geometry.scene import Obstacle
@@ -29,7 +28,6 @@ class TermColumns:
         if controller.field is self._field:
             return False
         self._field, self._terms = controller.field, logged_terms(controller)
-        self._values = IdentityCache(self._bind_values)
         self._distances: dict[str, NullSpaceField] = {}  # terms that measure one
         probe, nv = present_state(controller), controller.robot.nv
         for name, term in self._terms.items():
@@ -41,19 +39,10 @@ class TermColumns:
                 column(distance, (), "m", "minimum distance", **_center_of(term))
         return True
 
-    def _bind_values(
-        self, state: RobotState
-    ) -> list[tuple[Callable[[], float], Array]]:
-        """Return what computes the value of each term at a state, and its column."""
-        return [
-            (term.bind_value(state), self._columns.arrays[f"field.{name}.value"])
-            for name, term in self._terms.items()
-        ]
-
     def write(self, row: int, state: RobotState) -> None:
         """Write the values of the terms, and distances."""
-        for value, column in self._values.get(state):
-            column[row] = value()
+        for name, term in self._terms.items():
+            self._columns.arrays[f"field.{name}.value"][row] = term.value(state)
         for name, term in self._distances.items():
             self._columns.arrays[name][row] = term.minimum_distance(state)
 
