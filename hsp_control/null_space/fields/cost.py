@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import KW_ONLY
 from functools import partial
+from typing import NoReturn
 
 import numpy as np
 
@@ -107,16 +108,33 @@ class Cost(NullSpaceField):
             return StepPlan(follow, (*write, descent))
         return StepPlan(write=(partial(self._descend, state, descent, out),))
 
+    def evaluate(
+        self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
+    ) -> FieldSample:
+        """Write g and g'; see `NullSpaceField.evaluate`.
+
+        Raises:
+            FieldError: If the gradient or its rate is not nv finite numbers.
+        """
+        super().evaluate(state, metric, form, out)
+        if not np.isfinite([*out]).all():
+            self._raise_not_finite(state)
+        return out
+
     def _descend(
         self, state: RobotState, descent: Callable[[], bool], out: FieldSample
     ) -> None:
         self.differentiate(state, out.g, out.g_dot)
         if not descent():
-            raise FieldError(
-                f"cost {self.name!r} has the gradient {self.gradient(state)!r} and the "
-                f"gradient rate {self.gradient_rate(state)!r} at t = {state.t:.6g} s; "
-                "needs finite numbers"
-            )
+            self._raise_not_finite(state)
+
+    def _raise_not_finite(self, state: RobotState) -> NoReturn:
+        self.value(state)  # may say what is wrong
+        raise FieldError(
+            f"cost {self.name!r} has the gradient {self.gradient(state)!r} and the "
+            f"gradient rate {self.gradient_rate(state)!r} at t = {state.t:.6g} s; "
+            "needs finite numbers"
+        )
 
     def _derivative(self, state: RobotState, which: int) -> Array:
         """Return ∇f (0) or (∇f)' (1) of the kernel, shape (nv,)."""

@@ -105,9 +105,7 @@ class JacobianCost(Cost):
             J: The selected rows, orientation rows scaled, shape (k, nv).
             J_dot: Their time derivative, shape (k, nv).
         """
-        raise TypeError(
-            f"{type(self).__name__} has neither terms nor terms_kernel"
-        )
+        raise TypeError(f"{type(self).__name__} has neither terms nor terms_kernel")
 
     def terms_kernel(self, nv: int) -> KernelCall:
         """Return a kernel and its first arguments, instead of `terms`.
