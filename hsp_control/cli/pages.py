@@ -12,7 +12,7 @@ from hsp_control.config import Experiment
 from hsp_control.config.loaded_scenario import LoadedScenario
 from hsp_control.config.view_settings import ViewSettings
 from hsp_control.simulation import Rollout
-from hsp_control.simulation.recorder import Recorder
+from hsp_control.simulation.log_writer import LogWriter
 from hsp_control.visualization.viewer import LiveView, Viewer, browser, view_logs
 from hsp_control.visualization.viewer.commands import set_caption, set_status
 from hsp_control.visualization.viewer.server import Server
@@ -146,7 +146,7 @@ class Screen:
         self._page.open()
         return True
 
-    def on_row(self, recorder: Recorder) -> None:
+    def on_row(self, recorder: LogWriter) -> None:
         """Show the rows computed so far."""
         if self._live is not None:
             self._live.on_row(recorder)

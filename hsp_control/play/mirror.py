@@ -16,8 +16,8 @@ from hsp_control.control.controller import Controller
 from hsp_control.play.channel import Channel
 from hsp_control.play.handles import Handles
 from hsp_control.play.knobs import RAMP
-from hsp_control.simulation.journal import JournalTail
-from hsp_control.simulation.recorder import Recorder
+from hsp_control.simulation.journal import JournalReader
+from hsp_control.simulation.log_writer import LogWriter
 
 
 class ToldHandles(Handles):
@@ -47,6 +47,10 @@ class ToldHandles(Handles):
                 self.knobs[name].turn(at, value)
 
 
+_KEPT = 1000
+"""Rows of the journal that are kept for the picture."""
+
+
 class Mirror:
     """What a picture needs of a live loop, as of a `Session`."""
 
@@ -66,12 +70,13 @@ class Mirror:
         self.kind: Literal["live", "held"] = "held" if held else "live"
         self.controller = experiment.controller
         output = self.controller.compute(0.0, experiment.q0, experiment.v0)
-        start = Recorder(self.controller, experiment.scene, 1)
+        start = LogWriter(self.controller, experiment.scene, 1)
         start.record(self.controller.state, output, output.tau, {})
-        self.recorder: Recorder | JournalTail = start
+        self.recorder: LogWriter | JournalReader = start
         self.handles = ToldHandles(self.controller, period)
         self.over = ""
-        self._tail, self._channel = JournalTail(journal), channel
+        self._journal = JournalReader(journal, most=_KEPT)
+        self._channel = channel
 
     @property
     def t(self) -> float:
@@ -81,7 +86,7 @@ class Mirror:
     @property
     def meta(self) -> dict[str, Any]:
         """The meta data of these rows."""
-        if isinstance(self.recorder, Recorder):
+        if isinstance(self.recorder, LogWriter):
             return self.recorder.meta("", "")
         return self.recorder.meta
 
@@ -99,12 +104,12 @@ class Mirror:
         """Read what has come from the loop."""
         for word in self._channel.receive():
             self.handles.hear(word)
-        if self._tail.read():
-            self.recorder = self._tail
-            row = self._tail.rows(self._tail.count - 1)
+        if self._journal.read():
+            self.recorder = self._journal
+            row = self._journal.rows(self._journal.count - 1)
             with suppress(HspControlError):  # the loop says what is wrong
                 self.controller.compute(float(row["t"][0]), row["q"][0], row["v"][0])
-        if self._tail.ended:
-            self.over = str(self._tail.meta["message"])
+        if self._journal.ended:
+            self.over = str(self._journal.meta["message"])
         elif self._channel.lost:
             self.over = "the loop's process has ended"

@@ -11,7 +11,7 @@ from hsp_control.control.controller import Controller
 from hsp_control.null_space.fields import Clearance, NullSpaceField, SelfClearance
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.limit_excess import POSITION, VELOCITY
-from hsp_control.simulation.term_columns import logged_terms
+from hsp_control.simulation.log_columns import logged_terms
 from hsp_control.simulation.unreached import FAR, OUT, Unreached, unreached
 from hsp_control.visualization import palette
 from hsp_control.visualization.viewer.commands import (

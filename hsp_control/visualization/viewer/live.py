@@ -11,7 +11,7 @@ from hsp_control.common.exceptions import HspControlError, LogError, ViewerError
 from hsp_control.config.experiment import Experiment
 from hsp_control.robot import RobotState
 from hsp_control.simulation import Rollout
-from hsp_control.simulation.recorder import Recorder
+from hsp_control.simulation.log_writer import LogWriter
 from hsp_control.visualization.viewer.clip import Clip, bands_of, extend_clip, set_clip
 from hsp_control.visualization.viewer.commands import set_status
 from hsp_control.visualization.viewer.motion import COARSEST, Motion, motion_of
@@ -62,7 +62,7 @@ class LiveView:
         self._begin: float | None = None
         self._size = viewer.set_stage(self._run, experiment.scenario.title)
 
-    def on_row(self, recorder: Recorder) -> None:
+    def on_row(self, recorder: LogWriter) -> None:
         """Send the rows computed since the last message, if the next one is due."""
         now = time.perf_counter()
         if self._begin is None:
@@ -93,7 +93,7 @@ class LiveView:
             status=f"computed at {_shown(rate)} × real time",
         )
 
-    def _send(self, recorder: Recorder, now: float) -> None:
+    def _send(self, recorder: LogWriter, now: float) -> None:
         rows = Rollout(recorder.rows(self._sent), self._meta)
         # From the last row sent on, whose bands may go on.
         joined = Rollout(recorder.rows(max(self._sent - 1, 0)), self._meta)
@@ -107,7 +107,7 @@ class LiveView:
         self._sent += len(rows)
         self._pieces += 1
 
-    def _send_plots(self, recorder: Recorder, now: float) -> None:
+    def _send_plots(self, recorder: LogWriter, now: float) -> None:
         """Send the plots of all rows computed so far, in place of the last ones."""
         before = time.thread_time()
         duration = self._experiment.scenario.simulation.duration
@@ -163,7 +163,7 @@ def _preview(experiment: Experiment) -> Rollout:
     # A stream would go on to the end of the preview.
     robot, controller = experiment.robot, experiment.controller.preview()
     duration = experiment.scenario.simulation.duration
-    recorder = Recorder(controller, experiment.scene, _PREVIEW_ROWS)
+    recorder = LogWriter(controller, experiment.scene, _PREVIEW_ROWS)
     state = RobotState(robot)
     for t in np.linspace(0.0, duration, _PREVIEW_ROWS):
         state.update(float(t), experiment.q0, experiment.v0)

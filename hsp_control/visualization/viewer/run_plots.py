@@ -7,9 +7,8 @@ import numpy as np
 from hsp_control.common.arrays import Indices
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
-from hsp_control.simulation.recorder import Recorder
+from hsp_control.simulation.log_writer import LogWriter, continuous_dofs
 from hsp_control.simulation.rollout import complete_columns
-from hsp_control.simulation.run_meta import continuous_dofs
 from hsp_control.visualization.viewer.commands import Command, Json, set_plots
 from hsp_control.visualization.viewer.comparison import ComparedRun
 from hsp_control.visualization.viewer.packed.packing import ArrayTable
@@ -24,7 +23,7 @@ def plots_of(runs: Sequence[ComparedRun]) -> Command:
 
 
 def plots_so_far(
-    recorder: Recorder, meta: Json, robot: Robot, duration: float
+    recorder: LogWriter, meta: Json, robot: Robot, duration: float
 ) -> Command:
     """Return the command that plots a run so far, on the whole run's axis."""
     rows = recorder.rows(0)

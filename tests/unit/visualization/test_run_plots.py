@@ -4,7 +4,7 @@ import pytest
 
 from hsp_control import Rollout, load_experiment
 from hsp_control.config import Experiment
-from hsp_control.simulation.recorder import Recorder as Rows
+from hsp_control.simulation.log_writer import LogWriter as Rows
 from hsp_control.visualization.viewer import ComparedRun, InlineView, Recorder, Viewer
 from hsp_control.visualization.viewer.commands import PLOTS, unpack
 from hsp_control.visualization.viewer.latest_commands import key_of
