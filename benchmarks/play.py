@@ -21,7 +21,7 @@ from hsp_control.companions.film.chromium import headless_browser
 from hsp_control.play import Picture, Session, play
 from hsp_control.play.playable import playable
 from hsp_control.visualization.viewer import Viewer
-from hsp_control.visualization.viewer.server import Server
+from hsp_control.visualization.viewer.transport import Server
 
 sys.path.append(str(Path(__file__).parents[1] / "tests" / "support"))
 from pages import Steering

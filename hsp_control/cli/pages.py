@@ -13,11 +13,10 @@ from hsp_control.config.loaded_scenario import LoadedScenario
 from hsp_control.config.view_settings import ViewSettings
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.recorder import Recorder
-from hsp_control.visualization.viewer import LiveView, Viewer, browser, view_logs
+from hsp_control.visualization.viewer import LiveView, Viewer, transport, view_logs
 from hsp_control.visualization.viewer.commands import set_caption, set_status
-from hsp_control.visualization.viewer.server import Server
 from hsp_control.visualization.viewer.stage import draw_background
-from hsp_control.visualization.viewer.transport import Transport
+from hsp_control.visualization.viewer.transport import Server, Transport
 
 
 class OpeningPage:
@@ -46,7 +45,7 @@ class OpeningPage:
         self._done = True
         self._announce(self._url)
         if self._browser:
-            self.opened = browser.open_browser(self._url)
+            self.opened = transport.open_browser(self._url)
 
     def ready(self) -> None:
         """Open the page, if it is not open; from now on it says nothing of kernels."""

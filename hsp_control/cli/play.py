@@ -16,7 +16,7 @@ from hsp_control.play import Picture, Session
 from hsp_control.play import play as play_in_real_time
 from hsp_control.play.playable import playable_document
 from hsp_control.visualization.viewer import Viewer
-from hsp_control.visualization.viewer.server import Server
+from hsp_control.visualization.viewer.transport import Server
 
 
 def play(options: argparse.Namespace) -> int:

@@ -27,14 +27,17 @@ from hsp_control.config.streams import without_sources
 from hsp_control.control.controller import Controller
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.live import OperatorRequests
-from hsp_control.play.channel import Channel, channel_pair
-from hsp_control.play.dead_mans_key import DeadMansKey
 from hsp_control.play.handles import Handles
-from hsp_control.play.mirror import Mirror
+from hsp_control.play.live_loop import (
+    Channel,
+    DeadMansKey,
+    Mirror,
+    SteeredLoop,
+    channel_pair,
+)
 from hsp_control.play.picture import FRAME, Picture
-from hsp_control.play.steered_loop import SteeredLoop
 from hsp_control.visualization.viewer import Viewer
-from hsp_control.visualization.viewer.server import Server
+from hsp_control.visualization.viewer.transport import Server
 
 START = 60.0
 """Time in which the page's process must say its address [s]."""

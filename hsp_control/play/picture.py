@@ -10,7 +10,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.null_space.fields import FieldSum, NullSpaceField, Rest
 from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.fields.weight import sample_weight
-from hsp_control.play.mirror import Mirror
+from hsp_control.play.live_loop import Mirror
 from hsp_control.play.session import Session
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.log_series import distance_label
@@ -18,6 +18,11 @@ from hsp_control.simulation.unreached import unreached
 from hsp_control.visualization.palette import SERIES
 from hsp_control.visualization.viewer import Viewer
 from hsp_control.visualization.viewer.appearance import CHALK, INK
+from hsp_control.visualization.viewer.clearances import (
+    Capsules,
+    Distances,
+    Influence,
+)
 from hsp_control.visualization.viewer.commands import (
     Command,
     delete,
@@ -25,13 +30,8 @@ from hsp_control.visualization.viewer.commands import (
     play_command,
     typed_array,
 )
-from hsp_control.visualization.viewer.measured_links import (
-    Capsules,
-    Distances,
-    Influence,
-)
 from hsp_control.visualization.viewer.motion import Motion
-from hsp_control.visualization.viewer.obstacle_layer import ObstacleLayer
+from hsp_control.visualization.viewer.obstacles import ObstacleLayer
 from hsp_control.visualization.viewer.run_drawing import Layer, RunDrawing, all_layers
 
 FRAME = 1.0 / 30.0  # time between two pictures [s]

@@ -15,10 +15,14 @@ from hsp_control.live import InProcessRobot, LoopReport, OperatorRequests, run_l
 from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.fields.weight import sample_weight
 from hsp_control.play import Picture
-from hsp_control.play.channel import Channel, channel_pair
-from hsp_control.play.dead_mans_key import TIMEOUT, DeadMansKey
-from hsp_control.play.mirror import Mirror
-from hsp_control.play.steered_loop import SteeredLoop
+from hsp_control.play.live_loop import (
+    TIMEOUT,
+    Channel,
+    DeadMansKey,
+    Mirror,
+    SteeredLoop,
+    channel_pair,
+)
 from hsp_control.visualization.viewer import Recorder, Viewer
 
 

@@ -26,18 +26,18 @@ from tornado.websocket import websocket_connect
 from hsp_control import Robot, Rollout, load_experiment
 from hsp_control.common.exceptions import ExportError, ViewerError
 from hsp_control.geometry import Scene
-from hsp_control.visualization.viewer import Recorder, Viewer, browser, server
+from hsp_control.visualization.viewer import Recorder, Viewer, offline_page, transport
 from hsp_control.visualization.viewer.commands import CAMERA, CAPTION, CLIP
-from hsp_control.visualization.viewer.latest_commands import LatestCommands, key_of
-from hsp_control.visualization.viewer.offline import page as offline_page
-from hsp_control.visualization.viewer.pipe_protocol import (
+from hsp_control.visualization.viewer.pipe import (
     DELETE,
     SET,
     Decoder,
+    LatestCommands,
     Record,
     encode,
+    key_of,
 )
-from hsp_control.visualization.viewer.server import Server
+from hsp_control.visualization.viewer.transport import Server
 
 pytestmark = pytest.mark.process
 
@@ -121,7 +121,7 @@ def test_closing_leaves_nothing(arm: Robot) -> None:
 PARENT = """
 import os, sys, time
 from hsp_control.geometry import Scene
-from hsp_control.visualization.viewer.server import Server
+from hsp_control.visualization.viewer.transport import Server
 server = Server()
 if sys.argv[1] == "fork" and os.fork() == 0:
     os.close(1)
@@ -213,7 +213,7 @@ def test_without_what_reads_meshes_a_notebook_shows_the_live_page(
 def test_a_dead_or_stopped_server_is_an_error_not_a_wait(
     arm: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(server, "STALL_TIMEOUT", 0.3)
+    monkeypatch.setattr(transport, "STALL_TIMEOUT", 0.3)
     for sign, message in ((signal.SIGKILL, "has ended"), (signal.SIGSTOP, "for 0.3 s")):
         viewer = Viewer(arm)
         assert isinstance(viewer.transport, Server)
@@ -397,7 +397,7 @@ def test_a_flood_is_no_more_than_its_newest_words(steered: Server) -> None:
 
 
 def test_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(server.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr(transport.importlib.util, "find_spec", lambda name: None)
     with pytest.raises(ViewerError, match="pip install meshcat"):
         Server()
 
@@ -405,10 +405,10 @@ def test_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_server_that_cannot_start_says_why(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(server, "meshcat_page", lambda: tmp_path)
+    monkeypatch.setattr(transport, "meshcat_page", lambda: tmp_path)
     with pytest.raises(ViewerError, match=r"cannot start: .*main\.min\.js"):
         Server()
-    monkeypatch.setattr(server.sys, "executable", "/bin/false")
+    monkeypatch.setattr(transport.sys, "executable", "/bin/false")
     with pytest.raises(ViewerError, match="has ended"):
         Server()
 
@@ -417,21 +417,21 @@ def test_a_browser_is_opened_only_where_there_is_one(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     url, opened = "http://127.0.0.1:7000/", threading.Event()
-    monkeypatch.setattr(browser.webbrowser, "open", lambda url, new: opened.set())
-    monkeypatch.setattr(browser.sys, "platform", "linux")
+    monkeypatch.setattr(transport.webbrowser, "open", lambda url, new: opened.set())
+    monkeypatch.setattr(transport.sys, "platform", "linux")
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"):
         monkeypatch.delenv(name, raising=False)
-    assert not browser.open_browser(url)
+    assert not transport.open_browser(url)
     assert f"no display to open a browser on; the view is at {url}" in caplog.text
     monkeypatch.setenv("DISPLAY", ":0")
     terminal = webbrowser.GenericBrowser("w3m")
-    monkeypatch.setattr(browser.webbrowser, "get", lambda: terminal)
-    assert not browser.open_browser(url)
+    monkeypatch.setattr(transport.webbrowser, "get", lambda: terminal)
+    assert not transport.open_browser(url)
     assert "w3m would take over the terminal" in caplog.text
     assert not opened.is_set()
     graphical = webbrowser.BackgroundBrowser("firefox")
-    monkeypatch.setattr(browser.webbrowser, "get", lambda: graphical)
-    assert browser.open_browser(url)
+    monkeypatch.setattr(transport.webbrowser, "get", lambda: graphical)
+    assert transport.open_browser(url)
     assert opened.wait(5.0)
 
 

@@ -20,14 +20,13 @@ from hsp_control.simulation import Rollout
 from hsp_control.simulation.log_series import task_names
 from hsp_control.visualization import palette
 from hsp_control.visualization.viewer.commands import path_element
-from hsp_control.visualization.viewer.mesh_files import collada_object, mesh_geometry
 from hsp_control.visualization.viewer.motion import Motion
-from hsp_control.visualization.viewer.obstacle_layer import ObstacleLayer
-from hsp_control.visualization.viewer.obstacle_shapes import triangles_of
-from hsp_control.visualization.viewer.offline.meshes import read_mesh
+from hsp_control.visualization.viewer.obstacles import ObstacleLayer, triangles_of
+from hsp_control.visualization.viewer.packed_scene import read_mesh
 from hsp_control.visualization.viewer.replay import robot_of
+from hsp_control.visualization.viewer.robot_drawing import Visual, read_visuals
 from hsp_control.visualization.viewer.targets import read_targets
-from hsp_control.visualization.viewer.visuals import Visual, read_visuals
+from hsp_control.visualization.viewer.threejs import collada_object, mesh_geometry
 
 INSTALL = "pip install 'hsp_control[rerun]'"
 TIMELINE = "t"

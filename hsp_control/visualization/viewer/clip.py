@@ -14,6 +14,7 @@ from hsp_control.simulation.limit_excess import POSITION, VELOCITY
 from hsp_control.simulation.term_columns import logged_terms
 from hsp_control.simulation.unreached import FAR, OUT, Unreached, unreached
 from hsp_control.visualization import palette
+from hsp_control.visualization.viewer.analysis import from_the_start
 from hsp_control.visualization.viewer.commands import (
     Command,
     Json,
@@ -21,7 +22,6 @@ from hsp_control.visualization.viewer.commands import (
     forget_clip,
     typed_array,
 )
-from hsp_control.visualization.viewer.controller_analysis import from_the_start
 
 CLOSED_SHARE = 1 / 200
 """Gaps up to this share of the whole run are closed: nobody would see them."""

@@ -9,7 +9,7 @@ import umsgpack  # type: ignore[import-untyped]
 
 from hsp_control.common.arrays import Array
 from hsp_control.visualization.viewer.appearance import LegendEntry
-from hsp_control.visualization.viewer.latest_commands import LatestCommands, key_of
+from hsp_control.visualization.viewer.pipe import LatestCommands, key_of
 
 Json = dict[str, Any]
 

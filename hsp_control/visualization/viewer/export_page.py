@@ -16,15 +16,15 @@ from hsp_control.visualization.viewer.comparison import (
     ghost_color,
     run_parts,
 )
-from hsp_control.visualization.viewer.offline.page import assemble
-from hsp_control.visualization.viewer.offline.scene_reduction import reduce_scene
-from hsp_control.visualization.viewer.packed.packing import ArrayTable
-from hsp_control.visualization.viewer.packed.plot_packing import (
+from hsp_control.visualization.viewer.offline_page import assemble
+from hsp_control.visualization.viewer.packed_scene import reduce_scene
+from hsp_control.visualization.viewer.packing import ArrayTable
+from hsp_control.visualization.viewer.page_plots import (
     PlottedRun,
     pack_panels,
 )
-from hsp_control.visualization.viewer.recorder import Recorder
 from hsp_control.visualization.viewer.replay import rebuild_run
+from hsp_control.visualization.viewer.transport import Recorder
 from hsp_control.visualization.viewer.viewer import Viewer
 
 

@@ -15,8 +15,8 @@ from hsp_control.simulation.recorder import Recorder
 from hsp_control.visualization.viewer.clip import Clip, bands_of, extend_clip, set_clip
 from hsp_control.visualization.viewer.commands import set_status
 from hsp_control.visualization.viewer.motion import COARSEST, Motion, motion_of
+from hsp_control.visualization.viewer.page_plots import plots_so_far
 from hsp_control.visualization.viewer.run_drawing import RunDrawing, all_layers
-from hsp_control.visualization.viewer.run_plots import plots_so_far
 from hsp_control.visualization.viewer.targets import GrowingPaths
 from hsp_control.visualization.viewer.viewer import Viewer
 

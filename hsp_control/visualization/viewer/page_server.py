@@ -27,8 +27,14 @@ from tornado.netutil import bind_sockets
 from tornado.web import Application, HTTPError, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
-from hsp_control.visualization.viewer.latest_commands import LatestCommands, key_of
-from hsp_control.visualization.viewer.pipe_protocol import ASK, DELETE, Decoder, Record
+from hsp_control.visualization.viewer.pipe import (
+    ASK,
+    DELETE,
+    Decoder,
+    LatestCommands,
+    Record,
+    key_of,
+)
 
 _MAX_SIZE = 1_000_000  # bytes; the commands that move a robot are far smaller
 

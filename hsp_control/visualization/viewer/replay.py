@@ -18,9 +18,8 @@ from hsp_control.robot.description.access import ANYWHERE, Access, only_within
 from hsp_control.robot.description.sources import packaged_folders
 from hsp_control.simulation import Rollout
 from hsp_control.visualization.viewer.comparison import ComparedRun
-from hsp_control.visualization.viewer.offline.page import HEIGHT, InlineView
-from hsp_control.visualization.viewer.recorder import Recorder
-from hsp_control.visualization.viewer.transport import Transport
+from hsp_control.visualization.viewer.offline_page import HEIGHT, InlineView
+from hsp_control.visualization.viewer.transport import Recorder, Transport
 from hsp_control.visualization.viewer.viewer import Viewer
 
 _log = logging.getLogger(__name__)

@@ -8,19 +8,18 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.control.controller import Controller
 from hsp_control.robot import Robot
+from hsp_control.visualization.viewer.analysis import from_the_start
 from hsp_control.visualization.viewer.appearance import CHALK, INK, LegendEntry
-from hsp_control.visualization.viewer.arrows import Contacts, SelfMotion
-from hsp_control.visualization.viewer.clip import Band, Clip, Track
-from hsp_control.visualization.viewer.commands import Command, delete, set_property
-from hsp_control.visualization.viewer.controller_analysis import from_the_start
-from hsp_control.visualization.viewer.ellipsoid import Ellipsoid
-from hsp_control.visualization.viewer.measured_links import (
+from hsp_control.visualization.viewer.arrows import Contacts, Ellipsoid, SelfMotion
+from hsp_control.visualization.viewer.clearances import (
     Capsules,
     Distances,
     Influence,
 )
+from hsp_control.visualization.viewer.clip import Band, Clip, Track
+from hsp_control.visualization.viewer.commands import Command, delete, set_property
 from hsp_control.visualization.viewer.motion import Motion
-from hsp_control.visualization.viewer.obstacle_layer import ObstacleLayer, SolidLayer
+from hsp_control.visualization.viewer.obstacles import ObstacleLayer, SolidLayer
 from hsp_control.visualization.viewer.robot_drawing import RobotDrawing, robot_entry
 from hsp_control.visualization.viewer.targets import Paths, TargetMarkers
 

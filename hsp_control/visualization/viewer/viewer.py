@@ -15,7 +15,7 @@ from hsp_control.control.controller import Controller
 from hsp_control.geometry.scene import Scene
 from hsp_control.robot import Robot, RobotState
 from hsp_control.simulation import Rollout
-from hsp_control.visualization.viewer import browser
+from hsp_control.visualization.viewer import transport
 from hsp_control.visualization.viewer.clip import bands_of, remove_clip, set_clip
 from hsp_control.visualization.viewer.commands import (
     Command,
@@ -28,12 +28,11 @@ from hsp_control.visualization.viewer.commands import (
 )
 from hsp_control.visualization.viewer.comparison import ComparedRun, Comparison
 from hsp_control.visualization.viewer.motion import motion_of
-from hsp_control.visualization.viewer.obstacle_layer import ObstacleDrawing
-from hsp_control.visualization.viewer.offline.page import InlineView
+from hsp_control.visualization.viewer.obstacles import ObstacleDrawing
+from hsp_control.visualization.viewer.offline_page import InlineView
+from hsp_control.visualization.viewer.page_plots import plots_of
 from hsp_control.visualization.viewer.robot_drawing import RobotDrawing
 from hsp_control.visualization.viewer.run_drawing import RunDrawing, all_layers, clear
-from hsp_control.visualization.viewer.run_plots import plots_of
-from hsp_control.visualization.viewer.server import Server
 from hsp_control.visualization.viewer.stage import (
     draw_stage,
     in_sight,
@@ -43,7 +42,7 @@ from hsp_control.visualization.viewer.stage import (
     scene_size,
     stage_legend,
 )
-from hsp_control.visualization.viewer.transport import Transport
+from hsp_control.visualization.viewer.transport import Server, Transport
 
 StageContent = RunDrawing | Comparison | ObstacleDrawing
 
@@ -238,7 +237,7 @@ class Viewer:
 
     def open_browser(self) -> bool:
         """Open the page in the user's browser; return whether there is one."""
-        return self.url is not None and browser.open_browser(self.url)
+        return self.url is not None and transport.open_browser(self.url)
 
     def wait_until_closed(self) -> None:
         """Wait until no page is open any more."""

@@ -10,7 +10,7 @@ from hsp_control.common import adapters, kernels
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.config.loaded_scenario import load_scenario
 from hsp_control.config.source import read_document
-from hsp_control.visualization.viewer import Recorder, Viewer, browser
+from hsp_control.visualization.viewer import Recorder, Viewer, transport
 from hsp_control.visualization.viewer.commands import unpack
 
 
@@ -33,7 +33,7 @@ def said(monkeypatch: pytest.MonkeyPatch) -> Said:
         said.events.append("browser")
         return True
 
-    monkeypatch.setattr(browser, "open_browser", open_browser)
+    monkeypatch.setattr(transport, "open_browser", open_browser)
     return said
 
 

@@ -7,12 +7,12 @@ from hsp_control.config import Experiment
 from hsp_control.simulation.recorder import Recorder as Rows
 from hsp_control.visualization.viewer import ComparedRun, InlineView, Recorder, Viewer
 from hsp_control.visualization.viewer.commands import PLOTS, unpack
-from hsp_control.visualization.viewer.latest_commands import key_of
-from hsp_control.visualization.viewer.run_plots import (
+from hsp_control.visualization.viewer.page_plots import (
     PREVIEW_ROWS,
     plots_of,
     plots_so_far,
 )
+from hsp_control.visualization.viewer.pipe import key_of
 
 MOVING = "paper/4_moving_obstacle"
 

@@ -5,7 +5,7 @@ import pytest
 
 from hsp_control import load_experiment
 from hsp_control.visualization.viewer.motion import motion_of
-from hsp_control.visualization.viewer.obstacle_layer import SolidLayer
+from hsp_control.visualization.viewer.obstacles import SolidLayer
 from hsp_control.visualization.viewer.run_drawing import LAYERS, all_layers
 
 pytest.importorskip("mujoco")

@@ -33,13 +33,13 @@ from hsp_control.visualization.viewer import (
     Viewer,
     live,
 )
-from hsp_control.visualization.viewer.commands import CAPTION, CLIP, unpack
-from hsp_control.visualization.viewer.controller_analysis import (
+from hsp_control.visualization.viewer.analysis import (
     null_space_projector,
     terms_of_type,
 )
-from hsp_control.visualization.viewer.ellipsoid import SECONDS
-from hsp_control.visualization.viewer.measured_links import Capsules, zone
+from hsp_control.visualization.viewer.arrows import ELLIPSOID_SECONDS
+from hsp_control.visualization.viewer.clearances import Capsules, zone
+from hsp_control.visualization.viewer.commands import CAPTION, CLIP, unpack
 from hsp_control.visualization.viewer.motion import motion_of
 from hsp_control.visualization.viewer.run_drawing import LAYERS
 
@@ -367,7 +367,7 @@ def test_the_ellipsoid_is_the_image_of_the_ball_of_joint_speeds(
         state = experiment.robot.state(t, rollout.q[row], rollout.v[row])
         J = state.frame(frame).jacobian[:3]
         R, scale = clip.pose(path, t)[:3, :3], clip.value(path, "scale", t)
-        shape = R @ np.diag(scale**2) @ R.T / SECONDS**2
+        shape = R @ np.diag(scale**2) @ R.T / ELLIPSOID_SECONDS**2
         np.testing.assert_allclose(shape, J @ J.T, atol=1e-5)
 
 

@@ -1,4 +1,4 @@
-"""Quantities of a controller that the viewer draws: field terms and projector."""
+"""Quantities of a controller that the view draws: field terms, projector, floor."""
 
 from collections.abc import Iterator
 from typing import TypeVar

@@ -5,28 +5,33 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hsp_control.common.arrays import Array
+from hsp_control.common.arrays import Array, Indices
 from hsp_control.control.controller import Controller
 from hsp_control.law import MetricSample
-from hsp_control.robot import RobotState
+from hsp_control.robot import Robot, RobotState
 from hsp_control.simulation import Rollout, log_series
 from hsp_control.simulation.log_series import (
     held_period,
     logged_distances,
     predicted_decay,
 )
+from hsp_control.simulation.recorder import Recorder
+from hsp_control.simulation.rollout import complete_columns
+from hsp_control.simulation.run_meta import continuous_dofs
 from hsp_control.visualization import palette
-from hsp_control.visualization.viewer.commands import Json
-from hsp_control.visualization.viewer.controller_analysis import (
+from hsp_control.visualization.viewer.analysis import (
     from_the_start,
     null_space_projector,
 )
-from hsp_control.visualization.viewer.packed.keyframes import (
+from hsp_control.visualization.viewer.commands import Command, Json, set_plots
+from hsp_control.visualization.viewer.comparison import ComparedRun
+from hsp_control.visualization.viewer.packing import (
+    CLOCK_STEP,
+    ArrayTable,
     distance_error,
     keyframe_rows,
     linear,
 )
-from hsp_control.visualization.viewer.packed.packing import CLOCK_STEP, ArrayTable
 
 _COARSEST = 1.0
 """Largest K_N times the time between two rows: else the rows miss what decays."""
@@ -343,3 +348,40 @@ def _range(panel: Panel, values: Array) -> tuple[float, float]:
         low, high = min(low, edge.value), max(high, edge.value)
     room = 0.06 * (high - low) or max(0.05 * abs(low), 0.5)
     return low - room, high + room
+
+
+PREVIEW_ROWS = 500  # about so many rows of a run that is being computed are plotted
+
+
+def plots_of(runs: Sequence[ComparedRun]) -> Command:
+    """Return the command that shows the plots of complete runs."""
+    return _command(runs, None)
+
+
+def plots_so_far(
+    recorder: Recorder, meta: Json, robot: Robot, duration: float
+) -> Command:
+    """Return the command that plots a run so far, on the whole run's axis."""
+    rows = recorder.rows(0)
+    chosen = _chosen(len(rows["t"]))
+    columns = {name: values[chosen] for name, values in rows.items()}  # copies
+    complete_columns(columns, continuous_dofs(robot))
+    # Without the controller: the expected floor takes too long to compute meanwhile.
+    return _command([ComparedRun("", robot, Rollout(columns, meta), None)], duration)
+
+
+def _command(runs: Sequence[ComparedRun], end: float | None) -> Command:
+    arrays = ArrayTable()
+    plotted = [PlottedRun(run.name, run.rollout, run.controller) for run in runs]
+    plots = pack_panels(plotted, arrays)
+    if end is not None:
+        plots["end"] = max(end, plots["end"])
+    return set_plots(plots, arrays.entries)
+
+
+def _chosen(count: int) -> Indices:
+    """Return rows at distances of a power of two, so that curves don't flicker."""
+    step = 1
+    while count > step * PREVIEW_ROWS:
+        step *= 2
+    return np.append(np.arange(0, count - 1, step), count - 1)

@@ -12,13 +12,12 @@ from pathlib import Path
 import umsgpack  # type: ignore[import-untyped]
 
 from hsp_control.visualization.viewer.commands import CAPTION, PLOTS, Json, unpack
-from hsp_control.visualization.viewer.latest_commands import LatestCommands, key_of
-from hsp_control.visualization.viewer.offline.scene_reduction import reduce_scene
-from hsp_control.visualization.viewer.packed.packing import ArrayTable
-from hsp_control.visualization.viewer.server import meshcat_page
+from hsp_control.visualization.viewer.packed_scene import reduce_scene
+from hsp_control.visualization.viewer.packing import ArrayTable
+from hsp_control.visualization.viewer.pipe import LatestCommands, key_of
+from hsp_control.visualization.viewer.transport import meshcat_page
 
-_LIVE = Path(__file__).parents[1] / "page"
-_OWN = Path(__file__).parent / "page"
+_FILES = Path(__file__).parent / "page"
 _SCRIPTS = ("run_switch.js", "export.js")
 _STYLES = ("export.css",)
 _NOTE = (
@@ -33,18 +32,18 @@ _POLICY = (
 
 def assemble(title: str, content: Json) -> str:
     """Return the page's HTML: the live page with its files inlined, and its content."""
-    live = (_LIVE / "index.html").read_text(encoding="utf-8")
+    live = (_FILES / "index.html").read_text(encoding="utf-8")
     body = live[live.index("<body>") + len("<body>") : live.index("</body>")]
     names = re.findall(r'<script src="([^"]+)"></script>', body)
     body = re.sub(r"<script.*?</script>\s*", "", body, flags=re.DOTALL)
     styles = [
-        *((_LIVE / name).read_text(encoding="utf-8") for name in _stylesheets(live)),
+        *((_FILES / name).read_text(encoding="utf-8") for name in _stylesheets(live)),
         *re.findall(r"<style>(.*?)</style>", live, flags=re.DOTALL),
-        *((_OWN / name).read_text(encoding="utf-8") for name in _STYLES),
+        *((_FILES / name).read_text(encoding="utf-8") for name in _STYLES),
     ]
     scripts = [
         *(_live_script(name).read_text(encoding="utf-8") for name in names),
-        *((_OWN / name).read_text(encoding="utf-8") for name in _SCRIPTS),
+        *((_FILES / name).read_text(encoding="utf-8") for name in _SCRIPTS),
     ]
     return "\n".join(
         [
@@ -62,7 +61,7 @@ def assemble(title: str, content: Json) -> str:
             f"<body>{body.rstrip()}",
             _block("scripts", json.dumps(scripts).encode()),
             _block("content", umsgpack.packb(content)),
-            f"<script>{(_OWN / 'start.js').read_text(encoding='utf-8')}</script>",
+            f"<script>{(_FILES / 'start.js').read_text(encoding='utf-8')}</script>",
             "</body>",
             "</html>",
             "",
@@ -75,7 +74,7 @@ def _stylesheets(page: str) -> Iterable[str]:
 
 
 def _live_script(name: str) -> Path:
-    own = _LIVE / name
+    own = _FILES / name
     return own if own.is_file() else meshcat_page() / name
 
 

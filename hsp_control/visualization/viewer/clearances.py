@@ -18,6 +18,7 @@ from hsp_control.geometry.shapes import Shape
 from hsp_control.null_space.fields import Clearance, ObstacleClearance, PointDistance
 from hsp_control.robot import RobotState
 from hsp_control.visualization.viewer import threejs
+from hsp_control.visualization.viewer.analysis import terms_of_type
 from hsp_control.visualization.viewer.appearance import (
     BAR_END_RADIUS,
     BAR_RADIUS,
@@ -38,10 +39,11 @@ from hsp_control.visualization.viewer.commands import (
     set_object,
     set_transform,
 )
-from hsp_control.visualization.viewer.controller_analysis import terms_of_type
 from hsp_control.visualization.viewer.motion import Motion
-from hsp_control.visualization.viewer.obstacle_layer import obstacle_tracks
-from hsp_control.visualization.viewer.obstacle_shapes import facets, triangles_of
+from hsp_control.visualization.viewer.obstacles import (
+    obstacle_tracks,
+    triangles_of,
+)
 from hsp_control.visualization.viewer.threejs import (
     always_visible,
     material,
@@ -138,7 +140,7 @@ def _solid(shape: LinkShape) -> Json:
         case coal.Box():
             solid = threejs.box((2.0 * np.asarray(geometry.halfSide)).tolist())
         case _:
-            solid = facets(*triangles_of(geometry))
+            solid = threejs.facets(*triangles_of(geometry))
     return threejs.mesh(solid, surface, pose, shadow=False)
 
 
@@ -358,7 +360,7 @@ def _rounded(points: Array, distance: float) -> Json:
     inward = (normals * hull.equations[:, :3]).sum(axis=1) < 0.0
     triangles = hull.simplices.astype(np.int64)
     triangles[inward] = triangles[inward, ::-1]
-    return facets(hull.points, triangles)
+    return threejs.facets(hull.points, triangles)
 
 
 def _unit_sphere() -> Array:
