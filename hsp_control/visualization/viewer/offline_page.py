@@ -18,10 +18,11 @@ from hsp_control.visualization.viewer.pipe import LatestCommands, key_of
 from hsp_control.visualization.viewer.transport import meshcat_page
 
 _FILES = Path(__file__).parent / "page"
-_SCRIPTS = ("run_switch.js", "export.js")
-_STYLES = ("export.css",)
+_SCRIPTS = ("offline.js",)
+_STYLES = ("offline.css",)
 _NOTE = (
-    "Written by hsp_control. Holds Meshcat's page (MIT), which holds three.js (MIT)."
+    "Written by hsp_control. Holds Meshcat's page, which holds three.js, and uPlot "
+    "(all MIT)."
 )
 # The browser blocks all network access of the page, whatever the scripts do.
 _POLICY = (
@@ -41,7 +42,10 @@ def assemble(title: str, content: Json) -> str:
         *re.findall(r"<style>(.*?)</style>", live, flags=re.DOTALL),
         *((_FILES / name).read_text(encoding="utf-8") for name in _STYLES),
     ]
+    start = (_FILES / "offline_start.js").read_text(encoding="utf-8")
+    licence = (_FILES / "uPlot.LICENSE.txt").read_text(encoding="utf-8")
     scripts = [
+        f"/* uPlot:\n{licence}*/",
         *(_live_script(name).read_text(encoding="utf-8") for name in names),
         *((_FILES / name).read_text(encoding="utf-8") for name in _SCRIPTS),
     ]
@@ -61,7 +65,7 @@ def assemble(title: str, content: Json) -> str:
             f"<body>{body.rstrip()}",
             _block("scripts", json.dumps(scripts).encode()),
             _block("content", umsgpack.packb(content)),
-            f"<script>{(_FILES / 'start.js').read_text(encoding='utf-8')}</script>",
+            f"<script>{start}</script>",
             "</body>",
             "</html>",
             "",

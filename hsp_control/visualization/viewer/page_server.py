@@ -128,7 +128,12 @@ def _refuse(word: str) -> Callable[[], None]:
 PORTS = (*range(7000, 7100), 0)  # 0: any free port
 TAKEN = "taken"  # a page's acknowledgement of a message
 
-_TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}
+_TYPES = {
+    ".html": "text/html",
+    ".js": "text/javascript",
+    ".css": "text/css",
+    ".txt": "text/plain",
+}
 _LOOPBACK_NAMES = {"127.0.0.1", "localhost"}
 _PARENT_CHECK_PERIOD = 1.0  # s
 _FLUSH_PERIOD = 0.005  # s

@@ -1,4 +1,4 @@
-// Unpack and run the scripts; export.js then shows the content.
+// Unpack and run the scripts; offline.js then shows the content.
 "use strict";
 
 async function unzipped(id) {
