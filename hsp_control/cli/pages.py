@@ -16,7 +16,7 @@ from hsp_control.simulation.recorder import Recorder
 from hsp_control.visualization.viewer import LiveView, Viewer, transport, view_logs
 from hsp_control.visualization.viewer.commands import set_caption, set_status
 from hsp_control.visualization.viewer.stage import draw_background
-from hsp_control.visualization.viewer.transport import Server, Transport
+from hsp_control.visualization.viewer.transport import PageServer, SceneRecorder
 
 
 class OpeningPage:
@@ -78,12 +78,12 @@ class OpeningPage:
             raise
 
 
-def status_line(transport: Transport) -> Callable[[str], object]:
+def status_line(transport: SceneRecorder) -> Callable[[str], object]:
     """Return what sets the status line of the pages of a transport."""
     return lambda text: transport.send([set_status(text)])
 
 
-def draw_empty(transport: Transport, title: str) -> None:
+def draw_empty(transport: SceneRecorder, title: str) -> None:
     """Show a title on an empty stage, before the robot is loaded."""
     transport.send([*draw_background(ViewSettings()), set_caption(title, [])])
 
@@ -164,7 +164,7 @@ def _say_without(error: ViewerError) -> None:
 def show_logs(options: argparse.Namespace) -> None:
     """Play logs until the user closes the view."""
     with ExitStack() as stack:
-        server = stack.enter_context(closing(Server(options.port)))
+        server = stack.enter_context(closing(PageServer(options.port)))
         draw_empty(server, ", ".join(log.stem for log in options.logs))
         page = OpeningPage(
             server.url,

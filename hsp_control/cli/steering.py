@@ -37,7 +37,7 @@ from hsp_control.play.live_loop import (
 )
 from hsp_control.play.picture import FRAME, Picture
 from hsp_control.visualization.viewer import Viewer
-from hsp_control.visualization.viewer.transport import Server
+from hsp_control.visualization.viewer.transport import PageServer
 
 START = 60.0
 """Time in which the page's process must say its address [s]."""
@@ -223,7 +223,7 @@ def main() -> int:
 
 
 def _run(settings: dict[str, Any]) -> None:
-    server = Server(settings["port"], host=settings["host"], steerable=True)
+    server = PageServer(settings["port"], host=settings["host"], steerable=True)
     try:
         print(server.url, flush=True)
         draw_empty(server, "")
@@ -252,13 +252,13 @@ def _run(settings: dict[str, Any]) -> None:
         server.close()
 
 
-def _drawn(loaded: LoadedScenario, server: Server) -> Viewer:
+def _drawn(loaded: LoadedScenario, server: PageServer) -> Viewer:
     viewer = Viewer(loaded.robot, transport=server, **loaded.scenario.view.all_fields())
     draw_before(viewer, loaded)
     return viewer
 
 
-def _show(mirror: Mirror, picture: Picture, server: Server) -> None:
+def _show(mirror: Mirror, picture: Picture, server: PageServer) -> None:
     due = marked = monotonic()
     marked_at, rate, ended = mirror.t, 0.0, False
     while not ended:

@@ -23,7 +23,7 @@ from hsp_control.play.live_loop import (
     SteeredLoop,
     channel_pair,
 )
-from hsp_control.visualization.viewer import Recorder, Viewer
+from hsp_control.visualization.viewer import SceneRecorder, Viewer
 
 
 class Steered:
@@ -158,7 +158,7 @@ def test_the_picture_follows_the_journal(steered: Steered) -> None:
     heard, page_end = channel_pair()
     mirror = Mirror(experiment, 0.001, steered.journal, heard, held=False)
     loop_side = Channel(page_end)
-    with Viewer(experiment.robot, transport=Recorder()) as viewer:
+    with Viewer(experiment.robot, transport=SceneRecorder()) as viewer:
         picture = Picture(mirror, viewer)
         start = {c.path: c for c in picture.frame(running=True, rate=1.0)}
         assert start

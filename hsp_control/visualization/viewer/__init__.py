@@ -10,5 +10,5 @@ from .offline_page import InlineView as InlineView
 from .replay import robot_of as robot_of
 from .replay import show as show
 from .replay import view_logs as view_logs
-from .transport import Recorder as Recorder
+from .transport import SceneRecorder as SceneRecorder
 from .viewer import Viewer as Viewer

@@ -24,7 +24,7 @@ from hsp_control.visualization.viewer.page_plots import (
     pack_panels,
 )
 from hsp_control.visualization.viewer.replay import rebuild_run
-from hsp_control.visualization.viewer.transport import Recorder
+from hsp_control.visualization.viewer.transport import SceneRecorder
 from hsp_control.visualization.viewer.viewer import Viewer
 
 
@@ -86,7 +86,7 @@ def write_page(path: Path, text: str) -> Path:
 def page_of(runs: Sequence[ComparedRun], view: dict[str, Any]) -> str:
     """Return the page that `export_html` writes."""
     first, names = runs[0], [run.name for run in runs]
-    recorder, arrays = Recorder(), ArrayTable()
+    recorder, arrays = SceneRecorder(), ArrayTable()
     own = (first.rollout.config or {}).get("view", {})
     beside = len({run.robot.name for run in runs}) > 1
     with Viewer(first.robot, transport=recorder, **{**own, **view}) as viewer:

@@ -23,7 +23,7 @@ from hsp_control.visualization.viewer.analysis import (
     from_the_start,
     null_space_projector,
 )
-from hsp_control.visualization.viewer.commands import Command, Json, set_plots
+from hsp_control.visualization.viewer.commands import Json, PageCommand, set_plots
 from hsp_control.visualization.viewer.comparison import ComparedRun
 from hsp_control.visualization.viewer.packing import (
     CLOCK_STEP,
@@ -353,14 +353,14 @@ def _range(panel: Panel, values: Array) -> tuple[float, float]:
 PREVIEW_ROWS = 500  # about so many rows of a run that is being computed are plotted
 
 
-def plots_of(runs: Sequence[ComparedRun]) -> Command:
+def plots_of(runs: Sequence[ComparedRun]) -> PageCommand:
     """Return the command that shows the plots of complete runs."""
     return _command(runs, None)
 
 
 def plots_so_far(
     recorder: Recorder, meta: Json, robot: Robot, duration: float
-) -> Command:
+) -> PageCommand:
     """Return the command that plots a run so far, on the whole run's axis."""
     rows = recorder.rows(0)
     chosen = _chosen(len(rows["t"]))
@@ -370,7 +370,7 @@ def plots_so_far(
     return _command([ComparedRun("", robot, Rollout(columns, meta), None)], duration)
 
 
-def _command(runs: Sequence[ComparedRun], end: float | None) -> Command:
+def _command(runs: Sequence[ComparedRun], end: float | None) -> PageCommand:
     arrays = ArrayTable()
     plotted = [PlottedRun(run.name, run.rollout, run.controller) for run in runs]
     plots = pack_panels(plotted, arrays)

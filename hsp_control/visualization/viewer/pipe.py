@@ -36,7 +36,7 @@ class LatestCommands:
             if node == path or node.startswith(below):
                 del self._packed[key]
 
-    def take(self) -> list[bytes]:
+    def pop_all(self) -> list[bytes]:
         """Return all packed commands, oldest first, and remove them."""
         packed = list(self._packed.values())
         self._packed.clear()
@@ -77,7 +77,7 @@ SET, DELETE, ASK = 0, 1, 2
 _HEAD = struct.Struct("<BII")  # kind, length of the name, length of the command
 
 
-class Record(NamedTuple):
+class PipeRecord(NamedTuple):
     """One record."""
 
     # ``SET`` a key, ``DELETE`` a path, or ``ASK`` whether a page shows all that was
@@ -88,7 +88,7 @@ class Record(NamedTuple):
     packed: bytes = b""  # the command for the page
 
 
-def encode(record: Record) -> bytes:
+def encode(record: PipeRecord) -> bytes:
     """Return a record as bytes."""
     name = record.name.encode()
     return _HEAD.pack(record.kind, len(name), len(record.packed)) + name + record.packed
@@ -101,7 +101,7 @@ class Decoder:
         """Start with an empty buffer."""
         self._rest = bytearray()
 
-    def feed(self, data: bytes) -> Iterator[Record]:
+    def feed(self, data: bytes) -> Iterator[PipeRecord]:
         """Append bytes, and yield the records that are complete."""
         rest = self._rest
         rest += data
@@ -113,5 +113,5 @@ class Decoder:
                 break
             name = rest[start + _HEAD.size : middle].decode()
             start = middle + length
-            yield Record(kind, name, bytes(rest[middle:start]))
+            yield PipeRecord(kind, name, bytes(rest[middle:start]))
         del rest[:start]

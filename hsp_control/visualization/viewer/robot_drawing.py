@@ -17,17 +17,17 @@ from hsp_control.robot.description.combining import Part
 from hsp_control.robot.description.mesh_files import candidates, find_problem
 from hsp_control.robot.description.sources import RobotSource
 from hsp_control.robot.description.urdf_checks import read_urdf
+from hsp_control.visualization.palette import JOINT, LINK
 from hsp_control.visualization.viewer import threejs
-from hsp_control.visualization.viewer.appearance import JOINT, LINK, LegendEntry
-from hsp_control.visualization.viewer.clip import Track
 from hsp_control.visualization.viewer.commands import (
-    Command,
     Json,
+    LegendEntry,
+    PageCommand,
     path_element,
     set_object,
     set_transform,
 )
-from hsp_control.visualization.viewer.motion import Motion
+from hsp_control.visualization.viewer.motion import RunMotion, Track, pose_tracks
 from hsp_control.visualization.viewer.threejs import (
     collada_object,
     material,
@@ -314,7 +314,7 @@ class RobotDrawing:
                 _hint(robot),
             )
 
-    def draw(self) -> Iterable[Command]:
+    def draw(self) -> Iterable[PageCommand]:
         """Yield the commands that draw the robot."""
         for joint in sorted(self._placeholders):
             body = placeholder(self.robot, joint)
@@ -329,7 +329,7 @@ class RobotDrawing:
             path = f"{self._nodes[joint]}/{path_element(link)}"
             yield set_object(path, threejs.group(things))
 
-    def move(self, placements: Sequence[pin.SE3]) -> list[Command]:
+    def move(self, placements: Sequence[pin.SE3]) -> list[PageCommand]:
         """Return the commands that move the joints to their placements in the world."""
         return [
             set_transform(node, placements[joint].homogeneous)
@@ -337,18 +337,11 @@ class RobotDrawing:
             if joint > 0
         ]
 
-    def tracks(self, motion: Motion) -> Iterator[Track]:
+    def tracks(self, motion: RunMotion) -> Iterator[Track]:
         """Yield the tracks of the joints along a run."""
-        joints = range(1, self.robot.model.njoints)
-        poses = np.empty((len(motion.times), len(joints), 7))
-        for row, state in enumerate(motion.states()):
-            placements = state.data.oMi
-            for k, joint in enumerate(joints):
-                poses[row, k] = pin.SE3ToXYZQUAT(placements[joint])
-        for k, joint in enumerate(joints):
-            node = self._nodes[joint]
-            yield Track(node, "position", motion.times, poses[:, k, :3])
-            yield Track(node, "quaternion", motion.times, poses[:, k, 3:])
+        poses = motion.joint_poses()
+        for joint, node in enumerate(self._nodes[1:], start=1):
+            yield from pose_tracks(node, motion.times, poses[:, joint])
 
     def points(self, placements: Sequence[pin.SE3]) -> Array:
         """Return the positions of all frames in the world [m], shape (K, 3)."""

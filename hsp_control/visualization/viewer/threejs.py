@@ -130,6 +130,11 @@ def mesh(
     }
 
 
+def mesh_group(geometry: Json, surface: Json, *about: Any, shadow: bool = True) -> Json:
+    """Return an object of its own of a geometry and a material; see `mesh`."""
+    return group([mesh(geometry, surface, *about, shadow=shadow)])
+
+
 def group(things: Sequence[Json]) -> Json:
     """Return several objects as one; each keeps its shadow settings."""
     return {

@@ -1,4 +1,4 @@
-"""Where commands go: into a scene that is kept, and to the pages of a server."""
+"""Where commands go: into a scene that is kept and, with a server, to its pages."""
 
 import atexit
 import importlib.util
@@ -16,75 +16,51 @@ from collections import deque
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ViewerError
-from hsp_control.visualization.viewer.commands import Command, Json, unpack
+from hsp_control.visualization.viewer.commands import Json, PageCommand, unpack
 from hsp_control.visualization.viewer.pipe import (
     ASK,
     DELETE,
     SET,
     LatestCommands,
-    Record,
+    PipeRecord,
     encode,
     key_of,
 )
 
 
-class Transport(Protocol):
-    """Sends commands to pages, and reports whether pages are open."""
+class SceneRecorder:
+    """Keeps the commands that build a scene: all that a viewer needs to draw.
 
-    @property
-    def url(self) -> str | None:
-        """The page's address; None where there is no page."""
+    Attributes:
+        scene: The commands.
+        url: The address of the page that shows it; None without a server.
+    """
 
-    @property
-    def scene(self) -> LatestCommands:
-        """The commands that build the scene."""
+    def __init__(self) -> None:
+        """Start with an empty scene."""
+        self.scene = LatestCommands()
+        self.url: str | None = None
 
-    def send(self, commands: Iterable[Command]) -> None:
+    def send(self, commands: Iterable[PageCommand]) -> None:
         """Send commands, to be shown together."""
+        for command in commands:
+            command.keep_in(self.scene)
 
     def wait_for_page(self, timeout: float) -> bool:
         """Wait until a page shows all that was sent; return whether one does."""
+        return False
 
     def wait_until_closed(self) -> None:
         """Wait until no page is open any more."""
 
     def close(self) -> None:
-        """Close it; a second call has no effect."""
-
-
-class Recorder:
-    """A transport without server and page: it stores the commands.
-
-    Attributes:
-        scene: The commands that build the scene.
-    """
-
-    url = None
-
-    def __init__(self) -> None:
-        """Start with an empty scene."""
-        self.scene = LatestCommands()
-
-    def send(self, commands: Iterable[Command]) -> None:
-        """Store commands."""
-        for command in commands:
-            command.keep_in(self.scene)
-
-    def wait_for_page(self, timeout: float) -> bool:
-        """Return False at once: there is no page."""
-        return False
-
-    def wait_until_closed(self) -> None:
-        """Return at once: there is no page."""
-
-    def close(self) -> None:
-        """Do nothing; the stored commands remain."""
+        """End the server, if there is one; the commands remain."""
 
     def paths(self, below: str = "") -> list[str]:
         """Return the paths of all objects that begin with ``below``."""
@@ -160,7 +136,7 @@ except Exception as error:
 """
 
 
-class Server:
+class PageServer(SceneRecorder):
     """The server's process, see `page_server`; it ends with this process."""
 
     def __init__(
@@ -174,8 +150,7 @@ class Server:
                 f"host {host!r} is every address of this computer; give the one at "
                 "which the page is opened, such as 192.168.1.20"
             )
-        self.url: str | None = None
-        self.scene = LatestCommands()
+        super().__init__()
         self._lock = threading.Lock()
         self._unsent = b""
         self._answers = b""
@@ -201,19 +176,18 @@ class Server:
             self.close()
             raise
 
-    def send(self, commands: Iterable[Command]) -> None:
+    def send(self, commands: Iterable[PageCommand]) -> None:
         """Send commands, to be shown together."""
         commands = list(commands)
         records = [
-            Record(DELETE, command.path, command.packed)
+            PipeRecord(DELETE, command.path, command.packed)
             if command.deletes
-            else Record(SET, command.key, command.packed)
+            else PipeRecord(SET, command.key, command.packed)
             for command in commands
         ]
         with self._lock:
             self._write(b"".join(map(encode, records)))
-            for command in commands:
-                command.keep_in(self.scene)
+            super().send(commands)
 
     def messages(self) -> list[dict[str, Any]]:
         """Return the steering page's messages since the last call; never waits."""
@@ -265,7 +239,7 @@ class Server:
     def _ask(self) -> dict[str, Any]:
         """Return how many pages are open, and how many show all sent before."""
         with self._lock:
-            self._write(encode(Record(ASK, str(self._asked))))
+            self._write(encode(PipeRecord(ASK, str(self._asked))))
             return self._answer(time.monotonic() + STALL_TIMEOUT)
 
     def _write(self, data: bytes) -> None:
