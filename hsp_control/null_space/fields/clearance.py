@@ -12,7 +12,7 @@ from pydantic import AfterValidator
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError, SceneError
 from hsp_control.common.native import bind
-from hsp_control.common.step_plan import StepPlan
+from hsp_control.common.step_plan import StepPlan, says
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Name, Names, OrInstance, Positive
@@ -82,14 +82,15 @@ class Clearance(Cost):
         """Return the minimum distance of all pairs [m]."""
         return self.proximity(state).nearest(state)[0]
 
-    def compile(
+    def plan(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
     ) -> StepPlan:
-        """Return the step plan; see `NullSpaceField.compile`."""
+        """Return the step plan: kernels alone if all distances have closed forms."""
         work = self._work(state)
         closed_form, coal = work.proximity.closed_form, work.proximity.coal
-        if closed_form is None or coal is not None:
-            return super().compile(state, metric, form, out)
+        ways = "plan", "differentiate", "gradient_rate", "gradient"
+        if closed_form is None or coal is not None or says(self, *ways) != "plan":
+            return super().plan(state, metric, form, out)
         follow, measure = closed_form.compile(state, work.proximity.distances)
         derivatives = closed_form.derivatives(state, work.slopes, work.curvatures, *out)
         to_field = bind(descend, metric.L, metric.W_dot, form, *out)

@@ -94,11 +94,14 @@ class Cost(NullSpaceField):
         Raises:
             FieldError: If either is not numeric or does not have shape (nv,).
         """
+        self._by_each(state, gradient, rate)
+
+    def _by_each(self, state: RobotState, gradient: Array, rate: Array) -> None:
         nv = state.robot.nv
         gradient[:] = self._tangent(self.gradient(state), "gradient", nv)
         rate[:] = self._tangent(self.gradient_rate(state), "gradient rate", nv)
 
-    def compile(
+    def plan(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
     ) -> StepPlan:
         """Return the step plan: g = -W⁻¹∇f and g' = -W⁻¹((∇f)' + W'g)."""
@@ -124,7 +127,9 @@ class Cost(NullSpaceField):
     def _descend(
         self, state: RobotState, descent: Callable[[], bool], out: FieldSample
     ) -> None:
-        self.differentiate(state, out.g, out.g_dot)
+        by_both = says(self, "differentiate", "gradient", "gradient_rate")
+        known = self.differentiate if by_both == "differentiate" else self._by_each
+        known(state, *out)
         if not descent():
             self._raise_not_finite(state)
 

@@ -102,12 +102,18 @@ class NullSpaceField(Part, ABC, family="fields", error=FieldError):
             form: The metric's form, see `Metric`.
             out: The sample that every step writes.
         """
-        if says(self, "evaluate", "compile") == "compile":
-            raise TypeError(f"{type(self).__name__} implements no evaluate")
+        if says(self, "plan", "evaluate") == "plan":
+            return self.plan(state, metric, form, out)
         if self.zero:
             self.evaluate(state, metric, form, out)
             return StepPlan()
         return StepPlan(write=(partial(self.evaluate, state, metric, form, out),))
+
+    def plan(
+        self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
+    ) -> StepPlan:
+        """Return the step plan of a kind of field that has one; else see `evaluate`."""
+        raise TypeError(f"{type(self).__name__} implements no evaluate")
 
     def evaluate(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
@@ -124,7 +130,7 @@ class NullSpaceField(Part, ABC, family="fields", error=FieldError):
         def make() -> tuple[MetricSample, FieldSample, StepPlan]:
             known = MetricSample.allocate(state.robot.nv)
             sample = FieldSample.allocate(state.robot.nv)
-            return known, sample, self.compile(state, known, form, sample)
+            return known, sample, self.plan(state, known, form, sample)
 
         known, sample, plan = state.made(self, f"evaluate {form}", make)
         for array, value in zip(known, metric, strict=True):
@@ -191,10 +197,10 @@ class FieldSum(NullSpaceField):
                 placed.append(term.placed(start))
         return replace(self, terms=tuple(placed))
 
-    def compile(
+    def plan(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
     ) -> StepPlan:
-        """Return the step plan; see `NullSpaceField.compile`."""
+        """Return the step plan of all terms."""
         return self.compile_terms(
             state, metric, form, out, self.allocate_terms(state.robot.nv)
         )

@@ -14,17 +14,20 @@ from field_oracles import (
     target,
 )
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from hsp_control import (
     Controller,
     FramePosition,
     JointCentering,
+    NullSpaceField,
     Rest,
     Robot,
     RobotState,
     TargetPosture,
 )
 from hsp_control.common.exceptions import FieldError
+from hsp_control.law import IDENTITY, FieldSample, MetricSample
 from hsp_control.null_space.fields import (
     FieldSum,
     InverseCondition,
@@ -38,6 +41,8 @@ from hsp_control.null_space.fields import (
 )
 from hsp_control.null_space.fields.weight import Product
 from hsp_control.trajectories import Hold
+
+Array = NDArray[np.float64]
 
 # --- members, one by one -------------------------------------------------------------
 
@@ -159,6 +164,42 @@ def test_a_field_with_a_value_of_its_own_is_diagnosed_by_it() -> None:
         controller.compute(TIME, q, v)
         found.append(controller.diagnose().field_value)
     assert found[0] == 0.5 * found[1] > 0.0
+
+
+class _HalfAsFast(JointCentering):
+    def evaluate(
+        self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
+    ) -> FieldSample:
+        super().evaluate(state, metric, form, out)
+        out.g[:] *= 0.5
+        return out
+
+
+class _HalfAsSteep(JointCentering):
+    def gradient(self, state: RobotState) -> Array:
+        return 0.5 * super().gradient(state)
+
+
+class _HalfAsClear(ObstacleClearance):
+    def gradient(self, state: RobotState) -> Array:
+        return 0.5 * super().gradient(state)
+
+
+@pytest.mark.parametrize(
+    "own", [_HalfAsFast(), _HalfAsSteep(), _HalfAsClear([OBSTACLE], influence=2)]
+)
+def test_a_step_calls_what_a_subclass_overrides(own: NullSpaceField) -> None:
+    """Though the field that it derives from is one of kernels, which a step prefers."""
+    of_package = type(own).__mro__[1](**own.all_fields())
+    robot, found = load("panda"), []
+    state = robot.state(TIME, *draw("panda", 3))
+    metric = MetricSample.allocate(robot.nv)
+    for field in (own, of_package):
+        sample = FieldSample.allocate(robot.nv)
+        field.compile(state, metric, IDENTITY, sample).run(state.t)
+        found.append(sample.g)
+    np.testing.assert_allclose(found[0], 0.5 * found[1], rtol=1e-13)
+    assert np.any(found[0])
 
 
 # --- fading --------------------------------------------------------------------------
