@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm, logm
+from scipy.stats import chi2
 
 from hsp_control.companions.walking.estimation.invariant_filter import (
     ACCELEROMETER,
@@ -110,6 +111,24 @@ def test_the_innovation_is_linear_in_the_error():
         hat = displaced(true, step * np.eye(FIXED + 6)[k])
         z = (y @ hat.rotation.T + hat.position - hat.points).ravel()
         assert z / step == pytest.approx(H[:, k], abs=1e-5)
+
+
+def test_a_correction_is_that_of_least_squares():
+    """P⁻¹ grows by Hᵀ N⁻¹ H, and the error is -P Hᵀ N⁻¹ z: without a gain."""
+    random = np.random.default_rng(6)
+    before = random_filter(random)
+    A = random.normal(size=(FIXED + 6, FIXED + 6))
+    before.covariance = A @ A.T
+    seen, n = random.normal(size=(2, 3)), np.diag(random.uniform(0.5, 2.0, 6))
+    after, turned = deepcopy(before), np.kron(np.eye(2), before.rotation)
+    after.correct(seen, n)
+    H, N = before.observation(), turned @ n @ turned.T
+    grown = np.linalg.inv(before.covariance) + H.T @ np.linalg.solve(N, H)
+    assert after.covariance == pytest.approx(np.linalg.inv(grown), rel=1e-6, abs=1e-8)
+    z = (seen @ before.rotation.T + before.position - before.points).ravel()
+    wanted = -np.linalg.solve(grown, H.T @ np.linalg.solve(N, z))
+    assert displaced(before, wanted).points == pytest.approx(after.points)
+    assert displaced(before, wanted).velocity == pytest.approx(after.velocity)
 
 
 def test_a_new_point_has_the_error_of_where_it_is_seen_from():
@@ -279,6 +298,19 @@ def walked(random, start, duration, densities=DENSITIES, seen=SEEN, noise=1.0):
 
 
 START = np.repeat([0.05, 0.1, 0.02, 0.01, 0.1], 3)
+
+
+def test_the_covariance_says_how_large_errors_are():
+    """The mean of ξᵀ P⁻¹ ξ over random runs is in its interval (NEES)."""
+    runs = 40
+    total = 0.0
+    for seed in range(runs):
+        walker, estimate = walked(np.random.default_rng(seed), START, 1.5)
+        error = error_of(estimate, walker.true(estimate))
+        total += error @ np.linalg.solve(estimate.covariance, error)
+    size = runs * len(error)
+    low, high = chi2.ppf([0.001, 0.999], size)
+    assert low < total < high
 
 
 def test_without_noise_what_can_be_observed_converges():
