@@ -126,6 +126,28 @@ def test_the_elbow_of_the_posture_leads_the_null_space(tmp_path: Path) -> None:
     np.testing.assert_array_equal(again.q, log.q)
 
 
+def test_a_return_is_no_jolt(still: Session) -> None:
+    """A target and an obstacle that were led far away return at a bearable speed."""
+    go(still, 0.1)
+    targets, obstacles = still.handles.places()
+    far = np.add(targets["hand"], [0.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0])
+    still.take({"do": "move", "target": "hand", "pose": far.tolist()})
+    away = np.add(obstacles["ball"], [0.0, 0.0, 0.5])
+    still.take({"do": "obstacle", "name": "ball", "position": away.tolist()})
+    go(still, 2.0)
+    first = still.recorder.count
+    still.take({"do": "resume", "target": "hand"})
+    still.take({"do": "resume", "name": "ball"})
+    go(still, 2.0)
+    np.testing.assert_allclose(still.handles.places()[1]["ball"], obstacles["ball"])
+    np.testing.assert_allclose(pose_of(still)[:3], targets["hand"][:3], atol=1e-4)
+    rows = still.recorder.rows(first)
+    for column in ("task.hand.actual", "obstacle.ball"):
+        steps = np.linalg.norm(np.diff(rows[column][:, :3], axis=0), axis=1)
+        assert steps.max() < 0.65 * still.row  # 15/8 of half a metre in 1.5 s
+    assert not rows["status"].any()
+
+
 LINK = "/robot/panda_joint4"
 BAD: list[dict[str, Any]] = [
     {"do": "move", "target": "foot", "pose": [0.0] * 7},

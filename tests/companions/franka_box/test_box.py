@@ -9,6 +9,7 @@ from franka_boxes import home, panda, plant
 from hsp_control.companions.franka.layouts import (
     COMMAND,
     HEADER,
+    PERIOD,
     REQUESTS,
     STATE,
     Command,
@@ -83,6 +84,20 @@ def test_a_payload_sinks_unless_its_load_is_set() -> None:
         sunk.append(float(np.abs(box.q - home()).max()))
     assert sunk[0] > 1e-3
     assert sunk[1] < 1e-9
+
+
+def test_an_effort_acts_for_one_period() -> None:
+    """After the first step v = h M⁻¹ tau, with the rotors in M, to first order in h."""
+    box, effort = Talking(), np.array([0.9, -0.8, 0.7, -0.6, 0.5, -0.4, 0.3])
+    box.begin(1, *TORQUE)
+    box.step(command(tau_J_d=effort))
+    robot = box.plant.robot
+    gravity = box.arm.robot.inverse_dynamics(home(), REST, REST)
+    expected = robot.forward_dynamics(home(), REST, effort + gravity)
+    np.testing.assert_allclose(box.v, PERIOD * expected, rtol=1e-3)
+    told = state(box)
+    np.testing.assert_allclose(told["tau_J_d"], effort, rtol=1e-6)
+    np.testing.assert_allclose(told["dtau_J"] * PERIOD, effort, atol=1e-3)
 
 
 def test_lost_commands_hold_the_effort_and_the_twentieth_ends_the_motion() -> None:

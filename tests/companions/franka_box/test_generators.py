@@ -133,6 +133,14 @@ def test_a_hand_starts_where_it_is_and_its_pose_is_one() -> None:
     ]
 
 
+def test_a_twist_is_that_of_the_poses_it_makes() -> None:
+    """In the base's axes, however the hand is turned."""
+    pose = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.8, 1.2), np.array([0.3, 0.1, 0.5]))
+    before, twist = hand.at_rest(pose), np.array([0.1, -0.2, 0.3, 0.5, -0.4, 0.3])
+    made = hand.to_twist(twist, before)
+    np.testing.assert_allclose(hand.to_pose(made.pose, before).twist, twist, atol=1e-9)
+
+
 def test_a_lost_command_keeps_the_acceleration_of_the_hand() -> None:
     """Of a constant angular acceleration about one axis, and a straight line."""
     a = np.array([0.4, 0.0, 0.2, 0.0, 0.0, 0.8])

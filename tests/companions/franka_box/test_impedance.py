@@ -66,6 +66,20 @@ def test_the_hand_is_a_spring_along_its_own_axes() -> None:
     )
 
 
+def test_an_external_wrench_is_told_in_axes_of_the_base_and_of_the_frame() -> None:
+    model, in_K = at(home() + 0.2), np.array([3.0, -2.0, 1.0, 0.2, 0.1, -0.3])
+    model.EE_T_K = pin.SE3(pin.utils.rotate("y", 0.7), np.array([0.0, 0.02, 0.05]))
+    effort = model.gravity + model.stiffness_jacobian().T @ in_K
+    for k in range(600):  # the arm stands still, and pushes
+        model.measure(k * PERIOD, home() + 0.2, REST, effort)
+    R = (model.O_T_EE * model.EE_T_K).rotation
+    in_base, turned = model.external_wrench()
+    np.testing.assert_allclose(turned, in_K, rtol=1e-9)
+    np.testing.assert_allclose(
+        in_base, np.append(R @ in_K[:3], R @ in_K[3:]), rtol=1e-9
+    )
+
+
 def test_an_axis_is_critically_damped_for_its_own_inertia() -> None:
     model, K_x = at(home()), impedance.CARTESIAN_STIFFNESS
     J, M = model.stiffness_jacobian(), np.array(model.state.mass_matrix)

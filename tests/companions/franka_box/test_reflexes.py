@@ -55,6 +55,15 @@ def test_each_limit_of_the_measured_state_is_watched(joint: int, sign: int) -> N
             assert all(f"joint {joint + 1} at" in v.reason for v in violations)
 
 
+def test_effort_rates_are_taken_from_what_the_client_was_told() -> None:
+    before = np.full(7, 40.0 / 3.0).astype(np.float32).astype(float)
+    step = np.full(7, 1.0 - 1e-6)
+    assert not list(reflexes.effort_rate(before + step, before))
+    (violation,) = reflexes.effort_rate(before - step - unit(4, 0.5), before)
+    assert violation.error is Error.CONTROLLER_TORQUE_DISCONTINUITY
+    assert "joint 5 at -1500 N·m/s; limit -1000" in str(violation)
+
+
 def test_each_limit_of_a_commanded_motion_is_watched() -> None:
     limits, start = panda().limits, Reference(home(), REST, REST)
 
@@ -73,6 +82,13 @@ def test_each_limit_of_a_commanded_motion_is_watched() -> None:
     assert errors(reflexes.commanded_motion(beyond, start, limits))[0] is (
         Error.JOINT_POSITION_LIMITS_VIOLATION
     )
+
+
+def test_a_constant_acceleration_is_no_jerk() -> None:
+    limits, most = panda().limits, np.full(7, 0.9 * ACCELERATION)
+    before = Reference(home(), 0.1 * most, most)
+    new = reference.extrapolated(before)
+    assert not list(reflexes.commanded_motion(new, before, limits))
 
 
 def test_a_lost_command_keeps_the_acceleration() -> None:

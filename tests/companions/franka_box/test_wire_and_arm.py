@@ -70,6 +70,20 @@ def test_what_clients_are_told_has_the_same_dynamics(name: str) -> None:
         assert mine.tolist() == theirs.tolist()
 
 
+def test_a_load_is_one_more_body() -> None:
+    arm = panda()
+    load = pin.Inertia(2.0, np.array([0.0, 0.1, 0.2]), np.eye(3))
+    carrying, rest = arm.carrying(load), np.zeros(7)
+    q = arm.robot.home() + 0.3  # the hand does not hang straight down
+    state = arm.robot.state(0.0, q, rest)
+    flange = state.frame("panda_link8")
+    lever = flange.rotation @ load.lever
+    point = flange.jacobian[:3] + np.cross(flange.jacobian[3:].T, lever).T
+    more = carrying.inverse_dynamics(q, rest, rest)
+    less = arm.robot.inverse_dynamics(q, rest, rest)
+    np.testing.assert_allclose(more - less, point.T @ [0, 0, 2 * 9.81], atol=1e-12)
+
+
 def test_velocity_limits_are_those_that_libfranka_computes() -> None:
     """``computeUpperLimitsJointVelocity`` of libfranka 0.21, without its tolerance."""
     limits = ArmLimits(**{k: np.array(x, float) for k, x in FR3_URDF_LIMITS.items()})

@@ -1,5 +1,6 @@
 """Check values, designs and sensitivities of sweeps."""
 
+import json
 import math
 from typing import Any
 
@@ -19,7 +20,10 @@ from hsp_control.companions.sweeps import (
 )
 from hsp_control.companions.sweeps.design import chosen_design, points
 from hsp_control.companions.sweeps.factor import factors
+from hsp_control.companions.sweeps.plan import Plan
+from hsp_control.companions.sweeps.row import Row
 from hsp_control.companions.sweeps.spelling import values
+from hsp_control.simulation.measures import Measure
 
 pytestmark = pytest.mark.process
 
@@ -117,6 +121,15 @@ def test_quantiles_are_those_of_the_distribution() -> None:
     assert chosen == [letter for letter in "abcd" for _ in range(25)]
 
 
+def test_a_factor_is_described_in_json_and_says_which_bound_is_infinite() -> None:
+    (factor,) = factors({"a": "normal:0:0.1"})
+    found = json.loads(json.dumps(factor.description(), allow_nan=False))
+    bounds = {"low": "-inf", "high": "inf"}
+    assert found == {
+        "key": "a", "type": "Normal", "mean": 0, "deviation": 0.1, **bounds,
+    }  # fmt: skip
+
+
 def test_a_grid_has_every_combination_in_order() -> None:
     found = points(factors({"a": "1:3:3", "b": ["x", "y"]}), "grid", None, 0)
     assert found == [(1, "x"), (1, "y"), (2, "x"), (2, "y"), (3, "x"), (3, "y")]
@@ -129,6 +142,14 @@ def test_a_latin_hypercube_meets_every_stratum_of_every_factor_once() -> None:
     found[:, 2] = np.log(found[:, 2])
     for column in found.T:
         assert sorted((column * 40).astype(int)) == list(range(40))
+
+
+def test_sobol_covers_every_factor_evenly_and_draws_any_number() -> None:
+    over = factors({"a": "0:1", "b": "0:1"})
+    for samples in (1, 2, 3, 16, 17, 33):
+        assert len(points(over, "sobol", samples, 3)) == samples
+    for column in np.transpose(points(over, "sobol", 32, 3)):
+        assert sorted((column * 32).astype(int)) == list(range(32))
 
 
 def test_no_design_has_more_than_a_million_runs() -> None:
@@ -146,6 +167,20 @@ def test_a_seed_is_a_design(design: Any) -> None:
     assert points(over, design, 20, 5) == points(over, design, 20, 5)
     assert points(over, design, 20, 5) != points(over, design, 20, 6)
     assert len(points(over, design, 20, 5)) == 20
+
+
+def test_rows_are_in_the_order_of_the_plan() -> None:
+    """In whichever order they finish, and also if some are missing."""
+    varied = factors({"a": "10:30:3"})
+    plan = Plan(
+        "invented", {}, varied, "grid", None, 0, points(varied, "grid", None, 0)
+    )
+    rows = [Row(k, "completed", "", {"e": 0.5 * k}, 0.0) for k in (2, 0)]
+    found = Sweep.collect(plan, {}, rows, {"e": Measure(0.0, "m", "error")})
+    assert found["run"].tolist() == [0, 2]
+    assert found["a"].tolist() == [10, 30]
+    assert found["e"].tolist() == [0.0, 1.0]
+    assert not found.complete
 
 
 # --- sensitivity ---------------------------------------------------------------------

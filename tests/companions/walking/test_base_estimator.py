@@ -121,6 +121,23 @@ def test_without_noise_it_converges_to_the_truth():
     assert np.sqrt(np.diag(P)[ROTATION][:2]).max() < 2e-4
 
 
+def test_from_the_truth_it_stays_there():
+    experiment, heard = swaying()
+    running = BaseEstimator().begin(experiment.controller, heard[0].inertial)
+    for each in heard:
+        estimate = running.update(each)
+        channels = running.log_channels(each.q, each.v)
+        assert np.abs(channels["estimate.position_error"].value).max() < 1e-4
+        assert np.abs(channels["estimate.rotation_error"].value).max() < 1e-4
+        assert np.abs(channels["estimate.velocity_error"].value).max() < 2e-3
+        assert channels["estimate.contacts"].value <= 2.0
+    assert estimate.wrenches is heard[-1].wrenches
+    R = experiment.robot.state(0.0, each.q, each.v).frame("base_link").rotation
+    turned, _ = tilted(experiment.robot, each.q, 0.1 * R[2], np.zeros(3))
+    error = running.log_channels(turned, each.v)["estimate.rotation_error"].value
+    assert error == pytest.approx([0.0, 0.0, -0.1], abs=1e-3)
+
+
 @pytest.mark.parametrize("share", [0.0, 0.09])
 def test_a_foot_counts_while_it_is_pressed(share):
     """With a tenth of the robot's weight."""

@@ -101,6 +101,19 @@ def test_the_transition_is_the_derivative_of_the_motion():
         assert found == pytest.approx(expected, abs=1e-7), k
 
 
+def test_a_period_adds_the_variance_of_its_noise():
+    """From certainty at the origin, at rest: density² h, whatever the period."""
+    made, n, h = random_filter(np.random.default_rng(7)), DENSITIES, 0.02
+    made.velocity, made.position = np.zeros(3), np.zeros(3)
+    made.points, made.covariance = np.zeros((2, 3)), np.zeros((FIXED + 6, FIXED + 6))
+    still = made.accelerometer_bias - made.rotation.T @ GRAVITY
+    made.predict(made.gyroscope_bias, still, h)
+    of = [n.gyroscope, n.accelerometer, n.gyroscope_walk, n.accelerometer_walk]
+    blocks = [ROTATION, VELOCITY, GYROSCOPE, ACCELEROMETER, slice(FIXED, None)]
+    for block, density in zip(blocks, [*of, n.slip], strict=True):
+        assert np.diag(made.covariance)[block] == pytest.approx(h * density**2)
+
+
 def test_the_innovation_is_linear_in_the_error():
     random = np.random.default_rng(3)
     true = random_filter(random)
@@ -110,6 +123,24 @@ def test_the_innovation_is_linear_in_the_error():
         hat = displaced(true, step * np.eye(FIXED + 6)[k])
         z = (y @ hat.rotation.T + hat.position - hat.points).ravel()
         assert z / step == pytest.approx(H[:, k], abs=1e-5)
+
+
+def test_a_correction_is_that_of_least_squares():
+    """P⁻¹ grows by Hᵀ N⁻¹ H, and the error is -P Hᵀ N⁻¹ z: without a gain."""
+    random = np.random.default_rng(6)
+    before = random_filter(random)
+    A = random.normal(size=(FIXED + 6, FIXED + 6))
+    before.covariance = A @ A.T
+    seen, n = random.normal(size=(2, 3)), np.diag(random.uniform(0.5, 2.0, 6))
+    after, turned = deepcopy(before), np.kron(np.eye(2), before.rotation)
+    after.correct(seen, n)
+    H, N = before.observation(), turned @ n @ turned.T
+    grown = np.linalg.inv(before.covariance) + H.T @ np.linalg.solve(N, H)
+    assert after.covariance == pytest.approx(np.linalg.inv(grown), rel=1e-6, abs=1e-8)
+    z = (seen @ before.rotation.T + before.position - before.points).ravel()
+    wanted = -np.linalg.solve(grown, H.T @ np.linalg.solve(N, z))
+    assert displaced(before, wanted).points == pytest.approx(after.points)
+    assert displaced(before, wanted).velocity == pytest.approx(after.velocity)
 
 
 def test_a_new_point_has_the_error_of_where_it_is_seen_from():

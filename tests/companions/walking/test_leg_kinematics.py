@@ -6,8 +6,9 @@ import pytest
 from hsp_control import Robot
 from hsp_control.companions.walking.estimation.leg_kinematics import (
     LegKinematics,
+    rolled,
 )
-from hsp_control.constraints.contacts import BallContact, SurfaceContact
+from hsp_control.constraints.contacts import BallContact, PointContact, SurfaceContact
 
 pytest.importorskip("example_robot_data")
 CASES = {
@@ -70,3 +71,12 @@ def test_the_jacobian_is_the_derivative_by_the_joints(case):
         difference = (points(e) - points(-e)) / (2.0 * step)
         assert pytest.approx(difference, abs=1e-8) == J[:, k]
     assert not J[:, :6].any()
+
+
+def test_a_ball_rolls_and_others_do_not():
+    """The point below the centre is at rest: c' + ω × (-r n) = 0."""
+    omega, normal = np.array([0.3, -2.0, 0.5]), np.array([0.0, 0.6, 0.8])
+    ball = BallContact("foot", radius=0.05, normal=normal)
+    way = rolled(ball, omega, 0.01)
+    assert way / 0.01 + np.cross(omega, -0.05 * normal) == pytest.approx(np.zeros(3))
+    assert not rolled(PointContact("foot"), omega, 0.01).any()

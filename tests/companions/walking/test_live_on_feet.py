@@ -1,5 +1,6 @@
 """Robots on feet in a live loop: what is measured, how they stand, stop and fall."""
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -234,6 +235,25 @@ def test_joints_and_feet_exert_the_force_of_a_safe_stop() -> None:
     held = feet.joint_effort(state, robot.inverse_dynamics(state.q, rest, rest))
     law = experiment.controller.compute(state).tau
     assert np.abs(held).max() < 3.0 * np.abs(law).max() + 1.0
+
+
+@pytest.mark.system
+def test_feet_that_are_not_pressed_do_not_bear() -> None:
+    experiment = trotting()
+    feet = BearingFeet(experiment.robot, experiment.controller.contacts)
+    q, v = experiment.q0, experiment.v0
+    pressed = {name: np.zeros(6) for name in FEET}
+    pressed["HL_FOOT"][2], pressed["HR_FOOT"][2] = 2.0, -2.0  # noise may pull
+    feet.feel(Measurement(1, 0.0, q, v, wrenches=pressed))
+    assert [each.frame for each in feet.contacts] == ["HL_FOOT"]
+    assert feet.hold
+    feet.feel(Measurement(1, 0.0, q, v))  # no sensors: their schedules count
+    assert len(feet.contacts) == 4
+    feet.lose()
+    assert not feet.hold
+    wall = replace(experiment.controller.contacts[0], normal=[1.0, 0.0, 0.5])
+    assert not BearingFeet(experiment.robot, [wall]).hold, "a wall may only be pushed"
+    assert BearingFeet(panda(), ()).hold
 
 
 @pytest.mark.system

@@ -73,6 +73,16 @@ def test_it_ends_when_the_ground_is_gone_but_not_at_once():
 
 
 @pytest.mark.parametrize(
+    ("height", "force", "bears"),
+    [(0.02, 2.9, False), (0.01, 3.0, False), (0.02, 3.0, True)],
+)
+def test_with_height_and_force_both_must_be_felt(height, force, bears):
+    experiment, running = told(f"{{force: 3, height: {height}}}")
+    contact, _ = feel(experiment, running, 0.0, force)  # it stands at 0.0165 m
+    assert contact.is_on == bears
+
+
+@pytest.mark.parametrize(
     ("rule", "message"),
     [
         ("{}", "give force or height: what tells that it bears"),

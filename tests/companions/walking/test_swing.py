@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 
 from hsp_control.common.rotations import log3, turn
+from hsp_control.companions.walking import Walk
 from hsp_control.companions.walking.footsteps import (
     Footstep,
     Stance,
     Velocity,
     between,
+    near,
 )
 from hsp_control.companions.walking.polygon import convex_hull, nearest_inside
 from hsp_control.companions.walking.quintic import Motion, to_rest
@@ -17,6 +19,7 @@ from hsp_control.companions.walking.step_adjustment import (
     WEIGHT_TIME,
     adjust,
 )
+from hsp_control.companions.walking.step_planner import StepPlanner
 from hsp_control.companions.walking.swing import APPROACH, DESCENT, Swing
 
 H = 1e-5
@@ -96,6 +99,15 @@ def test_a_redirected_swing_stays_smooth(t, end):
     assert swing.position(landed).position == pytest.approx([0.4, 0.0, 0.1], abs=1e-9)
 
 
+@pytest.mark.parametrize(("width", "arm"), [(0.17, 0.1), (0.3, 0.15)])
+def test_feet_that_turn_accelerate_as_those_that_walk(width, arm):
+    """They are half a width beside the middle; less than 0.1 m counts as that."""
+    walk = Walk(speed=0.5, turn=9.0, acceleration=0.4, swing=0.6, double_support=0.15)
+    planner = StepPlanner(walk, STANCE._replace(width=width), "a biped")
+    first = planner._next_velocity(Velocity(0.0, 0.0, 0.0), 0.0, 0)
+    assert first == pytest.approx((0.3, 0.0, 0.3 / arm))
+
+
 def test_steps_on_a_circle_stay_on_it():
     v, foot = Velocity(0.2, 0.0, 0.5), Footstep(0.0, 0.085, 0.0)
     side, middles = -1.0, []
@@ -119,6 +131,13 @@ def test_a_step_keeps_away_from_the_other_foot_and_within_reach():
     assert place.local(near.point) == pytest.approx([0.1, 0.12])
     far = STANCE.kept(place, -1.0, place.ahead(0.9, -0.7))
     assert place.local(far.point) == pytest.approx([0.6, -0.4])
+
+
+def test_full_turns_do_not_count_between_feet():
+    a, b = Footstep(0.0, 0.0, 3.1), Footstep(0.0, 0.2, -3.1)
+    assert between(a, b).yaw == pytest.approx(np.pi)
+    assert near(0.1, 4 * np.pi) == pytest.approx(0.1 + 4 * np.pi)
+    assert near(-3.0, 3.0) == pytest.approx(2 * np.pi - 3.0)
 
 
 def test_the_nearest_point_of_a_hull():

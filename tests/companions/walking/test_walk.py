@@ -6,9 +6,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from hsp_control import FramePose, Gains, Robot, load_experiment
+from hsp_control import Controller, FramePose, Gains, Robot, load_experiment
 from hsp_control.common.exceptions import FallError, HspControlError, PlanError
 from hsp_control.companions.walking import Walk
+from hsp_control.companions.walking.foot import Foot
 from hsp_control.constraints.contacts import BallContact, SurfaceContact
 from hsp_control.control.falling import FallDetector
 from hsp_control.tasks import CenterOfMass
@@ -176,6 +177,22 @@ def test_falls_are_found(talos):
             knees[talos.velocity_index(f"leg_{side}_{joint}_joint")] = angle
     with pytest.raises(FallError, match=r"its centre of mass is at \d+ % of its first"):
         detector.check(moved(knees))
+
+
+def test_a_footstep_is_the_middle_of_a_sole(talos):
+    """Wherever the frame's origin is: also beside it, as on a narrow ankle."""
+    frame = SurfaceContact("left_sole_link", **SOLE, center=[0.02, 0.01, 0.0])
+    given = {"left_foot": replace(frame, name="left_foot"), "right_foot": FEET[1]}
+    made = Walk().parts(talos, [], list(given.values()))
+    controller = Controller(talos, made.tasks, contacts=made.contacts)
+    foot, turned = Foot("left_foot", controller), np.zeros(talos.nv)
+    turned[5] = 0.6
+    q = talos.integrate(talos.home(), turned)
+    foot.begin(talos.state(0.0, q, np.zeros(talos.nv)), 0.6)
+    assert foot.corners(1.0).mean(axis=0) == pytest.approx(foot.place.point)
+    origin = foot.origin_of(foot.place)
+    state = talos.state(0.0, q, np.zeros(talos.nv))
+    assert origin.point == pytest.approx(state.position("left_sole_link")[:2])
 
 
 GIVEN = "plan={type: walk, footsteps: %s}"

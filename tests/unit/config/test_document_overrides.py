@@ -73,6 +73,14 @@ def test_mistakes_in_overrides(override: str, expected: str) -> None:
     assert message(GOOD, override) == f"{origin}: {expected}"
 
 
+def test_mistakes_of_overrides_come_last() -> None:
+    assert message("robot: a\nview: 3", "steps=x") == (
+        "panda.yaml:2: view: 3 is an integer; expected true or false\n"
+        "and 1 more:\n"
+        "  --set steps=x: steps: 'x' is text; expected an integer"
+    )
+
+
 # --- errors raised later -------------------------------------------------------------
 
 

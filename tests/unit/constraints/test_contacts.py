@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from runs import check_errors, check_null_space, continuous
+from runs import check_errors, check_null_space, continuous, held
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
@@ -264,6 +264,33 @@ def test_forces_are_permitted_up_to_the_friction_cone() -> None:
             forces[3 * k : 3 * k + 2] = (1.0 + 1e-9) * tangential
             assert not support.permits(forces)
     assert not support.permits(np.array([0.0, 0.0, -1.0, 0.0, 0.0, 5.0]))  # it pulls
+
+
+def test_the_log_says_how_much_friction_is_used() -> None:
+    """The largest ‖f_t‖/(μ f_n) of a sole's corners, each sole with its own μ."""
+    robot, frictions = talos(), (0.4, 0.9)
+    contacts = [
+        sole(frame, friction=mu) for frame, mu in zip(SOLES, frictions, strict=True)
+    ]
+    state = robot.state(0.0, robot.home(), np.zeros(robot.nv))
+    aside = state.centroidal.position + np.array([0.002, 0.005, 0.0])
+    controller = hsp.Controller(
+        robot,
+        [hsp.CenterOfMass(hsp.Hold(aside), gains=GAINS)],
+        contacts=contacts,
+        limits=None,
+    )
+    plant = ContactPlant(robot, [RigidContact(frame) for frame in SOLES])
+    log = held(controller, robot.home(), duration=0.002, plant=plant)
+    for k in range(len(log)):
+        out = controller.compute(robot.state(log.t[k], log.q[k], log.v[k]))
+        for frame, mu, forces in zip(
+            SOLES, frictions, out.forces.reshape(2, 4, 3), strict=True
+        ):
+            ratios = [np.hypot(x, y) / (mu * z) for x, y, z in forces if z > 1e-3]
+            assert 0.01 < max(ratios) <= 1.0
+            used = log[f"contact.{frame}.friction_used"][k]
+            assert used == pytest.approx(max(ratios), rel=1e-6)
 
 
 def test_propositions_hold_for_a_humanoid() -> None:

@@ -387,6 +387,26 @@ def test_the_predictor_knows_where_the_robot_will_be(
     assert_allclose(shown, then, atol=1e-10)
 
 
+@pytest.mark.parametrize(("efforts", "sensors"), [(1, 0), (2, 0), (0, 1), (1, 2)])
+def test_the_law_is_of_the_time_at_which_its_effort_acts(
+    efforts: int, sensors: int
+) -> None:
+    """Sent at t: the effort of the moving task at t + the drives' delay, no other."""
+    made, state = controller(), hsp.RobotState(PANDA)
+    compensation = Compensation(predictor=Predictor(efforts, sensors))
+    log = run(made, compensation, duration=0.05)
+
+    def effort(k: int, lead: int) -> Array:
+        then = log.t[k] + lead * H
+        shown = log["shown.q"][k], log["shown.v"][k]
+        return made.compute(state.update(then, *shown)).tau.copy()
+
+    for k in (0, 7, 40):
+        assert_allclose(effort(k, efforts), log.tau[k], rtol=0, atol=1e-9)
+        other = effort(k, efforts + 1) - log.tau[k]
+        assert np.abs(other).max() > 1e-3  # a period more or less would be seen
+
+
 @pytest.mark.parametrize("frequency", [0.0, 10.0])
 def test_the_ramp_leads_from_gravity_to_the_law(frequency: float) -> None:
     made = controller()

@@ -162,6 +162,24 @@ def row(direction: Array, least: float) -> tuple[Array, Array]:
     return direction[None, :], np.array([least])
 
 
+def test_distances_are_relaxed_less_than_motion_and_motion_less_than_holding() -> None:
+    """The violations of a quadratic cost are in inverse proportion to the costs."""
+    made = arm()
+    made.compute(0.0, panda().home(), np.zeros(7))
+    bounds, first = made._actuation._bounds, np.eye(7)[5]
+    made._actuation._tau_lower[:], made._actuation._tau_upper[:] = -np.inf, np.inf
+    for kind, cost in (("distances", 30.0), ("holding", 0.1)):
+        bounds.a_upper[5], bounds.a_lower[5] = 1.0, -np.inf
+        _, a, _, status, relaxation = repeated(made, {kind: row(first, 5.0)})
+        assert status == Status.RELAXED
+        assert (a[5] - 1.0) / (5.0 - a[5]) == pytest.approx(cost, rel=1e-3)
+        assert relaxation == pytest.approx(max(a[5] - 1.0, 5.0 - a[5]), rel=1e-4)
+    both = {"distances": row(first, 5.0), "holding": row(-first, 5.0)}
+    bounds.a_upper[5] = np.inf
+    a = repeated(made, both)[1]
+    assert (a[5] + 5.0) / (5.0 - a[5]) == pytest.approx(300.0, rel=1e-2)
+
+
 def test_contacts_are_relaxed_less_than_distances() -> None:
     made = drawn("whole_body/solo12_trunk", 1, 0.0)
     stack = made.active_stack

@@ -74,6 +74,18 @@ def test_a_mapping_is_a_sequence_of_parts(
     jsonschema.validate(chain.to_dict(), TypeAdapter(Chain).json_schema())
 
 
+def test_data_are_as_short_as_can_be() -> None:
+    chain = Chain(filters=[Delay(2), Noise(), Differences()])
+    short = {"delay": 2, "noise": True, "differences": True}
+    assert chain.to_dict() == {"filters": short}
+    assert Chain(filters=[Noise(seed=1)]).to_dict() == {
+        "filters": {"noise": {"seed": 1}}
+    }
+    both = {"std": 0.2, "seed": 1}
+    assert Chain(filters=[Noise(0.2, seed=1)]).to_dict() == {"filters": {"noise": both}}
+    assert Chain().to_dict() == {}
+
+
 WRONG: list[tuple[Any, str]] = [
     ({"dely": 1}, r"filters\.dely: unknown key 'dely'; did you mean 'delay'\?"),
     ({"delay": -1}, r"filters\.delay\.periods: -1 is negative; must be at least 0"),

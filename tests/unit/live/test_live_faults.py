@@ -220,6 +220,18 @@ def test_each_fault_of_a_measurement_is_named(kind: str, tmp_path: Path) -> None
     assert (np.diff(logged.t) < longest).all()  # also where the robot's clock jumps
 
 
+@pytest.mark.parametrize("end", ["lower", "upper"])
+def test_positions_may_be_beyond_a_limit_by_their_margin(end: str) -> None:
+    monitor = MeasurementMonitor(panda(), None, SETTINGS, PERIOD)
+    outwards = -1.0 if end == "lower" else 1.0
+    limit, v = getattr(own_limits(panda()), end)[1], np.zeros(7)
+    for share, fits in ((-2.0, True), (-0.5, True), (0.9, True), (1.1, False)):
+        q = start().copy()
+        q[1] = limit + outwards * share * SETTINGS.position_margin
+        found = monitor.violation(Measurement(1, 0.0, q, v))
+        assert (found is None) == fits, share
+
+
 @pytest.mark.parametrize("states", [1, 3])
 def test_a_jump_is_farther_than_the_greatest_speed_over_the_gap(states: int) -> None:
     """Also where the clock stands still: the numbers of the states count."""
@@ -231,6 +243,14 @@ def test_a_jump_is_farther_than_the_greatest_speed_over_the_gap(states: int) -> 
         q = start() + way * np.eye(7)[3]
         found = monitor.jump(Measurement(4 + states, 0.5, q, np.zeros(7)))
         assert (found is None) == fits, factor
+
+
+def test_a_robot_at_rest_is_not_frozen() -> None:
+    """Its brakes hold it: the same state to the last bit, and a velocity of 0."""
+    still = always(replaced(q=start(), v=np.zeros(7)), 1)
+    patient = LiveSettings(stop=QUICK, velocity_margin=99.0)  # it is not held here
+    report = run(Rig(watched(patient), still), duration=0.1, settings=patient)
+    assert report.ended == "completed", report.reason
 
 
 def test_buffers_that_the_driver_reuses_are_copied() -> None:

@@ -17,6 +17,7 @@ from hsp_control.live import (
     SimulatedRobot,
     run_loop,
 )
+from hsp_control.live.effort_limiter import EffortLimiter
 from hsp_control.robot.integrators import SemiImplicitEuler
 from hsp_control.simulation.plants import IntegratedPlant, RigidBodyPlant
 
@@ -196,6 +197,31 @@ def test_a_robot_never_rejects_an_effort_over_a_bad_line(
     assert report.ended == "completed", report.reason
     assert robot.robot.reason == "the loop has ended"
     assert np.abs(np.diff(robot.in_force, axis=0)).max() <= 0.1 * (1.0 + 1e-6)
+
+
+@given(seed=st.integers(0, 2**32 - 1), compensates=st.booleans())
+def test_the_limiter_keeps_the_rate_from_both(seed: int, compensates: bool) -> None:
+    rng = np.random.default_rng(seed)
+    most, step = 40.0, RATE * PERIOD
+    chosen = LiveSettings(
+        effort_rate=RATE, effort=most, compensates_gravity=compensates
+    )
+    limiter = EffortLimiter(panda(), chosen, PERIOD)
+    limiter.reset(start())
+    borne = gravity(start()) if compensates else np.zeros(7)
+    for _ in range(20):
+        before = limiter.sent.copy()
+        known = before + rng.choice([0.0, 0.7, 1.5, 30.0, 1e300]) * rng.choice(
+            [-step, step], 7
+        )
+        changed = limiter.robot_has(known)
+        assert changed is (not np.array_equal(known, before))
+        assert limiter.apply(100.0 * rng.standard_normal(7), start())
+        assert (np.abs(limiter.sent + borne) <= most + 1e-9).all()
+        true = np.clip(known, -most - borne, most - borne)
+        assert (np.abs(limiter.sent - true) <= step + 1e-9).all()
+        near = np.abs(true - before) <= 2.0 * step
+        assert (np.abs(limiter.sent - before)[near] <= step + 1e-9).all()
 
 
 def test_a_lost_effort_corrects_the_momentum_observer() -> None:

@@ -117,6 +117,20 @@ def test_coordinates_leave_the_rest_of_the_scene_alone() -> None:
     np.testing.assert_array_equal(np.concatenate(back), [*q, *v])
 
 
+def test_home_is_the_configuration_that_was_chosen() -> None:
+    model = compiled(CELL)
+    robot = Robot.from_mujoco(model, "base", ARM, keyframe="home")
+    np.testing.assert_allclose(robot.home(), [0.0, 0.5, 0.0, 1.0], atol=1e-15)
+    assert robot.source.locked == {"f": 0.02}
+    before = model.key_qpos.copy()
+    qpos = before[0].copy()
+    qpos[:4] += 0.01
+    moved = Robot.from_mujoco(model, "base", ARM, qpos=qpos, locked={"f": 0.03})
+    np.testing.assert_allclose(moved.home(), robot.home() + 0.01, atol=1e-15)
+    assert moved.source.locked == {"f": 0.03}
+    np.testing.assert_array_equal(model.key_qpos, before)
+
+
 # --- names, postures, limits ---------------------------------------------------------
 
 

@@ -73,6 +73,28 @@ class Spy(RigidBodyPlant):
         return super().acceleration(t, q, v, tau)
 
 
+def test_sampled_control_holds_the_effort() -> None:
+    """One effort a period, from beginning to end; the first is the logged one."""
+    plant = Spy(planar_controller().robot)
+    run = simulate(
+        planar_controller(),
+        planar_start(),
+        duration=0.04,
+        log_period=0.01,
+        control_period=0.0025,
+        integrator=Rk4(0.001),
+        plant=plant,
+    )
+    times = np.array([t for t, _ in plant.calls])
+    efforts = np.array([tau for _, tau in plant.calls])
+    changes = 1 + np.flatnonzero(np.abs(np.diff(efforts, axis=0)).max(axis=1) > 0.0)
+    np.testing.assert_allclose(
+        times[[0, *changes]], 0.0025 * np.arange(16), rtol=0, atol=1e-12
+    )
+    assert len(plant.calls) == 16 * 3 * 4  # 3 steps of 0.83 ms, 4 stages
+    np.testing.assert_array_equal(efforts[[0, *changes]][::4], run.tau[:4])
+
+
 def test_continuous_control_is_evaluated_in_every_stage() -> None:
     plant = Spy(planar_controller().robot)
     simulate(

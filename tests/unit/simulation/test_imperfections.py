@@ -292,6 +292,12 @@ def test_a_saturated_drive() -> None:
     )
 
 
+@pytest.mark.parametrize("periods", [0, 1, 3])
+def test_a_late_drive(periods: int) -> None:
+    found = [effort[0] for effort in driven(EffortDelay(periods), EFFORTS)]
+    assert found == [1.0] * periods + [float(k) for k in range(1, 9 - periods)]
+
+
 def test_a_drive_that_loses_efforts() -> None:
     """Each is the commanded one, or what the last one was; the first is there."""
     efforts = [np.full(7, float(k)) for k in range(2000)]

@@ -16,6 +16,7 @@ from hsp_control.common.exceptions import (
 from hsp_control.robot.friction import JointFriction
 from hsp_control.simulation.plants import (
     MujocoScenePlant,
+    Push,
 )
 from hsp_control.simulation.plants.mujoco import MujocoPlant
 from hsp_control.trajectories import Circle
@@ -93,6 +94,36 @@ def test_the_rest_of_the_scene_lives_on() -> None:
     assert data.qpos[7] == pytest.approx(1.0 - fallen, rel=1e-9)
     assert data.qpos[4] > 0.02
     assert data.time == pytest.approx(end)
+
+
+def test_two_bodies_of_the_scene_push_each_other_equally() -> None:
+    """The hand, pushed down on the ball: what one gets, the other gives."""
+    robot, model, data = cell()
+    state = robot.state(0.0, robot.home(), np.zeros(4))
+    finger = state.position("finger")
+    data.qpos[5:8] = finger
+    data.qpos[5] += 0.03
+    model.opt.gravity[:] = 0.0
+    model.geom_contype[0] = model.geom_conaffinity[0] = 0  # no floor
+    plant = MujocoScenePlant(robot, model, data, contacts=["ball", "finger", "hand"])
+    at_home(robot, plant)
+    channels = plant.log_channels(0.0, robot.home(), np.zeros(4), np.zeros(4))
+    names = ("ball", "finger", "hand")
+    forces = [channels[f"plant.contact.{name}.force"].value for name in names]
+    assert np.linalg.norm(forces[0]) > 0.1
+    np.testing.assert_allclose(np.sum(forces, axis=0), 0.0, atol=1e-12)
+
+
+def test_pushes_are_applied_besides_the_motors() -> None:
+    robot, model, data = cell()
+    push = Push("tip", force=(0.0, 10.0, 0.0), start=0.0, duration=1.0)
+    plant = MujocoScenePlant(robot, model, data, pushes=[push])
+    at_home(robot, plant)
+    plant.advance(0.0, 0.001, EFFORT)
+    state = robot.state(0.0, robot.home(), np.zeros(4))
+    expected = state.frame("tip").jacobian[:3].T @ [0.0, 10.0, 0.0]
+    np.testing.assert_allclose(data.qfrc_applied[:4], expected, atol=1e-12)
+    np.testing.assert_allclose(data.qfrc_actuator[:4], EFFORT, rtol=1e-12)
 
 
 def test_a_controller_tracks_in_the_scene() -> None:

@@ -1,6 +1,7 @@
 """Check that many periods in one native call move the robot as one by one."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,10 +19,12 @@ from hsp_control import (
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.common.kernels import PLAIN
 from hsp_control.config import Experiment
+from hsp_control.constraints.limits import RobotLimits
 from hsp_control.control.changes import Changes
 from hsp_control.control.controller import Controller
 from hsp_control.robot.integrators import SemiImplicitEuler
 from hsp_control.simulation import loops
+from hsp_control.simulation.limit_excess import LimitExcess
 from hsp_control.trajectories import Hold
 
 if not PLAIN:
@@ -126,6 +129,16 @@ def test_periods_in_which_a_limit_binds_are_made_alone(counted: Counted) -> None
     assert ((made > 0) & (made < 8)).sum() >= 2
 
 
+def test_what_a_held_effort_teaches_is_the_same(counted: Counted) -> None:
+    """How far speeds were off widens the margin of a speed limit that binds later."""
+    slow = "panda_obstacle", "limits.velocity={scale: 0.3}"
+    theirs = counted.alone(short(*slow, duration=2.0).run)
+    ours = short(*slow, duration=2.0).run()
+    assert_same(ours, theirs)
+    assert (ours["status"] == 2).sum() > 10
+    assert sum(counted.many) > 1000
+
+
 def test_after_it_the_controller_is_at_its_last_step(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -146,6 +159,30 @@ def test_after_it_the_controller_is_at_its_last_step(
     # The effort of the last period was computed where that period began.
     expected = before + 1e-3 * np.maximum(made - 1, 0)
     np.testing.assert_allclose(after, expected, rtol=0, atol=1e-12)
+
+
+def test_no_state_between_two_rows_is_missed(
+    counted: Counted, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is seen beyond limits, here beyond 0.05 rad/s, is seen in each period."""
+
+    def strict(limits: RobotLimits | None) -> RobotLimits:
+        assert limits is not None
+        return replace(limits, velocity=np.full(7, 0.05))
+
+    arguments = LimitExcess._arguments
+    monkeypatch.setattr(
+        LimitExcess,
+        "_arguments",
+        lambda self, limits, q, v: arguments(self, strict(limits), q, v),
+    )
+    rows = "simulation.log_period=0.1"
+    theirs = counted.alone(short("panda_obstacle", rows, duration=3.0).run)
+    ours = short("panda_obstacle", rows, duration=3.0).run()
+    assert_same(ours, theirs)
+    at_rows = np.maximum(np.abs(ours.v) - 0.05, 0.0)
+    assert (ours["velocity_excess"] > at_rows + 1e-4).any()  # a peak between two rows
+    assert sum(counted.many) > 2000
 
 
 ELBOW = FramePosition("panda_link4", Hold(), axes="z", name="elbow")

@@ -197,6 +197,21 @@ def test_gains_at_a_state_are_those_of_the_step(case: Case) -> None:
     assert (kept < 1.0).any()
 
 
+def test_joint_impedance_of_all_joints_has_the_mass_matrix() -> None:
+    robot = hsp.Robot.load("panda")
+    spring = Impedance([600, 600, 600, 600, 250, 150, 50], damping=12.0)
+    task = JointPosture("home", impedance=spring)
+    controller = Controller(robot, [task], limits=None)
+    K = np.diag(np.array(spring.stiffness))
+    for away in (0.2, -0.1, 0.4):
+        q, v = robot.home() + away, np.linspace(-away, 0.5, 7)
+        output = controller.compute(0.0, q, v)
+        state = robot.state(0.0, q, v)
+        force = K @ robot.difference(q, robot.home()) - 12.0 * v
+        effort = force - 0.5 * state.mass_matrix_rate @ v + state.nonlinear_effects
+        np.testing.assert_allclose(output.tau, effort, rtol=1e-9, atol=1e-9)
+
+
 def test_through_a_singularity() -> None:
     """A straight arm: gains stay finite, and the term in the inertia's rate fades."""
     robot = hsp.Robot.load("planar3r")
