@@ -11,8 +11,11 @@ from hsp_control.robot import Robot
 from hsp_control.robot.inverse_kinematics import Target, reach
 from hsp_control.tasks import FramePose, FramePosition, Task
 
-_TIMES = 25
+_TIMES = 40
 """At how many times of a run a target is looked at."""
+_UNEVEN = 1.1
+"""The times are powers of even ones, so that a target that goes round in a whole part
+of the run is not looked at in one place alone."""
 _STARTS = 4
 """From how many random postures inverse kinematics begins where it failed."""
 _REACHED = 1e-3
@@ -74,7 +77,8 @@ def _leaves(
     robot: Robot, task: Task, q0: Array, duration: float, rows: int
 ) -> OutOfReach | None:
     """Return when and by how much the target of a task is out of reach, if it is."""
-    places = [(t, _target(task, t)) for t in np.linspace(0.0, duration, _TIMES)]
+    times = duration * np.linspace(0.0, 1.0, _TIMES) ** _UNEVEN
+    places = [(t, _target(task, t)) for t in times]
     away: list[float] = []
     q = q0
     for k, (_, place) in enumerate(places):
@@ -91,8 +95,8 @@ def _leaves(
         return None
     first = next(k for k, distance in enumerate(away) if distance > _REACHED)
     worst = int(np.argmax(away))
-    times = [float(t) for t, _ in places]
-    return OutOfReach(task.name, times[first], times[worst], away[worst], turned=False)
+    since, most = float(times[first]), float(times[worst])
+    return OutOfReach(task.name, since, most, away[worst], turned=False)
 
 
 def _target(task: Task, t: float) -> pin.SE3:

@@ -121,6 +121,49 @@ def test_the_summary_tells_of_a_target_out_of_reach(
     assert re.search(r"\d+ rows: target out of reach, 1\.\d\d m at the end", told)
 
 
+@pytest.mark.parametrize(
+    ("hand", "told"),
+    [
+        (
+            "{type: frame_position, trajectory: "
+            "{type: line, origin: world, start: [0.4, 0, 0.5], end: [1.6, 0, 0.5], "
+            "duration: 2}}",
+            r"task 'hand': its target is out of reach by 0\.\d+ m, from t = 0\.\d* s, "
+            r"most at 2",
+        ),
+        (
+            "{type: frame_pose, trajectory: {type: composed, position: "
+            "{type: hold, point: [0.8, 0, 0.3]}, orientation: "
+            "{type: hold, rotation: [0, -2, 0]}}}",
+            "task 'hand': its target cannot be reached in its orientation, at the",
+        ),
+        (
+            # 39 turns: looked at evenly it would be seen where it begins, within reach
+            "{type: frame_position, trajectory: {type: circle, center: [-1.1, 0, 0.5], "
+            "radius: 1.5, angular_rate: 122.52211349000193}}",
+            "task 'hand': its target is out of reach by",
+        ),
+        (
+            "{type: frame_pose, trajectory: "
+            "{type: circle, radius: 0.1, angular_rate: 1}}",
+            None,
+        ),
+    ],
+)
+def test_check_tells_before_the_run_what_is_out_of_reach(
+    hand: str, told: str | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By how much and when, or that it is the orientation alone."""
+    config = tmp_path / "far.yaml"
+    config.write_text(
+        f"robot: {{name: panda}}\ntasks: {{hand: {hand}}}\n"
+        "simulation: {duration: 2, control_period: 0.001}\n"
+    )
+    assert main(["check", str(config)]) == 0
+    warned = capsys.readouterr().err
+    assert ("reach" not in warned) if told is None else re.search(told, warned)
+
+
 @pytest.mark.slow
 def test_plot_draws_beside_the_log(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
