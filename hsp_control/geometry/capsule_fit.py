@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.geometry.hulls import convex_hull
-from hsp_control.robot.description.body_shape import BodyShape
+from hsp_control.robot.description.sources import BodyShape
 
 
 def enclosing_capsule(points: Array) -> tuple[Array, Array, float]:

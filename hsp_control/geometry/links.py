@@ -22,10 +22,9 @@ from hsp_control.geometry.capsule_fit import (
 from hsp_control.geometry.hulls import convex_hull, hull_corners
 from hsp_control.robot import Robot
 from hsp_control.robot.description import mesh_files
-from hsp_control.robot.description.combining import Part
-from hsp_control.robot.description.loading import parser_text
+from hsp_control.robot.description.loading import RobotPart
 from hsp_control.robot.description.sources import RobotSource
-from hsp_control.robot.description.urdf_checks import read_urdf
+from hsp_control.robot.description.urdf import parser_text, read_urdf
 
 Proxy = Literal["capsules", "spheres", "hulls", "meshes"]
 
@@ -97,13 +96,13 @@ def _shapes_of(robot: Robot, proxy: Proxy) -> list[LinkShape]:
     return [sphere for capsule in capsules for sphere in _spheres_along(capsule)]
 
 
-def part_of(robot: Robot, name: str) -> Part:
+def part_of(robot: Robot, name: str) -> RobotPart:
     """Return the part of a combined robot that a joint or link name belongs to."""
     parts = [part for part in robot.parts if name.startswith(part.prefix)]
     return max(parts, key=lambda part: len(part.prefix))
 
 
-def _collision_shapes(robot: Robot, part: Part) -> list[LinkShape]:
+def _collision_shapes(robot: Robot, part: RobotPart) -> list[LinkShape]:
     """Return the collision geometry of a part, fixed to the joints of the robot."""
     if part.source.shapes is None:
         return _shapes_of_urdf(robot, part)
@@ -118,7 +117,7 @@ def _collision_shapes(robot: Robot, part: Part) -> list[LinkShape]:
     return shapes
 
 
-def _shapes_of_urdf(robot: Robot, part: Part) -> list[LinkShape]:
+def _shapes_of_urdf(robot: Robot, part: RobotPart) -> list[LinkShape]:
     """Return the URDF's collision geometry, fixed to the joints of the robot.
 
     The robot may have fewer joints than the URDF, since joints can be locked. So the
@@ -178,7 +177,7 @@ def _locate_meshes(xml: Element, source: RobotSource) -> dict[str, str]:
 
 
 def _report_missing(
-    robot: Robot, part: Part, missing: Mapping[str, str], left: int
+    robot: Robot, part: RobotPart, missing: Mapping[str, str], left: int
 ) -> None:
     """Warn of meshes that do not exist, once for each robot."""
     name = next(iter(missing.values()))
@@ -204,7 +203,7 @@ def _finite(geometry: Any) -> bool:
     return bool(np.isfinite(np.array(geometry.vertices())).all())
 
 
-def _between_joints(robot: Robot, part: Part) -> list[LinkShape]:
+def _between_joints(robot: Robot, part: RobotPart) -> list[LinkShape]:
     """Return capsules between the joints, and a sphere at each last joint."""
     model = robot.model
     joints = [

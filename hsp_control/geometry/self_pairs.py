@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from hsp_control.common.exceptions import ModelError
 from hsp_control.geometry.links import LinkShape, part_of
 from hsp_control.robot import Robot
-from hsp_control.robot.description.xml_files import XmlError, read_xml
+from hsp_control.robot.description.access import XmlError, read_xml
 
 
 def self_pairs(robot: Robot, links: Sequence[LinkShape]) -> list[tuple[int, int]]:
