@@ -548,18 +548,18 @@ class SeenState(RobotState):
     """
 
     __slots__ = ("_own", "_shown")
+    _own: RobotState
+    _shown: tuple[Array, Array]
 
     def __init__(self, own: RobotState) -> None:
-        object.__setattr__(self, "__dict__", own.__dict__)
-        object.__setattr__(self, "_own", own)
-        views = own.q.view(), own.v.view()
-        for view in views:
+        self.__dict__ = own.__dict__
+        self._own, self._shown = own, (own.q.view(), own.v.view())
+        for view in self._shown:
             view.flags.writeable = False
-        object.__setattr__(self, "_shown", views)
 
-    t = property(lambda self: self._own.t)  # type: ignore[assignment]
-    q = property(lambda self: self._shown[0])  # type: ignore[assignment]
-    v = property(lambda self: self._shown[1])  # type: ignore[assignment]
+    t = property(lambda self: self._own.t)
+    q = property(lambda self: self._shown[0])
+    v = property(lambda self: self._shown[1])
 
     def __setattr__(self, name: str, value: object) -> None:
         if name in ("t", "q", "v"):
