@@ -1,7 +1,7 @@
-"""Shapes of the robot's links for distances: capsules or its collision geometry."""
+"""Shapes of the robot's links for distances, and which of their pairs can collide."""
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 from weakref import WeakKeyDictionary, WeakSet
@@ -14,16 +14,17 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ModelError
 from hsp_control.common.suggestions import listing
-from hsp_control.geometry.capsule_fit import (
-    body_geometry,
+from hsp_control.geometry.enclosing import (
+    convex_hull,
     enclosing_capsule,
     enclosing_ellipsoid_capsule,
+    hull_corners,
 )
-from hsp_control.geometry.hulls import convex_hull, hull_corners
 from hsp_control.robot import Robot
 from hsp_control.robot.description import mesh_files
+from hsp_control.robot.description.access import XmlError, read_xml
 from hsp_control.robot.description.loading import RobotPart
-from hsp_control.robot.description.sources import RobotSource
+from hsp_control.robot.description.sources import BodyShape, RobotSource
 from hsp_control.robot.description.urdf import parser_text, read_urdf
 
 Proxy = Literal["capsules", "spheres", "hulls", "meshes"]
@@ -112,9 +113,32 @@ def _collision_shapes(robot: Robot, part: RobotPart) -> list[LinkShape]:
             name = part.prefix + shape.body
             frame = robot.model.frames[robot.frame_id(name)]
             place = frame.placement * pin.SE3(shape.pose)
-            geometry = body_geometry(shape)
+            geometry = _body_geometry(shape)
             shapes.append(LinkShape(name, frame.parentJoint, place, geometry))
     return shapes
+
+
+def _body_geometry(shape: BodyShape) -> Any:
+    """Return Coal's geometry; of a mesh its convex hull, or a flat mesh as it is."""
+    match shape.kind:
+        case "box":
+            return coal.Box(*shape.size)
+        case "sphere":
+            return coal.Sphere(*shape.size)
+        case "capsule":
+            return coal.Capsule(*shape.size)
+        case "cylinder":
+            return coal.Cylinder(*shape.size)
+        case "ellipsoid":
+            return coal.Ellipsoid(*shape.size)
+    assert shape.mesh is not None
+    vertices, triangles = shape.mesh
+    mesh = coal.BVHModelOBBRSS()
+    mesh.beginModel(len(triangles), len(vertices))
+    for triangle in vertices[triangles]:
+        mesh.addTriangle(*triangle)
+    mesh.endModel()
+    return convex_hull(mesh) or mesh
 
 
 def _shapes_of_urdf(robot: Robot, part: RobotPart) -> list[LinkShape]:
@@ -342,3 +366,55 @@ def _placement_along(first: Array, second: Array) -> tuple[pin.SE3, float]:
 
 def _replaced(shape: LinkShape, geometry: Any) -> LinkShape:
     return LinkShape(shape.link, shape.joint, shape.placement, geometry)
+
+
+# --- pairs of them that can collide ---------------------------------------------------
+
+
+def self_pairs(robot: Robot, links: Sequence[LinkShape]) -> list[tuple[int, int]]:
+    """Return the pairs of link shapes that can collide, as indices into ``links``.
+
+    Neighbours, which always touch, and pairs that the SRDF or MJCF disables are none.
+    """
+    disabled = _disabled(robot)
+    parents = list(robot.model.parents)
+    pairs = []
+    for i, first in enumerate(links):
+        for j in range(i + 1, len(links)):
+            second = links[j]
+            a, b = first.joint, second.joint
+            if a == b or _neighbours(robot, first, second, parents):
+                continue
+            if frozenset((first.link, second.link)) in disabled:
+                continue
+            pairs.append((i, j))
+    return pairs
+
+
+def _neighbours(
+    robot: Robot, first: LinkShape, second: LinkShape, parents: Sequence[int]
+) -> bool:
+    """Return whether a link's joint is the parent of the other's, in one part."""
+    a, b = first.joint, second.joint
+    if parents[a] != b and parents[b] != a:
+        return False
+    return min(a, b) > 0 or part_of(robot, first.link) is part_of(robot, second.link)
+
+
+def _disabled(robot: Robot) -> set[frozenset[str]]:
+    disabled = set()
+    for part in robot.parts:
+        for pair in part.source.excluded:
+            disabled.add(frozenset(part.prefix + link for link in pair))
+        if part.source.srdf is None:
+            continue
+        try:
+            srdf = read_xml(part.source.srdf)
+        except XmlError as error:
+            raise ModelError(error.within(part.source.srdf)) from None
+        except OSError as error:
+            raise ModelError(f"{part.source.srdf}: {error.strerror}") from error
+        for element in srdf.iter("disable_collisions"):
+            links = (element.get("link1", ""), element.get("link2", ""))
+            disabled.add(frozenset(part.prefix + link for link in links))
+    return disabled

@@ -11,7 +11,7 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array
 from hsp_control.control.controller import Controller
 from hsp_control.geometry import shapes
-from hsp_control.geometry.hulls import hull_corners
+from hsp_control.geometry.enclosing import hull_corners
 from hsp_control.geometry.links import LinkShape
 from hsp_control.geometry.scene import Obstacle
 from hsp_control.geometry.shapes import Shape
