@@ -21,7 +21,7 @@ from hsp_control.companions.film.chromium import headless_browser
 from hsp_control.play import Picture, Session, play
 from hsp_control.play.playable import playable
 from hsp_control.visualization.viewer import Viewer
-from hsp_control.visualization.viewer.server import Server
+from hsp_control.visualization.viewer.transport import PageServer
 
 sys.path.append(str(Path(__file__).parents[1] / "tests" / "support"))
 from pages import Steering
@@ -45,7 +45,7 @@ class Timed(Session):
         super().reset()
 
 
-def measured(session: Timed, picture: Picture, server: Server) -> tuple[Any, float]:
+def measured(session: Timed, picture: Picture, server: PageServer) -> tuple[Any, float]:
     """Return how late rows begin [s], and the share of time that all of it takes."""
     session.rows.clear()
     begin, drawn = monotonic(), [0.0]
@@ -75,7 +75,7 @@ def lines() -> Iterator[str]:
     for name in CONFIGURATIONS:
         found: dict[str, list[tuple[Any, float]]] = {}
         with ExitStack() as stack:
-            server = Server(steerable=True)
+            server = PageServer(steerable=True)
             stack.callback(server.close)
             session = Timed(playable(name))
             session.rehearse()

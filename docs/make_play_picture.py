@@ -10,7 +10,7 @@ from hsp_control.companions.film.chromium import headless_browser
 from hsp_control.play import Picture, Session
 from hsp_control.play.playable import playable
 from hsp_control.visualization.viewer import Viewer
-from hsp_control.visualization.viewer.server import Server
+from hsp_control.visualization.viewer.transport import PageServer
 
 FILE = Path(__file__).parent / "figures" / "play.webp"
 SIZE = {"width": 1280, "height": 760}
@@ -20,7 +20,7 @@ ELBOW = "/robot/panda_joint4/panda_link4"
 def main() -> None:
     """Drag the hand, then pull at the elbow, and photograph it in the pull."""
     session = Session(playable("panda_obstacle", "view.camera=[2.0,0.9,1.1]"))
-    server = Server(steerable=True)
+    server = PageServer(steerable=True)
     view = session.experiment.scenario.view.all_fields()
     viewer = Viewer(session.experiment.robot, transport=server, **view)
     picture = Picture(session, viewer)

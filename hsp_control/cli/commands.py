@@ -28,8 +28,8 @@ from hsp_control.config.loaded_scenario import LoadedScenario, load_scenario
 from hsp_control.robot import Robot
 from hsp_control.robot.description.sources import example_robots
 from hsp_control.simulation import Rollout
+from hsp_control.simulation.log_writer import LogWriter
 from hsp_control.simulation.measures import measures
-from hsp_control.simulation.recorder import Recorder
 
 if TYPE_CHECKING:
     from hsp_control.cli.pages import Screen
@@ -74,15 +74,17 @@ def _run_and_save(
     tell: Callable[[Rollout, Path, Stopwatch], None],
     screen: "Screen | None",
 ) -> int:
-    status = 0
+    status, journal = 0, log.with_suffix(".journal")  # readable if we are killed
     stopwatch = Stopwatch()
+    on_row = screen.on_row if screen else None
     with DeferredInterrupt() as interrupts:
         try:
             rollout = _run_with_progress(
-                experiment, stopwatch, interrupts, screen.on_row if screen else None
+                experiment, stopwatch, interrupts, journal, on_row
             )
         except SimulationError as error:
             if not isinstance(error.rollout, Rollout) or not len(error.rollout):
+                journal.unlink(missing_ok=True)
                 raise
             rollout, status = error.rollout, 2
             print(f"hsp: {message_of(error)}", file=sys.stderr)
@@ -95,11 +97,13 @@ def _run_and_save(
             print(f"hsp: {rollout.meta['message']}", file=sys.stderr)
             status = 2
         if not len(rollout):
+            journal.unlink(missing_ok=True)
             return status
         try:
             log = rollout.save(log)
         except LogError as error:
             log, status = _saved_elsewhere(rollout, log, error), 2
+        journal.unlink(missing_ok=True)
     tell(rollout, log, stopwatch)
     if screen is not None:
         screen.finish(rollout)
@@ -198,7 +202,8 @@ def _run_with_progress(
     experiment: Experiment,
     stopwatch: Stopwatch,
     interrupts: DeferredInterrupt,
-    on_row: Callable[[Recorder], None] | None = None,
+    journal: Path,
+    on_row: Callable[[LogWriter], None] | None = None,
 ) -> Rollout:
     with Progress(
         TextColumn("{task.description}"),
@@ -216,7 +221,7 @@ def _run_with_progress(
             stopwatch.lap()
             progress.update(bar, completed=done)
 
-        return experiment.run(show, on_row)
+        return experiment.run(show, on_row, journal)
 
 
 def _describe(robot: Robot) -> None:

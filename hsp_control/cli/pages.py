@@ -12,12 +12,11 @@ from hsp_control.config import Experiment
 from hsp_control.config.loaded_scenario import LoadedScenario
 from hsp_control.config.view_settings import ViewSettings
 from hsp_control.simulation import Rollout
-from hsp_control.simulation.recorder import Recorder
-from hsp_control.visualization.viewer import LiveView, Viewer, browser, view_logs
+from hsp_control.simulation.log_writer import LogWriter
+from hsp_control.visualization.viewer import LiveView, Viewer, transport, view_logs
 from hsp_control.visualization.viewer.commands import set_caption, set_status
-from hsp_control.visualization.viewer.server import Server
 from hsp_control.visualization.viewer.stage import draw_background
-from hsp_control.visualization.viewer.transport import Transport
+from hsp_control.visualization.viewer.transport import PageServer, SceneRecorder
 
 
 class OpeningPage:
@@ -46,7 +45,7 @@ class OpeningPage:
         self._done = True
         self._announce(self._url)
         if self._browser:
-            self.opened = browser.open_browser(self._url)
+            self.opened = transport.open_browser(self._url)
 
     def ready(self) -> None:
         """Open the page, if it is not open; from now on it says nothing of kernels."""
@@ -79,12 +78,12 @@ class OpeningPage:
             raise
 
 
-def status_line(transport: Transport) -> Callable[[str], object]:
+def status_line(transport: SceneRecorder) -> Callable[[str], object]:
     """Return what sets the status line of the pages of a transport."""
     return lambda text: transport.send([set_status(text)])
 
 
-def draw_empty(transport: Transport, title: str) -> None:
+def draw_empty(transport: SceneRecorder, title: str) -> None:
     """Show a title on an empty stage, before the robot is loaded."""
     transport.send([*draw_background(ViewSettings()), set_caption(title, [])])
 
@@ -146,7 +145,7 @@ class Screen:
         self._page.open()
         return True
 
-    def on_row(self, recorder: Recorder) -> None:
+    def on_row(self, recorder: LogWriter) -> None:
         """Show the rows computed so far."""
         if self._live is not None:
             self._live.on_row(recorder)
@@ -165,7 +164,7 @@ def _say_without(error: ViewerError) -> None:
 def show_logs(options: argparse.Namespace) -> None:
     """Play logs until the user closes the view."""
     with ExitStack() as stack:
-        server = stack.enter_context(closing(Server(options.port)))
+        server = stack.enter_context(closing(PageServer(options.port)))
         draw_empty(server, ", ".join(log.stem for log in options.logs))
         page = OpeningPage(
             server.url,

@@ -16,14 +16,14 @@ from hsp_control.play import Picture, Session
 from hsp_control.play import play as play_in_real_time
 from hsp_control.play.playable import playable_document
 from hsp_control.visualization.viewer import Viewer
-from hsp_control.visualization.viewer.server import Server
+from hsp_control.visualization.viewer.transport import PageServer
 
 
 def play(options: argparse.Namespace) -> int:
     """Serve the page until Ctrl-C, and save the log at the end."""
     options.out.mkdir(parents=True, exist_ok=True)  # fails before the play, not after
     with ExitStack() as stack:
-        server = Server(options.port, host=options.host, steerable=True)
+        server = PageServer(options.port, host=options.host, steerable=True)
         stack.callback(server.close)
         draw_empty(server, str(options.config))
         page = OpeningPage(

@@ -19,14 +19,16 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HardwareError, HspControlError
 from hsp_control.config import Experiment, load_experiment
 from hsp_control.config.streams import without_sources
+from hsp_control.control.measurement import LogChannel
 from hsp_control.control.output import ControlOutput
 from hsp_control.live.link import Faults, Kind, Link
-from hsp_control.live.live_log import LiveLog, Row, live_channels
+from hsp_control.live.live_log import DueRows, live_channels
 from hsp_control.live.settings import LiveSettings
 from hsp_control.live.simulated_robot import SimulatedRobot
 from hsp_control.live.udp import CLOSED_BY_LOOP, SensorLayout, UdpHardware, serve
 from hsp_control.robot import RobotState
 from hsp_control.simulation.limit_excess import LimitExcess
+from hsp_control.simulation.log_writer import LogWriter
 from hsp_control.simulation.plants import differing_bodies
 
 
@@ -233,8 +235,7 @@ class _RobotLog:
         self, experiment: Experiment, robot: SimulatedRobot, settings: dict[str, Any]
     ) -> None:
         self._controller, self._robot = experiment.controller, robot
-        self._every = settings["log_period"]
-        self._next, self._phase = -np.inf, robot.phase
+        self._due = DueRows(settings["log_period"])
         self._state = RobotState(experiment.robot)
         self._excess = LimitExcess(experiment.robot)
         meta = {
@@ -246,20 +247,22 @@ class _RobotLog:
             "config": settings["config"],
         }
         path = Path(settings["log"])
-        self.log = LiveLog(path, experiment.controller, experiment.scene, meta)
-        self.log.warm_up(self._row(0.0, robot.q, robot.v))
+        scene = experiment.scene
+        self.log = LogWriter(experiment.controller, scene, 0, path=path, meta=meta)
+        self.log.warm_up(*self._row(0.0, robot.q, robot.v))
 
     def row(self, t: float, q: Array, v: Array, last: bool) -> None:
         """Write the row of a period, if one is due."""
         robot = self._robot
         self._excess.see(self._controller.limits, q, v)
-        if t < self._next and robot.phase == self._phase and not last:
-            return
-        self._next = (np.floor(t / self._every + 1e-6) + 1.0 - 1e-6) * self._every
-        self._phase = robot.phase
-        self.log.add(self._row(t, q, v))
+        if self._due.is_due(t, robot.phase, last=last):
+            self.log.record(*self._row(t, q, v))
+            self._due.written(t, robot.phase)
 
-    def _row(self, t: float, q: Array, v: Array) -> Row:
+    def _row(
+        self, t: float, q: Array, v: Array
+    ) -> tuple[RobotState, ControlOutput | None, Array, dict[str, LogChannel]]:
+        """Return the arguments of `LogWriter.record`."""
         robot, state = self._robot, self._state.update(t, q, v)
         output: ControlOutput | None = None
         with suppress(HspControlError):  # then its columns are empty
@@ -269,7 +272,7 @@ class _RobotLog:
             **robot.plant.log_channels(t, q, v, robot.tau),
             **self._excess.take(self._controller.limits),
         }
-        return Row(state, output, robot.tau, log_channels)
+        return state, output, robot.tau, log_channels
 
 
 def _warm_up(robot: SimulatedRobot, experiment: Experiment) -> None:

@@ -27,14 +27,17 @@ from hsp_control.config.streams import without_sources
 from hsp_control.control.controller import Controller
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.live import OperatorRequests
-from hsp_control.play.channel import Channel, channel_pair
-from hsp_control.play.dead_mans_key import DeadMansKey
 from hsp_control.play.handles import Handles
-from hsp_control.play.mirror import Mirror
+from hsp_control.play.live_loop import (
+    Channel,
+    DeadMansKey,
+    Mirror,
+    SteeredLoop,
+    channel_pair,
+)
 from hsp_control.play.picture import FRAME, Picture
-from hsp_control.play.steered_loop import SteeredLoop
 from hsp_control.visualization.viewer import Viewer
-from hsp_control.visualization.viewer.server import Server
+from hsp_control.visualization.viewer.transport import PageServer
 
 START = 60.0
 """Time in which the page's process must say its address [s]."""
@@ -220,7 +223,7 @@ def main() -> int:
 
 
 def _run(settings: dict[str, Any]) -> None:
-    server = Server(settings["port"], host=settings["host"], steerable=True)
+    server = PageServer(settings["port"], host=settings["host"], steerable=True)
     try:
         print(server.url, flush=True)
         draw_empty(server, "")
@@ -249,13 +252,13 @@ def _run(settings: dict[str, Any]) -> None:
         server.close()
 
 
-def _drawn(loaded: LoadedScenario, server: Server) -> Viewer:
+def _drawn(loaded: LoadedScenario, server: PageServer) -> Viewer:
     viewer = Viewer(loaded.robot, transport=server, **loaded.scenario.view.all_fields())
     draw_before(viewer, loaded)
     return viewer
 
 
-def _show(mirror: Mirror, picture: Picture, server: Server) -> None:
+def _show(mirror: Mirror, picture: Picture, server: PageServer) -> None:
     due = marked = monotonic()
     marked_at, rate, ended = mirror.t, 0.0, False
     while not ended:

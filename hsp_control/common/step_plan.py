@@ -1,4 +1,11 @@
-"""Step plans: the calls of a step, decided once, that know where to read and write."""
+"""Step plans: the calls of a step, decided once, that know where to read and write.
+
+A part says its mathematics as a kernel with its arguments, a `KernelCall`. An argument
+may be something that has to be brought up to date first: the kinematics of a frame, a
+trajectory, what another kernel writes. Its method ``supplied`` returns what the kernel
+reads, and the calls that write it: those of the time, and those that read the state.
+`planned` makes a step plan of it all.
+"""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import groupby
@@ -6,7 +13,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hsp_control.common.native import FOREVER, NativeCall, Timed, are_native, sequence
+from hsp_control.common.kernels import KernelCall
+from hsp_control.common.native import (
+    FOREVER,
+    NativeCall,
+    Timed,
+    are_native,
+    bind,
+    sequence,
+)
 
 
 def stay(t: float) -> None:
@@ -19,7 +34,60 @@ class StepPlan(NamedTuple):
     # calls of the time [s] that update references
     follow: tuple[Callable[[float], object], ...] = ()
     # calls without arguments that read the state and write the results
-    write: tuple[Callable[[], object], ...] = ()
+    write: tuple[Callable[[], Any], ...] = ()
+
+    def run(self, t: float) -> Any:
+        """Make the calls at a time [s]; return what the last one returns."""
+        value = None
+        for follow in self.follow:
+            follow(t)
+        for write in self.write:
+            value = write()
+        return value
+
+
+class KernelOutput:
+    """An argument of a kernel: what another kernel writes into its last argument."""
+
+    def __init__(self, call: KernelCall, out: Any) -> None:
+        self._call, self._out = call, out
+
+    def supplied(self) -> tuple[Any, ...]:
+        """Return the output, and the calls that write it."""
+        return self._out, *planned(self._call, self._out)
+
+
+def planned(call: KernelCall, *others: Any) -> StepPlan:
+    """Return the plan of a kernel's call, with further arguments after its own."""
+    function, arguments = call
+    given, follow, write = _supplied(arguments)
+    return StepPlan(follow, (*write, bind(function, *given, *others)))
+
+
+def _supplied(argument: Any) -> tuple[Any, tuple[Any, ...], tuple[Any, ...]]:
+    """Return an argument as a kernel reads it, and the calls that write it."""
+    if hasattr(argument, "supplied"):
+        found: tuple[Any, tuple[Any, ...], tuple[Any, ...]] = argument.supplied()
+        return found
+    if type(argument) is not tuple:
+        return argument, (), ()
+    parts = [_supplied(each) for each in argument]
+    follow = tuple(call for _, calls, _ in parts for call in calls)
+    write = tuple(call for _, _, calls in parts for call in calls)
+    return tuple(value for value, _, _ in parts), follow, write
+
+
+def says(part: object, *ways: str) -> str:
+    """Return by which of several methods a part's class says its mathematics.
+
+    It is the one of the most derived class, so that whoever derives from a part of the
+    package may override any of them; the first, if one class has several.
+    """
+    for each in type(part).__mro__:
+        for way in ways:
+            if way in vars(each):
+                return way
+    raise AttributeError(f"{type(part).__name__} has none of {', '.join(ways)}")
 
 
 class CallSequence:

@@ -47,8 +47,8 @@ from hsp_control.robot.description.robot_description import RobotDescription
 from hsp_control.robot.integrators import Integrator
 from hsp_control.simulation import Rollout, simulate
 from hsp_control.simulation.initial_state import InitialState
+from hsp_control.simulation.log_writer import LogWriter
 from hsp_control.simulation.plants import Plant, PlantPart, SampledPlant
-from hsp_control.simulation.recorder import Recorder
 from hsp_control.simulation.settings import SimulationSettings
 from hsp_control.simulation.simulate import check_steps
 from hsp_control.tasks import Task
@@ -296,7 +296,8 @@ class Experiment:
     def run(
         self,
         on_progress: Callable[[float], None] | None = None,
-        on_row: Callable[[Recorder], None] | None = None,
+        on_row: Callable[[LogWriter], None] | None = None,
+        log: str | Path | None = None,
     ) -> Rollout:
         """Simulate the experiment; see `simulate` for arguments and errors.
 
@@ -321,6 +322,7 @@ class Experiment:
             check_rate=False,  # checked when it was built, or not to be
             on_progress=on_progress,
             on_row=on_row,
+            log=log,
             meta={
                 "name": self.name,
                 "title": self.scenario.title,
@@ -418,12 +420,12 @@ def _named_obstacles(scene: Scene, parts: Any) -> tuple[Scene, Any]:
 
 
 def _in_real_time(
-    period: float, on_row: Callable[[Recorder], None] | None
-) -> Callable[[Recorder], None]:
+    period: float, on_row: Callable[[LogWriter], None] | None
+) -> Callable[[LogWriter], None]:
     """Return what keeps a simulation pace with the clock, called after every row."""
     rows, begin = count(), monotonic()
 
-    def wait(recorder: Recorder) -> None:
+    def wait(recorder: LogWriter) -> None:
         nonlocal begin
         if on_row is not None:
             on_row(recorder)

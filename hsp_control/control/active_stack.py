@@ -174,10 +174,9 @@ class ActiveStack:
         law = self.resolution.compile(state.v, controls=field.controls)
         return steps(plans, law)
 
-    @cached_property
-    def field_value(self) -> Callable[[], float]:
-        """The call that returns the field's value at the state; see `bind_value`."""
-        return self._field.bind_value(self._state)
+    def field_value(self) -> float:
+        """Return the field's value at the state."""
+        return self._field.value(self._state)
 
     def flow(self) -> Array:
         """Return J# x_d' + P g, shape (nv,), where it was resolved, at rest."""
@@ -206,6 +205,7 @@ class ActiveStack:
                     "does its trajectory return NaN or infinity there?"
                 )
         if not all(np.isfinite(array).all() for array in problem.field):
+            self._field.value(state)  # may say what is wrong
             raise NonFiniteError(
                 f"field {self._field.name!r} is not finite at t = {state.t:.6g} s"
             )

@@ -1,17 +1,15 @@
-"""The log of a live loop: rows are written to a journal while the loop runs."""
+"""The log of a live loop: which rows are due, and what stands in them."""
 
 from collections.abc import Mapping
 from math import floor, inf, nan
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.control.controller import Controller
 from hsp_control.control.measurement import LogChannel
 from hsp_control.control.output import ControlOutput
-from hsp_control.control.plan import RunningPlan
 from hsp_control.geometry.scene import Scene
 from hsp_control.live.effort_limiter import EffortLimiter
 from hsp_control.live.report import LoopReport
@@ -19,11 +17,10 @@ from hsp_control.live.safe_stop import Phase
 from hsp_control.live.state_reader import StateReader
 from hsp_control.robot import RobotState
 from hsp_control.simulation.control_chain import ControlChain, EffortSource
-from hsp_control.simulation.journal import JournalWriter
 from hsp_control.simulation.limit_excess import LimitExcess
-from hsp_control.simulation.recorder import Recorder
+from hsp_control.simulation.log_writer import LogWriter
 
-CHANNEL_INFO = {
+_CHANNELS = {
     "phase": ("-", "0 waiting; 1 running; 2 safe stop, damping; 3 safe stop, hold"),
     "sent": ("N·m or N", "sent to the robot: tau, or tau - g(q)"),
     "applied": ("N·m or N", "what the robot had of it before, if it says so"),
@@ -33,93 +30,54 @@ CHANNEL_INFO = {
 }
 
 
-class Row(NamedTuple):
-    """One row of the log; see `Recorder.record`."""
+def live_channels(**values: Array | float) -> dict[str, LogChannel]:
+    """Return what a live loop logs, by the names of its columns."""
+    return {
+        f"live.{name}": LogChannel(value, *_CHANNELS[name])
+        for name, value in values.items()
+    }
 
-    state: RobotState  # the state
-    output: ControlOutput | None  # the controller's output for it, or None
-    tau: Array  # the effort of the motors, shape (nv,)
-    log_channels: Mapping[str, LogChannel]  # further values to log, by name
 
+class DueRows:
+    """When rows of a log are due: on a grid of times, and where the phase changes."""
 
-class LiveLog:
-    """Writes rows to a journal; each is passed to the operating system at once."""
+    def __init__(self, period: float) -> None:
+        self._period, self._next, self._last = period, -inf, -inf
+        self._phase = -1
 
-    def __init__(
-        self,
-        path: Path,
-        controller: Controller,
-        scene: Scene | None = None,
-        meta: Mapping[str, Any] | None = None,
-    ) -> None:
-        self.path = path  # the journal
-        self._recorder = Recorder(controller, scene or Scene(), 1)
-        self._meta = dict(meta or {})
-        self._last_t = -inf
-        self._journal = JournalWriter(path)
+    def is_due(self, t: float, phase: int, *, last: bool = False) -> bool:
+        """Return whether a row is due at a time [s]; if ``last``, any later one is."""
+        on_grid = t >= self._next or phase != self._phase
+        return (on_grid or last) and t > self._last
 
-    def warm_up(self, row: Row) -> None:
-        """Record a row without writing it: compiles kernels and writes the heading."""
-        try:
-            self._recorder.record(*row)
-        finally:
-            self._recorder.clear()
-        self._head()
-
-    def follow(self, plan: RunningPlan | None) -> None:
-        """Set the plan of the run that begins; its streams are recorded."""
-        self._recorder.plan = plan
-
-    def add(self, row: Row) -> None:
-        """Write a row if it is later than the last one."""
-        if not row.state.t > self._last_t:
-            return
-        try:
-            self._recorder.record(*row)
-            columns = self._recorder.rows(0)
-            if not self._journal.describes(columns):
-                self._head()
-            self._journal.write_row(columns)
-            self._last_t = row.state.t
-        finally:
-            self._recorder.clear()
-
-    def end(self, status: str, message: str, **meta: Any) -> None:
-        """Write how the run ended, and close the file."""
-        try:
-            came = self._recorder.repeatable()
-            self._journal.write_end(status, message, **came, **meta)
-        except Exception:  # after Ctrl-C it may be called again
-            self._journal.close()
-            raise
-        self._journal.close()
-
-    def _head(self) -> None:
-        meta = self._recorder.meta("running", "", **self._meta)
-        self._journal.write_heading(self._recorder.rows(0), meta)
+    def written(self, t: float, phase: int) -> None:
+        """Note that a row was written."""
+        periods = floor(t / self._period + 1e-6) + 1
+        self._next, self._last = (periods - 1e-6) * self._period, t
+        self._phase = phase
 
 
 class LoopLog:
-    """Selects what a loop logs: rows on a time grid, and each change of the phase."""
+    """The log of a loop: selects its rows, and writes them at once."""
 
     def __init__(
         self,
         path: str | Path | None,
         period: float,
         chain: ControlChain[EffortSource],
-        scene: Scene | None,
+        scene: Scene,
         meta: Mapping[str, Any],
     ) -> None:
-        self._chain, self._period = chain, period
-        self._log: LiveLog | None = None
-        self._next, self._phase = -inf, Phase.WAITING
+        self._chain, self._due = chain, DueRows(period)
         self._failed = False
-        self._excess = LimitExcess(chain.command.controller.robot)
+        controller = chain.command.controller
+        self._excess = LimitExcess(controller.robot)
         self.path = None if path is None else Path(path)
         # whether the controller has raised; it is not called again
         self.controller_failed = False
+        self._log: LogWriter | None = None
         if self.path is not None:
-            self._log = LiveLog(self.path, chain.command.controller, scene, meta)
+            self._log = LogWriter(controller, scene, 0, path=self.path, meta=meta)
 
     def row(
         self,
@@ -139,48 +97,24 @@ class LoopLog:
             self._excess.see(limits, measurement.q, measurement.v)
         if measurement is None and phase == Phase.RUNNING:
             return  # no measurement, so no effort was computed
-        if state.t < self._next and phase == self._phase and not last:
+        if not self._due.is_due(state.t, phase, last=last):
             return
         try:
-            self._log.add(self._row(phase, reader, limiter, response))
+            self._log.record(*self._row(phase, reader, limiter, response))
         except Exception:  # after Ctrl-C the row is written again
             self._failed = True
             raise
-        periods = floor(state.t / self._period + 1e-6) + 1
-        self._next, self._phase = (periods - 1e-6) * self._period, phase
+        self._due.written(state.t, phase)
 
     def warm_up(self, reader: StateReader, limiter: EffortLimiter) -> None:
-        """Record a row without writing it, so that later rows compile nothing."""
+        """Make a row without writing it, so that later rows compile nothing."""
         if self._log is not None:
-            self._log.warm_up(self._row(Phase.RUNNING, reader, limiter, 0.0))
+            self._log.warm_up(*self._row(Phase.RUNNING, reader, limiter, 0.0))
 
     def begin(self) -> None:
         """Begin to log a run; the chain has begun, too."""
         if self._log is not None:
-            self._log.follow(self._chain.plan)
-
-    def _row(
-        self, phase: Phase, reader: StateReader, limiter: EffortLimiter, response: float
-    ) -> Row:
-        measurement, state = reader.measurement, reader.state
-        applied = None if measurement is None else measurement.applied
-        unknown = np.full(limiter.sent.shape, nan)
-        log_channels = live_channels(
-            phase=float(phase),
-            sent=limiter.sent,
-            applied=unknown if applied is None else applied,
-            measured=float(measurement is not None),
-            age=nan if measurement is None else measurement.age,
-            response=response,
-        )
-        if phase == Phase.RUNNING and not self.controller_failed:
-            log_channels = {
-                **self._chain.log_channels(state.q, state.v),
-                **log_channels,
-            }
-        limits = self._chain.command.controller.limits
-        log_channels |= self._excess.take(limits)
-        return Row(state, self._output(phase, state), limiter.applied, log_channels)
+            self._log.plan = self._chain.plan
 
     def end(self, report: LoopReport) -> None:
         """Write how the loop ended, and close the journal, if there is one."""
@@ -201,6 +135,28 @@ class LoopLog:
         }
         self._log.end(report.status, report.reason, live=summary)
 
+    def _row(
+        self, phase: Phase, reader: StateReader, limiter: EffortLimiter, response: float
+    ) -> tuple[RobotState, ControlOutput | None, Array, Mapping[str, LogChannel]]:
+        """Return the arguments of `LogWriter.record`."""
+        measurement, state = reader.measurement, reader.state
+        applied = None if measurement is None else measurement.applied
+        unknown = np.full(limiter.sent.shape, nan)
+        log_channels = live_channels(
+            phase=float(phase),
+            sent=limiter.sent,
+            applied=unknown if applied is None else applied,
+            measured=float(measurement is not None),
+            age=nan if measurement is None else measurement.age,
+            response=response,
+        )
+        if phase == Phase.RUNNING and not self.controller_failed:
+            own = self._chain.log_channels(state.q, state.v)
+            log_channels = {**own, **log_channels}
+        limits = self._chain.command.controller.limits
+        log_channels |= self._excess.take(limits)
+        return state, self._output(phase, state), limiter.applied, log_channels
+
     def _output(self, phase: Phase, state: RobotState) -> ControlOutput | None:
         """Return the controller's output, also during the safe stop, if possible."""
         if self.controller_failed:
@@ -212,11 +168,3 @@ class LoopLog:
         except Exception:  # its effort is not used any more: log without it
             self.controller_failed = True
             return None
-
-
-def live_channels(**values: Array | float) -> dict[str, LogChannel]:
-    """Return log channels; the names are the keys of `CHANNEL_INFO`."""
-    return {
-        f"live.{name}": LogChannel(value, *CHANNEL_INFO[name])
-        for name, value in values.items()
-    }

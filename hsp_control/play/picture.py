@@ -10,29 +10,28 @@ from hsp_control.common.arrays import Array
 from hsp_control.null_space.fields import FieldSum, NullSpaceField, Rest
 from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.fields.weight import sample_weight
-from hsp_control.play.mirror import Mirror
+from hsp_control.play.live_loop import Mirror
 from hsp_control.play.session import Session
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.log_series import distance_label
 from hsp_control.simulation.unreached import unreached
 from hsp_control.visualization.palette import SERIES
 from hsp_control.visualization.viewer import Viewer
-from hsp_control.visualization.viewer.appearance import CHALK, INK
+from hsp_control.visualization.viewer.clearances import capsules, distances, influence
 from hsp_control.visualization.viewer.commands import (
-    Command,
+    PageCommand,
     delete,
     path_element,
     play_command,
     typed_array,
 )
-from hsp_control.visualization.viewer.measured_links import (
-    Capsules,
-    Distances,
-    Influence,
+from hsp_control.visualization.viewer.motion import Layer, RunMotion
+from hsp_control.visualization.viewer.obstacles import logged_shapes
+from hsp_control.visualization.viewer.run_drawing import (
+    RunDrawing,
+    all_layers,
+    line_color,
 )
-from hsp_control.visualization.viewer.motion import Motion
-from hsp_control.visualization.viewer.obstacle_layer import ObstacleLayer
-from hsp_control.visualization.viewer.run_drawing import Layer, RunDrawing, all_layers
 
 FRAME = 1.0 / 30.0  # time between two pictures [s]
 _FIELD_LAYERS = ("influence", "distances", "capsules")
@@ -88,7 +87,7 @@ class Picture:
         self._plots = list(_plots(session))
         viewer.transport.send([self._setup(title), *self.frame(running=True, rate=1.0)])
 
-    def _layers(self, motion: Motion) -> dict[str, Layer]:
+    def _layers(self, motion: RunMotion) -> dict[str, Layer]:
         """Return the layers of the present instant, those of the present field too."""
         robot, controller = self._session.experiment.robot, self._session.controller
         dark = self._viewer.dark
@@ -97,20 +96,18 @@ class Picture:
         drawn = {task.name for task in controller.tasks if task.drawn}
         if set(self._session.handles.targets) >= drawn:
             del layers["targets"]  # the handles are there
-        obstacles = layers["obstacles"]
-        assert isinstance(obstacles, ObstacleLayer)
-        ink = CHALK if dark else INK
+        shown, ink = logged_shapes(motion.rows), line_color(dark=dark)
         acting = FieldSum(self._acting) if self._acting else Rest()
-        layers["influence"] = Influence(acting, obstacles.shapes, "/influence")
-        layers["distances"] = Distances(controller, "/distances", ink)
-        layers["capsules"] = Capsules(controller, "/capsules")
+        layers["influence"] = influence(acting, shown, "/influence")
+        layers["distances"] = distances(controller, "/distances", ink)
+        layers["capsules"] = capsules(controller, "/capsules")
         return layers
 
     def draw(self, *, running: bool, rate: float) -> None:
         """Send a picture of the present instant."""
         self._viewer.transport.send(self.frame(running=running, rate=rate))
 
-    def frame(self, *, running: bool, rate: float) -> list[Command]:
+    def frame(self, *, running: bool, rate: float) -> list[PageCommand]:
         """Return the commands of a picture; see `draw`."""
         session, handles = self._session, self._session.handles
         changed, samples = list(self._changed_field()), list(self._samples())
@@ -147,7 +144,7 @@ class Picture:
             if term.controls and sample_weight(term.weight, controller.state)[0] > 0.0
         )
 
-    def _changed_field(self) -> Iterator[Command]:
+    def _changed_field(self) -> Iterator[PageCommand]:
         """Draw the field's layers again, if the field or what acts of it is another."""
         field, acting = self._session.controller.field, self._acting_terms()
         same = len(acting) == len(self._acting) and all(
@@ -163,13 +160,13 @@ class Picture:
             self._run.layers[name] = layers[name]
             yield from self._run.draw_layer(name, self._size)
 
-    def _motion(self) -> Motion:
+    def _motion(self) -> RunMotion:
         """Return the present row as a log."""
         recorder = self._session.recorder
         columns = recorder.rows(recorder.count - 1)
-        return Motion(self._session.experiment.robot, Rollout(columns, self._meta))
+        return RunMotion(self._session.experiment.robot, Rollout(columns, self._meta))
 
-    def _setup(self, title: str) -> Command:
+    def _setup(self, title: str) -> PageCommand:
         session, state = self._session, self._session.controller.state
         obstacles = [
             {**grip.describe(state), "path": f"/obstacles/{path_element(name)}"}
@@ -203,7 +200,7 @@ class Picture:
             period_ms=1e3 * session.period,
         )
 
-    def _force(self) -> Command:
+    def _force(self) -> PageCommand:
         pull = self._session.pull()
         if pull is None:
             zero = [0.0, 0.0, 0.0]
@@ -217,7 +214,7 @@ class Picture:
             **{"from": point.tolist(), "to": hand.tolist()},
         )  # fmt: skip
 
-    def _samples(self) -> Iterator[Command]:
+    def _samples(self) -> Iterator[PageCommand]:
         """Yield the rows of the plots since the last picture."""
         recorder = self._session.recorder
         if recorder.count <= self._sent:

@@ -20,10 +20,10 @@ from hsp_control.play.operational_space import ComparedCommand
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.control_chain import ControlChain
+from hsp_control.simulation.log_writer import LogWriter
 from hsp_control.simulation.loops import Instant, sampled_loop
 from hsp_control.simulation.plants import Plant
 from hsp_control.simulation.plants.push import Pushes, Spring
-from hsp_control.simulation.recorder import Recorder
 from hsp_control.visualization.viewer.commands import path_element
 
 ROW = 0.01
@@ -79,7 +79,7 @@ class Session:
             experiment.q0, experiment.v0,
         )  # fmt: skip
         scene = self.controller.scene
-        self.recorder = Recorder(self.controller, scene, rows, chain.plan)
+        self.recorder = LogWriter(self.controller, scene, rows, chain.plan)
         self.over = ""
         self._step()
         self.handles = Handles(self.controller, self.period)
@@ -199,7 +199,7 @@ class Session:
         )
 
     def _rows(self) -> int:
-        probe = Recorder(self.controller, self.controller.scene, 1)
+        probe = LogWriter(self.controller, self.controller.scene, 1)
         size = sum(8 * int(np.prod(a.shape[1:])) for a in probe.rows(0).values())
         return int(min(LONGEST / self.row, LARGEST_LOG / size)) + 1
 

@@ -1,7 +1,8 @@
 """Placements of joints and frames, and of the mass: Jacobians, exact rates, drift."""
 
 from collections.abc import Callable
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -110,6 +111,10 @@ class FrameKinematics:
             frame_kinematics, stamp, np.array([-1]), carrier, v, motion, self.drift
         )
 
+    def supplied(self) -> tuple[Any, ...]:
+        """Return the motion as an argument of a kernel; see `planned`."""
+        return self.motion, (), (self.compute,)
+
 
 @kernel
 def frame_kinematics(
@@ -176,14 +181,50 @@ def frame_kinematics(
             drift[i] += J_dot[i, j] * v[j]
 
 
-def mass_matrix_difference(model: pin.Model, q: Array, v: Array) -> Array:
-    """Return M' along v (nv, nv) by differences, for robots with mimic joints."""
-    data, h = model.createData(), 1e-3 / max(1.0, float(np.abs(v).max()))
+class Term(NamedTuple):
+    """An array of a state, and the call that brings it up to date."""
+
+    value: Array
+    compute: Callable[[], object]
+
+    def supplied(self) -> tuple[Any, ...]:
+        """Return the array as an argument of a kernel; see `planned`."""
+        return self.value, (), (self.compute,)
+
+
+def inertia_terms(
+    model: pin.Model, data: pin.Data, q: Array, v: Array, stamp: Indices
+) -> tuple[Term, Term]:
+    """Return M (CRBA) and M' = C + Cᵀ along v, shape (nv, nv) each."""
+    M = Term(matrix_view(data.M), once([bind_pinocchio("crba", model, data, q)], stamp))
+    M_dot = np.zeros((model.nv, model.nv))
+    calls: list[Callable[[], object]]
+    if model.mimicking_joints:  # Pinocchio has no C of such a model
+        calls = [partial(_write_difference, model, model.createData(), q, v, M_dot)]
+    else:
+        coriolis = bind_pinocchio("coriolis", model, data, q, v)
+        calls = [coriolis, bind(_write_sum, matrix_view(data.C), M_dot)]
+    return M, Term(M_dot, once(calls, stamp))
+
+
+@kernel
+def _write_sum(C: Array, M_dot: Array) -> None:
+    """Write C + Cᵀ."""
+    for i in range(C.shape[0]):
+        for j in range(C.shape[0]):
+            M_dot[i, j] = C[i, j] + C[j, i]
+
+
+def _write_difference(
+    model: pin.Model, data: pin.Data, q: Array, v: Array, M_dot: Array
+) -> None:
+    """Write M' along v by differences."""
+    h = 1e-3 / max(1.0, float(np.abs(v).max()))
 
     def M(s: float) -> Array:
         return np.array(pin.crba(model, data, pin.integrate(model, q, s * v)))
 
-    return (8.0 * (M(h) - M(-h)) - (M(2.0 * h) - M(-2.0 * h))) / (12.0 * h)
+    M_dot[:] = (8.0 * (M(h) - M(-h)) - (M(2.0 * h) - M(-2.0 * h))) / (12.0 * h)
 
 
 def joint_support(model: pin.Model, joint: int) -> tuple[Indices, Indices]:
@@ -217,6 +258,15 @@ def joint_placements(data: pin.Data) -> Array:
     return np.lib.stride_tricks.as_strided(
         first.T.reshape(9), (len(turns), 12), (strides.pop() if strides else 96, 8)
     )
+
+
+class PointMotion(NamedTuple):
+    """The part of a `FrameMotion` that a point without axes has."""
+
+    jacobian: Array
+    jacobian_dot: Array
+    position: Array
+    velocity: Array
 
 
 class CentroidalMotion:
@@ -261,6 +311,12 @@ class CentroidalMotion:
             self.momentum_matrix_dot,
         )
         self.compute: Callable[[], object] = once([momentum, extract], stamp)
+
+    def supplied(self) -> tuple[Any, ...]:
+        """Return the centre's motion as an argument of a kernel; see `planned`."""
+        J, J_dot = self.jacobian, self.jacobian_dot
+        center = PointMotion(J, J_dot, self.position, self.velocity)
+        return center, (), (self.compute,)
 
 
 @kernel

@@ -40,8 +40,8 @@ from hsp_control.robot.kinematics import (
     CentroidalMotion,
     FrameKinematics,
     WorldKinematics,
+    inertia_terms,
     joint_placements,
-    mass_matrix_difference,
 )
 from hsp_control.robot.model import RobotModel
 from hsp_control.robot.motion import REFUSED, copy_valid
@@ -300,8 +300,8 @@ class RobotState:
         q: Configuration, shape (nq,).
         v: Velocity, shape (nv,).
         stamp_array: `stamp` as an array of shape (1,), for kernels.
-        compute_mass_matrix: Updates `mass_matrix`, if it is not up to date.
-        compute_coriolis_matrix: Updates `coriolis_matrix`, if it is not up to date.
+        inertia: M(q) as an argument of kernels; see `mass_matrix`.
+        inertia_rate: M' as an argument of kernels; see `mass_matrix_rate`.
         effort: What `inverse_dynamics` wrote last, shape (nv,) [N·m or N].
         data: Pinocchio's data at (q, v), for terms that this class does not offer.
     """
@@ -326,16 +326,12 @@ class RobotState:
         self._frames: dict[str, FrameKinematics] = {}
         self.stamp_array: Indices = np.zeros(1, dtype=np.int64)
         model, stamp = robot.model, self.stamp_array
-        mass_matrix = bind_pinocchio("crba", model, self.data, self.q)
-        coriolis = bind_pinocchio("coriolis", model, self.data, self.q, self.v)
-        self.compute_mass_matrix = once([mass_matrix], stamp)
-        self.compute_coriolis_matrix = once([coriolis], stamp)
-        self._mass_matrix = matrix_view(self.data.M)
-        effects = partial(pin.nonLinearEffects, model, self.data, self.q, self.v)
+        self.inertia, self.inertia_rate = inertia_terms(
+            model, self.data, *self._memory, stamp
+        )
+        effects = partial(pin.nonLinearEffects, model, self.data, *self._memory)
         self._compute_effects = once([effects], stamp)
-        self._mass_matrix_rate_stamp = -1
         self._centroidal: CentroidalMotion | None = None
-        self._mass_matrix_rate: Array = np.zeros((robot.nv, robot.nv))
         self._displaced: RobotState | None = None
         self._made: dict[tuple[int, str], tuple[object, Any]] = {}
         self._move = self.bind_move()
@@ -438,27 +434,14 @@ class RobotState:
     @property
     def mass_matrix(self) -> Array:
         """M(q), shape (nv, nv) (CRBA)."""
-        self.compute_mass_matrix()
-        return self._mass_matrix
-
-    @property
-    def coriolis_matrix(self) -> Array:
-        """C(q, v), where C v are Coriolis and centrifugal efforts, shape (nv, nv)."""
-        self.compute_coriolis_matrix()
-        return matrix_view(self.data.C)
+        self.inertia.compute()
+        return self.inertia.value
 
     @property
     def mass_matrix_rate(self) -> Array:
-        """M' = C + Cᵀ along v, shape (nv, nv)."""
-        if self._mass_matrix_rate_stamp != self.stamp:
-            if self.robot.mimics:
-                rate = mass_matrix_difference(self.robot.model, self.q, self.v)
-                self._mass_matrix_rate[:] = rate
-            else:
-                C = self.coriolis_matrix
-                np.add(C, C.T, out=self._mass_matrix_rate)
-            self._mass_matrix_rate_stamp = self.stamp
-        return self._mass_matrix_rate
+        """M' along v, shape (nv, nv)."""
+        self.inertia_rate.compute()
+        return self.inertia_rate.value
 
     @property
     def nonlinear_effects(self) -> Array:

@@ -1,16 +1,17 @@
-"""A log that is written row by row, so that no complete row is lost if a process dies.
+"""The journal of a log: rows appended as they come, so that a killed run loses none.
 
-An ``.npz`` is written only when a run is over. A journal is appended to. It is the line
-`MAGIC`, then frames, each of
+An ``.npz`` has all rows of a column in one place and its directory at the end, so it
+can only be written when a run is over. Until then the rows stand in a file to which
+is only appended: the line `MAGIC`, then frames, each of
 
     kind     1 byte: H a heading, R a row, E the end
     length   4 bytes, of the payload
     check    4 bytes, CRC-32 of kind and payload
     payload
 
-all little-endian. A heading is JSON: the log's meta data and the shape of every column.
-A new heading is written whenever columns are added or grow. A row is the columns'
-numbers in the order of the heading. The end is JSON: the status of the run and more.
+all little-endian. A heading is JSON: the log's meta data and the shape of every column;
+another one follows when columns are added or grow. A row is the columns' numbers in
+the order of the heading. The end is JSON: the status of the run and more.
 Each frame is one `write`. After that the operating system has it, and a killed process
 loses nothing that it wrote. Reading stops at the first incomplete frame.
 """
@@ -20,7 +21,7 @@ import math
 import os
 import struct
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -33,8 +34,11 @@ from hsp_control.common.exceptions import LogError
 MAGIC = b"hsp_control journal 1\n"
 KILLED = "the journal has no end: its writer was killed"
 
-FRAME = struct.Struct("<cII")
-HEADING, ROW, END = b"H", b"R", b"E"
+_FRAME = struct.Struct("<cII")
+_HEADING, _ROW, _END = b"H", b"R", b"E"
+
+Shapes = Mapping[str, tuple[int, ...]]
+"""The shape of each column in one row."""
 
 
 class JournalWriter:
@@ -43,7 +47,6 @@ class JournalWriter:
     def __init__(self, path: Path) -> None:
         """Begin a journal; an existing file is overwritten."""
         self.path = path  # the file
-        self._shapes: dict[str, tuple[int, ...]] = {}
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_APPEND
@@ -53,26 +56,17 @@ class JournalWriter:
         except OSError as error:
             raise self._failure(error) from error
 
-    def describes(self, columns: Mapping[str, Array]) -> bool:
-        """Return whether the last heading fits these columns, (rows, ...) each."""
-        return self._shapes == {name: a.shape[1:] for name, a in columns.items()}
-
-    def write_heading(
-        self, columns: Mapping[str, Array], meta: Mapping[str, Any]
-    ) -> None:
+    def write_heading(self, shapes: Shapes, meta: Mapping[str, Any]) -> None:
         """Write a heading for the next rows."""
-        shapes = {name: a.shape[1:] for name, a in columns.items()}
-        self._frame(HEADING, _json({"columns": shapes, "meta": meta}))
-        self._shapes = shapes  # only now: Ctrl-C may cut the heading short
+        self._frame(_HEADING, _json({"columns": shapes, "meta": meta}))
 
-    def write_row(self, columns: Mapping[str, Array]) -> None:
-        """Write the first row of columns that fit the last heading."""
-        row = np.concatenate([columns[name][0].ravel() for name in self._shapes])
-        self._frame(ROW, row.astype("<f8").tobytes())
+    def write_row(self, numbers: Array) -> None:
+        """Write a row, shape (n,): the numbers of all columns of the last heading."""
+        self._frame(_ROW, numbers.astype("<f8", copy=False).tobytes())
 
     def write_end(self, status: str, message: str, **meta: Any) -> None:
         """Write how the run ended, and meta data that replaces the heading's."""
-        self._frame(END, _json({"status": status, "message": message, **meta}))
+        self._frame(_END, _json({"status": status, "message": message, **meta}))
 
     def close(self) -> None:
         """Close the file; a second call does nothing."""
@@ -83,7 +77,7 @@ class JournalWriter:
     def _frame(self, kind: bytes, payload: bytes) -> None:
         """Write a frame, whole or not at all: what cuts it short takes it back."""
         check = zlib.crc32(payload, zlib.crc32(kind))
-        data = FRAME.pack(kind, len(payload), check) + payload
+        data = _FRAME.pack(kind, len(payload), check) + payload
         try:
             self._put(data)
             self._size += len(data)
@@ -103,154 +97,122 @@ class JournalWriter:
         return LogError(f"{self.path}: cannot write the journal: {reason}")
 
 
+class JournalReader:
+    """Reads a journal, also while it grows."""
+
+    def __init__(self, path: Path, most: int | None = None) -> None:
+        """Begin at the start; of all rows only the last ``most`` are kept, if given."""
+        self.path = path  # the journal
+        # the meta data of the last heading; those of the end once it is there
+        self.meta: dict[str, Any] = {}
+        self.count = 0  # the rows that were read
+        self.ended = False  # whether the writer has written its end
+        self._most, self._at = most, len(MAGIC)
+        self._parts: list[tuple[Shapes, list[Array]]] = []
+
+    def read(self) -> int:
+        """Read the frames that have come; return how many rows there are of them.
+
+        Raises:
+            LogError: If the file is no journal, or cannot be read.
+        """
+        before = self.count
+        for kind, payload in self._frames():
+            if kind == _HEADING:
+                heading = json.loads(payload)
+                self.meta = heading["meta"]
+                shapes = {n: tuple(s) for n, s in heading["columns"].items()}
+                self._parts.append((shapes, []))
+            elif kind == _ROW and self._parts:
+                self._parts[-1][1].append(np.frombuffer(payload, "<f8"))
+                self.count += 1
+                if self._most is not None:
+                    del self._parts[:-1], self._parts[-1][1][: -self._most]
+            elif kind == _END:
+                self.meta, self.ended = {**self.meta, **json.loads(payload)}, True
+        return self.count - before
+
+    def rows(self, first: int) -> dict[str, Array]:
+        """Return the columns from a row on, as far as they are kept."""
+        kept = sum(len(rows) for _, rows in self._parts)
+        return joined(self._parts, max(first - (self.count - kept), 0))
+
+    def _frames(self) -> Iterator[tuple[bytes, bytes]]:
+        """Yield kind and payload of every new frame before the first incomplete one."""
+        try:
+            with self.path.open("rb") as file:
+                if not MAGIC.startswith(file.read(len(MAGIC))):
+                    raise LogError(f"{self.path} is no journal")
+                file.seek(self._at)
+                data = file.read()
+        except FileNotFoundError:  # its writer has not begun
+            return
+        except OSError as error:
+            raise LogError(f"{self.path}: cannot be read: {error.strerror}") from error
+        at = 0
+        while at + _FRAME.size <= len(data):
+            kind, length, check = _FRAME.unpack_from(data, at)
+            payload = data[at + _FRAME.size : at + _FRAME.size + length]
+            if len(payload) < length or zlib.crc32(payload, zlib.crc32(kind)) != check:
+                return
+            at += _FRAME.size + length
+            self._at += _FRAME.size + length
+            yield kind, payload
+
+
 def is_journal(path: Path) -> bool:
     """Return whether a file is a journal, by its content, not by its name."""
     with path.open("rb") as file:
         return file.read(len(MAGIC)) == MAGIC
 
 
-def read_journal(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
-    """Return the columns and the meta data of a journal, up to an incomplete frame."""
-    meta: dict[str, Any] = {}
-    parts: list[_Part] = []
-    end: dict[str, Any] = {"status": "interrupted", "message": KILLED}
-    for kind, payload in _frames(path.read_bytes()):
-        if kind == HEADING:
-            heading = json.loads(payload)
-            meta = heading["meta"]
-            columns = heading["columns"]
-            parts.append(({name: tuple(shape) for name, shape in columns.items()}, []))
-        elif kind == ROW and parts:
-            parts[-1][1].append(np.frombuffer(payload, "<f8"))
-        elif kind == END:
-            end = json.loads(payload)
-    if not parts:
-        raise LogError(f"{path}: the journal ends before its first heading")
-    return _joined(parts), {**meta, **end}
+def width(shapes: Shapes) -> int:
+    """Return how many numbers a row has."""
+    return sum(map(math.prod, shapes.values()))
 
 
-_Part = tuple[dict[str, tuple[int, ...]], list[Array]]
-"""The shapes of a heading's columns, and its rows."""
+def views(block: Array, shapes: Shapes) -> dict[str, Array]:
+    """Return the columns of rows of numbers, shape (..., n), as views of them."""
+    found, at = {}, 0
+    for name, shape in shapes.items():
+        size = math.prod(shape)
+        part = block[..., at : at + size]
+        found[name] = part.reshape((*block.shape[:-1], *shape))
+        at += size
+    return found
 
 
-def _frames(data: bytes) -> Iterator[tuple[bytes, bytes]]:
-    """Yield kind and payload of every frame before the first incomplete one."""
-    at = len(MAGIC)
-    while (frame := frame_at(data, at)) is not None:
-        yield frame
-        at += FRAME.size + len(frame[1])
+def joined(
+    parts: Sequence[tuple[Shapes, Sequence[Array] | Array]], skip: int = 0
+) -> dict[str, Array]:
+    """Return the columns of rows that follow one another, without the first ones.
 
-
-def frame_at(data: bytes, at: int) -> tuple[bytes, bytes] | None:
-    """Return kind and payload of the frame at a place; None if it is incomplete."""
-    if at + FRAME.size > len(data):
-        return None
-    kind, length, check = FRAME.unpack_from(data, at)
-    payload = data[at + FRAME.size : at + FRAME.size + length]
-    if len(payload) < length or zlib.crc32(payload, zlib.crc32(kind)) != check:
-        return None
-    return kind, payload
-
-
-def _joined(parts: list[_Part]) -> dict[str, Array]:
-    """Return the columns of all parts."""
-    count = sum(len(rows) for _, rows in parts)
-    final: dict[str, tuple[int, ...]] = {}
-    for shapes, _ in [part for part in parts if part[1]] or parts[:1]:
-        for name, shape in shapes.items():
-            final[name] = tuple(map(max, final.get(name, shape), shape))
-    columns = {name: np.full((count, *shape), np.nan) for name, shape in final.items()}
+    Each part has its own columns; NaN is where it lacks a number. Of one part they are
+    views, if its rows are an array.
+    """
+    chosen = []
+    for k, (shapes, rows) in enumerate(parts):
+        if len(rows) > skip or k == len(parts) - 1:
+            block = np.asarray(rows[skip:]).reshape(-1, width(shapes))
+            chosen.append(views(block, shapes))
+        skip = max(skip - len(rows), 0)
+    if len(chosen) == 1:
+        return chosen[0]
+    largest: dict[str, tuple[int, ...]] = {}
+    for columns in chosen:
+        for name, values in columns.items():
+            shape = values.shape[1:]
+            largest[name] = tuple(map(max, largest.get(name, shape), shape))
+    counts = [len(next(iter(columns.values()))) for columns in chosen]
+    found = {n: np.full((sum(counts), *shape), np.nan) for n, shape in largest.items()}
     begin = 0
-    for shapes, rows in parts:
-        if not rows:
-            continue
-        end = begin + len(rows)
-        stacked = np.array(rows)
-        at = 0
-        for name, shape in shapes.items():
-            size = math.prod(shape)
-            where = (slice(begin, end), *(slice(length) for length in shape))
-            block = stacked[:, at : at + size].reshape(len(rows), *shape)
-            columns[name][where] = block
-            at += size
-        begin = end
-    return columns
+    for columns, count in zip(chosen, counts, strict=True):
+        for name, values in columns.items():
+            where = slice(begin, begin + count), *map(slice, values.shape[1:])
+            found[name][where] = values
+        begin += count
+    return found
 
 
 def _json(data: Any) -> bytes:
     return json.dumps(data, ensure_ascii=False).encode()
-
-
-_KEPT = 1000
-"""Rows that are kept."""
-
-
-class JournalTail:
-    """The last rows of a journal that still grows."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path  # the journal
-        # the meta data of the last heading; those of the end once it is there
-        self.meta: dict[str, Any] = {}
-        self.count = 0  # the rows that were read
-        self._read = len(MAGIC)
-        self._shapes: dict[str, tuple[int, ...]] = {}
-        self._next_shapes: dict[str, tuple[int, ...]] | None = None
-        self._rows: list[Array] = []
-
-    @property
-    def ended(self) -> bool:
-        """Whether the writer has written its end."""
-        return "status" in self.meta and self.meta["status"] != "running"
-
-    def read(self) -> int:
-        """Read the frames that have come; return how many rows there are of them."""
-        before = self.count
-        try:
-            data = self._new_bytes()
-        except OSError as error:
-            raise LogError(f"{self.path}: cannot be read: {error.strerror}") from error
-        at = 0
-        while (frame := frame_at(data, at)) is not None:
-            kind, payload = frame
-            at += FRAME.size + len(payload)
-            if kind == HEADING:
-                heading = json.loads(payload)
-                self.meta = heading["meta"]
-                columns = heading["columns"]
-                self._next_shapes = {n: tuple(s) for n, s in columns.items()}
-            elif kind == ROW:
-                if self._next_shapes is not None:  # only now: the last row stays there
-                    self._shapes, self._next_shapes = self._next_shapes, None
-                    self._rows.clear()
-                self._rows.append(np.frombuffer(payload, "<f8"))
-                self.count += 1
-            elif kind == END:
-                self.meta = {**self.meta, **json.loads(payload)}
-        self._read += at
-        del self._rows[:-_KEPT]
-        return self.count - before
-
-    def rows(self, first: int) -> dict[str, Array]:
-        """Return the columns from a row on, as far as they are kept."""
-        wanted = max(self.count - first, 0)
-        kept = self._rows[max(len(self._rows) - wanted, 0) :] if wanted else []
-        width = sum(int(np.prod(shape)) for shape in self._shapes.values())
-        block = np.array(kept).reshape(len(kept), width)
-        ends = np.cumsum([int(np.prod(shape)) for shape in self._shapes.values()])
-        parts = np.split(block, ends[:-1], axis=1) if len(ends) else []
-        return {
-            name: part.reshape(len(kept), *shape)
-            for (name, shape), part in zip(self._shapes.items(), parts, strict=True)
-        }
-
-    def _new_bytes(self) -> bytes:
-        if not self.path.exists():
-            return b""
-        with self.path.open("rb") as file:
-            if self._read == len(MAGIC):
-                beginning = file.read(len(MAGIC))
-                if not MAGIC.startswith(beginning):
-                    raise LogError(f"{self.path} is no journal")
-            file.seek(self._read)
-            return file.read()

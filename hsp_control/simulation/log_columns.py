@@ -1,48 +1,350 @@
-"""The columns of a log, allocated before the run."""
+"""The columns of a log: what is written of tasks, fields and contacts in each row."""
 
-import math
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
+from hsp_control.control.active_stack import ActiveStack
+from hsp_control.control.controller import Controller
+from hsp_control.control.measurement import LogChannel
+from hsp_control.control.output import ControlOutput
+from hsp_control.declaration.nested import parts_within
+from hsp_control.geometry.scene import Obstacle
+from hsp_control.law.problem import Record
+from hsp_control.null_space.fields import NullSpaceField, PointDistance
+from hsp_control.null_space.fields.field import terms_of
+from hsp_control.robot import RobotState
+from hsp_control.simulation.journal import Shapes, joined, views, width
+from hsp_control.tasks import Task
+from hsp_control.tasks.compliant_task import impedance_of
+from hsp_control.trajectories.streams.stream import Streamed
 
 MAX_SIZE = 2_000_000_000
 """Most bytes of all columns: an hour at 1 kHz with 70 numbers per row."""
 
+Sources = Iterator[tuple[str, Array]]
+"""Columns, each with the array that the law writes for it."""
+
 
 class LogColumns:
-    """Columns for a known number of rows; what is not written is NaN."""
+    """The columns of a log, each declared once: the present row, and the rows before.
+
+    Attributes:
+        row: Where the numbers of the present row are written, by column; what is not
+            written is NaN.
+        numbers: The same numbers side by side, shape (n,); another array once columns
+            were added.
+        descriptions: The unit and the meaning of each column, as JSON data.
+        count: How many rows are complete.
+    """
 
     def __init__(self, capacity: int) -> None:
-        # the columns by name; each has a row for every row of the log
-        self.arrays: dict[str, Array] = {}
-        # the unit and the meaning of each, as JSON data
+        """Begin without columns; ``capacity`` is how many rows are kept."""
+        self.row: dict[str, Array] = {}
+        self.numbers = np.zeros(0)
         self.descriptions: dict[str, dict[str, str]] = {}
-        self.count = 0  # how many rows are complete
-        self._capacity, self._size = capacity, 0
+        self.count = 0
+        self._capacity = capacity
+        self._shapes: dict[str, tuple[int, ...]] = {}
+        self._laid_out = True
+        # The rows before columns were added, and the present ones, with their shapes.
+        self._earlier: list[tuple[Shapes, Array]] = []
+        self._block, self._first = np.zeros((0, 0)), 0
+
+    @property
+    def shapes(self) -> Shapes:
+        """The shape of each column of `row`."""
+        return {name: numbers.shape for name, numbers in self.row.items()}
 
     def add(
         self, name: str, shape: tuple[int, ...], unit: str, meaning: str, **more: str
     ) -> None:
-        """Add a column if it does not exist."""
-        if name in self.arrays:
+        """Declare a column if there is none of that name; `lay_out` makes it."""
+        if name not in self._shapes:
+            self._shapes[name], self._laid_out = shape, False
+            self.descriptions[name] = {"unit": unit, "meaning": meaning, **more}
+
+    def widen(self, name: str, length: int) -> None:
+        """Give a column of vectors at least so many numbers."""
+        if length > self._shapes[name][0]:
+            self._shapes[name], self._laid_out = (length,), False
+
+    def lay_out(self) -> None:
+        """Make the columns that were added; what the row has already is kept."""
+        if self._laid_out:
             return
-        self._size += 8 * self._capacity * math.prod(shape)
-        if self._size > MAX_SIZE:  # before memory is allocated
+        old, size = self.row, width(self._shapes)
+        if 8 * self._capacity * size > MAX_SIZE:  # before memory is allocated
             raise SimulationError(
                 f"a log of {self._capacity} rows is larger than {MAX_SIZE / 1e9:g} GB; "
                 "choose a longer log_period or a shorter duration"
             )
-        self.arrays[name] = np.full((self._capacity, *shape), np.nan)
-        self.descriptions[name] = {"unit": unit, "meaning": meaning, **more}
+        if self.count > self._first:
+            kept = self._block[: self.count - self._first]
+            self._earlier.append((self.shapes, kept))
+            self._first = self.count
+        self._block = np.empty((max(self._capacity - self.count, 0), size))
+        self.numbers = np.full(size, np.nan)
+        self.row = views(self.numbers, self._shapes)
+        for name, values in old.items():
+            self.row[name][tuple(map(slice, values.shape))] = values
+        self._laid_out = True
+
+    def begin_row(self) -> None:
+        """Begin the next row."""
+        self.numbers.fill(np.nan)
+
+    def keep_row(self) -> None:
+        """Append the present row to those that are kept."""
+        if self._capacity:
+            self._block[self.count - self._first] = self.numbers
+        self.count += 1
 
     def rows(self, start: int = 0) -> dict[str, Array]:
-        """Return views of the columns from a row to the last complete one."""
-        return {name: array[start : self.count] for name, array in self.arrays.items()}
+        """Return the columns from a row to the last complete one, views if possible."""
+        present = self.shapes, self._block[: self.count - self._first]
+        return joined([*self._earlier, present], start)
 
-    def clear(self) -> None:
-        """Remove all rows, to make room for new ones."""
-        for array in self.arrays.values():
-            array[: self.count] = np.nan
-        self.count = 0
+
+STREAM_CHANNELS = {
+    "age": "time since the last message",
+    "taken": "messages taken",
+    "late": "of these, messages that came too late to count",
+    "rejected": "invalid messages",
+}
+"""What is logged of a stream; see `Streamed.counts`."""
+
+
+class TaskColumns:
+    """The columns of all tasks of a run; a task that is removed keeps its own."""
+
+    def __init__(self, controller: Controller, columns: LogColumns) -> None:
+        self._controller, self._columns = controller, columns
+        # all tasks that there have been, by their names in the log
+        self.logged: dict[str, Task] = {}
+        self._levels: dict[str, int] = {}
+        self._streams: dict[str, list[tuple[str, Streamed]]] = {}
+        self._names: dict[str, str] = {}  # in the log, of the tasks that there are
+        self._compliant: set[str] = set()  # of these, tasks with an impedance
+        self._known: list[int] = []
+        self.update()
+
+    def update(self) -> None:
+        """Add columns for the tasks that there are, if they are others."""
+        # By identity: equal tasks of two runs may have streams in different states.
+        known = list(map(id, self._controller.tasks))
+        if known == self._known:
+            return
+        self._known = known
+        self._names.clear()
+        self._compliant.clear()
+        probe = _present_state(self._controller)
+        for level, tasks in enumerate(self._controller.levels):
+            for task in tasks:
+                name = self._names[task.name] = self._log_name(task)
+                self.logged[name], self._levels[name] = task, level
+                self._add(name, task, len(task.measure(probe)[0]))
+
+    def _log_name(self, task: Task) -> str:
+        """Return the task's name in the log."""
+        name, k = task.name, 2
+        while name in self.logged and task_meta(self.logged[name]) != task_meta(task):
+            name, k = f"{task.name}_{k}", k + 1
+        return name
+
+    def _add(self, name: str, task: Task, width: int) -> None:
+        """Add a task's columns; its reference has so many numbers."""
+        column, m, prefix = self._columns.add, task.rows, f"task.{name}"
+        parts = task.error_parts
+        unit = " and ".join(dict.fromkeys(part.unit for part in parts))
+        rate_unit = " and ".join(dict.fromkeys(part.rate_unit for part in parts))
+        what = " and ".join(part.name for part in parts)
+        column(f"{prefix}.error", (m,), unit, f"error e: {what}")
+        column(f"{prefix}.error_rate", (m,), rate_unit, "error rate e'")
+        column(f"{prefix}.bounded", (), unit, "length of an error that counts for less")
+        # To look for streams in every row would cost more than the row.
+        self._streams[name] = list(_streams_of(task, name))
+        for stream, _ in self._streams[name]:
+            for what, meaning in STREAM_CHANNELS.items():
+                unit_of = "s" if what == "age" else "-"
+                column(f"{stream}.{what}", (), unit_of, meaning)
+        if impedance_of(task) is not None:
+            self._compliant.add(task.name)
+            column(f"{prefix}.stiffness", (m,), "N/m or N·m/rad", "diagonal of K")
+        column(f"{prefix}.reference", (width,), unit, "desired value")
+        column(f"{prefix}.actual", (width,), unit, "actual value")
+
+    def write(self, state: RobotState) -> None:
+        """Write references, what follows them, and what streams have heard."""
+        row = self._columns.row
+        for name, task in self.logged.items():
+            reference, actual = task.measure(state)
+            row[f"task.{name}.reference"][:] = reference
+            row[f"task.{name}.actual"][:] = actual
+            for prefix, stream in self._streams[name]:
+                for what, value in stream.counts().items():
+                    row[f"{prefix}.{what}"][...] = value
+
+    def write_law(self, active: ActiveStack, output: ControlOutput) -> None:
+        """Write what counts of the active tasks: far targets, and stiffnesses."""
+        row, away = self._columns.row, output.bounded
+        for task in active.task_rows:
+            prefix = f"task.{self._names[task]}"
+            row[f"{prefix}.bounded"][...] = away.get(task, 0.0)
+            if task in self._compliant:
+                stiffness = np.diag(self._controller.stiffness(task))
+                row[f"{prefix}.stiffness"][:] = stiffness
+
+    def sources(self, active: ActiveStack, law: Record) -> Sources:
+        """Yield what the law writes of the active tasks."""
+        for task, rows in active.task_rows.items():
+            prefix = f"task.{self._names[task]}"
+            yield f"{prefix}.error", law.task.error[rows]
+            yield f"{prefix}.error_rate", law.task.error_rate[rows]
+
+    def meta(self) -> dict[str, Any]:
+        """Return what the log says of all tasks that there have been, as JSON data."""
+        return {
+            name: {**task_meta(task), "level": self._levels[name]}
+            for name, task in self.logged.items()
+        }
+
+
+def task_meta(task: Task) -> dict[str, Any]:
+    """Return what a log says of a task."""
+    return {
+        "type": type(task).__name__,
+        "rows": task.rows,
+        "error": [list(part) for part in task.error_parts],
+        "drawn": list(task.drawn),
+        "axes": getattr(task, "axes", None),
+        "frame": getattr(task, "frame", None),
+    }
+
+
+def _present_state(controller: Controller) -> RobotState:
+    """Return a state at the present time: streams would go on to any later one."""
+    robot = controller.robot
+    return robot.state(controller.state.t, robot.neutral(), np.zeros(robot.nv))
+
+
+def _streams_of(task: Task, name: str) -> Iterator[tuple[str, Streamed]]:
+    """Yield the streams of a task that is logged by a name, with their own names."""
+    if task.remembers:
+        for k, stream in enumerate(parts_within(task, Streamed)):
+            yield f"stream.{name}" + (f"_{k + 1}" if k else ""), stream
+
+
+class TermColumns:
+    """The columns of all terms of a controller's field; old ones keep theirs."""
+
+    def __init__(self, controller: Controller, columns: LogColumns) -> None:
+        self._controller, self._columns = controller, columns
+        self._unit = " or ".join(dict.fromkeys(controller.robot.units)) + "/s"
+        self._field: NullSpaceField | None = None
+        self.update()
+
+    def update(self) -> None:
+        """Add columns for the terms that there are, if they are others."""
+        controller, column = self._controller, self._columns.add
+        if controller.field is self._field:
+            return
+        self._field, self._terms = controller.field, logged_terms(controller)
+        self._distances: dict[str, NullSpaceField] = {}  # terms that measure one
+        probe, nv = _present_state(controller), controller.robot.nv
+        for name, term in self._terms.items():
+            column(f"field.{name}.g", (nv,), self._unit, "weighted share of g")
+            column(f"field.{name}.value", (), "-", "unweighted cost or norm")
+            if term.minimum_distance(probe) is not None:
+                distance = f"distance.{name}"
+                self._distances[distance] = term
+                column(distance, (), "m", "minimum distance", **_center_of(term))
+
+    def write(self, state: RobotState) -> None:
+        """Write the values of the terms, and distances."""
+        row = self._columns.row
+        for name, term in self._terms.items():
+            row[f"field.{name}.value"][...] = term.value(state)
+        for name, term in self._distances.items():
+            row[name][...] = term.minimum_distance(state)
+
+    def sources(self, active: ActiveStack) -> Sources:
+        """Yield what the law writes of the terms."""
+        for name, sample in zip(self._terms, active.term_samples, strict=True):
+            yield f"field.{name}.g", sample.g
+
+
+def logged_terms(controller: Controller) -> dict[str, NullSpaceField]:
+    """Return the terms of the controller's field, by names that differ."""
+    terms = terms_of(controller.field)
+    names = [term.name for term in terms]
+    return {
+        name if names.count(name) == 1 else f"{name}_{k}": term
+        for k, (name, term) in enumerate(zip(names, terms, strict=True))
+    }
+
+
+def _center_of(term: NullSpaceField) -> dict[str, str]:
+    """Return which obstacle's centre a term's distance leads to, if to a centre."""
+    if isinstance(term, PointDistance) and isinstance(term.obstacle, Obstacle):
+        return {"center_of": term.obstacle.name}
+    return {}
+
+
+class ContactColumns:
+    """The columns of all contacts: forces, centres of pressure, friction in use."""
+
+    def __init__(self, controller: Controller, columns: LogColumns) -> None:
+        self._controller, self._columns = controller, columns
+        for contact in controller.contacts:
+            prefix, column = f"contact.{contact.name}", columns.add
+            column(f"{prefix}.force", (3,), "N", "on the robot, in world axes")
+            if contact.force is not None:
+                meaning = "force that is commanded, in world axes"
+                column(f"{prefix}.commanded", (3,), "N", meaning)
+            column(f"{prefix}.position", (3,), "m", "centre of pressure")
+            column(f"{prefix}.weight", (), "-", "how much it bears, 0 to 1")
+            column(
+                f"{prefix}.friction_used", (), "-", "largest ‖f_t‖/(μ f_n) of a point"
+            )
+
+    def write(self, t: float, output: ControlOutput) -> None:
+        """Write a row."""
+        controller, row = self._controller, self._columns.row
+        if not controller.contacts:
+            return
+        support = controller.active_stack.support
+        world = support.in_world(output.forces)
+        commanded = support.in_world(support.reference)
+        for contact in controller.contacts:
+            prefix = f"contact.{contact.name}"
+            row[f"{prefix}.force"][:] = 0.0
+            row[f"{prefix}.weight"][...] = controller.bearing_of(contact.name, t)
+            if contact not in support.contacts:
+                continue
+            points = support.points[support.contacts.index(contact)]
+            local = output.forces.reshape(-1, 3)[points]
+            row[f"{prefix}.force"][:] = world[points].sum(axis=0)
+            if contact.force is not None:
+                row[f"{prefix}.commanded"][:] = commanded[points].sum(axis=0)
+            normal = np.maximum(local[:, 2], 1e-9)
+            center = normal @ support.positions[points] / normal.sum()
+            row[f"{prefix}.position"][:] = center
+            tangential = np.hypot(local[:, 0], local[:, 1])  # without overflow
+            loaded = local[:, 2] > 1e-3  # [N]: below it the ratio is rounding
+            ratios = tangential[loaded] / (contact.friction * local[loaded, 2])
+            row[f"{prefix}.friction_used"][...] = ratios.max(initial=0.0)
+
+
+def write_channels(columns: LogColumns, channels: Mapping[str, LogChannel]) -> None:
+    """Write what the parts of a run report; a new name is a new column."""
+    for name, channel in channels.items():
+        if name not in columns.row:
+            shape = np.shape(channel.value)
+            columns.add(name, shape, channel.unit, channel.meaning)
+    columns.lay_out()
+    for name, channel in channels.items():
+        columns.row[name][...] = channel.value

@@ -1,7 +1,6 @@
 """The rollout of a run: named columns with their descriptions, and its file."""
 
 import json
-import math
 import zipfile
 import zlib
 from collections.abc import Callable, Mapping, Sequence
@@ -15,15 +14,10 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LogError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.robot import Robot, RobotState
-from hsp_control.simulation.journal import is_journal, read_journal
+from hsp_control.simulation.journal import KILLED, JournalReader, is_journal
 
 FORMAT = "hsp_control rollout 1"
 _REQUIRED = ("t", "q", "v", "tau")
-_MAX_DRAWN, _MAX_VALUE = 1e12, 1e100
-"""Largest values of drawn and of other columns in a journal.
-
-The axes of a plot cannot resolve larger ones. A motion that diverges ends long before.
-"""
 _UNREADABLE = (
     OSError, ValueError, EOFError, KeyError, NotImplementedError,
     zipfile.BadZipFile, zlib.error,
@@ -153,13 +147,8 @@ class Rollout:
         """
         path = Path(path)
         try:
-            if is_journal(path):
-                columns, meta = read_journal(path)
-                complete_columns(columns, [])  # one absurd turn would spoil all later
-                columns, meta = without_absurd_rows(columns, meta)
-                complete_columns(columns, meta["robot"]["continuous"])
-            else:
-                columns, meta = _read_npz(path)
+            reading = _read_journal if is_journal(path) else _read_npz
+            columns, meta = reading(path)
         except LogError:
             raise
         except FileNotFoundError:
@@ -189,6 +178,19 @@ class Rollout:
         if {column.shape[:1] for column in columns.values()} != {columns["t"].shape}:
             raise LogError(f"{path}: the log's columns differ in length")
         return cls(columns, meta)
+
+
+def _read_journal(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
+    """Return the columns and the meta data of a journal, up to its last whole row."""
+    reader = JournalReader(path)
+    reader.read()
+    if not reader.meta:
+        raise LogError(f"{path}: the journal ends before its first heading")
+    columns, meta = reader.rows(0), reader.meta
+    complete_columns(columns, meta["robot"]["continuous"])
+    if not reader.ended:
+        meta = {**meta, "status": "interrupted", "message": KILLED}
+    return columns, meta
 
 
 def _read_npz(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
@@ -229,38 +231,3 @@ def complete_columns(columns: Mapping[str, Array], continuous: Sequence[int]) ->
             finite = np.flatnonzero(np.isfinite(column).all(axis=1))
             if finite.size:
                 column[: finite[0]] = column[finite[0]]
-
-
-def without_absurd_rows(
-    columns: dict[str, Array], meta: dict[str, Any]
-) -> tuple[dict[str, Array], dict[str, Any]]:
-    """Return the columns without rows that cannot be drawn; the message counts them."""
-    kept = _drawable_rows(columns)
-    if kept.all():
-        return columns, meta
-    count, first = int((kept == 0).sum()), columns["t"][int(kept.argmin())]
-    told = f"{count} of {len(kept)} rows are left out, from t = {first:g} s on: their "
-    told += "numbers are too large, or not finite"
-    meta = {**meta, "message": "; ".join(filter(None, (meta.get("message"), told)))}
-    return {name: column[kept] for name, column in columns.items()}, meta
-
-
-def _drawable_rows(columns: dict[str, Array]) -> Array:
-    """Return which rows have numbers that can be drawn, shape (N,), booleans."""
-    drawable = np.ones(len(columns["t"]), dtype=bool)
-    for name, column in columns.items():
-        size = np.abs(column.reshape(len(column), math.prod(column.shape[1:])))
-        if _is_drawn(name):
-            drawable &= (size <= _MAX_DRAWN).all(axis=1)  # neither is NaN
-        else:
-            drawable &= ~((size > _MAX_VALUE) & np.isfinite(size)).any(axis=1)
-    return drawable
-
-
-def _is_drawn(name: str) -> bool:
-    """Return whether a column is drawn in space, or over time as the motion is."""
-    return (
-        name in {*_REQUIRED, "joint_positions", "skeleton"}
-        or name.startswith("obstacle.")
-        or (name.startswith("task.") and name.endswith((".reference", ".actual")))
-    )

@@ -1,6 +1,8 @@
 """Simulates the closed loop of a controller and a plant."""
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -8,6 +10,7 @@ import numpy as np
 from hsp_control.common.exceptions import (
     FallError,
     HspControlError,
+    LogError,
     SimulationError,
     StreamError,
 )
@@ -21,6 +24,7 @@ from hsp_control.declaration import within
 from hsp_control.geometry.scene import Scene
 from hsp_control.robot.integrators import Dop853, Integrator
 from hsp_control.simulation.control_chain import ControlChain
+from hsp_control.simulation.log_writer import LogWriter
 from hsp_control.simulation.loops import continuous_loop, sampled_loop
 from hsp_control.simulation.plants import (
     ContinuousPlant,
@@ -32,7 +36,6 @@ from hsp_control.simulation.plants import (
     check_plant,
     differing_bodies,
 )
-from hsp_control.simulation.recorder import Recorder
 from hsp_control.simulation.rollout import Rollout
 
 MAX_ROWS = 10_000_000
@@ -58,7 +61,8 @@ def simulate(
     check_rate: bool = True,
     start_time: float = 0.0,
     on_progress: Callable[[float], None] | None = None,
-    on_row: Callable[[Recorder], None] | None = None,
+    on_row: Callable[[LogWriter], None] | None = None,
+    log: str | Path | None = None,
     meta: dict[str, Any] | None = None,
 ) -> Rollout:
     """Run the closed loop and return its rollout.
@@ -90,7 +94,9 @@ def simulate(
             unstable at its control period are refused.
         start_time: Time of the first row [s].
         on_progress: Called at every row with the fraction of the run that is done.
-        on_row: Called with the recorder after every recorded row.
+        on_row: Called with the writer of the log after every row.
+        log: A journal to write while the run lasts; `Rollout.load` reads it also if the
+            process is killed. The rollout that is returned does not need it.
         meta: JSON data to add to the meta data of the rollout.
 
     Returns:
@@ -157,11 +163,17 @@ def simulate(
             f"{type(plant).__name__} holds the effort during a period: it needs a "
             "control_period [s], for example 0.001"
         )
-    recorder = Recorder(controller, scene or controller.scene, rows, running)
     description = {**plant.describe(), **differing_bodies(plant, robot)}
-    meta = {"plant": description, **(meta or {})}
+    writer = LogWriter(
+        controller,
+        scene or controller.scene,
+        rows,
+        running,
+        path=None if log is None else Path(log),
+        meta={"plant": description, **(meta or {})},
+    )
 
-    status, message = "completed", ""
+    status, message = "stopped", "an error that is not ours"
     try:
         for row, (state, output, tau, own_channels) in enumerate(loop):
             if row == 0 and periods:  # else efforts are continuous, and have no rate
@@ -169,21 +181,26 @@ def simulate(
             elif row == 0:  # else `applied` has told
                 warn_of_jump(robot, q, v, tau)
             plant_channels = plant.log_channels(state.t, state.q, state.v, tau)
-            recorder.record(state, output, tau, {**own_channels, **plant_channels})
+            writer.record(state, output, tau, {**own_channels, **plant_channels})
             if on_progress is not None:
                 on_progress(row / (rows - 1) if rows > 1 else 1.0)
             if on_row is not None:
-                on_row(recorder)
+                on_row(writer)
+        status, message = "completed", ""
     except KeyboardInterrupt:
         status, message = "interrupted", "stopped by the user"
     except FallError as error:
         status, message = "stopped", str(error)
     except HspControlError as error:
         failure = SimulationError(f"the simulation stopped: {error}")
-        status = "stopped" if isinstance(error, StreamError) else "diverged"
-        failure.rollout = recorder.rollout(status, str(error), **meta)
+        outside = isinstance(error, StreamError | LogError)
+        status, message = "stopped" if outside else "diverged", str(error)
+        failure.rollout = writer.rollout(status, str(error))
         raise failure from error
-    return recorder.rollout(status, message, **meta)
+    finally:
+        with suppress(LogError):  # all rows are in memory, too
+            writer.end(status, message)
+    return writer.rollout(status, message)
 
 
 def count_rows(

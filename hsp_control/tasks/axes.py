@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.arrays import Indices
 from hsp_control.common.kernels import kernel
 from hsp_control.law import TaskSample
+from hsp_control.robot.kinematics import FrameMotion, PointMotion
 from hsp_control.tasks.task import Feedback, add_feedback
 from hsp_control.trajectories import TrajectorySample
 
@@ -17,15 +18,14 @@ def axis_indices(axes: str) -> Indices:
 @kernel
 def track_axes(
     axes: Indices,
-    J_point: Array,
-    J_point_dot: Array,
-    position: Array,
-    velocity: Array,
+    point: FrameMotion | PointMotion,
     desired: TrajectorySample,
     feedback: Feedback,
     out: TaskSample,
 ) -> None:
-    """Write a point's sample; its Jacobian, (3 or more, nv), is in world axes."""
+    """Write the sample of a point, whose motion is in world axes."""
+    J_point, J_point_dot = point.jacobian, point.jacobian_dot
+    position, velocity = point.position, point.velocity
     x_d, x_d_dot, x_d_ddot = desired
     J, J_dot, e, e_dot, a_x = out
     for k in range(axes.shape[0]):

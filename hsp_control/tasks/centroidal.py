@@ -6,8 +6,7 @@ from typing import ClassVar, Literal, Self
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.native import bind
-from hsp_control.common.step_plan import StepPlan
+from hsp_control.common.kernels import KernelCall
 from hsp_control.declaration.quantities import Axes, Positive
 from hsp_control.geometry.start import Start
 from hsp_control.law import TaskSample
@@ -15,7 +14,7 @@ from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.axes import axis_indices, track_axes
 from hsp_control.tasks.frame_task import TrackingTask, place_point
 from hsp_control.tasks.task import ErrorPart, Feedback, Task
-from hsp_control.trajectories import Hold, Trajectory, TrajectorySample
+from hsp_control.trajectories import Hold, Trajectory
 
 
 class CenterOfMass(TrackingTask, type="center_of_mass"):
@@ -51,23 +50,9 @@ class CenterOfMass(TrackingTask, type="center_of_mass"):
         placed = replace(self, trajectory=trajectory, blend=None)
         return placed.checked(start.state.robot)
 
-    def compile(
-        self, state: RobotState, feedback: Feedback, out: TaskSample
-    ) -> StepPlan:
-        """Return the step plan; see `Task.compile`."""
-        mass, desired = state.centroidal, TrajectorySample.allocate(self.rows)
-        write = bind(
-            track_axes,
-            axis_indices(self.axes),
-            mass.jacobian,
-            mass.jacobian_dot,
-            mass.position,
-            mass.velocity,
-            desired,
-            feedback,
-            out,
-        )
-        return StepPlan((self.trajectory.follow(desired),), (mass.compute, write))
+    def kernel(self, state: RobotState) -> KernelCall:
+        """Return the kernel; see `Task.kernel`."""
+        return track_axes, (axis_indices(self.axes), state.centroidal, self.trajectory)
 
     def reference_rate(self, state: RobotState) -> Array:
         """Return c_d', shape (m,) [m/s]."""

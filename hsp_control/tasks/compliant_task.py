@@ -1,16 +1,13 @@
 """The base class of tasks that may have an impedance instead of gains."""
 
-from collections.abc import Callable
 from dataclasses import KW_ONLY, replace
-from functools import partial
 from typing import ClassVar, Self
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import GainError
-from hsp_control.common.native import bind
-from hsp_control.common.step_plan import StepPlan
+from hsp_control.common.step_plan import StepPlan, planned
 from hsp_control.declaration import within
 from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
@@ -93,23 +90,17 @@ class CompliantTask(SecondOrderTask):
         task = self.compile(state, in_force.feedback, out)
         if self.impedance is None:
             return task
-        matrices = state.mass_matrix, state.mass_matrix_rate
-        update: list[Callable[[], object]] = [
-            partial(getattr, state, name)
-            for name in ("mass_matrix", "mass_matrix_rate")
-        ]
-        write = bind(
-            impedance_gains,
-            *matrices,
-            self._rotating(state),
-            in_force.numbers,
-            self.part_ends(),
-            out,
-            Scratch.allocate(self.rows, state.robot.nv),
-            in_force.mobility,
-            in_force.feedback,
+        inertia = state.inertia, state.inertia_rate
+        numbers = in_force.numbers, self.part_ends()
+        scratch = Scratch.allocate(self.rows, state.robot.nv)
+        gains = planned(
+            (
+                impedance_gains,
+                (*inertia, self._rotating(state), *numbers, out, scratch),
+            ),
+            *(in_force.mobility, in_force.feedback),
         )
-        return StepPlan(task.follow, (*update, *task.write, write, *task.write))
+        return StepPlan(task.follow, (*task.write, *gains.write, *task.write))
 
     def feedback_at(self, state: RobotState) -> Feedback:
         """Return new arrays of feedback at a state; see `Task.feedback_at`."""
@@ -137,10 +128,7 @@ class CompliantTask(SecondOrderTask):
 
         in_force, plan = state.made(self, "impedance", make)
         in_force.numbers[:] = numbers
-        for follow in plan.follow:
-            follow(state.t)
-        for write in plan.write:
-            write()
+        plan.run(state.t)
         return Feedback(*(array.copy() for array in in_force.feedback))
 
 

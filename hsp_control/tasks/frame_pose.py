@@ -2,13 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Annotated, Any, ClassVar, NamedTuple, Self
+from typing import Annotated, ClassVar, NamedTuple, Self
 
 import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.kernels import kernel
+from hsp_control.common.kernels import KernelCall, kernel
 from hsp_control.common.linalg import multiply
 from hsp_control.common.native import bind
 from hsp_control.common.rotations import (
@@ -27,7 +27,7 @@ from hsp_control.declaration import AnyOf
 from hsp_control.geometry.start import Start
 from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
-from hsp_control.robot.kinematics import FrameKinematics, FrameMotion
+from hsp_control.robot.kinematics import FrameMotion
 from hsp_control.tasks.compliant_task import CompliantTask
 from hsp_control.tasks.frame_task import (
     FrameTask,
@@ -47,7 +47,6 @@ from hsp_control.trajectories import (
     PoseTrajectory,
     Trajectory,
 )
-from hsp_control.trajectories.following import Follower
 
 ORIENTATION_SCRATCH = 12
 """Rows of the scratch array of `orientation_error` and `orientation_acceleration`."""
@@ -92,19 +91,11 @@ class FrameOrientation(
         placed = replace(self, frame=frame, trajectory=trajectory, blend=None)
         return placed.checked(robot)
 
-    def _compile(
-        self, frame: FrameKinematics, feedback: Feedback, out: TaskSample
-    ) -> tuple[Follower, Callable[[], Any]]:
-        desired = OrientationSample.allocate()
-        write = bind(
-            _frame_orientation,
-            frame.motion,
-            desired,
-            feedback,
-            np.zeros((ORIENTATION_SCRATCH, 3)),
-            out,
-        )
-        return self.trajectory.follow(desired), write
+    def kernel(self, state: RobotState) -> KernelCall:
+        """Return the kernel; see `Task.kernel`."""
+        scratch = np.zeros((ORIENTATION_SCRATCH, 3))
+        frame = state.frame(self.frame_name)
+        return _track_orientation, (frame, self.trajectory, scratch)
 
     def _rotating(self, state: RobotState) -> Rotating:
         motion = state.frame(self.frame_name).motion
@@ -183,11 +174,11 @@ def orientation_acceleration(
 
 
 @kernel
-def _frame_orientation(
+def _track_orientation(
     frame: FrameMotion,
     desired: OrientationSample,
-    feedback: Feedback,
     scratch: Array,
+    feedback: Feedback,
     out: TaskSample,
 ) -> None:
     """Write the sample: the angular acceleration for which e'' = -Kv e' - Kp e."""
@@ -254,19 +245,10 @@ class FramePose(FrameTask, TrackingTask, CompliantTask, type="frame_pose"):
         placed = replace(self, frame=frame, trajectory=trajectory, blend=None)
         return placed.checked(robot)
 
-    def _compile(
-        self, frame: FrameKinematics, feedback: Feedback, out: TaskSample
-    ) -> tuple[Follower, Callable[[], Any]]:
-        desired = np.zeros((8, 3))
-        write = bind(
-            pose_error_equation,
-            frame.motion,
-            desired,
-            feedback,
-            np.zeros((ORIENTATION_SCRATCH, 3)),
-            out,
-        )
-        return self.pose.follow(PoseSample.over(desired)), write
+    def kernel(self, state: RobotState) -> KernelCall:
+        """Return the kernel; see `Task.kernel`."""
+        scratch = np.zeros((ORIENTATION_SCRATCH, 3))
+        return track_pose, (state.frame(self.frame_name), self.pose, scratch)
 
     def _rotating(self, state: RobotState) -> Rotating:
         motion = state.frame(self.frame_name).motion
@@ -329,11 +311,11 @@ def _measured_pose(desired: Array, position: Array, R: Array, values: Array) -> 
 
 
 @kernel
-def pose_error_equation(
+def track_pose(
     frame: FrameMotion,
     desired: Array,
-    feedback: Feedback,
     scratch: Array,
+    feedback: Feedback,
     out: TaskSample,
 ) -> None:
     """Write the sample of a pose task; gains may couple position and orientation.

@@ -1,22 +1,18 @@
 """The task of a frame's origin, along all world axes or some of them."""
 
-from collections.abc import Callable
 from dataclasses import KW_ONLY, replace
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.native import bind
+from hsp_control.common.kernels import KernelCall
 from hsp_control.declaration.quantities import Axes
 from hsp_control.geometry.start import Start
-from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
-from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.tasks.axes import axis_indices, track_axes
 from hsp_control.tasks.compliant_task import CompliantTask
 from hsp_control.tasks.frame_task import FrameTask, TrackingTask, frame_of, place_point
-from hsp_control.tasks.task import Drawn, ErrorPart, Feedback
-from hsp_control.trajectories import Hold, Trajectory, TrajectorySample
-from hsp_control.trajectories.following import Follower
+from hsp_control.tasks.task import Drawn, ErrorPart
+from hsp_control.trajectories import Hold, Trajectory
 
 
 class FramePosition(FrameTask, TrackingTask, CompliantTask, type="frame_position"):
@@ -54,22 +50,10 @@ class FramePosition(FrameTask, TrackingTask, CompliantTask, type="frame_position
         placed = replace(self, frame=frame, trajectory=trajectory, blend=None)
         return placed.checked(robot)
 
-    def _compile(
-        self, frame: FrameKinematics, feedback: Feedback, out: TaskSample
-    ) -> tuple[Follower, Callable[[], Any]]:
-        desired = TrajectorySample.allocate(self.rows)
-        write = bind(
-            track_axes,
-            axis_indices(self.axes),
-            frame.jacobian,
-            frame.jacobian_dot,
-            frame.position,
-            frame.velocity,
-            desired,
-            feedback,
-            out,
-        )
-        return self.trajectory.follow(desired), write
+    def kernel(self, state: RobotState) -> KernelCall:
+        """Return the kernel; see `Task.kernel`."""
+        frame = state.frame(self.frame_name)
+        return track_axes, (axis_indices(self.axes), frame, self.trajectory)
 
     def reference_rate(self, state: RobotState) -> Array:
         """Return x_d', shape (m,) [m/s]."""

@@ -1,22 +1,16 @@
 """Base classes of tasks that follow a trajectory, or track a frame; its placing."""
 
-from abc import abstractmethod
-from collections.abc import Callable
 from dataclasses import KW_ONLY
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TaskError
-from hsp_control.common.step_plan import StepPlan
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Positive
-from hsp_control.law import TaskSample
-from hsp_control.robot import Robot, RobotState
-from hsp_control.robot.kinematics import FrameKinematics
-from hsp_control.tasks.task import Feedback, SecondOrderTask, default_name
+from hsp_control.robot import Robot
+from hsp_control.tasks.task import SecondOrderTask, default_name
 from hsp_control.trajectories import (
     Blend,
     BlendOrientation,
@@ -25,7 +19,6 @@ from hsp_control.trajectories import (
     PoseTrajectory,
     Trajectory,
 )
-from hsp_control.trajectories.following import Follower
 
 
 def place_point(trajectory: Trajectory, here: Array, blend: float | None) -> Trajectory:
@@ -85,8 +78,7 @@ class TrackingTask(SecondOrderTask):
 class FrameTask(SecondOrderTask):
     """J a + J'v = a_x for one frame, with a reference that a trajectory gives.
 
-    A subclass implements `_compile`, `reference_rate` and `measure`. The frame's
-    kinematics are in world axes at its origin, linear rows before angular rows
+    Its kinematics are in world axes at its origin, linear rows before angular rows
     (Pinocchio's LOCAL_WORLD_ALIGNED).
     """
 
@@ -102,20 +94,6 @@ class FrameTask(SecondOrderTask):
 
     def _default_name(self) -> str:
         return default_name(self.frame or "end_effector")
-
-    @abstractmethod
-    def _compile(
-        self, frame: FrameKinematics, feedback: Feedback, out: TaskSample
-    ) -> tuple[Follower, Callable[[], Any]]:
-        """Return what updates the reference at a time [s], and what writes ``out``."""
-
-    def compile(
-        self, state: RobotState, feedback: Feedback, out: TaskSample
-    ) -> StepPlan:
-        """Return the step plan; see `Task.compile`."""
-        frame = state.frame(self.frame_name)
-        follow, write = self._compile(frame, feedback, out)
-        return StepPlan((follow,), (frame.compute, write))
 
     def keeps_balance(self, robot: Robot) -> bool:
         """Whether the frame belongs to the trunk; see `Robot.is_on_trunk`."""

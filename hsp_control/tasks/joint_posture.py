@@ -8,9 +8,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import TaskError
-from hsp_control.common.kernels import kernel
-from hsp_control.common.native import bind
-from hsp_control.common.step_plan import StepPlan, stay
+from hsp_control.common.kernels import KernelCall, kernel
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Names
 from hsp_control.geometry.start import Start
@@ -90,28 +88,14 @@ class JointPosture(CompliantTask, type="joint_posture"):
                     )
         return replace(placed, displacement=displacement).checked(robot)
 
-    def compile(
-        self, state: RobotState, feedback: Feedback, out: TaskSample
-    ) -> StepPlan:
-        """Return the step plan; see `Task.compile`."""
-        robot, displacement = state.robot, self.displacement
-        sample = TrajectorySample.allocate(self.rows)
+    def kernel(self, state: RobotState) -> KernelCall:
+        """Return the kernel; see `Task.kernel`."""
+        robot = state.robot
         # The rows of `single_dof_joints`, in the order of the joints of the task.
         place = {int(row[0]): row for row in robot.single_dof_joints}
         joints = np.array([place[i] for i in self._indices(robot)], dtype=np.int64)
-        write = bind(
-            _joint_posture,
-            state.q,
-            state.v,
-            self._configuration(robot),
-            joints,
-            sample,
-            feedback,
-            np.zeros(robot.nv),
-            out,
-        )
-        follow = stay if displacement is None else displacement.follow(sample)
-        return StepPlan((follow,), (write,))
+        where = state.q, state.v, self._configuration(robot), joints
+        return _track_posture, (*where, np.zeros(robot.nv), self.followed)
 
     def reference_rate(self, state: RobotState) -> Array:
         """Return the desired velocities of the joints, shape (m,) [rad/s or m/s]."""
@@ -165,14 +149,14 @@ class JointPosture(CompliantTask, type="joint_posture"):
 
 
 @kernel
-def _joint_posture(
+def _track_posture(
     q: Array,
     v: Array,
     reference: Array,
     joints: Indices,
+    away: Array,
     desired: TrajectorySample,
     feedback: Feedback,
-    away: Array,
     out: TaskSample,
 ) -> None:
     """Write the sample: e = displacement - (q ⊖ reference), within ±π if continuous."""

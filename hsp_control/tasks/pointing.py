@@ -1,6 +1,5 @@
 """The task of an axis of a frame that points along a direction, which may move."""
 
-from collections.abc import Callable
 from dataclasses import KW_ONLY, replace
 from functools import cached_property
 from math import sqrt
@@ -11,14 +10,13 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TaskError
-from hsp_control.common.kernels import kernel
-from hsp_control.common.native import bind
+from hsp_control.common.kernels import KernelCall, kernel
 from hsp_control.common.rotations import cross, rotate, rotate_back
 from hsp_control.declaration.quantities import Vector3
 from hsp_control.geometry.start import Start
 from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
-from hsp_control.robot.kinematics import FrameKinematics, FrameMotion
+from hsp_control.robot.kinematics import FrameMotion
 from hsp_control.tasks.frame_task import FrameTask, frame_of, place_orientation
 from hsp_control.tasks.task import Drawn, ErrorPart, Feedback, add_feedback
 from hsp_control.trajectories import (
@@ -27,7 +25,6 @@ from hsp_control.trajectories import (
     OrientationTrajectory,
 )
 from hsp_control.trajectories.crossfade import AnyReference
-from hsp_control.trajectories.following import Follower
 
 ANTIPODE_MARGIN = 0.02
 """Smallest 1 + cos(angle) of the coordinates; below it (angle > 168°) they are held."""
@@ -122,21 +119,11 @@ class Pointing(FrameTask, type="pointing"):
         normals[1] *= np.sign(np.linalg.det(np.vstack([normals, self._axis])))
         return normals.copy()
 
-    def _compile(
-        self, frame: FrameKinematics, feedback: Feedback, out: TaskSample
-    ) -> tuple[Follower, Callable[[], Any]]:
-        desired = OrientationSample.allocate()
-        write = bind(
-            _pointing,
-            self._axis,
-            self._normals,
-            frame.motion,
-            desired,
-            feedback,
-            np.zeros((14, 3)),
-            out,
-        )
-        return self._desired.follow(desired), write
+    def kernel(self, state: RobotState) -> KernelCall:
+        """Return the kernel; see `Task.kernel`."""
+        axes = self._axis, self._normals
+        frame = state.frame(self.frame_name)
+        return _pointing, (*axes, frame, self._desired, np.zeros((14, 3)))
 
     def reference_rate(self, state: RobotState) -> Array:
         """Return the part of w_d perpendicular to the axis, shape (2,) [rad/s]."""
@@ -164,8 +151,8 @@ def _pointing(
     normals: Array,
     frame: FrameMotion,
     desired: OrientationSample,
-    feedback: Feedback,
     scratch: Array,
+    feedback: Feedback,
     out: TaskSample,
 ) -> None:
     """Write the sample.

@@ -8,24 +8,22 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TaskError
-from hsp_control.common.kernels import kernel
-from hsp_control.common.native import bind
+from hsp_control.common.kernels import KernelCall, kernel
 from hsp_control.common.rotations import quaternion_from_rotation
-from hsp_control.common.step_plan import StepPlan
+from hsp_control.common.step_plan import KernelOutput
 from hsp_control.declaration import within
 from hsp_control.geometry.start import Start
-from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.kinematics import FrameMotion
 from hsp_control.tasks.frame_pose import (
     ORIENTATION_SCRATCH,
     POSE_ERROR,
     PoseOrPoint,
-    pose_error_equation,
+    track_pose,
 )
 from hsp_control.tasks.frame_task import TrackingTask, frame_of, place_pose
-from hsp_control.tasks.task import ErrorPart, Feedback, default_name
-from hsp_control.trajectories import ComposedPose, PoseSample, PoseTrajectory
+from hsp_control.tasks.task import ErrorPart, default_name
+from hsp_control.trajectories import ComposedPose, PoseTrajectory
 
 
 class RelativePose(TrackingTask, type="relative_pose"):
@@ -88,25 +86,12 @@ class RelativePose(TrackingTask, type="relative_pose"):
         placed = replace(self, frame=frame, trajectory=trajectory, blend=None)
         return placed.checked(robot)
 
-    def compile(
-        self, state: RobotState, feedback: Feedback, out: TaskSample
-    ) -> StepPlan:
-        """Return the step plan; see `Task.compile`."""
-        frame, reference = state.frame(self.frame_name), state.frame(self.reference)
-        desired, relative = np.zeros((8, 3)), FrameMotion.allocate(state.robot.nv)
-        relate = bind(
-            _relative_kinematics, frame.motion, reference.motion, state.v, relative
-        )
-        write = bind(
-            pose_error_equation,
-            relative,
-            desired,
-            feedback,
-            np.zeros((ORIENTATION_SCRATCH, 3)),
-            out,
-        )
-        follow = self.pose.follow(PoseSample.over(desired))
-        return StepPlan((follow,), (frame.compute, reference.compute, relate, write))
+    def kernel(self, state: RobotState) -> KernelCall:
+        """Return the kernel; see `Task.kernel`."""
+        frames = state.frame(self.frame_name), state.frame(self.reference)
+        motion = FrameMotion.allocate(state.robot.nv)
+        relative = KernelOutput((_relative_kinematics, (*frames, state.v)), motion)
+        return track_pose, (relative, self.pose, np.zeros((ORIENTATION_SCRATCH, 3)))
 
     def reference_rate(self, state: RobotState) -> Array:
         """Return x_d' and w_d in the reference's axes, shape (6,) [m/s, rad/s]."""

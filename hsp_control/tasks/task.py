@@ -2,7 +2,7 @@
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, replace
 from functools import partial
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
@@ -12,8 +12,8 @@ from pydantic import AfterValidator, BeforeValidator
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import HspControlError, TaskError
-from hsp_control.common.kernels import kernel
-from hsp_control.common.step_plan import StepPlan
+from hsp_control.common.kernels import KernelCall, kernel
+from hsp_control.common.step_plan import StepPlan, planned, says
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.quantities import Positive, PositiveCount, plain
@@ -99,8 +99,9 @@ class Task(Part, ABC, family="tasks", error=TaskError):
     A subclass declares its parameters as fields (see `Part`) and implements:
 
     * `error_parts` names the components of e, and so says how many rows there are.
-    * `evaluate` writes J, J', e, e' and a_x. The error equation must follow *exactly*
-      from J a + J'v = a_x, in the coordinates of e.
+    * `kernel` returns what writes J, J', e, e' and a_x; or `evaluate`, in plain Python,
+      writes them itself. The error equation must follow *exactly* from
+      J a + J'v = a_x, in the coordinates of e.
     * `reference_rate` returns J v on the reference.
     * `measure` returns the reference and the actual value, for logs and plots.
     * `placed`, if it refers to the start or to frames.
@@ -110,8 +111,7 @@ class Task(Part, ABC, family="tasks", error=TaskError):
     coordinates of e, e' and offset may be others, in which the error equation is linear
     (a rotation vector, for example).
 
-    `compile` may be implemented instead of `evaluate`, to make a step faster. A task
-    has no memory: the controller owns the feedback, and the state keeps what a
+    A task has no memory: the controller owns the feedback, and the state keeps what a
     computation needs (see `RobotState.made`).
 
     Most tasks derive from `SecondOrderTask`, which has gains.
@@ -263,22 +263,25 @@ class Task(Part, ABC, family="tasks", error=TaskError):
         """Whether a floating base needs the task to stand; see `priority`."""
         return False
 
-    def __init_subclass__(cls, **arguments: Any) -> None:
-        """Reset `compile` if a subclass overrides `evaluate`, which it would ignore."""
-        super().__init_subclass__(**arguments)
-        if "evaluate" in vars(cls) and "compile" not in vars(cls):
-            cls.compile = Task.compile  # type: ignore[method-assign]
+    def kernel(self, state: RobotState) -> KernelCall:
+        """Return a kernel and its first arguments; `feedback` and `out` follow.
+
+        ``kernel(*arguments, feedback: Feedback, out: TaskSample)`` writes what
+        `evaluate` describes. Arguments are numbers, arrays and records of them, which
+        may be memory of the state; and what is brought up to date before each call:
+        ``state.frame(name)`` becomes a `FrameMotion`, a trajectory its sample.
+
+        Args:
+            state: The state that every step reads. Its values change between steps.
+        """
+        raise TypeError(f"{type(self).__name__} implements neither kernel nor evaluate")
 
     def compile(
         self, state: RobotState, feedback: Feedback, out: TaskSample
     ) -> StepPlan:
-        """Return the step plan that does what `evaluate` does; may be overridden.
-
-        Args:
-            state: The state that every step reads. Its values change between steps.
-            feedback: The gains and the offset that every step reads.
-            out: The sample that every step writes.
-        """
+        """Return the step plan that writes the sample of each step."""
+        if says(self, "kernel", "evaluate") == "kernel":
+            return planned(self.kernel(state), feedback, out)
         return StepPlan(write=(partial(self.evaluate, state, out, feedback),))
 
     def evaluate(
@@ -301,34 +304,19 @@ class Task(Part, ABC, family="tasks", error=TaskError):
             ``out``, or the new sample.
         """
         out, feedback = self.given(state, out, feedback)
-        compile_ = self._compiled_by()
 
         def make() -> tuple[Feedback, TaskSample, StepPlan]:
-            own, sample = (
-                self.feedback(),
-                TaskSample.allocate(self.rows, state.robot.nv),
-            )
-            return own, sample, compile_(self, state, own, sample)
+            own = self.feedback()
+            sample = TaskSample.allocate(self.rows, state.robot.nv)
+            return own, sample, planned(self.kernel(state), own, sample)
 
         own, sample, plan = state.made(self, "evaluate", make)
         for array, value in zip(own, feedback, strict=True):
             array[:] = value
-        for follow in plan.follow:
-            follow(state.t)
-        for write in plan.write:
-            write()
+        plan.run(state.t)
         for array, value in zip(out, sample, strict=True):
             array[:] = value
         return out
-
-    @classmethod
-    def _compiled_by(cls) -> Callable[..., StepPlan]:
-        """Return the `compile` that does what this class's own `evaluate` does."""
-        for each in cls.__mro__:
-            own = vars(each).get("compile", Task.compile)
-            if own is not Task.compile:
-                return own  # type: ignore[no-any-return]
-        raise TypeError(f"{cls.__name__} implements no evaluate")
 
     def given(
         self, state: RobotState, out: TaskSample | None, feedback: Feedback | None

@@ -10,14 +10,13 @@ from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TrajectoryError
-from hsp_control.common.kernels import kernel
+from hsp_control.common.kernels import KernelCall, kernel
 from hsp_control.declaration.quantities import Matrix, Number, Positive, Vector, Vector3
 from hsp_control.trajectories import checks
-from hsp_control.trajectories.following import Compiled, Kernel
 from hsp_control.trajectories.trajectory import Trajectory
 
 
-class Circle(Compiled, Trajectory, type="circle"):
+class Circle(Trajectory, type="circle"):
     """x(t) = c + r (cos θ u1 + sin θ u2), θ = ω t + θ0, for all t.
 
     The paper's (1 + cos 3t, 1 + sin 3t) is ``Circle(1, 3, center=[1, 1])``. In the
@@ -76,7 +75,8 @@ class Circle(Compiled, Trajectory, type="circle"):
         normal = [0.0, 0.0, 1.0] if self.normal is None else self.normal
         return _axes_from_normal(checks.direction(normal, "normal"), self.toward)
 
-    def _kernel(self) -> Kernel:
+    def kernel(self) -> KernelCall:
+        """Return the kernel; see `Trajectory.kernel`."""
         radii = self.radius * self._plane
         return _circle, (self.angular_rate, self.phase, np.asarray(self.center), radii)
 
@@ -118,7 +118,7 @@ def _circle(
         acceleration[i] = -rate * rate * radial
 
 
-class Lissajous(Compiled, Trajectory, type="lissajous"):
+class Lissajous(Trajectory, type="lissajous"):
     """x_i(t) = c_i + a_i sin(ω_i t + φ_i), for all t."""
 
     points: ClassVar[tuple[str, ...]] = ("center",)
@@ -146,7 +146,8 @@ class Lissajous(Compiled, Trajectory, type="lissajous"):
         """The number n of coordinates."""
         return np.size(self.amplitudes)
 
-    def _kernel(self) -> Kernel:
+    def kernel(self) -> KernelCall:
+        """Return the kernel; see `Trajectory.kernel`."""
         phases = np.zeros(self.dimension) if self.phases is None else self.phases
         parameters = [self.center, self.amplitudes, self.rates, phases]
         return _lissajous, (np.array(parameters, dtype=float),)
@@ -165,7 +166,7 @@ def _lissajous(
         acceleration[i] = -rate * rate * swing
 
 
-class UniformLine(Compiled, Trajectory, type="uniform_line"):
+class UniformLine(Trajectory, type="uniform_line"):
     """x(t) = x0 + t v, for all t. For a line that starts and stops use `Line`."""
 
     points: ClassVar[tuple[str, ...]] = ("start",)
@@ -186,7 +187,8 @@ class UniformLine(Compiled, Trajectory, type="uniform_line"):
         """The number n of coordinates."""
         return np.size(self.velocity)
 
-    def _kernel(self) -> Kernel:
+    def kernel(self) -> KernelCall:
+        """Return the kernel; see `Trajectory.kernel`."""
         return _line, (np.asarray(self.start), np.asarray(self.velocity))
 
 

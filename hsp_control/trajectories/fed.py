@@ -7,16 +7,15 @@ from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TrajectoryError
-from hsp_control.common.kernels import kernel
+from hsp_control.common.kernels import KernelCall, kernel
 from hsp_control.common.rotations import turn
 from hsp_control.declaration.quantities import PositiveCount
-from hsp_control.trajectories.following import Compiled, Kernel
 from hsp_control.trajectories.orientation import OrientationTrajectory
 from hsp_control.trajectories.remembering import Written
 from hsp_control.trajectories.trajectory import Trajectory
 
 
-class Fed(Written, Compiled, Trajectory):
+class Fed(Written, Trajectory):
     """x(t) in Rⁿ that a plan writes, once a control period.
 
     From one writing to the next it is x + x' (t - t0) + ½ x'' (t - t0)², so that its
@@ -68,11 +67,12 @@ class Fed(Written, Compiled, Trajectory):
         rows[0], rows[1], rows[2] = position, velocity, acceleration
         self.memory[0] = t
 
-    def _kernel(self) -> Kernel:
+    def kernel(self) -> KernelCall:
+        """Return the kernel; see `Trajectory.kernel`."""
         return _go_on, (self.memory,)
 
 
-class FedOrientation(Written, Compiled, OrientationTrajectory):
+class FedOrientation(Written, OrientationTrajectory):
     """R(t) that a plan writes; in between R turns about ω + ½ ω' (t - t0)."""
 
     @property
@@ -103,7 +103,8 @@ class FedOrientation(Written, Compiled, OrientationTrajectory):
         rows[:3], rows[3], rows[4] = rotation, velocity, acceleration
         self.memory[0] = t
 
-    def _kernel(self) -> Kernel:
+    def kernel(self) -> KernelCall:
+        """Return the kernel; see `Trajectory.kernel`."""
         return _turn_on, (self.memory[:1], self.memory[1:].reshape(5, 3))
 
 

@@ -1,6 +1,5 @@
 """Followers: repeated sampling of trajectories into the same memory."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any
 
@@ -9,13 +8,28 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
-from hsp_control.common.step_plan import CallSequence, TimeWindow, stay
+from hsp_control.common.step_plan import CallSequence, TimeWindow, says, stay
 
 Follower = Callable[[float], object]
 """A function of time [s] that writes the sample at that time into fixed memory."""
 
-Kernel = tuple[Callable[..., None], tuple[Any, ...]]
-"""``(function, parameters)``, called as ``function(*parameters, *sample, t)``."""
+
+def sampled(trajectory: Any, t: float, out: Any) -> Any:
+    """Write a trajectory's sample at time t [s] with its kernel, and return it."""
+    function, arguments = trajectory.kernel()
+    function(*arguments, *out, float(t))
+    return out
+
+
+def follow_sampled(trajectory: Any, out: Any) -> Follower:
+    """Return the follower of a trajectory that says its kernel, or its sample."""
+    if trajectory.constant:
+        trajectory.sample(0.0, out)
+        return stay
+    if says(trajectory, "kernel", "sample") == "kernel":
+        function, arguments = trajectory.kernel()
+        return bind(function, *arguments, *out, timed=True)
+    return follow_by(trajectory.sample, out)
 
 
 def follow_all(*followers: Follower) -> Follower:
@@ -62,28 +76,3 @@ def _restore(constant: Array, out: Array, t: float) -> None:
     """Write the constant values into ``out``, at any time."""
     for i in range(out.shape[0]):
         out[i] = constant[i]
-
-
-class Compiled(ABC):
-    """Mixin, named before the abstract class: the kernel of `_kernel` samples."""
-
-    __slots__ = ()
-
-    _output: Callable[[Any], Any]  # the abstract class's: ``out``, checked, or a new
-
-    @abstractmethod
-    def _kernel(self) -> Kernel:
-        """Return the kernel and its parameters: ``kernel(*parameters, *sample, t)``."""
-
-    def sample(self, t: float, out: Any = None) -> Any:
-        """Return the sample at time t [s]; see `Trajectory.sample`."""
-        out = self._output(out)
-        function, parameters = self._kernel()
-        function(*parameters, *out, float(t))
-        return out
-
-    def follow(self, out: Any) -> Follower:
-        """Return the follower; see `Trajectory.follow`."""
-        out = self._output(out)
-        function, parameters = self._kernel()
-        return bind(function, *parameters, *out, timed=True)

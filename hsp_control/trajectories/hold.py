@@ -6,10 +6,8 @@ from typing import ClassVar
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.step_plan import stay
 from hsp_control.declaration.quantities import Vector
 from hsp_control.declaration.rotation import Rotation, matrix_of
-from hsp_control.trajectories.following import Follower
 from hsp_control.trajectories.orientation import (
     OrientationSample,
     OrientationTrajectory,
@@ -20,6 +18,7 @@ from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
 class Hold(Trajectory, type="hold"):
     """x(t) = x0, a constant point."""
 
+    constant: ClassVar[bool] = True
     points: ClassVar[tuple[str, ...]] = ("point",)
 
     point: Vector | None = None
@@ -38,14 +37,11 @@ class Hold(Trajectory, type="hold"):
         out.acceleration.fill(0.0)
         return out
 
-    def follow(self, out: TrajectorySample) -> Follower:
-        """Write ``out`` once, and return a follower that does nothing."""
-        self.sample(0.0, out)
-        return stay
-
 
 class HoldOrientation(OrientationTrajectory, type="hold"):
     """R(t) = R0, a constant orientation."""
+
+    constant: ClassVar[bool] = True
 
     rotation: Rotation | None = None
     """R0, body to world: roll, pitch and yaw [rad], a quaternion or a matrix [-]; the
@@ -65,8 +61,3 @@ class HoldOrientation(OrientationTrajectory, type="hold"):
     def _matrix(self) -> Array:
         assert self.rotation is not None
         return matrix_of(self.rotation)
-
-    def follow(self, out: OrientationSample) -> Follower:
-        """Write ``out`` once, and return a follower that does nothing."""
-        self.sample(0.0, out)
-        return stay

@@ -1,22 +1,22 @@
 """Orientations that move: the abstract one, from waypoint to waypoint, a spin."""
 
-from abc import ABC, abstractmethod
+from abc import ABC
 from dataclasses import KW_ONLY, replace
 from functools import cached_property
-from typing import Any, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TrajectoryError
-from hsp_control.common.kernels import kernel
+from hsp_control.common.kernels import KernelCall, kernel
 from hsp_control.common.rotations import compose_back, log3, rotate, turn
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Number, Vector, Vector3
 from hsp_control.declaration.rotation import Rotation, Rotations, matrix_of
 from hsp_control.trajectories import checks
-from hsp_control.trajectories.following import Compiled, Follower, Kernel, follow_by
+from hsp_control.trajectories.following import Follower, follow_sampled, sampled
 from hsp_control.trajectories.timing import smooth_step
 
 
@@ -40,13 +40,18 @@ class OrientationTrajectory(Part, ABC, family="orientations", error=TrajectoryEr
     """R(t) in SO(3) with ω(t) and ω'(t); a value, defined at every t.
 
     R is body to world, ω is in world axes. A subclass declares its parameters as fields
-    and implements `sample`; it may override `follow`, or derive from `Compiled`, as
-    described in `Trajectory`. A motion of finite duration rests at its first
-    orientation before the start and at its last orientation after the end.
+    and implements `sample` or `kernel`, as described in `Trajectory`. A motion of
+    finite duration rests at its first orientation before the start and at its last
+    orientation after the end.
 
     A field `rotation` that is omitted means the orientation in which the robot starts.
     Such a trajectory cannot be sampled; `anchored` returns it with that orientation.
+
+    Attributes:
+        constant: Whether it rests at one orientation for ever.
     """
+
+    constant: ClassVar[bool] = False
 
     @property
     def relative(self) -> bool:
@@ -65,7 +70,10 @@ class OrientationTrajectory(Part, ABC, family="orientations", error=TrajectoryEr
         rotated: dict[str, Any] = {"rotation": start}
         return replace(self, **rotated)
 
-    @abstractmethod
+    def kernel(self) -> KernelCall:
+        """Return a kernel and its first arguments; see `Trajectory.kernel`."""
+        raise TypeError(f"{type(self).__name__} implements neither kernel nor sample")
+
     def sample(
         self, t: float, out: OrientationSample | None = None
     ) -> OrientationSample:
@@ -79,10 +87,17 @@ class OrientationTrajectory(Part, ABC, family="orientations", error=TrajectoryEr
         Returns:
             ``out``, or the new sample.
         """
+        sample: OrientationSample = sampled(self, t, self._output(out))
+        return sample
 
     def follow(self, out: OrientationSample) -> Follower:
         """Return a call that writes ``out`` for a time [s]; see `Trajectory.follow`."""
-        return follow_by(self.sample, out)
+        return follow_sampled(self, self._output(out))
+
+    def supplied(self) -> tuple[Any, ...]:
+        """Return its sample as an argument of a kernel; see `planned`."""
+        sample = OrientationSample.allocate()
+        return sample, (self.follow(sample),), ()
 
     def _output(self, out: OrientationSample | None) -> OrientationSample:
         """Return ``out``, or a new sample if it is None."""
@@ -94,7 +109,7 @@ class OrientationTrajectory(Part, ABC, family="orientations", error=TrajectoryEr
         return OrientationSample.allocate() if out is None else out
 
 
-class OrientationPath(Compiled, OrientationTrajectory, type="path"):
+class OrientationPath(OrientationTrajectory, type="path"):
     """R(t) = exp(s a_i) R_i from t_i to t_{i+1}, s the `smooth_step`.
 
     a_i = R_i log(R_iᵀ R_{i+1}) is the shortest rotation to the next waypoint, in the
@@ -117,7 +132,8 @@ class OrientationPath(Compiled, OrientationTrajectory, type="path"):
     def _matrices(self) -> Array:
         return np.array([matrix_of(each) for each in np.asarray(self.rotations)])
 
-    def _kernel(self) -> Kernel:
+    def kernel(self) -> KernelCall:
+        """Return the kernel; see `Trajectory.kernel`."""
         R = self._matrices
         turns, between = np.zeros((len(R) - 1, 3)), np.zeros((3, 3))
         for i, a in enumerate(turns):
@@ -151,7 +167,7 @@ def _path(
         acceleration[k] = s_ddot * turns[i, k]
 
 
-class Spin(Compiled, OrientationTrajectory, type="spin"):
+class Spin(OrientationTrajectory, type="spin"):
     """R(t) = exp(t ω) R0 with ω = rate · axis in the world frame, for all t."""
 
     axis: Vector3
@@ -167,11 +183,12 @@ class Spin(Compiled, OrientationTrajectory, type="spin"):
         """Check that the axis is not zero."""
         checks.direction(self.axis, "axis")
 
-    def _kernel(self) -> Kernel:
+    def kernel(self) -> KernelCall:
+        """Return the kernel; see `Trajectory.kernel`."""
         return self._call
 
     @cached_property
-    def _call(self) -> Kernel:
+    def _call(self) -> KernelCall:
         assert self.rotation is not None
         omega = self.rate * checks.direction(self.axis, "axis")
         return _spin, (np.asarray(omega), matrix_of(self.rotation))

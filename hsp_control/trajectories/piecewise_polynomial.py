@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.kernels import kernel
+from hsp_control.common.kernels import KernelCall, kernel
 from hsp_control.declaration.quantities import Matrix, Number, Positive, Tensor, Vector
 from hsp_control.trajectories import checks
-from hsp_control.trajectories.following import Compiled, Kernel
 from hsp_control.trajectories.trajectory import Trajectory
 
 # Row k maps (x, x', x'') at u = 0 and (x, x', x'') at u = 1 to the coefficient of u^k.
@@ -75,7 +74,7 @@ def join(times: ArrayLike, coefficients: ArrayLike, end: ArrayLike | None) -> Pi
     return Pieces(knots, np.vstack([c[:, 0], last]), c)
 
 
-class PolynomialTrajectory(Compiled, Trajectory):
+class PolynomialTrajectory(Trajectory):
     """Polynomials that join at knots; a subclass says which, in `_pieces`.
 
     The motion rests exactly at the first point before the first knot, and at the last
@@ -101,7 +100,8 @@ class PolynomialTrajectory(Compiled, Trajectory):
         """The number n of coordinates."""
         return len(self.pieces.waypoints[0])
 
-    def _kernel(self) -> Kernel:
+    def kernel(self) -> KernelCall:
+        """Return the kernel; see `Trajectory.kernel`."""
         return _evaluate, tuple(self.pieces)
 
 

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from dataclasses import KW_ONLY, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -88,6 +88,14 @@ class PoseTrajectory(Part, ABC, family="poses", error=TrajectoryError):
             return own if sample is out else (*sample.position, *sample.orientation)
 
         return follow_by(sampler, (*out.position, *out.orientation))
+
+    def supplied(self) -> tuple[Any, ...]:
+        """Return its sample as an argument of a kernel, in one array; see `planned`.
+
+        The rows are x, x', x'', R (three), ω and ω', shape (8, 3).
+        """
+        desired = np.zeros((8, 3))
+        return desired, (self.follow(PoseSample.over(desired)),), ()
 
 
 class ComposedPose(PoseTrajectory, type="composed"):

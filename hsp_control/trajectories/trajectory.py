@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ShapeError, TrajectoryError
+from hsp_control.common.kernels import KernelCall
 from hsp_control.declaration import Part
-from hsp_control.trajectories.following import Follower, follow_by
+from hsp_control.trajectories.following import Follower, follow_sampled, sampled
 
 
 class TrajectorySample(NamedTuple):
@@ -33,20 +34,20 @@ class Trajectory(Part, ABC, family="trajectories", error=TrajectoryError):
     """x(t) in Rⁿ with x'(t) and x''(t); a value, defined at every t.
 
     A subclass declares its parameters as fields (see `Part`) and implements `dimension`
-    and `sample`. The coordinates may have any unit; a task says which frame and units
-    it needs. A motion of finite duration rests at its first point before the start and
-    at its last point after the end.
+    and `sample`, or `kernel`, which makes a step faster. The coordinates may have any
+    unit; a task says which frame and units it needs. A motion of finite duration rests
+    at its first point before the start and at its last point after the end.
 
     Points may be relative to where the robot starts: those that ``origin: start``
     moves, and those that are omitted. Such a trajectory cannot be sampled; `anchored`
     returns it with all points in the world. Name the fields that hold points in
     `points`.
 
-    A subclass may override `follow` to make repeated sampling faster. If one kernel
-    computes the sample, derive from `Compiled` first, then from `Trajectory`, and
-    implement `_kernel` instead of `sample`.
+    Attributes:
+        constant: Whether it rests at one point for ever.
     """
 
+    constant: ClassVar[bool] = False
     points: ClassVar[tuple[str, ...]] = ()
 
     _: KW_ONLY
@@ -106,7 +107,13 @@ class Trajectory(Part, ABC, family="trajectories", error=TrajectoryError):
     def dimension(self) -> int:
         """The number n of coordinates."""
 
-    @abstractmethod
+    def kernel(self) -> KernelCall:
+        """Return a kernel and its first arguments; the sample's arrays and t follow.
+
+        ``kernel(*arguments, *sample, t)`` writes what `sample` returns.
+        """
+        raise TypeError(f"{type(self).__name__} implements neither kernel nor sample")
+
     def sample(self, t: float, out: TrajectorySample | None = None) -> TrajectorySample:
         """Return x(t), x'(t) and x''(t), shape (n,) each.
 
@@ -124,6 +131,8 @@ class Trajectory(Part, ABC, family="trajectories", error=TrajectoryError):
         Raises:
             ShapeError: If ``out`` has another dimension.
         """
+        sample: TrajectorySample = sampled(self, t, self._output(out))
+        return sample
 
     def follow(self, out: TrajectorySample) -> Follower:
         """Return a function of time [s] that writes the sample into ``out``.
@@ -132,7 +141,12 @@ class Trajectory(Part, ABC, family="trajectories", error=TrajectoryError):
         After this call nothing else may write into ``out``, because a follower may
         skip entries that do not change.
         """
-        return follow_by(self.sample, out)
+        return follow_sampled(self, self._output(out))
+
+    def supplied(self) -> tuple[Any, ...]:
+        """Return its sample as an argument of a kernel; see `planned`."""
+        sample = TrajectorySample.allocate(self.dimension)
+        return sample, (self.follow(sample),), ()
 
     def _output(self, out: TrajectorySample | None) -> TrajectorySample:
         """Return ``out``, or a new sample if it is None."""

@@ -15,11 +15,15 @@ from hsp_control.live import InProcessRobot, LoopReport, OperatorRequests, run_l
 from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.fields.weight import sample_weight
 from hsp_control.play import Picture
-from hsp_control.play.channel import Channel, channel_pair
-from hsp_control.play.dead_mans_key import TIMEOUT, DeadMansKey
-from hsp_control.play.mirror import Mirror
-from hsp_control.play.steered_loop import SteeredLoop
-from hsp_control.visualization.viewer import Recorder, Viewer
+from hsp_control.play.live_loop import (
+    TIMEOUT,
+    Channel,
+    DeadMansKey,
+    Mirror,
+    SteeredLoop,
+    channel_pair,
+)
+from hsp_control.visualization.viewer import SceneRecorder, Viewer
 
 
 class Steered:
@@ -154,7 +158,7 @@ def test_the_picture_follows_the_journal(steered: Steered) -> None:
     heard, page_end = channel_pair()
     mirror = Mirror(experiment, 0.001, steered.journal, heard, held=False)
     loop_side = Channel(page_end)
-    with Viewer(experiment.robot, transport=Recorder()) as viewer:
+    with Viewer(experiment.robot, transport=SceneRecorder()) as viewer:
         picture = Picture(mirror, viewer)
         start = {c.path: c for c in picture.frame(running=True, rate=1.0)}
         assert start

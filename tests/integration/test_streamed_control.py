@@ -11,7 +11,7 @@ import pytest
 
 import hsp_control as hsp
 from hsp_control.common.exceptions import AccessError, HspControlError
-from hsp_control.simulation.recorder import Recorder
+from hsp_control.simulation.log_writer import LogWriter
 
 PERIOD = 1e-3
 PANDA = hsp.Robot.load("panda")
@@ -29,11 +29,13 @@ def moved(pose: pin.SE3, t: float) -> pin.SE3:
     return pin.SE3(pose.rotation @ turned, pose.translation + away)
 
 
-def every(period: float, send: Callable[[float], object]) -> Callable[[Recorder], None]:
+def every(
+    period: float, send: Callable[[float], object]
+) -> Callable[[LogWriter], None]:
     """Return an ``on_row`` for rows of 10 ms that sends after each period [s]."""
     rows = iter(range(10**9))
 
-    def on_row(recorder: Recorder) -> None:
+    def on_row(recorder: LogWriter) -> None:
         t = 0.01 * next(rows)
         if t / period == pytest.approx(round(t / period)):
             send(t)

@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from hsp_control.visualization.viewer import Recorder
+from hsp_control.visualization.viewer import SceneRecorder
 from hsp_control.visualization.viewer.commands import CLIP
 
 
-def told(recorder: Recorder, path: str, kind: str) -> dict[str, Any]:
+def told(recorder: SceneRecorder, path: str, kind: str) -> dict[str, Any]:
     """Return the last command of a kind at a path; there is one."""
     command = recorder.command(path, kind)
     assert command is not None
@@ -19,7 +19,7 @@ def told(recorder: Recorder, path: str, kind: str) -> dict[str, Any]:
 class Clip:
     """The clip of a recorder: what each node does, at any time."""
 
-    def __init__(self, recorder: Recorder) -> None:
+    def __init__(self, recorder: SceneRecorder) -> None:
         begin = recorder.command(CLIP, "begin")
         assert begin is not None
         self.start, self.end = begin["start"], begin["end"]

@@ -23,11 +23,11 @@ from hsp_control.companions.film import FilmStyle, export_film
 from hsp_control.companions.film.encoding import find_ffmpeg
 from hsp_control.visualization.viewer import LiveView, Viewer, export_html
 from hsp_control.visualization.viewer.commands import PLOTS
-from hsp_control.visualization.viewer.latest_commands import key_of
-from hsp_control.visualization.viewer.offline.clip_reduction import (
+from hsp_control.visualization.viewer.packing import (
     ANGLE_BOUND,
     POSITION_BOUND,
 )
+from hsp_control.visualization.viewer.pipe import key_of
 
 pytest.importorskip("playwright.sync_api")
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
@@ -42,10 +42,8 @@ COARSE = (
 )
 PLANAR = "paper/4_moving_obstacle"
 
-EDGES = """() => {
-  const {left, right} = PlotAxes.MARGIN;
-  return [left, document.querySelector('#side svg').clientWidth - right];
-}"""  # of the plots, from left to right
+WIDTH = "document.querySelector('#side .u-over').clientWidth"  # of the plots' curves
+END = "uPlot.sync('run').plots[0].scales.x.max"  # of the axis of time
 # What a page shows once it has drawn: without the two frames, a picture may be stale.
 SETTLE = """() => { viewer.render(); return new Promise((drawn) =>
   requestAnimationFrame(() => requestAnimationFrame(drawn))); }"""
@@ -135,12 +133,10 @@ def seek(watched: Watched, moment: float) -> None:
 
 
 def cursors(watched: Watched) -> list[float]:
-    """Where the cursors stand in the plots, as the times below them."""
+    """Where the cursors stand in the plots, from the left of their curves."""
     return watched.page.evaluate(
-        """() => [...document.querySelectorAll("#side svg")].map((picture) => {
-          const cursor = picture.querySelector(".cursor").transform.baseVal;
-          return cursor.consolidate().matrix.e;
-        })"""
+        """() => [...document.querySelectorAll("#side .cursor")].map((cursor) =>
+          new DOMMatrix(getComputedStyle(cursor).transform).e)"""
     )
 
 
@@ -208,10 +204,10 @@ def test_timeline_plots_and_robot_move_together(
     watched = exported(watch, planar_page, at="#t=2")
     page = watched.page
     assert page.evaluate("[player.time, player.playing]") == [2.0, False]
-    left, right = page.evaluate(EDGES)
+    width = page.evaluate(WIDTH)
 
     def expect(moment: float) -> None:
-        at = left + moment / 4.0 * (right - left)
+        at = moment / 4.0 * width
         np.testing.assert_allclose(cursors(watched), at, atol=0.02)
         assert page.locator(".player .clock").inner_text().startswith(f"{moment:.2f} /")
         assert float(page.locator(".timeline").input_value()) == pytest.approx(moment)
@@ -227,16 +223,15 @@ def test_timeline_plots_and_robot_move_together(
     np.testing.assert_allclose(numbers, angles, atol=0.02)
 
     # A click in a plot goes there; the cursor can be taken, and follows.
-    box = page.locator("#side svg").nth(1).bounding_box()
-    quarter = left + 0.25 * (right - left)
-    page.mouse.click(box["x"] + quarter, box["y"] + 40)
+    box = page.locator("#side .u-over").nth(1).bounding_box()
+    page.mouse.click(box["x"] + 0.25 * width, box["y"] + 40)
     assert page.evaluate("player.time") == pytest.approx(1.0, abs=0.02)
     page.mouse.down()
-    page.mouse.move(box["x"] + left + 0.5 * (right - left), box["y"] + 45, steps=3)
+    page.mouse.move(box["x"] + 0.5 * width, box["y"] + 45, steps=3)
     page.mouse.up()
     released = page.evaluate("player.time")
     assert released == pytest.approx(2.0, abs=0.02)
-    page.mouse.move(box["x"] + left, box["y"] + 40)
+    page.mouse.move(box["x"] + 1, box["y"] + 40)
     assert page.evaluate("player.time") == released
 
     # Playing moves all of it.
@@ -352,8 +347,7 @@ def test_the_live_view_has_the_run_s_plots(
         live.on_row(recorder)
         if not partial and recorder.rows(0)["t"][-1] >= 1.0:
             assert viewer.wait_for_browser(200.0)
-            plot = watched.page.locator("#side svg").first
-            partial.append(plot.get_attribute("aria-valuemax"))
+            partial.append(watched.page.evaluate(END))
             watched.page.locator("#side .plot button").first.click()
 
     with Viewer(experiment.robot) as viewer:
@@ -362,7 +356,7 @@ def test_the_live_view_has_the_run_s_plots(
         live = LiveView(viewer, experiment)
         assert not page.locator("#side").count()  # there is no run yet
         log = experiment.run(on_row=on_row)
-        assert partial == ["4"]  # the axis is that of the whole run
+        assert partial == [4]  # the axis is that of the whole run
         live.finish(log)
         assert viewer.wait_for_browser(200.0)
         assert page.locator("#side .plot").count() == 7
@@ -374,10 +368,10 @@ def test_the_live_view_has_the_run_s_plots(
             name for path, name, _ in viewer.transport.scene.items() if path == PLOTS
         ]
         assert kept == ["plots"]
-        left, right = page.evaluate(EDGES)
+        width = page.evaluate(WIDTH)
         for moment in (1.0, 3.25):
             seek(watched, moment)
-            at = left + moment / 4.0 * (right - left)
+            at = moment / 4.0 * width
             np.testing.assert_allclose(cursors(watched), at, atol=0.02)
 
         viewer.draw_scene(experiment.scene)  # no run, no plots

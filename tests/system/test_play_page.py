@@ -328,7 +328,7 @@ def test_a_link_is_pulled(page: Any) -> None:
     }"""
     assert page.evaluate(distance, first) < 1e-6
     assert lies_under(page, first["point"], start)
-    until(page, "play.outbox.pending.size === 0")
+    until(page, "play.pending.size === 0")
     assert lies_under(page, sent(page, "pull")[-1]["to"], end)
     force = {"from": first["point"], "to": first["point"]}
     tell(page, "play_force", visible=True, newtons=23.4, **force)

@@ -23,7 +23,7 @@ from hsp_control.visualization.viewer.commands import (
     set_object,
     set_trail,
 )
-from hsp_control.visualization.viewer.mesh_files import collada_object
+from hsp_control.visualization.viewer.threejs import collada_object
 
 pytestmark = pytest.mark.browser
 

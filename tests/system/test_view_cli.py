@@ -13,7 +13,7 @@ from hsp_control import Experiment, Rollout
 from hsp_control.cli import main
 from hsp_control.common import kernels
 from hsp_control.config.loaded_scenario import LoadedScenario
-from hsp_control.visualization.viewer import browser, server
+from hsp_control.visualization.viewer import transport
 
 pytestmark = pytest.mark.process
 
@@ -25,7 +25,7 @@ SHORT = ["--set", "simulation.duration=0.2"]
 def nobody_looks(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"):
         monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr(browser.sys, "platform", "linux")
+    monkeypatch.setattr(transport.sys, "platform", "linux")
 
 
 @pytest.fixture(scope="module")
@@ -95,7 +95,7 @@ def test_the_page_of_a_run_opens_before_its_kernels_are_compiled(
     made = Experiment.of
     monkeypatch.setattr(Experiment, "of", of)
     monkeypatch.setattr(
-        browser, "open_browser", lambda url: pages.append(Page(url)) or False
+        transport, "open_browser", lambda url: pages.append(Page(url)) or False
     )
     assert main(["run", MOVING, "--view", "--out", str(tmp_path), *SHORT]) == 0
     assert any(c["type"] == "clip" for c in pages[0].commands)
@@ -128,10 +128,10 @@ def test_what_makes_no_sense_is_refused(
 def test_with_a_browser_it_stays_until_the_page_is_closed(
     log: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(server, "RELOAD_TIMEOUT", 0.5)
+    monkeypatch.setattr(transport, "RELOAD_TIMEOUT", 0.5)
     monkeypatch.setenv("DISPLAY", ":0")
-    graphical = browser.webbrowser.BackgroundBrowser("firefox")
-    monkeypatch.setattr(browser.webbrowser, "get", lambda: graphical)
+    graphical = transport.webbrowser.BackgroundBrowser("firefox")
+    monkeypatch.setattr(transport.webbrowser, "get", lambda: graphical)
     pages: list[Page] = []
     left: list[float] = []
 
@@ -142,7 +142,7 @@ def test_with_a_browser_it_stays_until_the_page_is_closed(
         left.append(time.monotonic())
         page.leave()
 
-    monkeypatch.setattr(browser.webbrowser, "open", look)
+    monkeypatch.setattr(transport.webbrowser, "open", look)
     assert main(["view", str(log)]) == 0
     assert time.monotonic() > left[0]  # not before the page was closed
     (page,) = pages

@@ -26,18 +26,23 @@ from tornado.websocket import websocket_connect
 from hsp_control import Robot, Rollout, load_experiment
 from hsp_control.common.exceptions import ExportError, ViewerError
 from hsp_control.geometry import Scene
-from hsp_control.visualization.viewer import Recorder, Viewer, browser, server
+from hsp_control.visualization.viewer import (
+    SceneRecorder,
+    Viewer,
+    offline_page,
+    transport,
+)
 from hsp_control.visualization.viewer.commands import CAMERA, CAPTION, CLIP
-from hsp_control.visualization.viewer.latest_commands import LatestCommands, key_of
-from hsp_control.visualization.viewer.offline import page as offline_page
-from hsp_control.visualization.viewer.pipe_protocol import (
+from hsp_control.visualization.viewer.pipe import (
     DELETE,
     SET,
     Decoder,
-    Record,
+    LatestCommands,
+    PipeRecord,
     encode,
+    key_of,
 )
-from hsp_control.visualization.viewer.server import Server
+from hsp_control.visualization.viewer.transport import PageServer
 
 pytestmark = pytest.mark.process
 
@@ -56,13 +61,13 @@ def arm() -> Robot:
 
 
 @pytest.fixture
-def recorder() -> Recorder:
-    return Recorder()
+def recorder() -> SceneRecorder:
+    return SceneRecorder()
 
 
 @pytest.fixture
-def started() -> Iterator[Server]:
-    with_process = Server()
+def started() -> Iterator[PageServer]:
+    with_process = PageServer()
     yield with_process
     with_process.close()
 
@@ -91,7 +96,7 @@ def gone(pid: int) -> bool:
 
 
 @LINUX
-def test_it_listens_on_the_loopback_address_alone(started: Server) -> None:
+def test_it_listens_on_the_loopback_address_alone(started: PageServer) -> None:
     pid = started.process.pid
     links = [str(link.readlink()) for link in Path(f"/proc/{pid}/fd").iterdir()]
     inodes = {link[8:-1] for link in links if link.startswith("socket:[")}
@@ -110,7 +115,7 @@ def test_closing_leaves_nothing(arm: Robot) -> None:
         port = port_of(viewer.url)
         assert answers(port)
         viewer.show(arm.home())
-    assert isinstance(viewer.transport, Server)
+    assert isinstance(viewer.transport, PageServer)
     assert viewer.transport.process.returncode is not None
     assert not answers(port)
     viewer.close()  # again is no error
@@ -121,8 +126,8 @@ def test_closing_leaves_nothing(arm: Robot) -> None:
 PARENT = """
 import os, sys, time
 from hsp_control.geometry import Scene
-from hsp_control.visualization.viewer.server import Server
-server = Server()
+from hsp_control.visualization.viewer.transport import PageServer
+server = PageServer()
 if sys.argv[1] == "fork" and os.fork() == 0:
     os.close(1)
     time.sleep(30)  # holds the server's input open after its parent's death
@@ -189,7 +194,7 @@ def test_without_a_browser_nothing_waits(
     assert time.monotonic() - begin < 10.0
 
 
-def test_a_notebook_holds_what_is_shown(arm: Robot, recorder: Recorder) -> None:
+def test_a_notebook_holds_what_is_shown(arm: Robot, recorder: SceneRecorder) -> None:
     with Viewer(arm) as viewer:
         shown = viewer._repr_html_()
     assert shown.startswith("<iframe srcdoc=")
@@ -213,10 +218,10 @@ def test_without_what_reads_meshes_a_notebook_shows_the_live_page(
 def test_a_dead_or_stopped_server_is_an_error_not_a_wait(
     arm: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(server, "STALL_TIMEOUT", 0.3)
+    monkeypatch.setattr(transport, "STALL_TIMEOUT", 0.3)
     for sign, message in ((signal.SIGKILL, "has ended"), (signal.SIGSTOP, "for 0.3 s")):
         viewer = Viewer(arm)
-        assert isinstance(viewer.transport, Server)
+        assert isinstance(viewer.transport, PageServer)
         viewer.transport.process.send_signal(sign)
         begin = time.monotonic()
         with pytest.raises(ViewerError, match=message):
@@ -274,7 +279,7 @@ def test_a_page_that_opens_late_sees_everything(arm: Robot, run: Rollout) -> Non
     second.join(5.0)
 
 
-def test_a_connection_names_host_and_origin(started: Server) -> None:
+def test_a_connection_names_host_and_origin(started: PageServer) -> None:
     """No page of another site, no name that resolves here, no program without both."""
     assert started.url is not None
     with pytest.raises(HTTPClientError) as refused:
@@ -306,13 +311,13 @@ async def opened(request: HTTPRequest) -> None:
 
 
 @pytest.fixture
-def steered() -> Iterator[Server]:
-    with_process = Server(steerable=True)
+def steered() -> Iterator[PageServer]:
+    with_process = PageServer(steerable=True)
     yield with_process
     with_process.close()
 
 
-def heard(server: Server, last: str) -> list[dict[str, Any]]:
+def heard(server: PageServer, last: str) -> list[dict[str, Any]]:
     """What the pages say, up to a message of a kind."""
     found: list[dict[str, Any]] = []
     wait_until(
@@ -328,7 +333,7 @@ HANDSHAKE = {
 }  # fmt: skip
 
 
-def test_the_page_that_steers_needs_the_key(steered: Server) -> None:
+def test_the_page_that_steers_needs_the_key(steered: PageServer) -> None:
     assert steered.url is not None
     address, key = steered.url.split("?key=")
     assert len(key) >= 20
@@ -350,13 +355,13 @@ def test_the_page_that_steers_needs_the_key(steered: Server) -> None:
         with connection.getresponse() as answer:
             assert answer.status == 403
     asyncio.run(connect(steered.url))
-    other = Server(steerable=True)
+    other = PageServer(steerable=True)
     assert other.url is not None
     assert other.url.split("?key=")[1] != key
     other.close()
 
 
-def test_one_page_steers_at_a_time(steered: Server) -> None:
+def test_one_page_steers_at_a_time(steered: PageServer) -> None:
     assert steered.url is not None
     first = Steering(steered.url)
     wait_until(lambda: first.drives() == (True, True))
@@ -378,7 +383,7 @@ def test_one_page_steers_at_a_time(steered: Server) -> None:
     wait_until(lambda: third.drives() == (True, True))
 
 
-def test_a_flood_is_no_more_than_its_newest_words(steered: Server) -> None:
+def test_a_flood_is_no_more_than_its_newest_words(steered: PageServer) -> None:
     """10,000 messages while nobody listens: the last of each kind is what counts."""
     assert steered.url is not None
     page = Steering(steered.url)
@@ -397,41 +402,41 @@ def test_a_flood_is_no_more_than_its_newest_words(steered: Server) -> None:
 
 
 def test_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(server.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr(transport.importlib.util, "find_spec", lambda name: None)
     with pytest.raises(ViewerError, match="pip install meshcat"):
-        Server()
+        PageServer()
 
 
 def test_a_server_that_cannot_start_says_why(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(server, "meshcat_page", lambda: tmp_path)
+    monkeypatch.setattr(transport, "meshcat_page", lambda: tmp_path)
     with pytest.raises(ViewerError, match=r"cannot start: .*main\.min\.js"):
-        Server()
-    monkeypatch.setattr(server.sys, "executable", "/bin/false")
+        PageServer()
+    monkeypatch.setattr(transport.sys, "executable", "/bin/false")
     with pytest.raises(ViewerError, match="has ended"):
-        Server()
+        PageServer()
 
 
 def test_a_browser_is_opened_only_where_there_is_one(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     url, opened = "http://127.0.0.1:7000/", threading.Event()
-    monkeypatch.setattr(browser.webbrowser, "open", lambda url, new: opened.set())
-    monkeypatch.setattr(browser.sys, "platform", "linux")
+    monkeypatch.setattr(transport.webbrowser, "open", lambda url, new: opened.set())
+    monkeypatch.setattr(transport.sys, "platform", "linux")
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"):
         monkeypatch.delenv(name, raising=False)
-    assert not browser.open_browser(url)
+    assert not transport.open_browser(url)
     assert f"no display to open a browser on; the view is at {url}" in caplog.text
     monkeypatch.setenv("DISPLAY", ":0")
     terminal = webbrowser.GenericBrowser("w3m")
-    monkeypatch.setattr(browser.webbrowser, "get", lambda: terminal)
-    assert not browser.open_browser(url)
+    monkeypatch.setattr(transport.webbrowser, "get", lambda: terminal)
+    assert not transport.open_browser(url)
     assert "w3m would take over the terminal" in caplog.text
     assert not opened.is_set()
     graphical = webbrowser.BackgroundBrowser("firefox")
-    monkeypatch.setattr(browser.webbrowser, "get", lambda: graphical)
-    assert browser.open_browser(url)
+    monkeypatch.setattr(transport.webbrowser, "get", lambda: graphical)
+    assert transport.open_browser(url)
     assert opened.wait(5.0)
 
 
@@ -442,13 +447,13 @@ def test_the_newest_word_counts_and_order_is_kept() -> None:
     kept = LatestCommands()
     for key, word in (("/a", b"1"), ("/a/b", b"2"), ("/ab", b"3"), ("/a", b"4")):
         kept.put(key_of(key, "object"), word)
-    assert kept.copy().take() == [b"2", b"3", b"4"]
+    assert kept.copy().pop_all() == [b"2", b"3", b"4"]
     kept.drop("/a")
     assert [item[0] for item in kept.items()] == ["/ab"]
 
 
 def test_records_survive_being_cut_anywhere() -> None:
-    records = [Record(SET, "/ä", b"x" * 300), Record(DELETE, "", b"")] * 3
+    records = [PipeRecord(SET, "/ä", b"x" * 300), PipeRecord(DELETE, "", b"")] * 3
     data = b"".join(map(encode, records))
     for size in (1, 7, 310, len(data)):
         decoder = Decoder()

@@ -1,26 +1,29 @@
 """A field: a frame, such as the elbow, keeps a height."""
 
-from hsp_control.declaration import within
+from hsp_control.common.kernels import KernelCall, kernel
 from hsp_control.declaration.quantities import Number
-from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields import Cost
-from hsp_control.robot import RobotState
 
 
 class ElbowHeight(Cost, type="elbow_height"):
-    """f = (z - height)², with gradient and rate by differences."""
+    """f = (z - height)², with gradient and rate by a kernel."""
 
     frame: str
     """Name of the frame [-]."""
     height: Number = 0.6
     """The height [m]."""
 
-    def placed(self, start: Start) -> "ElbowHeight":
-        """Return the cost, whose frame exists."""
-        with within("frame"):
-            start.state.robot.frame_id(self.frame)
-        return self
+    def kernel(self, state) -> KernelCall:
+        """Return the kernel; see `Cost.kernel`."""
+        return _elbow_height, (state.frame(self.frame), self.height)
 
-    def value(self, state: RobotState) -> float:
-        """Return f."""
-        return float((state.position(self.frame)[2] - self.height) ** 2)
+
+@kernel
+def _elbow_height(frame, height, gradient, rate):
+    """Write ∇f = 2 (z - height) J_z and its rate, and return f."""
+    away = frame.position[2] - height
+    for i in range(gradient.shape[0]):
+        J, J_dot = frame.jacobian[2, i], frame.jacobian_dot[2, i]
+        gradient[i] = 2.0 * away * J
+        rate[i] = 2.0 * (frame.velocity[2] * J + away * J_dot)
+    return away * away

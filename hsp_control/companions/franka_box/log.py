@@ -1,16 +1,17 @@
 """The true motion behind a control box as an ordinary log."""
 
-from math import floor, inf
 from pathlib import Path
 from typing import Self
 
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LogError
 from hsp_control.companions.franka_box import Box
 from hsp_control.config import Experiment
 from hsp_control.control.measurement import LogChannel
-from hsp_control.live.live_log import LiveLog, Row
+from hsp_control.live.live_log import DueRows
 from hsp_control.robot import RobotState
 from hsp_control.simulation import Rollout
+from hsp_control.simulation.log_writer import LogWriter
 from hsp_control.simulation.plants import differing_bodies
 
 _PERIOD = 0.01
@@ -33,7 +34,7 @@ class BoxLog:
             raise LogError(f"--log {path}: the name of a log ends in .npz")
         self.path, self._box = path, box
         self._state = RobotState(experiment.robot)
-        self._next = -inf
+        self._due = DueRows(_PERIOD)
         plant = {
             **box.plant.describe(),
             **differing_bodies(box.plant, experiment.robot),
@@ -44,9 +45,11 @@ class BoxLog:
             "config": experiment.config,
             "plant": plant,
         }
-        journal = path.with_suffix(".journal")
-        self._log = LiveLog(journal, experiment.controller, experiment.scene, meta)
-        self._log.warm_up(self._row())
+        self._journal = path.with_suffix(".journal")
+        self._log = LogWriter(
+            experiment.controller, experiment.scene, 0, path=self._journal, meta=meta
+        )
+        self._log.warm_up(*self._row())
         box.on_period = self._on_period
 
     def __enter__(self) -> Self:
@@ -57,19 +60,20 @@ class BoxLog:
             self._log.end("completed", "the box was switched off")
         else:
             self._log.end("stopped", str(error) or type(error).__name__)
-        Rollout.load(self._log.path).save(self.path)
-        self._log.path.unlink()
+        Rollout.load(self._journal).save(self.path)
+        self._journal.unlink()
 
     def _on_period(self) -> None:
         box = self._box
-        if not box.at_rest and box.t >= self._next:
-            self._next = (floor(box.t / _PERIOD + 1e-6) + 1.0 - 1e-6) * _PERIOD
-            self._log.add(self._row())
+        if not box.at_rest and self._due.is_due(box.t, 0):
+            self._log.record(*self._row())
+            self._due.written(box.t, 0)
 
-    def _row(self) -> Row:
+    def _row(self) -> tuple[RobotState, None, Array, dict[str, LogChannel]]:
+        """Return the arguments of `LogWriter.record`."""
         box = self._box
         channels = {
             "box.mode": LogChannel(float(box.mode), "-", "1 idle; 2 move; 4 reflex"),
             **box.plant.log_channels(box.t, box.q, box.v, box.tau),
         }
-        return Row(self._state.update(box.t, box.q, box.v), None, box.tau, channels)
+        return self._state.update(box.t, box.q, box.v), None, box.tau, channels

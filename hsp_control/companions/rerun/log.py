@@ -9,25 +9,23 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ExportError
 from hsp_control.geometry import shapes
 from hsp_control.geometry.shapes import Shape
-from hsp_control.robot import Robot, RobotState
+from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.log_series import task_names
 from hsp_control.visualization import palette
 from hsp_control.visualization.viewer.commands import path_element
-from hsp_control.visualization.viewer.mesh_files import collada_object, mesh_geometry
-from hsp_control.visualization.viewer.motion import Motion
-from hsp_control.visualization.viewer.obstacle_layer import ObstacleLayer
-from hsp_control.visualization.viewer.obstacle_shapes import triangles_of
-from hsp_control.visualization.viewer.offline.meshes import read_mesh
+from hsp_control.visualization.viewer.motion import RunMotion
+from hsp_control.visualization.viewer.obstacles import logged_shapes, triangles_of
+from hsp_control.visualization.viewer.packed_scene import read_mesh
 from hsp_control.visualization.viewer.replay import robot_of
+from hsp_control.visualization.viewer.robot_drawing import Visual, read_visuals
 from hsp_control.visualization.viewer.targets import read_targets
-from hsp_control.visualization.viewer.visuals import Visual, read_visuals
+from hsp_control.visualization.viewer.threejs import collada_object, mesh_geometry
 
 INSTALL = "pip install 'hsp_control[rerun]'"
 TIMELINE = "t"
@@ -78,7 +76,7 @@ def log_to_rerun(
             recording.save(str(path))
         except OSError as error:
             raise ExportError(f"{path}: {error.strerror or error}") from error
-    motion = Motion(robot, rollout)
+    motion = RunMotion(robot, rollout)
     recording.log("/", rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     _log_robot(rerun, recording, motion)
     _log_obstacles(rerun, recording, motion)
@@ -124,7 +122,7 @@ def _layout(rollout: Rollout) -> Any:
     )
 
 
-def _log_robot(rerun: Any, recording: Any, motion: Motion) -> None:
+def _log_robot(rerun: Any, recording: Any, motion: RunMotion) -> None:
     robot = motion.robot
     nodes = [f"/robot/{path_element(name)}" for name in robot.model.names]
     for k, visual in enumerate(read_visuals(robot)):
@@ -132,19 +130,13 @@ def _log_robot(rerun: Any, recording: Any, motion: Motion) -> None:
         recording.log(path, _transform(rerun, visual.pose), static=True)
         for i, shape in enumerate(_archetypes(rerun, visual, path)):
             recording.log(f"{path}/{i}", shape, static=True)
-    poses = np.empty((len(motion.times), robot.model.njoints, 7))
-    state = RobotState(robot)
-    rows = motion.rows
-    for row, (t, q, v) in enumerate(zip(rows.t, rows.q, rows.v, strict=True)):
-        placements = state.update(float(t), q, v).data.oMi
-        for joint in range(robot.model.njoints):
-            poses[row, joint] = pin.SE3ToXYZQUAT(placements[joint])
+    poses = motion.joint_poses()
     for joint, node in enumerate(nodes[1:], start=1):
         _send_poses(rerun, recording, node, motion.times, poses[:, joint])
 
 
-def _log_obstacles(rerun: Any, recording: Any, motion: Motion) -> None:
-    for name, shape in ObstacleLayer(motion, "").shapes.items():
+def _log_obstacles(rerun: Any, recording: Any, motion: RunMotion) -> None:
+    for name, shape in logged_shapes(motion.rows).items():
         path = f"/obstacles/{path_element(name)}"
         for drawn in _shape(rerun, shape):
             recording.log(path, drawn, static=True)
@@ -175,7 +167,7 @@ def _shape(rerun: Any, shape: Shape) -> Iterator[Any]:
             yield _mesh(rerun, *triangles_of(shape.geometry()), _rgb(palette.OBSTACLE))
 
 
-def _log_paths(rerun: Any, recording: Any, motion: Motion) -> None:
+def _log_paths(rerun: Any, recording: Any, motion: RunMotion) -> None:
     """Log the whole paths, and the present references as points."""
     for target in read_targets(motion.rows):
         if target.desired is None:

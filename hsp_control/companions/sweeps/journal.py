@@ -1,8 +1,10 @@
 """The journal: finished rows in their order of arrival, safe if the process is killed.
 
 Rows cannot be appended to a Parquet file, so they are written to a text file beside it,
-one line of JSON per row. A process that is killed while writing leaves an incomplete
-line; reading ignores it, and the next writing removes it.
+one line of JSON per row. They are no log: a row is a run, with its status in words and
+metrics that differ from run to run, not numbers of one layout. A process that is killed
+while writing leaves an incomplete line; reading ignores it, and the next writing
+removes it.
 """
 
 import fcntl

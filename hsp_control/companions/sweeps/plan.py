@@ -12,7 +12,7 @@ from hsp_control.companions.sweeps.factor import Factor
 from hsp_control.config import Experiment
 from hsp_control.config.document import Document
 from hsp_control.config.experiment import build
-from hsp_control.simulation.run_meta import versions
+from hsp_control.simulation.log_writer import versions
 
 _TRIALS = 20  # if so many runs cannot be built, the sweep itself is wrong
 

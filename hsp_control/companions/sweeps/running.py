@@ -15,8 +15,8 @@ from hsp_control.companions.sweeps.plan import document
 from hsp_control.companions.sweeps.row import CRASHED, TIMED_OUT, Row
 from hsp_control.config.experiment import build
 from hsp_control.simulation import Rollout
+from hsp_control.simulation.log_writer import versions
 from hsp_control.simulation.measures import Measure, measures
-from hsp_control.simulation.run_meta import versions
 
 
 def run_task(task: str) -> str:

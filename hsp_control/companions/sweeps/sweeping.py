@@ -20,7 +20,7 @@ from hsp_control.companions.sweeps.running import read_result
 from hsp_control.companions.sweeps.store import Store
 from hsp_control.config.experiment import build
 from hsp_control.config.source import read_document
-from hsp_control.simulation.run_meta import versions
+from hsp_control.simulation.log_writer import versions
 
 
 def sweep(

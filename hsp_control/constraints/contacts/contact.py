@@ -1,7 +1,6 @@
 """Contacts, and the rows of a base that its contacts leave free."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY
 from functools import cached_property
 from typing import Annotated, Any, ClassVar, Self
@@ -12,9 +11,8 @@ from pydantic import AfterValidator
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import ContactError, TrajectoryError
-from hsp_control.common.kernels import kernel
-from hsp_control.common.native import bind
-from hsp_control.common.step_plan import StepPlan
+from hsp_control.common.kernels import KernelCall, kernel
+from hsp_control.common.step_plan import StepPlan, planned
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.quantities import (
@@ -159,8 +157,8 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
     it pushes and never pulls.
 
     A subclass declares its parameters as fields (see `Part`), sets `rows`, and
-    implements `points` and `constrain`, and `shift` if its points are not where
-    forces act.
+    implements `points` and `kernel`, and `shift` if its points are not where forces
+    act.
 
     Attributes:
         rows: Number of constraint rows.
@@ -264,27 +262,22 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
     def points(self) -> Array:
         """Where forces act, in the frame, shape (k, 3) [m]."""
 
+    @abstractmethod
+    def kernel(self, state: RobotState) -> KernelCall:
+        """Return a kernel and its first arguments; ``v``, ``damping``, ``out`` follow.
+
+        It writes J and J', shape (rows, nv) each, e' = -J v, and the acceleration that
+        damps it, see `damp_velocity`; see `Task.kernel` for its arguments.
+        """
+
     def compile(self, state: RobotState, out: TaskSample) -> StepPlan:
-        """Return the step plan that evaluates this state into this sample."""
-        frame = state.frame(self.frame)
-        J, _, _, e_dot, a = out
-        damp = bind(damp_velocity, J, state.v, self.damping, e_dot, a)
-        return StepPlan(write=(frame.compute, *self.constrain(frame, out), damp))
+        """Return the step plan that writes the rows of each step."""
+        return planned(self.kernel(state), state.v, self.damping, out)
 
     def evaluate(self, state: RobotState, out: TaskSample) -> TaskSample:
         """Write the rows: J, J', and the acceleration that damps the motion."""
-        for write in self.compile(state, out).write:
-            write()
+        self.compile(state, out).run(state.t)
         return out
-
-    @abstractmethod
-    def constrain(
-        self, frame: FrameKinematics, out: TaskSample
-    ) -> Sequence[Callable[[], object]]:
-        """Return the calls that write J and J' of the constraint, (rows, nv) each.
-
-        Each call reads the frame's motion as it is then.
-        """
 
     @property
     def shift(self) -> Array:
@@ -297,8 +290,9 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
 
 
 @kernel
-def damp_velocity(J: Array, v: Array, damping: float, e_dot: Array, a: Array) -> None:
+def damp_velocity(v: Array, damping: float, out: TaskSample) -> None:
     """Write e' = -J v and the acceleration Kd e', which damps the contact's motion."""
+    J, e_dot, a = out.jacobian, out.error_rate, out.acceleration
     for k in range(J.shape[0]):
         total = 0.0
         for i in range(J.shape[1]):

@@ -1,23 +1,27 @@
 """The kinds of contacts: points, balls, surfaces, and what slides."""
 
-from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY
 from functools import cached_property
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import AfterValidator
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ContactError
-from hsp_control.common.kernels import kernel
+from hsp_control.common.kernels import KernelCall, kernel
 from hsp_control.common.linalg import multiply_transposed
-from hsp_control.common.native import bind
-from hsp_control.constraints.contacts.contact import NORMAL, WRENCH, Contact
+from hsp_control.constraints.contacts.contact import (
+    NORMAL,
+    WRENCH,
+    Contact,
+    damp_velocity,
+)
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Points, Positive, Vector3, read_only
 from hsp_control.law import TaskSample
-from hsp_control.robot.kinematics import FrameKinematics, FrameMotion
+from hsp_control.robot import RobotState
+from hsp_control.robot.kinematics import FrameMotion
 from hsp_control.tasks.task import copy_rows
 
 
@@ -35,19 +39,28 @@ class PointContact(Contact, type="point"):
         """The point in the frame, shape (1, 3) [m]."""
         return np.asarray(self.point)[None]
 
-    def constrain(
-        self, frame: FrameKinematics, out: TaskSample
-    ) -> Sequence[Callable[[], object]]:
-        """Return the call for the velocity rows of the point."""
-        return [point_rows(self, frame, out.jacobian, out.jacobian_dot)]
+    def kernel(self, state: RobotState) -> KernelCall:
+        """Return the kernel of the velocity rows of the point."""
+        return _hold_point, _point_of(self, state)
 
 
-def point_rows(
-    contact: Contact, frame: FrameKinematics, out: Array, out_dot: Array
-) -> Callable[[], object]:
-    """Return the call that writes J and J' (3, nv) of a contact's first point."""
+def _point_of(contact: Contact, state: RobotState) -> tuple[Any, Array, Array]:
+    """Return the first arguments of `_point_velocity_rows`."""
     point, shift = np.array(contact.points[0]), np.array(contact.shift)
-    return bind(_point_velocity_rows, frame.motion, point, shift, out, out_dot)
+    return state.frame(contact.frame), point, shift
+
+
+@kernel
+def _hold_point(
+    frame: FrameMotion,
+    point: Array,
+    shift: Array,
+    v: Array,
+    damping: float,
+    out: TaskSample,
+) -> None:
+    _point_velocity_rows(frame, point, shift, out.jacobian, out.jacobian_dot)
+    damp_velocity(v, damping, out)
 
 
 @kernel
@@ -103,11 +116,9 @@ class BallContact(Contact, type="ball"):
         """From the ball's centre to the point in contact: -r n, shape (3,) [m]."""
         return -self.radius * self.axes[:, 2]
 
-    def constrain(
-        self, frame: FrameKinematics, out: TaskSample
-    ) -> Sequence[Callable[[], object]]:
-        """Return the call for the velocity rows of the material point in contact."""
-        return [point_rows(self, frame, out.jacobian, out.jacobian_dot)]
+    def kernel(self, state: RobotState) -> KernelCall:
+        """Return the kernel of the velocity rows of the material point in contact."""
+        return _hold_point, _point_of(self, state)
 
 
 class SlidingContact(Contact, type="sliding"):
@@ -171,17 +182,28 @@ class SlidingContact(Contact, type="sliding"):
         """From the point to where the plane is touched, shape (3,) [m]."""
         return np.asarray(self.offset, dtype=float)
 
-    def constrain(
-        self, frame: FrameKinematics, out: TaskSample
-    ) -> Sequence[Callable[[], object]]:
-        """Return the calls for the normal's row: nᵀ times the point's velocity rows."""
-        J, J_dot = np.zeros((2, *frame.jacobian[:3].shape))
-        n = np.ascontiguousarray(self.axes[:, 2])
-        return [
-            point_rows(self, frame, J, J_dot),
-            bind(multiply_transposed, J, n, out.jacobian[0]),
-            bind(multiply_transposed, J_dot, n, out.jacobian_dot[0]),
-        ]
+    def kernel(self, state: RobotState) -> KernelCall:
+        """Return the kernel of the normal's row, nᵀ times the point's velocity rows."""
+        normal = np.ascontiguousarray(self.axes[:, 2])
+        rows = np.zeros((2, 3, state.robot.nv))
+        return _hold_normal, (*_point_of(self, state), normal, rows)
+
+
+@kernel
+def _hold_normal(
+    frame: FrameMotion,
+    point: Array,
+    shift: Array,
+    normal: Array,
+    rows: Array,
+    v: Array,
+    damping: float,
+    out: TaskSample,
+) -> None:
+    _point_velocity_rows(frame, point, shift, rows[0], rows[1])
+    multiply_transposed(rows[0], normal, out.jacobian[0])
+    multiply_transposed(rows[1], normal, out.jacobian_dot[0])
+    damp_velocity(v, damping, out)
 
 
 def _surface(corners: Array) -> Array:
@@ -242,9 +264,14 @@ class SurfaceContact(Contact, type="surface"):
         center = np.zeros(3) if self.center is None else np.asarray(self.center)
         return read_only(square + center)
 
-    def constrain(
-        self, frame: FrameKinematics, out: TaskSample
-    ) -> Sequence[Callable[[], object]]:
-        """Return the call for the six rows of the frame: it neither moves nor turns."""
-        J, J_dot = out.jacobian, out.jacobian_dot
-        return [bind(copy_rows, frame.jacobian, frame.jacobian_dot, 0, J, J_dot)]
+    def kernel(self, state: RobotState) -> KernelCall:
+        """Return the kernel of the frame's six rows: it neither moves nor turns."""
+        return _hold_surface, (state.frame(self.frame),)
+
+
+@kernel
+def _hold_surface(
+    frame: FrameMotion, v: Array, damping: float, out: TaskSample
+) -> None:
+    copy_rows(frame.jacobian, frame.jacobian_dot, 0, out.jacobian, out.jacobian_dot)
+    damp_velocity(v, damping, out)

@@ -321,7 +321,7 @@ class LimitedStep:
         self._nearest = bind(solve_step, NEAREST, *arguments)
         self._again = bind(solve_step, NEAREST_AGAIN, *arguments)
         self._least_violation = bind(solve_step, LEAST_VIOLATION, *arguments)
-        self._write_mass_matrix = state.compute_mass_matrix
+        self._write_mass_matrix = state.inertia.compute
         self._calls = IdentityCache(self._after_input)
 
     def prepare(self, acceleration: Array, effort: Array) -> None:

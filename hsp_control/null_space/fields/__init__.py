@@ -5,7 +5,6 @@ from hsp_control.law import FieldSample as FieldSample
 from .clearance import Clearance as Clearance
 from .clearance import ObstacleClearance as ObstacleClearance
 from .clearance import SelfClearance as SelfClearance
-from .cost import CompiledCost as CompiledCost
 from .cost import Cost as Cost
 from .cost import FunctionCost as FunctionCost
 from .field import FieldSum as FieldSum

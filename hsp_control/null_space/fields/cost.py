@@ -1,22 +1,23 @@
 """Costs f(q, t): the field is their steepest descent, g = -W⁻¹∇f."""
 
-from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import KW_ONLY
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NoReturn
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
-from hsp_control.common.kernels import kernel
+from hsp_control.common.kernels import KernelCall, kernel
 from hsp_control.common.native import bind
-from hsp_control.common.step_plan import StepPlan
+from hsp_control.common.step_plan import StepPlan, planned, says
 from hsp_control.law import VARYING, FieldSample, MetricSample, raise_covector
 from hsp_control.null_space.differences import gradient, rate_along_flow
 from hsp_control.null_space.fields.field import NullSpaceField
 from hsp_control.robot import RobotState
+
+_BY_KERNEL = "kernel", "derivatives"
 
 
 class Cost(NullSpaceField):
@@ -44,32 +45,43 @@ class Cost(NullSpaceField):
     * `gradient_rate` returns (∇f)' = ∇²f v + ∂∇f/∂t, shape (nv,).
     * `differentiate` writes both, where one computation gives both.
 
+    Or it implements `kernel` alone, which gives f and both derivatives at once.
+
     f and ∇f depend on q and t only, not on v. The unit of f is chosen such that
-    -W⁻¹∇f is in rad/s and m/s. `CompiledCost` is the base class for costs whose
-    derivatives come from kernels.
+    -W⁻¹∇f is in rad/s and m/s.
     """
 
-    def __init_subclass__(cls, **arguments: Any) -> None:
-        """Reset `differentiate` and `compile` if a subclass overrides what they use."""
-        super().__init_subclass__(**arguments)
-        own = vars(cls)
-        if "differentiate" not in own and {"gradient", "gradient_rate"} & own.keys():
-            cls.differentiate = Cost.differentiate  # type: ignore[method-assign]
-        derivatives = {"differentiate", "gradient", "gradient_rate"}
-        if "compile" not in own and derivatives & own.keys():
-            cls.compile = Cost.compile  # type: ignore[method-assign]
+    def kernel(self, state: RobotState) -> KernelCall:
+        """Return a kernel and its first arguments; ``gradient`` and ``rate`` follow.
 
-    @abstractmethod
+        ``kernel(*arguments, gradient, rate) -> float`` writes ∇f and (∇f)', shape (nv,)
+        each, and returns f; see `Task.kernel` for its arguments.
+        """
+        raise TypeError(f"{type(self).__name__} implements neither kernel nor value")
+
+    def derivatives(self, state: RobotState, gradient: Array, rate: Array) -> StepPlan:
+        """Return the plan that writes ∇f and (∇f)' with `kernel`, and gives f."""
+        return planned(self.kernel(state), gradient, rate)
+
+    def _has_kernel(self, *ways: str) -> bool:
+        """Return whether no subclass overrides any of these methods in plain Python."""
+        return says(self, "kernel", "derivatives", *ways, "value") in _BY_KERNEL
+
     def value(self, state: RobotState) -> float:
         """Return f(q, t), which must not depend on v."""
+        return float(self._derived(state)[0].run(state.t))
 
     def gradient(self, state: RobotState) -> Array:
         """Return ∇f in the tangent space, shape (nv,); by default by differences."""
-        return gradient(self.value, state)
+        if not self._has_kernel():
+            return gradient(self.value, state)
+        return self._derivative(state, 0)
 
     def gradient_rate(self, state: RobotState) -> Array:
         """Return (∇f)' = ∇²f v + ∂∇f/∂t, shape (nv,); by default by differences."""
-        return rate_along_flow(self.gradient, state)
+        if not self._has_kernel("gradient"):
+            return rate_along_flow(self.gradient, state)
+        return self._derivative(state, 1)
 
     def differentiate(self, state: RobotState, gradient: Array, rate: Array) -> None:
         """Write ∇f and (∇f)'; by default it calls `gradient` and `gradient_rate`.
@@ -86,34 +98,58 @@ class Cost(NullSpaceField):
         gradient[:] = self._tangent(self.gradient(state), "gradient", nv)
         rate[:] = self._tangent(self.gradient_rate(state), "gradient rate", nv)
 
+    def compile(
+        self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
+    ) -> StepPlan:
+        """Return the step plan: g = -W⁻¹∇f and g' = -W⁻¹((∇f)' + W'g)."""
+        descent = bind(descend, metric.L, metric.W_dot, form, *out)
+        if self._has_kernel("gradient", "gradient_rate", "differentiate"):
+            follow, write = self.derivatives(state, *out)
+            return StepPlan(follow, (*write, descent))
+        return StepPlan(write=(partial(self._descend, state, descent, out),))
+
     def evaluate(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
     ) -> FieldSample:
-        """Write g = -W⁻¹∇f and g' = -W⁻¹((∇f)' + W'g).
+        """Write g and g'; see `NullSpaceField.evaluate`.
 
         Raises:
             FieldError: If the gradient or its rate is not nv finite numbers.
         """
-        self._evaluate(state, lambda: descend(metric.L, metric.W_dot, form, *out), out)
+        super().evaluate(state, metric, form, out)
+        if not np.isfinite([*out]).all():
+            self._raise_not_finite(state)
         return out
 
-    def compile(
-        self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
-    ) -> StepPlan:
-        """Return the step plan; see `NullSpaceField.compile`."""
-        descent = bind(descend, metric.L, metric.W_dot, form, *out)
-        return StepPlan(write=(partial(self._evaluate, state, descent, out),))
-
-    def _evaluate(
+    def _descend(
         self, state: RobotState, descent: Callable[[], bool], out: FieldSample
     ) -> None:
         self.differentiate(state, out.g, out.g_dot)
         if not descent():
-            raise FieldError(
-                f"cost {self.name!r} has the gradient {self.gradient(state)!r} and the "
-                f"gradient rate {self.gradient_rate(state)!r} at t = {state.t:.6g} s; "
-                "needs finite numbers"
-            )
+            self._raise_not_finite(state)
+
+    def _raise_not_finite(self, state: RobotState) -> NoReturn:
+        self.value(state)  # may say what is wrong
+        raise FieldError(
+            f"cost {self.name!r} has the gradient {self.gradient(state)!r} and the "
+            f"gradient rate {self.gradient_rate(state)!r} at t = {state.t:.6g} s; "
+            "needs finite numbers"
+        )
+
+    def _derivative(self, state: RobotState, which: int) -> Array:
+        """Return ∇f (0) or (∇f)' (1) of the kernel, shape (nv,)."""
+        plan, both = self._derived(state)
+        plan.run(state.t)
+        return np.array(both[which])
+
+    def _derived(self, state: RobotState) -> tuple[StepPlan, Array]:
+        """Return a plan of `derivatives`, and ∇f and (∇f)' that it writes, (2, nv)."""
+
+        def make() -> tuple[StepPlan, Array]:
+            both = np.zeros((2, state.robot.nv))
+            return self.derivatives(state, *both), both
+
+        return state.made(self, "derivatives", make)
 
     def _tangent(self, value: Array, what: str, nv: int) -> Array:
         try:
@@ -190,70 +226,3 @@ def descend(L: Array, W_dot: Array, form: int, g: Array, g_dot: Array) -> bool:
     for i in range(g.shape[0]):
         total += g[i] + g_dot[i]
     return bool(np.isfinite(total))
-
-
-Derivatives = Callable[[], float]
-"""A call that reads a state, writes ∇f and (∇f)', and returns f."""
-
-
-class _Own(NamedTuple):
-    gradient: Array
-    rate: Array
-    derivatives: Derivatives
-
-
-class CompiledCost(Cost):
-    """g = -W⁻¹∇f with f, ∇f and (∇f)' from one call: a subclass implements `_compile`.
-
-    `value`, `gradient` and `gradient_rate` follow from it and are exact.
-    """
-
-    @abstractmethod
-    def _compile(self, state: RobotState, gradient: Array, rate: Array) -> Derivatives:
-        """Return a call that writes ∇f and (∇f)' and returns f.
-
-        Shapes: gradient (nv,), rate (nv,).
-        """
-
-    def compile(
-        self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
-    ) -> StepPlan:
-        """Return the step plan; see `NullSpaceField.compile`."""
-        derivatives = self._compile(state, out.g, out.g_dot)
-        to_field = bind(descend, metric.L, metric.W_dot, form, *out)
-        return StepPlan(write=(derivatives, to_field))
-
-    def value(self, state: RobotState) -> float:
-        """Return f."""
-        return float(self._own(state).derivatives())
-
-    def bind_value(self, state: RobotState) -> Derivatives:
-        """Return the call of `value`."""
-        return self._own(state).derivatives
-
-    def gradient(self, state: RobotState) -> Array:
-        """Return ∇f, exact, shape (nv,)."""
-        own = self._own(state)
-        own.derivatives()
-        return own.gradient.copy()
-
-    def gradient_rate(self, state: RobotState) -> Array:
-        """Return (∇f)', exact, shape (nv,)."""
-        own = self._own(state)
-        own.derivatives()
-        return own.rate.copy()
-
-    def differentiate(self, state: RobotState, gradient: Array, rate: Array) -> None:
-        """Write ∇f and (∇f)'; see `Cost.differentiate`."""
-        own = self._own(state)
-        own.derivatives()
-        gradient[:], rate[:] = own.gradient, own.rate
-
-    def _own(self, state: RobotState) -> _Own:
-        """Return the call that writes into memory of its own."""
-
-        def make() -> _Own:
-            gradient, rate = np.zeros((2, state.robot.nv))
-            return _Own(gradient, rate, self._compile(state, gradient, rate))
-
-        return state.made(self, "derivatives", make)

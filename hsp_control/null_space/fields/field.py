@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, replace
 from functools import partial
 from numbers import Real
-from typing import Annotated, Any, ClassVar, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from pydantic import AfterValidator, InstanceOf
@@ -15,7 +15,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
-from hsp_control.common.step_plan import StepPlan
+from hsp_control.common.step_plan import StepPlan, says
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import NonNegative, OrInstance
 from hsp_control.geometry.start import Start
@@ -38,9 +38,7 @@ class NullSpaceField(Part, ABC, family="fields", error=FieldError):
     * `evaluate` writes g and its exact total time derivative g'.
     * `value` returns one number to plot.
 
-    It may override `compile` to make a step faster (by default the step plan calls
-    `evaluate` at every step) and `bind_value` to make `Controller.diagnose` faster,
-    `placed` if it refers to the start, to obstacles or to frames, and
+    It may override `placed` if it refers to the start, to obstacles or to frames, and
     `minimum_distance` if it measures distances. A field has no memory: what a
     computation needs is kept by the state (see `RobotState.made`).
 
@@ -48,9 +46,11 @@ class NullSpaceField(Part, ABC, family="fields", error=FieldError):
 
     Attributes:
         controls: False only for `Uncontrolled`, which sets φ_N = 0.
+        zero: Whether g = 0 at all times.
     """
 
     controls: ClassVar[bool] = True
+    zero: ClassVar[bool] = False
 
     _: KW_ONLY
     weight: Annotated[float | Weight, OrInstance(NonNegative | Ramp, Weight)] = 1.0
@@ -91,19 +91,10 @@ class NullSpaceField(Part, ABC, family="fields", error=FieldError):
             "one, call `placed` first"
         )
 
-    def __init_subclass__(cls, **arguments: Any) -> None:
-        """Reset `compile` and `bind_value` if a subclass overrides what they do."""
-        super().__init_subclass__(**arguments)
-        own = vars(cls)
-        if "evaluate" in own and "compile" not in own:
-            cls.compile = NullSpaceField.compile  # type: ignore[method-assign]
-        if "value" in own and "bind_value" not in own:
-            cls.bind_value = NullSpaceField.bind_value  # type: ignore[method-assign]
-
     def compile(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
     ) -> StepPlan:
-        """Return the step plan that does what `evaluate` does; may be overridden.
+        """Return the step plan that writes the sample of each step.
 
         Args:
             state: The state that every step reads. Its values change between steps.
@@ -111,9 +102,13 @@ class NullSpaceField(Part, ABC, family="fields", error=FieldError):
             form: The metric's form, see `Metric`.
             out: The sample that every step writes.
         """
+        if says(self, "evaluate", "compile") == "compile":
+            raise TypeError(f"{type(self).__name__} implements no evaluate")
+        if self.zero:
+            self.evaluate(state, metric, form, out)
+            return StepPlan()
         return StepPlan(write=(partial(self.evaluate, state, metric, form, out),))
 
-    @abstractmethod
     def evaluate(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
     ) -> FieldSample:
@@ -126,17 +121,22 @@ class NullSpaceField(Part, ABC, family="fields", error=FieldError):
             out: The sample to write into, shape (nv,) each.
         """
 
+        def make() -> tuple[MetricSample, FieldSample, StepPlan]:
+            known = MetricSample.allocate(state.robot.nv)
+            sample = FieldSample.allocate(state.robot.nv)
+            return known, sample, self.compile(state, known, form, sample)
+
+        known, sample, plan = state.made(self, f"evaluate {form}", make)
+        for array, value in zip(known, metric, strict=True):
+            array[:] = value
+        plan.run(state.t)
+        for array, value in zip(out, sample, strict=True):
+            array[:] = value
+        return out
+
     @abstractmethod
     def value(self, state: RobotState) -> float:
         """Return one number to plot: f(q, t) of a cost, or the norm of a field."""
-
-    def bind_value(self, state: RobotState) -> Callable[[], float]:
-        """Return a call that does what `value` does; may be overridden.
-
-        Args:
-            state: The state that every call reads. Its values change between calls.
-        """
-        return partial(self.value, state)
 
     def minimum_distance(self, state: RobotState) -> float | None:
         """Return the minimum distance that the field measures [m], or None."""
@@ -191,18 +191,6 @@ class FieldSum(NullSpaceField):
                 placed.append(term.placed(start))
         return replace(self, terms=tuple(placed))
 
-    def evaluate(
-        self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
-    ) -> FieldSample:
-        """Write the weighted sums of g and g'; see `NullSpaceField.evaluate`."""
-        own = state.made(self, "sum", lambda: _Adding.allocate(state.robot.nv))
-        for k, term in enumerate(self.terms):
-            term.evaluate(state, metric, form, own.sample)
-            own.weights[:] = sample_weight(term.weight, state)
-            own.start() if k == 0 else own.add()
-        out.g[:], out.g_dot[:] = own.total
-        return out
-
     def compile(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
     ) -> StepPlan:
@@ -244,25 +232,6 @@ class FieldSum(NullSpaceField):
             sample_weight(term.weight, state)[0] * term.value(state)
             for term in self.terms
         )
-
-
-class _Adding(NamedTuple):
-    """What a sum computes with at one state."""
-
-    sample: FieldSample  # the sample of a term
-    weights: Array  # its w and w', (2,)
-    total: FieldSample
-    start: Callable[[], object]  # begins the sum with the sample
-    add: Callable[[], object]  # adds the sample to the sum
-
-    @classmethod
-    def allocate(cls, nv: int) -> "_Adding":
-        sample, total = FieldSample.allocate(nv), FieldSample.allocate(nv)
-        weights = np.zeros(2)
-        start, add = (
-            bind(_add, first, weights, *sample, *total) for first in (True, False)
-        )
-        return cls(sample, weights, total, start, add)
 
 
 def terms_of(field: NullSpaceField) -> tuple[NullSpaceField, ...]:

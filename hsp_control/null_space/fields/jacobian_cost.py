@@ -15,22 +15,20 @@ which running sums give in O(n), without the kinematic Hessian. Its rate is exac
 because J' is known exactly.
 """
 
-from abc import abstractmethod
-from collections.abc import Callable
 from dataclasses import KW_ONLY, replace
-from typing import Any, Literal, NamedTuple, Self
+from typing import Literal, NamedTuple, Self
 
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import FieldError
-from hsp_control.common.kernels import kernel
+from hsp_control.common.kernels import KernelCall, kernel
 from hsp_control.common.native import bind
-from hsp_control.common.step_plan import CallSequence
+from hsp_control.common.step_plan import CallSequence, StepPlan
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Axes
 from hsp_control.geometry.start import Start
-from hsp_control.null_space.fields.cost import CompiledCost, Derivatives
+from hsp_control.null_space.fields.cost import Cost
 from hsp_control.robot import Robot, RobotState
 
 Rows = Literal["position", "orientation", "pose"]
@@ -50,12 +48,12 @@ class JacobianTerms(NamedTuple):
     slope_rate: Array
 
 
-class JacobianCost(CompiledCost):
+class JacobianCost(Cost):
     """f = φ(J) of k rows of a frame's Jacobian, in world axes at the frame's origin.
 
     A subclass implements `terms`, which returns φ, ∂φ/∂J and the rate of ∂φ/∂J. Value,
-    gradient and gradient rate follow exactly. If one kernel computes the terms, derive
-    from `CompiledJacobianCost` instead. The rows are those of the position, unless the
+    gradient and gradient rate follow exactly. If one kernel computes the terms, it
+    implements `terms_kernel` instead. The rows are those of the position, unless the
     subclass declares fields ``rows`` and ``length``, with defaults.
     """
 
@@ -100,7 +98,6 @@ class JacobianCost(CompiledCost):
             kept = (kept if self.rows == "pose" else []) + [3, 4, 5]
         return np.array(kept, dtype=np.int64)
 
-    @abstractmethod
     def terms(self, J: Array, J_dot: Array) -> JacobianTerms:
         """Return φ, ∂φ/∂J and its rate for the k selected rows.
 
@@ -108,71 +105,42 @@ class JacobianCost(CompiledCost):
             J: The selected rows, orientation rows scaled, shape (k, nv).
             J_dot: Their time derivative, shape (k, nv).
         """
+        raise TypeError(f"{type(self).__name__} has neither terms nor terms_kernel")
 
-    def _compile_terms(
-        self, J: Array, J_dot: Array, slope: Array, slope_rate: Array
-    ) -> Derivatives:
-        """Return a call that writes ∂φ/∂J and its rate, and returns φ."""
+    def terms_kernel(self, nv: int) -> KernelCall:
+        """Return a kernel and its first arguments, instead of `terms`.
 
-        def write() -> float:
+        The further arguments are J, J', ∂φ/∂J and its rate, shape (k, nv) each, and a
+        scratch array of shape (8, k, nv). It writes ∂φ/∂J and its rate, and returns φ.
+        """
+
+        def write(
+            J: Array, J_dot: Array, slope: Array, slope_rate: Array, scratch: Array
+        ) -> float:
             value, slope[:], slope_rate[:] = self.terms(J, J_dot)
             return value
 
-        return write
+        return write, ()
 
-    def _compile(self, state: RobotState, gradient: Array, rate: Array) -> Derivatives:
+    def derivatives(self, state: RobotState, gradient: Array, rate: Array) -> StepPlan:
+        """Return the plan that writes ∇f and (∇f)' and gives f."""
         frame, nv = state.frame(self._frame(state.robot)), state.robot.nv
         dofs, first = _chain(state.robot, self._frame(state.robot))
         selected = self._selected()
         length = self.length if self.rows == "pose" else 1.0
         rows = selected, np.where(selected < 3, 1.0, length)
         J, J_dot, slope, slope_rate = np.zeros((4, len(selected), nv))
-        select = bind(_select, frame.jacobian, frame.jacobian_dot, *rows, J, J_dot)
-        terms = self._compile_terms(J, J_dot, slope, slope_rate)
+        motion = frame.jacobian, frame.jacobian_dot
+        select = bind(_select, *motion, *rows, J, J_dot)
+        function, parameters = self.terms_kernel(nv)
+        scratch = np.zeros((8, len(selected), nv))
+        terms = bind(function, *parameters, J, J_dot, slope, slope_rate, scratch)
+        work = np.zeros((2, 6, nv)), dofs, first, np.zeros((4, len(dofs) + 1, 3))
         raise_slope = bind(
-            _raise_slope,
-            frame.jacobian,
-            frame.jacobian_dot,
-            slope,
-            slope_rate,
-            *rows,
-            np.zeros((2, 6, nv)),
-            dofs,
-            first,
-            np.zeros((4, len(dofs) + 1, 3)),
-            gradient,
-            rate,
+            _raise_slope, *motion, slope, slope_rate, *rows, *work, gradient, rate
         )
-        return CallSequence(frame.compute, select, terms, raise_slope, result=2)
-
-
-class CompiledJacobianCost(JacobianCost):
-    """f = φ(J) with φ, ∂φ/∂J and its rate from one kernel.
-
-    A subclass implements `_kernel` instead of `terms`.
-    """
-
-    @abstractmethod
-    def _kernel(self, nv: int) -> tuple[Callable[..., float], tuple[Any, ...]]:
-        """Return the kernel and its first arguments.
-
-        The further arguments are J, J', ∂φ/∂J and its rate, shape (k, nv) each, and a
-        scratch array of shape (8, k, nv). The kernel writes ∂φ/∂J and its rate, and
-        returns φ.
-        """
-
-    def terms(self, J: Array, J_dot: Array) -> JacobianTerms:
-        """Return φ, ∂φ/∂J and its rate; see `JacobianCost.terms`."""
-        slope, slope_rate = np.zeros_like(J), np.zeros_like(J)
-        value = self._compile_terms(J, J_dot, slope, slope_rate)()
-        return JacobianTerms(value, slope, slope_rate)
-
-    def _compile_terms(
-        self, J: Array, J_dot: Array, slope: Array, slope_rate: Array
-    ) -> Derivatives:
-        function, parameters = self._kernel(J.shape[1])
-        scratch = np.zeros((8, *J.shape))
-        return bind(function, *parameters, J, J_dot, slope, slope_rate, scratch)
+        calls = CallSequence(frame.compute, select, terms, raise_slope, result=2)
+        return StepPlan(write=(calls,))
 
 
 @kernel

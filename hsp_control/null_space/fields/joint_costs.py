@@ -10,20 +10,19 @@ from pydantic import Field
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import FieldError
-from hsp_control.common.kernels import kernel
-from hsp_control.common.native import bind
+from hsp_control.common.kernels import KernelCall, kernel
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Fraction, Names, Weights
 from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields.barrier import barrier_at
-from hsp_control.null_space.fields.cost import CompiledCost, Derivatives
+from hsp_control.null_space.fields.cost import Cost
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.model import joint_displacements
 from hsp_control.robot.robot import Posture, configuration
-from hsp_control.trajectories import Trajectory, TrajectorySample
+from hsp_control.trajectories import Hold, Trajectory, TrajectorySample
 
 
-class JointCentering(CompiledCost, type="joint_centering"):
+class JointCentering(Cost, type="joint_centering"):
     """f = ½ Σ w_i ((q_i - m_i)/r_i)², m_i the middle and r_i half of the range.
 
     Joints without limits, continuous joints and a floating root do not count. After
@@ -48,23 +47,15 @@ class JointCentering(CompiledCost, type="joint_centering"):
             )
         return self
 
-    def _compile(self, state: RobotState, gradient: Array, rate: Array) -> Derivatives:
+    def kernel(self, state: RobotState) -> KernelCall:
+        """Return the kernel; see `Cost.kernel`."""
         robot = state.robot
         limited, (lower, upper) = limited_joints(robot), robot.position_limits()
         dofs = limited[:, 0]
         low, high = lower[dofs], upper[dofs]
         half = np.maximum(0.5 * (high - low), 1.0)
         stiffness = per_dof(self.weights, robot.nv)[dofs] / half**2
-        return bind(
-            _centering,
-            state.q,
-            state.v,
-            limited,
-            0.5 * (low + high),
-            stiffness,
-            gradient,
-            rate,
-        )
+        return _centering, (state.q, state.v, limited, 0.5 * (low + high), stiffness)
 
 
 def limited_joints(robot: Robot) -> Indices:
@@ -107,7 +98,7 @@ def per_dof(weights: ArrayLike, nv: int) -> Array:
     return array
 
 
-class TargetPosture(CompiledCost, type="target_posture"):
+class TargetPosture(Cost, type="target_posture"):
     """f = Σ w_i ½d_i², d = q ⊖ target(t); Σ w_i (1 - cos d_i) for continuous joints.
 
     The two forms differ by terms of fourth order. The second is smooth at all angles,
@@ -145,32 +136,15 @@ class TargetPosture(CompiledCost, type="target_posture"):
             target = configuration(self.target, start.state)
         return replace(self, target=target, displacement=displacement)
 
-    def _compile(self, state: RobotState, gradient: Array, rate: Array) -> Derivatives:
+    def kernel(self, state: RobotState) -> KernelCall:
+        """Return the kernel; see `Cost.kernel`."""
         robot = state.robot
         if isinstance(self.target, str) or np.shape(self.target) != (robot.nq,):
             raise self._not_placed("posture")
-        moved = TrajectorySample.allocate(robot.nv)
-        derivatives = bind(
-            _posture,
-            state.q,
-            state.v,
-            np.asarray(self.target, dtype=float),
-            moved.position,
-            moved.velocity,
-            robot.single_dof_joints,
-            per_dof(self.weights, robot.nv),
-            gradient,
-            rate,
-        )
-        if self.displacement is None:
-            return derivatives
-        follow = self.displacement.follow(moved)
-
-        def followed() -> float:
-            follow(state.t)
-            return float(derivatives())
-
-        return followed
+        target = np.asarray(self.target, dtype=float)
+        moved = self.displacement or Hold(np.zeros(robot.nv))
+        joints, weights = robot.single_dof_joints, per_dof(self.weights, robot.nv)
+        return _posture, (state.q, state.v, target, moved, joints, weights)
 
 
 @kernel
@@ -178,8 +152,7 @@ def _posture(
     q: Array,
     v: Array,
     target: Array,
-    moved: Array,
-    moved_rate: Array,
+    moved: TrajectorySample,
     single_dof_joints: Indices,
     weights: Array,
     gradient: Array,
@@ -192,7 +165,7 @@ def _posture(
     f = 0.0
     for k in range(single_dof_joints.shape[0]):
         i = single_dof_joints[k, 0]
-        d, d_dot = gradient[i] - moved[i], v[i] - moved_rate[i]
+        d, d_dot = gradient[i] - moved.position[i], v[i] - moved.velocity[i]
         if single_dof_joints[k, 2] == 1:
             f += 0.5 * weights[i] * d * d
             gradient[i] = weights[i] * d
@@ -204,7 +177,7 @@ def _posture(
     return f
 
 
-class EqualJointAngles(CompiledCost, type="equal_joint_angles"):
+class EqualJointAngles(Cost, type="equal_joint_angles"):
     """f = Σ (q_{k+1} - q_k)² [1/s] over consecutive joints of a list.
 
     The paper's third simulation has the weight 5 and the joints 2 and 3 of the planar
@@ -227,20 +200,15 @@ class EqualJointAngles(CompiledCost, type="equal_joint_angles"):
                     )
         return self
 
-    def _compile(self, state: RobotState, gradient: Array, rate: Array) -> Derivatives:
+    def kernel(self, state: RobotState) -> KernelCall:
+        """Return the kernel; see `Cost.kernel`."""
         robot = state.robot
         chain = [robot.velocity_index(joint).start for joint in self.joints]
-        return bind(
-            _equal_angles,
-            state.q,
-            state.v,
-            robot.neutral(),
-            robot.single_dof_joints,
-            np.array(chain, dtype=np.int64),
-            np.zeros(robot.nv),
-            gradient,
-            rate,
-        )
+        joints, angles = robot.single_dof_joints, np.zeros(robot.nv)
+        chained = np.array(chain, dtype=np.int64)
+        return _equal_angles, (
+            state.q, state.v, robot.neutral(), joints, chained, angles,
+        )  # fmt: skip
 
 
 @kernel
@@ -271,7 +239,7 @@ def _equal_angles(
     return f
 
 
-class LimitBarrier(CompiledCost, type="limit_barrier"):
+class LimitBarrier(Cost, type="limit_barrier"):
     """f = Σ w_i (b((q_i - lower_i)/u_i) + b((upper_i - q_i)/u_i)).
 
     u_i is ``zone`` times half the range, and b the function `barrier_at`: a joint adds
@@ -295,23 +263,17 @@ class LimitBarrier(CompiledCost, type="limit_barrier"):
             raise FieldError(f"no joint of {robot.name} has limits")
         return self
 
-    def _compile(self, state: RobotState, gradient: Array, rate: Array) -> Derivatives:
+    def kernel(self, state: RobotState) -> KernelCall:
+        """Return the kernel; see `Cost.kernel`."""
         robot = state.robot
         limited, (low, high) = limited_joints(robot), robot.position_limits()
         dofs = limited[:, 0]
         lower, upper = low[dofs], high[dofs]
-        return bind(
-            _limit_barrier,
-            state.q,
-            state.v,
-            limited,
-            lower,
-            upper,
-            0.5 * self.zone * (upper - lower),  # u_i
-            per_dof(self.weights, robot.nv)[dofs],
-            gradient,
-            rate,
-        )
+        unit = 0.5 * self.zone * (upper - lower)  # u_i
+        weights = per_dof(self.weights, robot.nv)[dofs]
+        return _limit_barrier, (
+            state.q, state.v, limited, lower, upper, unit, weights,
+        )  # fmt: skip
 
 
 @kernel

@@ -1,15 +1,14 @@
 """Measures of the Jacobian: manipulability, condition, transmission ratios."""
 
-from collections.abc import Callable
 from dataclasses import KW_ONLY
 from math import exp, log, sqrt
-from typing import Any, Literal, Self
+from typing import Literal, Self
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
-from hsp_control.common.kernels import kernel
+from hsp_control.common.kernels import KernelCall, kernel
 from hsp_control.common.linalg import (
     cholesky,
     gram,
@@ -22,13 +21,13 @@ from hsp_control.common.linalg import (
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Matrix, Positive, Vector
 from hsp_control.geometry.start import Start
-from hsp_control.null_space.fields.jacobian_cost import CompiledJacobianCost, Rows
+from hsp_control.null_space.fields.jacobian_cost import JacobianCost, Rows
 
 FLOOR = 1e-6
 """Its square is added to the squared singular values, so that all slopes are finite."""
 
 
-class Manipulability(CompiledJacobianCost, type="manipulability"):
+class Manipulability(JacobianCost, type="manipulability"):
     """f = -det(G), -√det(G) or -½ log det(G), with G = J W⁻¹ Jᵀ of a frame's rows.
 
     Yoshikawa (1985) maximises √det(J Jᵀ). Towards a singularity the slope of the
@@ -66,7 +65,8 @@ class Manipulability(CompiledJacobianCost, type="manipulability"):
                 raise FieldError(f"metric has shape {shape}; needs ({nv}, {nv})")
         return super().placed(start)
 
-    def _kernel(self, nv: int) -> tuple[Callable[..., float], tuple[Any, ...]]:
+    def terms_kernel(self, nv: int) -> KernelCall:
+        """Return the kernel; see `JacobianCost.terms_kernel`."""
         weighted = self.metric is not None
         W_inv = np.linalg.inv(np.array(self.metric)) if weighted else np.eye(nv)
         # Larger if the entries of W are small: it must exceed the rounding error of G.
@@ -130,7 +130,7 @@ def _manipulability(
     return value
 
 
-class InverseCondition(CompiledJacobianCost, type="inverse_condition"):
+class InverseCondition(JacobianCost, type="inverse_condition"):
     """f = -k²/(tr G · tr G⁻¹), G = J Jᵀ of k rows.
 
     -f is the square of the inverse condition number in the Frobenius norm: 1 where all
@@ -144,7 +144,8 @@ class InverseCondition(CompiledJacobianCost, type="inverse_condition"):
     length: Positive = 1.0
     """Length that is equivalent to one radian [m], for rows of metres and radians."""
 
-    def _kernel(self, nv: int) -> tuple[Callable[..., float], tuple[Any, ...]]:
+    def terms_kernel(self, nv: int) -> KernelCall:
+        """Return the kernel; see `JacobianCost.terms_kernel`."""
         return _inverse_condition, (FLOOR**2,)
 
 
@@ -221,7 +222,7 @@ def _solve_with_rate(
     solve_columns(L, Y_dot)
 
 
-class Transmission(CompiledJacobianCost, type="transmission"):
+class Transmission(JacobianCost, type="transmission"):
     """f = -(uᵀG⁻¹u)^(-1/2) for velocity, -(uᵀGu)^(-1/2) for force, G = J Jᵀ.
 
     -f is the transmission ratio along the world direction u, the radius of the
@@ -254,7 +255,8 @@ class Transmission(CompiledJacobianCost, type="transmission"):
         unit: Array = given[np.argsort(list(self.axes))] / np.linalg.norm(given)
         return unit
 
-    def _kernel(self, nv: int) -> tuple[Callable[..., float], tuple[Any, ...]]:
+    def terms_kernel(self, nv: int) -> KernelCall:
+        """Return the kernel; see `JacobianCost.terms_kernel`."""
         return _transmission, (self.unit_direction, self.kind == "force", FLOOR**2)
 
 

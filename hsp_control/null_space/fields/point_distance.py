@@ -8,18 +8,18 @@ from pydantic import Field
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
-from hsp_control.common.kernels import kernel
-from hsp_control.common.native import bind
+from hsp_control.common.kernels import KernelCall, kernel
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Name, Names, OrInstance
 from hsp_control.geometry.scene import Obstacle
 from hsp_control.geometry.start import Start
-from hsp_control.null_space.fields.cost import CompiledCost, Derivatives
+from hsp_control.null_space.fields.cost import Cost
 from hsp_control.robot import RobotState
+from hsp_control.robot.kinematics import FrameMotion
 from hsp_control.trajectories import TrajectorySample
 
 
-class PointDistance(CompiledCost, type="point_distance"):
+class PointDistance(Cost, type="point_distance"):
     """f = Σ 1/d_k² [m²/s], d_k from the origin of frame k to the obstacle's centre.
 
     The paper's fourth simulation uses joints two and three of the planar arm and a
@@ -55,72 +55,71 @@ class PointDistance(CompiledCost, type="point_distance"):
             float(np.linalg.norm(state.position(frame) - c)) for frame in self.frames
         )
 
-    def _compile(self, state: RobotState, gradient: Array, rate: Array) -> Derivatives:
-        obstacle, center = self._placed_obstacle, TrajectorySample.allocate(3)
-        follow = obstacle.center.follow(center)
-        pushes = []
+    def kernel(self, state: RobotState) -> KernelCall:
+        """Return the kernel; see `Cost.kernel`."""
+        frames = tuple(map(state.frame, self.frames))
+        return _point_distance, (frames, self._placed_obstacle.center)
+
+    def value(self, state: RobotState) -> float:
+        """Return f; see `Cost.value`.
+
+        Raises:
+            FieldError: If a frame is at the centre, where the cost is infinite.
+        """
+        value = super().value(state)
+        if np.isfinite(value):
+            return value
+        c = self._placed_obstacle.center.sample(state.t).position
         for name in self.frames:
-            frame = state.frame(name)
-            push = bind(
-                _push,
-                frame.jacobian,
-                frame.jacobian_dot,
-                frame.position,
-                frame.velocity,
-                center.position,
-                center.velocity,
-                gradient,
-                rate,
-            )
-            pushes.append((name, push))
+            if np.linalg.norm(state.position(name) - c) < NEAREST:
+                raise FieldError(
+                    f"field {self.name!r}: frame {name!r} is at the centre of obstacle "
+                    f"{self._placed_obstacle.name!r}, where the cost is infinite"
+                )
+        return value
 
-        def derivatives() -> float:
-            follow(state.t)
-            gradient.fill(0.0)
-            rate.fill(0.0)
-            total = 0.0
-            for name, push in pushes:
-                state.frame(name)
-                square = push()
-                if square < 1e-24:  # a distance of 1e-12 m
-                    raise FieldError(
-                        f"field {self.name!r}: frame {name!r} is at the centre of "
-                        f"obstacle {obstacle.name!r}, where the cost is infinite"
-                    )
-                total += 1.0 / square
-            return total
 
-        return derivatives
+NEAREST = 1e-12
+"""Below this distance a frame is at the centre [m]."""
 
 
 @kernel
-def _push(
-    J: Array,
-    J_dot: Array,
-    position: Array,
-    velocity: Array,
-    center: Array,
-    center_velocity: Array,
+def _point_distance(
+    frames: tuple[FrameMotion, ...],
+    center: TrajectorySample,
     gradient: Array,
     rate: Array,
 ) -> float:
-    """Add the terms of one frame to ∇f and (∇f)', and return d².
+    """Write ∇f and (∇f)', and return f: the sum over the frames.
 
-    With r from the centre to the frame and r' = J v - c' the terms are
+    With r from the centre to a frame and r' = J v - c' its terms are
     -2 Jᵀr/d⁴ and -2 (J'ᵀr + Jᵀr' - 4 (r·r'/d²) Jᵀr)/d⁴.
     """
-    square = nearing = 0.0
-    for a in range(3):
-        r, r_dot = position[a] - center[a], velocity[a] - center_velocity[a]
-        square += r * r
-        nearing += r * r_dot
-    if square == 0.0:
-        return square
-    scale = -2.0 / (square * square)
+    c, c_dot = center.position, center.velocity
     for i in range(gradient.shape[0]):
+        gradient[i] = rate[i] = 0.0
+    total = 0.0
+    for frame in frames:
+        J, J_dot, x, x_dot = (
+            frame.jacobian,
+            frame.jacobian_dot,
+            frame.position,
+            frame.velocity,
+        )
+        square = nearing = 0.0
         for a in range(3):
-            r, r_dot = position[a] - center[a], velocity[a] - center_velocity[a]
-            inner = r_dot - 4.0 * nearing / square * r
-            gradient[i] += scale * J[a, i] * r
-            rate[i] += scale * (J_dot[a, i] * r + J[a, i] * inner)
-    return square
+            r, r_dot = x[a] - c[a], x_dot[a] - c_dot[a]
+            square += r * r
+            nearing += r * r_dot
+        if square < NEAREST * NEAREST:
+            gradient[0] = np.inf  # the law reports that the field is not finite
+            return np.inf
+        scale = -2.0 / (square * square)
+        for i in range(gradient.shape[0]):
+            for a in range(3):
+                r, r_dot = x[a] - c[a], x_dot[a] - c_dot[a]
+                inner = r_dot - 4.0 * nearing / square * r
+                gradient[i] += scale * J[a, i] * r
+                rate[i] += scale * (J_dot[a, i] * r + J[a, i] * inner)
+        total += 1.0 / square
+    return total

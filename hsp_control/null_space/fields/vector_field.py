@@ -9,7 +9,6 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
-from hsp_control.common.step_plan import StepPlan
 from hsp_control.law import FieldSample, MetricSample
 from hsp_control.null_space.differences import rate_along_flow
 from hsp_control.null_space.fields.field import NullSpaceField
@@ -89,6 +88,8 @@ class FunctionField(VectorField):
 class Rest(NullSpaceField, type="rest"):
     """g = 0: self-motion comes to rest. The paper's second simulation."""
 
+    zero: ClassVar[bool] = True
+
     def evaluate(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
     ) -> FieldSample:
@@ -96,13 +97,6 @@ class Rest(NullSpaceField, type="rest"):
         out.g[:] = 0.0
         out.g_dot[:] = 0.0
         return out
-
-    def compile(
-        self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
-    ) -> StepPlan:
-        """Write zeros once, and return an empty step plan."""
-        self.evaluate(state, metric, form, out)
-        return StepPlan()
 
     def value(self, state: RobotState) -> float:
         """Return 0."""

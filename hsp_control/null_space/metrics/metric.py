@@ -11,10 +11,9 @@ from pydantic import Field
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import MetricError
-from hsp_control.common.kernels import kernel
+from hsp_control.common.kernels import KernelCall, kernel
 from hsp_control.common.linalg import cholesky
-from hsp_control.common.native import bind
-from hsp_control.common.step_plan import StepPlan
+from hsp_control.common.step_plan import StepPlan, planned, says
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import (
     ArrayField,
@@ -36,10 +35,10 @@ class Metric(Part, ABC, family="metrics", error=MetricError):
     -W⁻¹∇f. W acts on the tangent space: v has shape (nv,) and is in rad/s and m/s.
 
     A subclass declares its parameters as fields (see `Part`), sets `form` to CONSTANT
-    or VARYING and implements `evaluate`; if W is constant, derive from `FixedMetric`
-    instead. It may override `placed`, and `compile` to make a step faster (by default
-    the step plan calls `evaluate` at every step). A metric has no memory: what a
-    computation needs is kept by the state (see `RobotState.made`).
+    or VARYING and implements `evaluate`, or `kernel`, which makes a step faster; if W
+    is constant, derive from `FixedMetric` instead. It may override `placed`. A metric
+    has no memory: what a computation needs is kept by the state (see
+    `RobotState.made`).
 
     Attributes:
         form: IDENTITY, CONSTANT or VARYING, by which the law skips terms that are zero.
@@ -58,22 +57,22 @@ class Metric(Part, ABC, family="metrics", error=MetricError):
         """
         return self
 
-    def __init_subclass__(cls, **arguments: Any) -> None:
-        """Reset `compile` if a subclass overrides `evaluate`, which it would ignore."""
-        super().__init_subclass__(**arguments)
-        if "evaluate" in vars(cls) and "compile" not in vars(cls):
-            cls.compile = Metric.compile  # type: ignore[method-assign]
+    def kernel(self, state: RobotState) -> KernelCall:
+        """Return a kernel and its first arguments; ``W``, ``L`` and ``W_dot`` follow.
+
+        It writes what `evaluate` describes; see `Task.kernel` for its arguments.
+        """
+        raise TypeError(f"{type(self).__name__} implements neither kernel nor evaluate")
 
     def compile(self, state: RobotState, out: MetricSample) -> StepPlan:
-        """Return the step plan that does what `evaluate` does; may be overridden.
-
-        Args:
-            state: The state that every step reads. Its values change between steps.
-            out: The sample that every step writes.
-        """
+        """Return the step plan that writes the sample of each step."""
+        if self.form != VARYING:
+            self.evaluate(state, out)
+            return StepPlan()
+        if says(self, "kernel", "evaluate") == "kernel":
+            return planned(self.kernel(state), *out)
         return StepPlan(write=(partial(self.evaluate, state, out),))
 
-    @abstractmethod
     def evaluate(self, state: RobotState, out: MetricSample) -> MetricSample:
         """Write W = L Lᵀ and W' at a state into ``out`` and return ``out``.
 
@@ -84,6 +83,8 @@ class Metric(Part, ABC, family="metrics", error=MetricError):
             state: The robot's state: t, q, v and the kinematics.
             out: The sample to write into, shapes (nv, nv).
         """
+        planned(self.kernel(state), *out).run(state.t)
+        return out
 
 
 class MassMatrixMetric(Metric, type="mass_matrix"):
@@ -108,39 +109,32 @@ class MassMatrixMetric(Metric, type="mass_matrix"):
             return self
         return replace(self, inertia=start.state.robot.typical_inertia)
 
-    def compile(self, state: RobotState, out: MetricSample) -> StepPlan:
-        """Return the step plan; where M is singular it writes NaN: the law tells."""
-        if state.robot.mimics:
-            return super().compile(state, out)
-        matrices = state.mass_matrix, state.coriolis_matrix
-        update = state.compute_mass_matrix, state.compute_coriolis_matrix
-        unit = self._unit(state)
-        return StepPlan((), (*update, bind(_write, *matrices, unit, *out)))
-
-    def _unit(self, state: RobotState) -> float:
-        robot = state.robot
-        return robot.typical_inertia if self.inertia == "robot" else self.inertia
+    def kernel(self, state: RobotState) -> KernelCall:
+        """Return the kernel; see `Metric.kernel`."""
+        known = self.inertia != "robot"
+        unit = self.inertia if known else state.robot.typical_inertia
+        return _write, (state.inertia, state.inertia_rate, unit)
 
     def evaluate(self, state: RobotState, out: MetricSample) -> MetricSample:
         """Write W = M/m, L and W' = M'/m; see `Metric.evaluate`."""
-        unit = self._unit(state)
-        out.W[:] = state.mass_matrix / unit
-        if not cholesky(out.W, out.L):
+        super().evaluate(state, out)
+        if np.isnan(out.L[0, 0]):
             raise MetricError(f"the mass matrix is singular at q = {state.q.tolist()}")
-        out.W_dot[:] = state.mass_matrix_rate / unit
         return out
 
 
 @kernel
-def _write(M: Array, C: Array, unit: float, W: Array, L: Array, W_dot: Array) -> None:
-    """Write W = M/m, its factor L and W' = (C + Cᵀ)/m; L is NaN if M is singular."""
+def _write(
+    M: Array, M_dot: Array, unit: float, W: Array, L: Array, W_dot: Array
+) -> None:
+    """Write W = M/m, its factor L and W' = M'/m; L is NaN if M is singular."""
     n = M.shape[0]
     for i in range(n):
         for j in range(n):
             W[i, j] = M[i, j] / unit
-            W_dot[i, j] = (C[i, j] + C[j, i]) / unit
+            W_dot[i, j] = M_dot[i, j] / unit
     if not cholesky(W, L):
-        L[0, 0] = np.nan
+        L[0, 0] = np.nan  # the law reports that the step is not finite
 
 
 class FixedMetric(Metric):
@@ -189,11 +183,6 @@ class FixedMetric(Metric):
                 )
         return self
 
-    def compile(self, state: RobotState, out: MetricSample) -> StepPlan:
-        """Write the constant W and L once, and return an empty step plan."""
-        self.evaluate(state, out)
-        return StepPlan()
-
     def evaluate(self, state: RobotState, out: MetricSample) -> MetricSample:
         """Write W and L; W' stays zero. See `Metric.evaluate`."""
         out.W[:] = self.W
@@ -205,10 +194,6 @@ class IdentityMetric(Metric, type="identity"):
     """W = I: the motions of all joints count the same. The default."""
 
     form: ClassVar[int] = IDENTITY
-
-    def compile(self, state: RobotState, out: MetricSample) -> StepPlan:
-        """Return an empty step plan: ``out`` is the identity already."""
-        return StepPlan()
 
     def evaluate(self, state: RobotState, out: MetricSample) -> MetricSample:
         """Return ``out`` unchanged: `MetricSample.allocate` returns the identity."""

@@ -12,13 +12,13 @@ from .curves import draw_null_space_error as draw_null_space_error
 from .curves import draw_singular_values as draw_singular_values
 from .curves import draw_task_errors as draw_task_errors
 from .figures import diagnostics_figure as diagnostics_figure
+from .figures import new_figure as new_figure
 from .figures import paper_figure as paper_figure
 from .figures import save_figure as save_figure
 from .figures import save_figures as save_figures
+from .figures import styled as styled
+from .figures import use_style as use_style
 from .frames import draw_frame as draw_frame
 from .frames import draw_frames as draw_frames
 from .frames import draw_superimposed as draw_superimposed
 from .paths import draw_end_effector as draw_end_effector
-from .style import new_figure as new_figure
-from .style import styled as styled
-from .style import use_style as use_style

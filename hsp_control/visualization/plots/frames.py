@@ -12,19 +12,19 @@ from matplotlib.patheffects import withStroke
 from hsp_control.common.arrays import Array
 from hsp_control.simulation import Rollout
 from hsp_control.visualization import palette
-from hsp_control.visualization.plots.logged_geometry import (
+from hsp_control.visualization.plots.world import (
+    View,
     center_points,
-    enclosing_points,
-    logged_obstacles,
-    parents,
-    task_paths,
-)
-from hsp_control.visualization.plots.views import View, fit, view_of
-from hsp_control.visualization.plots.world_drawing import (
     draw_axis_directions,
     draw_obstacle,
     draw_shadow,
     draw_skeleton,
+    enclosing_points,
+    fit,
+    logged_obstacles,
+    parents,
+    task_paths,
+    view_of,
 )
 
 _NEAR = 0.035  # width and height of a letter of a number, over the size of the scene

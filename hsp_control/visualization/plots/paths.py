@@ -11,23 +11,21 @@ from matplotlib.ticker import MaxNLocator
 from hsp_control.common.arrays import Array
 from hsp_control.simulation import Rollout
 from hsp_control.visualization import palette
-from hsp_control.visualization.plots.lines import legend_below, literal_text, note
-from hsp_control.visualization.plots.logged_geometry import (
-    center_points,
-    enclosing_points,
-    end_points,
-    logged_obstacles,
-    task_paths,
-)
-from hsp_control.visualization.plots.views import (
+from hsp_control.visualization.plots.curves import legend_below, literal_text, note
+from hsp_control.visualization.plots.world import (
     View,
     best_plane,
+    center_points,
+    draw_obstacle,
+    enclosing_points,
+    end_points,
     fit,
     is_flat,
+    logged_obstacles,
     oblique,
     plane,
+    task_paths,
 )
-from hsp_control.visualization.plots.world_drawing import draw_obstacle
 
 
 class _Edge(NamedTuple):

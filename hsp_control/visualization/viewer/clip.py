@@ -11,17 +11,18 @@ from hsp_control.control.controller import Controller
 from hsp_control.null_space.fields import Clearance, NullSpaceField, SelfClearance
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.limit_excess import POSITION, VELOCITY
-from hsp_control.simulation.term_columns import logged_terms
+from hsp_control.simulation.log_columns import logged_terms
 from hsp_control.simulation.unreached import FAR, OUT, Unreached, unreached
 from hsp_control.visualization import palette
+from hsp_control.visualization.viewer.analysis import from_the_start
 from hsp_control.visualization.viewer.commands import (
-    Command,
     Json,
+    PageCommand,
     clip_command,
     forget_clip,
     typed_array,
 )
-from hsp_control.visualization.viewer.controller_analysis import from_the_start
+from hsp_control.visualization.viewer.motion import Track
 
 CLOSED_SHARE = 1 / 200
 """Gaps up to this share of the whole run are closed: nobody would see them."""
@@ -118,17 +119,6 @@ def _fields_of(controller: Controller | None) -> dict[str, NullSpaceField]:
     return logged_terms(from_the_start(controller)) | logged_terms(controller)
 
 
-class Track(NamedTuple):
-    """The animation of one property of one node."""
-
-    path: str
-    # ``position`` [m], ``quaternion`` (x, y, z, w), ``scale``, ``color``, ``opacity``,
-    # ``visible`` or ``length``; see ``page/player.js``.
-    property: str
-    times: Array  # times [s], ascending, (n,)
-    values: Array  # one row per time, (n, k)
-
-
 class Clip(NamedTuple):
     """The animation of the scene from a start to an end."""
 
@@ -151,7 +141,7 @@ def set_clip(
     loop: bool = False,
     speed: float = 1.0,
     keep: bool = False,
-) -> list[Command]:
+) -> list[PageCommand]:
     """Return the commands that replace the current clip."""
     begin = clip_command(
         "clip",
@@ -166,12 +156,12 @@ def set_clip(
     return [forget_clip(), begin]
 
 
-def remove_clip() -> list[Command]:
+def remove_clip() -> list[PageCommand]:
     """Return the commands that remove the clip; then commands move the scene."""
     return [forget_clip(), clip_command("still", "begin")]
 
 
-def extend_clip(clip: Clip, number: int) -> Command:
+def extend_clip(clip: Clip, number: int) -> PageCommand:
     """Return the command that appends a clip to the current one."""
     return clip_command("clip", f"more {number}", **_fields(clip), begins=False)
 

@@ -1,6 +1,6 @@
 """Several runs in one scene: overlaid, the others as ghosts or not, or side by side."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,24 +10,20 @@ from hsp_control.control.controller import Controller
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
 from hsp_control.visualization import palette
-from hsp_control.visualization.viewer.appearance import ACTUAL, LegendEntry, merged
-from hsp_control.visualization.viewer.arrows import SelfMotion
+from hsp_control.visualization.viewer.arrows import SelfMotionLayer
 from hsp_control.visualization.viewer.clip import Band, Clip, bands_of
 from hsp_control.visualization.viewer.commands import (
-    Command,
+    LegendEntry,
+    PageCommand,
     path_element,
     set_ghost,
     set_transform,
 )
 from hsp_control.visualization.viewer.motion import motion_of
 from hsp_control.visualization.viewer.robot_drawing import RobotDrawing
-from hsp_control.visualization.viewer.run_drawing import (
-    LAYERS,
-    RunDrawing,
-    all_layers,
-    ghost_layers,
-)
+from hsp_control.visualization.viewer.run_drawing import LAYERS, RunDrawing, all_layers
 from hsp_control.visualization.viewer.stage import in_sight
+from hsp_control.visualization.viewer.targets import paths
 from hsp_control.visualization.viewer.threejs import pose_at
 
 GHOSTS = (palette.TASK, palette.SERIES[4], palette.WARNING)
@@ -77,7 +73,11 @@ class Comparison:
                 self._drawings.append(RobotDrawing(run.robot, f"{root}/robot"))
             motion = motion_of(run.robot, run.rollout)
             layers = (
-                ghost_layers(motion, ghost_color(number), root)
+                {
+                    "paths": paths(
+                        motion, f"{root}/paths", ghost_color(number), ghost=True
+                    )
+                }
                 if number and self._ghosts
                 else all_layers(run.robot, motion, run.controller, root=root, dark=dark)
             )
@@ -88,11 +88,11 @@ class Comparison:
             )
         self._offsets = self._compute_offsets()
         moving = [run.layers.get("self_motion") for run in self._runs]
-        arrows = [layer for layer in moving if isinstance(layer, SelfMotion)]
+        arrows = [layer for layer in moving if isinstance(layer, SelfMotionLayer)]
         for layer in arrows:  # compared arrows share one scale
             layer.seconds = min(other.seconds for other in arrows)
 
-    def draw(self, size: float) -> Iterator[Command]:
+    def draw(self, size: float) -> Iterator[PageCommand]:
         """Yield the commands that draw the runs, and all robots but the first."""
         for number, (run, root) in enumerate(zip(self._runs, self.roots, strict=True)):
             if number:
@@ -131,13 +131,13 @@ class Comparison:
     def legend(self) -> list[LegendEntry]:
         """Return the legend's entries."""
         if not self._ghosts:
-            return merged(entry for run in self._runs for entry in run.legend())
+            return _merged(entry for run in self._runs for entry in run.legend())
         # A ghost is all below its node; the first run is its robot and actual path.
         entries = self._runs[0].legend()
-        first = [e for e in entries if e.color == ACTUAL or e.name == "robot"]
-        paths = tuple(path for entry in first for path in entry.paths)
+        first = [e for e in entries if e.color == palette.ACTUAL or e.name == "robot"]
+        shown = tuple(path for entry in first for path in entry.paths)
         return [
-            LegendEntry(self._names[0], ACTUAL, paths),
+            LegendEntry(self._names[0], palette.ACTUAL, shown),
             *(
                 LegendEntry(name, ghost_color(k), (self.roots[k],))
                 for k, name in enumerate(self._names)
@@ -160,6 +160,16 @@ class Comparison:
             offsets.append(shift * self._beside)
             edge = shift + high + _GAP * (high - low)
         return offsets
+
+
+def _merged(entries: Iterable[LegendEntry]) -> list[LegendEntry]:
+    """Return the entries with those of the same name and colour made into one."""
+    rows: dict[tuple[str, str], LegendEntry] = {}
+    for entry in entries:
+        known = rows.setdefault((entry.name, entry.color), entry._replace(paths=()))
+        merged = known._replace(paths=(*known.paths, *entry.paths))
+        rows[entry.name, entry.color] = merged
+    return list(rows.values())
 
 
 def run_roots(names: Sequence[str]) -> list[str]:

@@ -16,15 +16,15 @@ from hsp_control.visualization.viewer.comparison import (
     ghost_color,
     run_parts,
 )
-from hsp_control.visualization.viewer.offline.page import assemble
-from hsp_control.visualization.viewer.offline.scene_reduction import reduce_scene
-from hsp_control.visualization.viewer.packed.packing import ArrayTable
-from hsp_control.visualization.viewer.packed.plot_packing import (
+from hsp_control.visualization.viewer.offline_page import assemble
+from hsp_control.visualization.viewer.packed_scene import reduce_scene
+from hsp_control.visualization.viewer.packing import ArrayTable
+from hsp_control.visualization.viewer.page_plots import (
     PlottedRun,
     pack_panels,
 )
-from hsp_control.visualization.viewer.recorder import Recorder
 from hsp_control.visualization.viewer.replay import rebuild_run
+from hsp_control.visualization.viewer.transport import SceneRecorder
 from hsp_control.visualization.viewer.viewer import Viewer
 
 
@@ -86,7 +86,7 @@ def write_page(path: Path, text: str) -> Path:
 def page_of(runs: Sequence[ComparedRun], view: dict[str, Any]) -> str:
     """Return the page that `export_html` writes."""
     first, names = runs[0], [run.name for run in runs]
-    recorder, arrays = Recorder(), ArrayTable()
+    recorder, arrays = SceneRecorder(), ArrayTable()
     own = (first.rollout.config or {}).get("view", {})
     beside = len({run.robot.name for run in runs}) > 1
     with Viewer(first.robot, transport=recorder, **{**own, **view}) as viewer:

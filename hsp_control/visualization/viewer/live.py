@@ -11,13 +11,13 @@ from hsp_control.common.exceptions import HspControlError, LogError, ViewerError
 from hsp_control.config.experiment import Experiment
 from hsp_control.robot import RobotState
 from hsp_control.simulation import Rollout
-from hsp_control.simulation.recorder import Recorder
+from hsp_control.simulation.log_writer import LogWriter
 from hsp_control.visualization.viewer.clip import Clip, bands_of, extend_clip, set_clip
 from hsp_control.visualization.viewer.commands import set_status
-from hsp_control.visualization.viewer.motion import COARSEST, Motion, motion_of
+from hsp_control.visualization.viewer.motion import COARSEST, RunMotion, motion_of
+from hsp_control.visualization.viewer.page_plots import plots_so_far
 from hsp_control.visualization.viewer.run_drawing import RunDrawing, all_layers
-from hsp_control.visualization.viewer.run_plots import plots_so_far
-from hsp_control.visualization.viewer.targets import GrowingPaths
+from hsp_control.visualization.viewer.targets import growing_paths
 from hsp_control.visualization.viewer.viewer import Viewer
 
 MIN_PERIOD = 0.1  # minimum time between two messages to the page [s]
@@ -49,7 +49,7 @@ class LiveView:
         motion = motion_of(robot, preview)
         shown = viewer.view.show.all_fields()
         layers = all_layers(robot, motion, controller, dark=viewer.dark)
-        layers["paths"] = GrowingPaths(motion, "/paths")
+        layers["paths"], self._extend = growing_paths(motion, "/paths")
         # Layers that are hidden are not computed now.
         layers = {name: layer for name, layer in layers.items() if shown[name]}
         self._run = RunDrawing(viewer.drawing, motion, layers, shown=shown)
@@ -62,7 +62,7 @@ class LiveView:
         self._begin: float | None = None
         self._size = viewer.set_stage(self._run, experiment.scenario.title)
 
-    def on_row(self, recorder: Recorder) -> None:
+    def on_row(self, recorder: LogWriter) -> None:
         """Send the rows computed since the last message, if the next one is due."""
         now = time.perf_counter()
         if self._begin is None:
@@ -93,7 +93,7 @@ class LiveView:
             status=f"computed at {_shown(rate)} × real time",
         )
 
-    def _send(self, recorder: Recorder, now: float) -> None:
+    def _send(self, recorder: LogWriter, now: float) -> None:
         rows = Rollout(recorder.rows(self._sent), self._meta)
         # From the last row sent on, whose bands may go on.
         joined = Rollout(recorder.rows(max(self._sent - 1, 0)), self._meta)
@@ -107,7 +107,7 @@ class LiveView:
         self._sent += len(rows)
         self._pieces += 1
 
-    def _send_plots(self, recorder: Recorder, now: float) -> None:
+    def _send_plots(self, recorder: LogWriter, now: float) -> None:
         """Send the plots of all rows computed so far, in place of the last ones."""
         before = time.thread_time()
         duration = self._experiment.scenario.simulation.duration
@@ -131,7 +131,7 @@ class LiveView:
         then, before = marks[0]
         return (computed - before) / (now - then) if now > then else 0.0
 
-    def _commands(self, motion: Motion, rows: Rollout, rate: float) -> list[Any]:
+    def _commands(self, motion: RunMotion, rows: Rollout, rate: float) -> list[Any]:
         first = not self._pieces
         duration = self._experiment.scenario.simulation.duration
         clip = Clip(
@@ -147,15 +147,9 @@ class LiveView:
             if first
             else [extend_clip(clip, self._pieces)]
         )
-        paths = self._run.layers.get("paths")
-        grown = paths.extend(motion) if isinstance(paths, GrowingPaths) else ()
-        if not rate:
-            return [*grown, *clip_commands]
-        return [
-            *grown,
-            *clip_commands,
-            set_status(f"computing at {_shown(rate)} × real time"),
-        ]
+        grown = self._extend(motion) if "paths" in self._run.layers else ()
+        told = [set_status(f"computing at {_shown(rate)} × real time")] if rate else []
+        return [*grown, *clip_commands, *told]
 
 
 def _preview(experiment: Experiment) -> Rollout:
@@ -163,7 +157,7 @@ def _preview(experiment: Experiment) -> Rollout:
     # A stream would go on to the end of the preview.
     robot, controller = experiment.robot, experiment.controller.preview()
     duration = experiment.scenario.simulation.duration
-    recorder = Recorder(controller, experiment.scene, _PREVIEW_ROWS)
+    recorder = LogWriter(controller, experiment.scene, _PREVIEW_ROWS)
     state = RobotState(robot)
     for t in np.linspace(0.0, duration, _PREVIEW_ROWS):
         state.update(float(t), experiment.q0, experiment.v0)

@@ -1,6 +1,7 @@
-"""The rows of a log that are drawn: close enough in time to look smooth."""
+"""What moves in the scene: the rows of a log that are drawn, tracks, and layers."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -10,60 +11,14 @@ from hsp_control.common.arrays import Array
 from hsp_control.robot import Robot, RobotState
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.log_series import drawn_parts, task_names
-
-
-class RowPosition(NamedTuple):
-    """The position of a time between two rows of a log."""
-
-    row: int  # the row before the time
-    fraction: float  # the fraction of the way to the next row, from 0 to 1
-
-
-def row_position(t: Array, time: float) -> RowPosition:
-    """Return where a time lies between the rows of a log; t (N,) [s]."""
-    row = int(np.clip(np.searchsorted(t, time, side="right") - 1, 0, len(t) - 1))
-    if row == len(t) - 1 or time <= t[row]:
-        return RowPosition(row, 0.0)
-    return RowPosition(row, float((time - t[row]) / (t[row + 1] - t[row])))
-
-
-def interpolate_column(column: Array, position: RowPosition) -> Array:
-    """Return a column's value at a position, interpolated linearly between two rows."""
-    row, fraction = position
-    here: Array = column[row]
-    if fraction == 0.0:
-        return here
-    there: Array = column[row + 1]
-    return (1.0 - fraction) * here + fraction * there
-
-
-def interpolate_orientation(
-    quaternions: Array, position: RowPosition
-) -> pin.Quaternion:
-    """Return the orientation at a position, by slerp between two rows."""
-    row, fraction = position
-    start, end = (
-        pin.Quaternion(*quaternions[k, [3, 0, 1, 2]]).normalized()
-        for k in (row, min(row + 1, len(quaternions) - 1))
-    )
-    return start.slerp(fraction, end)
-
-
-def interpolate_configuration(robot: Robot, q: Array, position: RowPosition) -> Array:
-    """Return the configuration at a position, on the geodesic between two rows."""
-    row, fraction = position
-    here: Array = q[row]
-    if fraction == 0.0:
-        return here
-    return robot.integrate(here, fraction * robot.difference(here, q[row + 1]))
-
+from hsp_control.visualization.viewer.commands import LegendEntry, PageCommand
 
 FINEST = 0.01  # minimum time between two drawn rows [s]
 COARSEST = 1 / 30
 """Maximum time between two drawn rows [s]; the page interpolates linearly."""
 
 
-class Motion(NamedTuple):
+class RunMotion(NamedTuple):
     """A robot's motion in a run."""
 
     robot: Robot
@@ -90,37 +45,86 @@ class Motion(NamedTuple):
         for t, q, v in zip(self.rows.t, self.rows.q, self.rows.v, strict=True):
             yield state.update(float(t), q, v)
 
+    def joint_poses(self) -> Array:
+        """Return each joint's x, y, z and quaternion, shape (N, njoints, 7)."""
+        poses = np.empty((len(self.times), self.robot.model.njoints, 7))
+        for row, state in enumerate(self.states()):
+            for joint, placement in enumerate(state.data.oMi):
+                poses[row, joint] = pin.SE3ToXYZQUAT(placement)
+        return poses
+
+
+class Track(NamedTuple):
+    """The animation of one property of one node."""
+
+    path: str
+    # ``position`` [m], ``quaternion`` (x, y, z, w), ``scale``, ``color``, ``opacity``,
+    # ``visible`` or ``length``; see ``page/player.js``.
+    property: str
+    times: Array  # times [s], ascending, (n,)
+    values: Array  # one row per time, (n, k)
+
+
+def pose_tracks(path: str, times: Array, poses: Array) -> Iterator[Track]:
+    """Yield the tracks of a node along poses: x, y, z, quaternion, shape (N, 7)."""
+    yield Track(path, "position", times, poses[:, :3])
+    yield Track(path, "quaternion", times, poses[:, 3:])
+
+
+@dataclass
+class Layer:
+    """One idea in the scene: how it is drawn, how it moves, its rows of the legend.
+
+    Attributes:
+        draw: Yields the commands that draw it in a scene of a size [m].
+        tracks: Yields its tracks along a run, or along a part of one.
+        legend: Returns the legend's entries.
+    """
+
+    draw: Callable[[float], Iterable[PageCommand]]
+    tracks: Callable[[RunMotion], Iterable[Track]]
+    legend: Callable[[], list[LegendEntry]]
+
 
 def motion_of(
     robot: Robot, rollout: Rollout, finest: float = FINEST, coarsest: float = COARSEST
-) -> Motion:
+) -> RunMotion:
     """Return the rows of a log that are drawn: thinned, or with interpolated rows."""
     times = drawn_times(rollout.t, finest, coarsest)
     if len(times) == len(rollout.t) and np.array_equal(times, rollout.t):
-        return Motion(robot, rollout)
+        return RunMotion(robot, rollout)
     kept = np.searchsorted(rollout.t, times)
     on_rows = kept < len(rollout.t)
     on_rows[on_rows] = rollout.t[kept[on_rows]] == times[on_rows]
     if on_rows.all():
         columns = {name: column[kept] for name, column in rollout.columns.items()}
-        return Motion(robot, Rollout(columns, rollout.meta))
-    positions = [row_position(rollout.t, time) for time in times]
+        return RunMotion(robot, Rollout(columns, rollout.meta))
+    places = np.interp(times, rollout.t, np.arange(len(rollout)))
+    rows = np.minimum(places.astype(int), len(rollout) - 2)
+    shares = places - rows
     columns = {}
     for name, column in rollout.columns.items():
-        if name == "q":
-            rows = [
-                interpolate_configuration(robot, column, position)
-                for position in positions
-            ]
-        else:
-            rows = [interpolate_column(column, position) for position in positions]
-        columns[name] = np.array(rows)
+        share = shares.reshape(-1, *[1] * (column.ndim - 1))
+        here, there = column[rows], column[rows + 1]
+        mixed = (1.0 - share) * here + share * there
+        # On a row its own value, also beside one that is not a number.
+        mixed = np.where(share == 0.0, here, mixed)
+        columns[name] = np.where(share == 1.0, there, mixed)
+    # Configurations on their geodesics, orientations on the sphere.
+    q = rollout.q
+    for k, (row, share) in enumerate(zip(rows, shares, strict=True)):
+        step = share * robot.difference(q[row], q[row + 1])
+        columns["q"][k] = robot.integrate(q[row], step)
     for name, where in _orientations(rollout):
-        turns = rollout[name][:, where]
-        columns[name][:, where] = [
-            interpolate_orientation(turns, position).coeffs() for position in positions
+        turns = [
+            pin.Quaternion(*turn[[3, 0, 1, 2]]).normalized()
+            for turn in rollout[name][:, where]
         ]
-    return Motion(robot, Rollout(columns, rollout.meta))
+        columns[name][:, where] = [
+            turns[row].slerp(share, turns[row + 1]).coeffs()
+            for row, share in zip(rows, shares, strict=True)
+        ]
+    return RunMotion(robot, Rollout(columns, rollout.meta))
 
 
 def _orientations(rollout: Rollout) -> Iterator[tuple[str, slice]]:

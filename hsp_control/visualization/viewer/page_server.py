@@ -22,13 +22,20 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
+import umsgpack  # type: ignore[import-untyped]
 from tornado.httpserver import HTTPServer
 from tornado.netutil import bind_sockets
 from tornado.web import Application, HTTPError, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
-from hsp_control.visualization.viewer.latest_commands import LatestCommands, key_of
-from hsp_control.visualization.viewer.pipe_protocol import ASK, DELETE, Decoder, Record
+from hsp_control.visualization.viewer.pipe import (
+    ASK,
+    DELETE,
+    Decoder,
+    LatestCommands,
+    PipeRecord,
+    key_of,
+)
 
 _MAX_SIZE = 1_000_000  # bytes; the commands that move a robot are far smaller
 
@@ -78,7 +85,7 @@ class Steering:
         self._put({"do": "left"})
         return True
 
-    def take(self, page: object, text: str) -> bool:
+    def receive(self, page: object, text: str) -> bool:
         """Take a page's message; return whether the page steers only from now on."""
         if len(text.encode()) > LONGEST:
             raise ValueError("the message is too long")
@@ -122,7 +129,12 @@ def _refuse(word: str) -> Callable[[], None]:
 PORTS = (*range(7000, 7100), 0)  # 0: any free port
 TAKEN = "taken"  # a page's acknowledgement of a message
 
-_TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}
+_TYPES = {
+    ".html": "text/html",
+    ".js": "text/javascript",
+    ".css": "text/css",
+    ".txt": "text/plain",
+}
 _LOOPBACK_NAMES = {"127.0.0.1", "localhost"}
 _PARENT_CHECK_PERIOD = 1.0  # s
 _FLUSH_PERIOD = 0.005  # s
@@ -183,7 +195,7 @@ class Hub:
         for page in self.pages:
             page.has_pending.set()
 
-    def _take(self, record: Record) -> None:
+    def _take(self, record: PipeRecord) -> None:
         kind, name, packed = record
         if kind == ASK:
             self._answer(int(name))
@@ -244,7 +256,7 @@ class Page(WebSocketHandler):
             if message == TAKEN:
                 self._ready.set()
             elif str(message).startswith("{") and steering is not None:
-                if steering.take(self, str(message)):
+                if steering.receive(self, str(message)):
                     self.hub.tell_who_steers()
                 self.hub.flush()
             else:
@@ -261,23 +273,18 @@ class Page(WebSocketHandler):
 
     def tell_drive(self, mine: bool, taken: bool) -> None:
         """Tell the page whether it steers, and whether any page does."""
-        # {"type": "play_drive", "path": "/play", "mine": ..., "taken": ...}
-        flags = [b"\xc3" if each else b"\xc2" for each in (mine, taken)]
-        packed = (
-            b"\x84\xa4type\xaaplay_drive\xa4path\xa5/play"
-            b"\xa4mine" + flags[0] + b"\xa5taken" + flags[1]
-        )
-        self.pending.put(key_of("/play", "drive"), packed)
-        self.has_pending.set()
+        self._tell("/play", "drive", type="play_drive", mine=mine, taken=taken)
 
     def ask(self, number: int) -> None:
         """Request that the page returns a number once it shows all sent before."""
         if self._asked < number:
             self._asked = number
-            # {"type": "ask", "number": ...}, the number as an unsigned 32-bit integer
-            packed = b"\x82\xa4type\xa3ask\xa6number\xce" + struct.pack(">I", number)
-            self.pending.put(key_of("", "ask"), packed)
-            self.has_pending.set()
+            self._tell("", "ask", type="ask", number=number)
+
+    def _tell(self, path: str, name: str, **command: Any) -> None:
+        packed = umsgpack.packb({"path": path, **command})
+        self.pending.put(key_of(path, name), packed)
+        self.has_pending.set()
 
     async def _deliver(self, stage: list[bytes]) -> None:
         """Send the stage, and from then on what is pending."""
@@ -293,7 +300,7 @@ class Page(WebSocketHandler):
                 await self._ready.wait()
             await self.has_pending.wait()
             self.has_pending.clear()
-            commands = self.pending.take()
+            commands = self.pending.pop_all()
 
 
 class FileHandler(RequestHandler):

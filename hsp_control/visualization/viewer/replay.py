@@ -18,9 +18,8 @@ from hsp_control.robot.description.access import ANYWHERE, Access, only_within
 from hsp_control.robot.description.sources import packaged_folders
 from hsp_control.simulation import Rollout
 from hsp_control.visualization.viewer.comparison import ComparedRun
-from hsp_control.visualization.viewer.offline.page import HEIGHT, InlineView
-from hsp_control.visualization.viewer.recorder import Recorder
-from hsp_control.visualization.viewer.transport import Transport
+from hsp_control.visualization.viewer.offline_page import HEIGHT, InlineView
+from hsp_control.visualization.viewer.transport import SceneRecorder
 from hsp_control.visualization.viewer.viewer import Viewer
 
 _log = logging.getLogger(__name__)
@@ -84,7 +83,7 @@ def view_logs(
     speed: float | None = None,
     loop: bool | None = None,
     port: int | None = None,
-    transport: Transport | None = None,
+    transport: SceneRecorder | None = None,
     strict: bool = False,
     allow: Sequence[str | PathLike[str]] = (),
 ) -> Viewer:
@@ -151,7 +150,7 @@ def show(
     """
     if robot is None:
         _, robot, _, controller = rebuild_run(rollout, "the log")
-    recorder = Recorder()
+    recorder = SceneRecorder()
     own = (rollout.config or {}).get("view", {})
     with Viewer(robot, transport=recorder, **{**own, **view}) as viewer:
         viewer.draw_scene(rollout, controller=controller)

@@ -1,42 +1,36 @@
 """Draws a run: the motion of its robot, and the layers."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Protocol
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.controller import Controller
 from hsp_control.robot import Robot
-from hsp_control.visualization.viewer.appearance import CHALK, INK, LegendEntry
-from hsp_control.visualization.viewer.arrows import Contacts, SelfMotion
-from hsp_control.visualization.viewer.clip import Band, Clip, Track
-from hsp_control.visualization.viewer.commands import Command, delete, set_property
-from hsp_control.visualization.viewer.controller_analysis import from_the_start
-from hsp_control.visualization.viewer.ellipsoid import Ellipsoid
-from hsp_control.visualization.viewer.measured_links import (
-    Capsules,
-    Distances,
-    Influence,
+from hsp_control.visualization import palette
+from hsp_control.visualization.viewer.analysis import from_the_start
+from hsp_control.visualization.viewer.arrows import contacts, ellipsoid, self_motion
+from hsp_control.visualization.viewer.clearances import capsules, distances, influence
+from hsp_control.visualization.viewer.clip import Band, Clip
+from hsp_control.visualization.viewer.commands import (
+    LegendEntry,
+    PageCommand,
+    delete,
+    set_property,
 )
-from hsp_control.visualization.viewer.motion import Motion
-from hsp_control.visualization.viewer.obstacle_layer import ObstacleLayer, SolidLayer
+from hsp_control.visualization.viewer.motion import Layer, RunMotion, Track
+from hsp_control.visualization.viewer.obstacles import (
+    logged_shapes,
+    obstacle_layer,
+    points_around,
+    solid_layer,
+)
 from hsp_control.visualization.viewer.robot_drawing import RobotDrawing, robot_entry
-from hsp_control.visualization.viewer.targets import Paths, TargetMarkers
-
-
-class Layer(Protocol):
-    """Draws itself once, and returns the tracks of its motion."""
-
-    def draw(self, size: float) -> Iterator[Command]:
-        """Yield the commands that draw it in a scene of the given size [m]."""
-
-    def tracks(self, motion: Motion) -> Iterator[Track]:
-        """Yield its tracks along a run, or along a part of one."""
-
-    def legend(self) -> list[LegendEntry]:
-        """Return the legend's entries."""
-
+from hsp_control.visualization.viewer.targets import (
+    desired_points,
+    paths,
+    target_markers,
+)
 
 LAYERS = (
     "paths",
@@ -55,41 +49,38 @@ LAYERS = (
 
 def all_layers(
     robot: Robot,
-    motion: Motion,
+    motion: RunMotion,
     controller: Controller | None,
     *,
     root: str = "",
     dark: bool = False,
 ) -> dict[str, Layer]:
     """Return the layers of a run, by name."""
-    ink = CHALK if dark else INK
-    obstacles = ObstacleLayer(motion, f"{root}/obstacles")
-    layers: dict[str, Layer] = {
-        "paths": Paths(motion, f"{root}/paths"),
-        "targets": TargetMarkers(motion, f"{root}/targets"),
-        "obstacles": obstacles,
-        "solids": SolidLayer(motion, f"{root}/solids"),
-        "ellipsoid": Ellipsoid(robot, controller, f"{root}/ellipsoid"),
-        "contacts": Contacts(robot, motion, f"{root}/contacts"),
+    layers = {
+        "paths": paths(motion, f"{root}/paths"),
+        "targets": target_markers(motion, f"{root}/targets"),
+        "obstacles": obstacle_layer(motion, f"{root}/obstacles"),
+        "solids": solid_layer(motion, f"{root}/solids"),
+        "ellipsoid": ellipsoid(robot, controller, f"{root}/ellipsoid"),
+        "contacts": contacts(robot, motion, f"{root}/contacts"),
     }
     if controller is not None:
         controller = from_the_start(controller)
+        shown, ink = logged_shapes(motion.rows), line_color(dark=dark)
         layers |= {
-            "influence": Influence(
-                controller.field, obstacles.shapes, f"{root}/influence"
-            ),
-            "distances": Distances(controller, f"{root}/distances", ink),
-            "capsules": Capsules(controller, f"{root}/capsules"),
+            "influence": influence(controller.field, shown, f"{root}/influence"),
+            "distances": distances(controller, f"{root}/distances", ink),
+            "capsules": capsules(controller, f"{root}/capsules"),
         }
         if "field.g" in motion.rows:
-            arrows = SelfMotion(controller, motion, f"{root}/self_motion")
+            arrows = self_motion(controller, motion, f"{root}/self_motion")
             layers["self_motion"] = arrows
     return layers
 
 
-def ghost_layers(motion: Motion, color: str, root: str) -> dict[str, Layer]:
-    """Return the layers of a ghost: only its path, in a colour."""
-    return {"paths": Paths(motion, f"{root}/paths", color, ghost=True)}
+def line_color(*, dark: bool) -> str:
+    """Return the colour of lines on a light or on a dark background."""
+    return palette.WALL if dark else palette.INK
 
 
 class RunDrawing:
@@ -98,7 +89,7 @@ class RunDrawing:
     def __init__(
         self,
         drawing: RobotDrawing,
-        motion: Motion,
+        motion: RunMotion,
         layers: dict[str, Layer],
         *,
         root: str = "",
@@ -113,12 +104,12 @@ class RunDrawing:
         self._bands = bands
         self._shown = dict.fromkeys(LAYERS, True) | dict(shown or {})
 
-    def draw(self, size: float) -> Iterator[Command]:
+    def draw(self, size: float) -> Iterator[PageCommand]:
         """Yield the commands that draw the layers in a scene of the given size [m]."""
         for name in self.layers:
             yield from self.draw_layer(name, size)
 
-    def draw_layer(self, name: str, size: float) -> Iterator[Command]:
+    def draw_layer(self, name: str, size: float) -> Iterator[PageCommand]:
         """Yield the commands that draw one layer; see `draw`."""
         layer = self.layers[name]
         yield from layer.draw(size)
@@ -132,7 +123,7 @@ class RunDrawing:
         times, tracks = self.motion.times, list(self.tracks(self.motion))
         return Clip(float(times[0]), float(times[-1]), tracks, bands=self._bands)
 
-    def tracks(self, motion: Motion) -> Iterator[Track]:
+    def tracks(self, motion: RunMotion) -> Iterator[Track]:
         """Yield the tracks of robot and layers along the run, or along a part of it."""
         yield from self._drawing.tracks(motion)
         for layer in self.layers.values():
@@ -142,13 +133,11 @@ class RunDrawing:
         """Return the positions of robot and targets in the run [m], shape (K, 3)."""
         rows = self.motion.rows
         skeleton = rows["skeleton"] if "skeleton" in rows else np.zeros((0, 3))
-        paths = Paths(self.motion, "").points()
-        return np.concatenate([skeleton.reshape(-1, 3), paths])
+        return np.concatenate([skeleton.reshape(-1, 3), desired_points(self.motion)])
 
     def obstacle_points(self) -> Array:
         """Return points that enclose obstacles and solids in the run [m], (K, 3)."""
-        layers = ObstacleLayer(self.motion, ""), SolidLayer(self.motion, "")
-        return np.concatenate([each.points() for each in layers])
+        return points_around(self.motion.rows)
 
     def legend(self) -> list[LegendEntry]:
         """Return the legend's entries of all layers, and the robot's."""
@@ -160,7 +149,7 @@ class RunDrawing:
         return [*entries, robot_entry(f"{self._root}/robot")]
 
 
-def clear() -> Iterator[Command]:
+def clear() -> Iterator[PageCommand]:
     """Yield the commands that delete all layers."""
     for name in LAYERS:
         yield delete(f"/{name}")

@@ -11,28 +11,28 @@ from hsp_control.config.view_settings import ViewSettings
 from hsp_control.robot import Robot
 from hsp_control.visualization import palette
 from hsp_control.visualization.viewer import threejs
-from hsp_control.visualization.viewer.appearance import (
-    GRID,
-    HAZE,
-    LegendEntry,
-    translucent,
-)
 from hsp_control.visualization.viewer.commands import (
-    Command,
     Json,
+    LegendEntry,
+    PageCommand,
     set_camera,
     set_object,
     set_property,
     set_transform,
+    translucent,
 )
 from hsp_control.visualization.viewer.threejs import pose_at
 
+_HAZE = 0.19  # share of grey in the background's colour at the horizon
+_GRID = "#8794A1"
 _LIGHT_FROM = np.array([0.5, -0.45, 1.6])
 _FINE = 1e-3
 _SHADOW = translucent(palette.MUTED, 0.4)
 
 
-def draw_stage(points: Array, floor: float, view: ViewSettings) -> Iterator[Command]:
+def draw_stage(
+    points: Array, floor: float, view: ViewSettings
+) -> Iterator[PageCommand]:
     """Yield the background, the lights and the floor; points (K, 3) [m]."""
     yield from draw_background(view)
     center = 0.5 * (points.min(axis=0) + points.max(axis=0))
@@ -42,10 +42,10 @@ def draw_stage(points: Array, floor: float, view: ViewSettings) -> Iterator[Comm
     yield set_property("/floor/grid", "visible", view.show.grid)
 
 
-def draw_background(view: ViewSettings) -> Iterator[Command]:
+def draw_background(view: ViewSettings) -> Iterator[PageCommand]:
     """Yield the background alone."""
     sky = view.background
-    horizon = palette.blend(sky, palette.MUTED, HAZE)
+    horizon = palette.blend(sky, palette.MUTED, _HAZE)
     yield set_property("/Background", "top_color", _channels(sky))
     yield set_property("/Background", "bottom_color", _channels(horizon))
 
@@ -53,7 +53,7 @@ def draw_background(view: ViewSettings) -> Iterator[Command]:
 def stage_legend(view: ViewSettings) -> list[LegendEntry]:
     """Return the legend's entries of what lies on the floor."""
     return [
-        LegendEntry("grid", GRID, ("/floor/grid",), view.show.grid, plain=True),
+        LegendEntry("grid", _GRID, ("/floor/grid",), view.show.grid, plain=True),
         LegendEntry("shadow", _SHADOW, ("/floor/shadow",), plain=True),
     ]
 
@@ -77,7 +77,7 @@ def scene_size(points: Array) -> float:
     return max(float(np.linalg.norm(points - center, axis=1).max()), _FINE)
 
 
-def _lights(center: Array, size: float, strength: float) -> Iterator[Command]:
+def _lights(center: Array, size: float, strength: float) -> Iterator[PageCommand]:
     sky = threejs.light("HemisphereLight", 0.57 * strength, groundColor=0xD5DCE2)
     fill = threejs.light("DirectionalLight", 0.14 * strength)
     back = np.array([-_LIGHT_FROM[0], 1.2 * abs(_LIGHT_FROM[1]), 0.6])
@@ -113,7 +113,7 @@ def _lights(center: Array, size: float, strength: float) -> Iterator[Command]:
     yield set_transform("/lights/key", pose_at(towards * distance))
 
 
-def _floor(center: Array, size: float, height: float) -> Iterator[Command]:
+def _floor(center: Array, size: float, height: float) -> Iterator[PageCommand]:
     pose = pose_at([center[0], center[1], height])
     yield set_object("/floor/shadow", threejs.group([_shadow(size)]))
     yield set_transform("/floor/shadow", pose)
@@ -136,7 +136,7 @@ def _grid(size: float, step: float) -> Json:
     lines = np.array([(tick, place, 0.0) for tick in ticks for place in along])
     points = np.vstack([lines, lines[:, [1, 0, 2]]])
     colors = np.empty((len(points), 4))
-    colors[:, :3] = _channels(GRID)
+    colors[:, :3] = _channels(_GRID)
     distance = np.linalg.norm(points, axis=1) / reach
     colors[:, 3] = 0.55 * np.clip(1.0 - distance, 0.0, 1.0) ** 1.5
     return threejs.segments(points, colors)
@@ -167,7 +167,7 @@ def look_at(
     target: ArrayLike | None = None,
     *,
     fit: bool = False,
-) -> Command:
+) -> PageCommand:
     """Return the command that places the camera.
 
     A planar arm is seen along its joint axes, any other robot from its front and above.

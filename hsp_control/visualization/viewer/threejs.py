@@ -1,14 +1,18 @@
-"""Objects, materials and poses of three.js, in Meshcat's format."""
+"""Objects, mesh files, materials and poses of three.js, in Meshcat's format."""
 
+import base64
+import mimetypes
 from collections.abc import Sequence
 from itertools import count
+from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from hsp_control.common.arrays import Array
+from hsp_control.common.arrays import Array, Indices
 from hsp_control.visualization.viewer.commands import Json, typed_array
 
 
@@ -126,6 +130,11 @@ def mesh(
     }
 
 
+def mesh_group(geometry: Json, surface: Json, *about: Any, shadow: bool = True) -> Json:
+    """Return an object of its own of a geometry and a material; see `mesh`."""
+    return group([mesh(geometry, surface, *about, shadow=shadow)])
+
+
 def group(things: Sequence[Json]) -> Json:
     """Return several objects as one; each keeps its shadow settings."""
     return {
@@ -152,6 +161,17 @@ def buffer_geometry(attributes: dict[str, Array]) -> Json:
         for name, rows in attributes.items()
     }
     return _geometry("BufferGeometry", data={"attributes": packed})
+
+
+def facets(vertices: Array, triangles: Indices) -> Json:
+    """Return flat-shaded triangles: each has its own vertices and normal."""
+    corners = vertices[triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals /= np.where(lengths > 0.0, lengths, 1.0)
+    return buffer_geometry(
+        {"position": corners.reshape(-1, 3), "normal": np.repeat(normals, 3, axis=0)}
+    )
 
 
 def segments(points: Array, colors: Array) -> Json:
@@ -252,3 +272,65 @@ def color_number(color: str | Sequence[float]) -> int:
         return int(color[1:], 16)
     red, green, blue = (round(255 * min(max(c, 0.0), 1.0)) for c in color[:3])
     return red << 16 | green << 8 | blue
+
+
+_PICTURES = {".bmp", ".gif", ".jpeg", ".jpg", ".png", ".tga", ".tif", ".tiff", ".webp"}
+"""Image files that a texture may name: other files must not get into a page."""
+
+
+def mesh_geometry(file: Path) -> Json:
+    """Return an OBJ or STL file as a geometry without material."""
+    kind = file.suffix.lower()[1:]
+    data = (
+        typed_array(np.frombuffer(file.read_bytes(), np.uint8), np.uint8)
+        if kind == "stl"
+        else file.read_text(encoding="utf-8", errors="replace")
+    )
+    return {
+        "uuid": unique_name(),
+        "type": "_meshfile_geometry",
+        "format": kind,
+        "data": data,
+    }
+
+
+def collada_object(file: Path) -> Json:
+    """Return a Collada file as an object with its own materials and textures."""
+    text = file.read_text(encoding="utf-8", errors="replace")
+    return {
+        "metadata": {"version": 4.5, "type": "Object"},
+        "geometries": [],
+        "materials": [],
+        "object": {
+            "uuid": unique_name(),
+            "type": "_meshfile_object",
+            "format": "dae",
+            "data": text,
+            "resources": _textures(file, text),
+        },
+    }
+
+
+def _textures(file: Path, text: str) -> dict[str, str]:
+    """Return the images that a Collada file names, as data URLs by name."""
+    if "<init_from>" not in text:
+        return {}
+    try:
+        root = ElementTree.fromstring(text)
+    except (ElementTree.ParseError, ValueError):  # the page reports it
+        return {}
+    names = {
+        (element.text or "").strip()
+        for images in root.iter()
+        if images.tag.endswith("library_images")
+        for element in images.iter()
+        if element.tag.endswith("init_from")
+    }
+    found = {}
+    for name in names:
+        image = file.parent / name.removeprefix("file://")
+        if image.suffix.lower() in _PICTURES and image.is_file():
+            kind = mimetypes.guess_type(image.name)[0] or "image/png"
+            content = base64.b64encode(image.read_bytes()).decode()
+            found[name] = f"data:{kind};base64,{content}"
+    return found

@@ -15,10 +15,10 @@ from hsp_control.control.controller import Controller
 from hsp_control.geometry.scene import Scene
 from hsp_control.robot import Robot, RobotState
 from hsp_control.simulation import Rollout
-from hsp_control.visualization.viewer import browser
+from hsp_control.visualization.viewer import transport
 from hsp_control.visualization.viewer.clip import bands_of, remove_clip, set_clip
 from hsp_control.visualization.viewer.commands import (
-    Command,
+    PageCommand,
     delete,
     remove_plots,
     seek,
@@ -28,12 +28,11 @@ from hsp_control.visualization.viewer.commands import (
 )
 from hsp_control.visualization.viewer.comparison import ComparedRun, Comparison
 from hsp_control.visualization.viewer.motion import motion_of
-from hsp_control.visualization.viewer.obstacle_layer import ObstacleDrawing
-from hsp_control.visualization.viewer.offline.page import InlineView
+from hsp_control.visualization.viewer.obstacles import SceneDrawing
+from hsp_control.visualization.viewer.offline_page import InlineView
+from hsp_control.visualization.viewer.page_plots import plots_of
 from hsp_control.visualization.viewer.robot_drawing import RobotDrawing
 from hsp_control.visualization.viewer.run_drawing import RunDrawing, all_layers, clear
-from hsp_control.visualization.viewer.run_plots import plots_of
-from hsp_control.visualization.viewer.server import Server
 from hsp_control.visualization.viewer.stage import (
     draw_stage,
     in_sight,
@@ -43,9 +42,9 @@ from hsp_control.visualization.viewer.stage import (
     scene_size,
     stage_legend,
 )
-from hsp_control.visualization.viewer.transport import Transport
+from hsp_control.visualization.viewer.transport import PageServer, SceneRecorder
 
-StageContent = RunDrawing | Comparison | ObstacleDrawing
+StageContent = RunDrawing | Comparison | SceneDrawing
 
 _log = logging.getLogger(__name__)
 
@@ -60,7 +59,7 @@ class Viewer:
         robot: The robot.
         view: The settings, as under ``view`` in a configuration.
         drawing: The robot in the scene.
-        transport: The server, or a `Recorder`.
+        transport: The server, or a `SceneRecorder`.
     """
 
     def __init__(
@@ -68,7 +67,7 @@ class Viewer:
         robot: Robot,
         *,
         open_browser: bool = False,
-        transport: Transport | None = None,
+        transport: SceneRecorder | None = None,
         port: int | None = None,
         **view: Any,
     ) -> None:
@@ -77,8 +76,8 @@ class Viewer:
         Args:
             robot: The robot.
             open_browser: Open the page in the user's browser.
-            transport: A `Recorder`, to store the commands and show nothing; None: a new
-                server on the loopback address.
+            transport: A `SceneRecorder`, to store the commands and show nothing; None:
+                a new server on the loopback address.
             port: The server's port; None: the first free one from 7000.
             view: Fields of `ViewSettings`, the keys of a configuration's ``view``:
                 ``camera`` and ``target`` [m], ``background``,
@@ -92,10 +91,10 @@ class Viewer:
         self.view = ViewSettings(**view)
         self.drawing = RobotDrawing(robot)
         self._data = robot.model.createData()
-        self._obstacles: ObstacleDrawing | None = None
+        self._obstacles: SceneDrawing | None = None
         self._others: list[str] = []
         self._plotted = False
-        self.transport = Server(port) if transport is None else transport
+        self.transport = PageServer(port) if transport is None else transport
         try:
             # Its meshes last: they appear where they belong, in their light.
             still = self._with_obstacles(Scene(), None)
@@ -152,7 +151,7 @@ class Viewer:
             NonFiniteError: If it holds a NaN or an infinity.
             ConfigurationError: If a quaternion or a (cos, sin) pair is not of norm 1.
         """
-        others: list[Command] = []
+        others: list[PageCommand] = []
         if isinstance(state, RobotState):
             placements = state.data.oMi
             others = self._move_others(state.t)
@@ -238,7 +237,7 @@ class Viewer:
 
     def open_browser(self) -> bool:
         """Open the page in the user's browser; return whether there is one."""
-        return self.url is not None and browser.open_browser(self.url)
+        return self.url is not None and transport.open_browser(self.url)
 
     def wait_until_closed(self) -> None:
         """Wait until no page is open any more."""
@@ -299,7 +298,7 @@ class Viewer:
         )
         self._plot([ComparedRun("", self.robot, rollout, controller)])
 
-    def show_plots(self, plots: Command) -> None:
+    def show_plots(self, plots: PageCommand) -> None:
         """Show plots beside the scene, until another scene is drawn."""
         self._plotted = True
         self.transport.send([plots])
@@ -307,7 +306,7 @@ class Viewer:
     @property
     def has_plots(self) -> bool:
         """Whether its pages show plots: those of its own server do."""
-        return isinstance(self.transport, Server)
+        return isinstance(self.transport, PageServer)
 
     def _plot(self, runs: Sequence[ComparedRun]) -> None:
         """Show the plots of runs beside the scene, which is already there."""
@@ -335,11 +334,11 @@ class Viewer:
         self.transport.send([*stage, *set_clip(run.clip(), **playing)])
         self._plot([ComparedRun("", self.robot, rollout, controller)])
 
-    def _with_obstacles(self, scene: Scene, title: str | None) -> list[Command]:
+    def _with_obstacles(self, scene: Scene, title: str | None) -> list[PageCommand]:
         """Return the commands that show the robot at home with a scene's obstacles."""
         placements = self._placements(self.robot.home())
-        obstacles = ObstacleDrawing(scene)
-        stage = self._stage(obstacles, title, self.drawing.points(placements))
+        obstacles = SceneDrawing(scene, self.drawing.points(placements))
+        stage = self._stage(obstacles, title)
         self._obstacles = obstacles
         still = [*obstacles.move(0.0), *self.drawing.move(placements)]
         return [*stage, *remove_clip(), *still]
@@ -348,12 +347,11 @@ class Viewer:
         self,
         scene: StageContent,
         title: str | None,
-        moving: Array | None = None,
         fit: bool = False,
-    ) -> list[Command]:
+    ) -> list[PageCommand]:
         """Return the commands that clear the stage, fit it, and draw a scene."""
         view = self.view
-        subject = self._subject(scene.points() if moving is None else moving)
+        subject = self._subject(scene.points())
         points = in_sight(subject, scene.obstacle_points())
         floor = min(0.0, float(subject[:, 2].min()))
         commands = [
@@ -371,7 +369,7 @@ class Viewer:
         self._plotted = False
         return commands
 
-    def _caption(self, scene: StageContent, title: str | None) -> Command:
+    def _caption(self, scene: StageContent, title: str | None) -> PageCommand:
         """Return the command that sets the title and the legend; None: its name."""
         legend = [*scene.legend(), *stage_legend(self.view)]
         return set_caption(title or self.robot.name, legend, dark=self.dark)
@@ -386,7 +384,7 @@ class Viewer:
             raise ViewerError(f"speed {speed} must be positive")
         return {"speed": speed, "loop": self.view.loop if loop is None else loop}
 
-    def _move_others(self, time: float) -> list[Command]:
+    def _move_others(self, time: float) -> list[PageCommand]:
         """Return the commands that move all but the robot to a time [s]."""
         if self._obstacles is None:
             return [seek(time)]

@@ -10,7 +10,7 @@ from hsp_control.common import adapters, kernels
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.config.loaded_scenario import load_scenario
 from hsp_control.config.source import read_document
-from hsp_control.visualization.viewer import Recorder, Viewer, browser
+from hsp_control.visualization.viewer import SceneRecorder, Viewer, transport
 from hsp_control.visualization.viewer.commands import unpack
 
 
@@ -33,7 +33,7 @@ def said(monkeypatch: pytest.MonkeyPatch) -> Said:
         said.events.append("browser")
         return True
 
-    monkeypatch.setattr(browser, "open_browser", open_browser)
+    monkeypatch.setattr(transport, "open_browser", open_browser)
     return said
 
 
@@ -41,7 +41,7 @@ def compiled() -> None:
     kernels._watched(lambda: None)
 
 
-def transforms(recorder: Recorder) -> dict[str, bytes]:
+def transforms(recorder: SceneRecorder) -> dict[str, bytes]:
     return {path: packed for path, kind, packed in recorder.scene.items()
             if kind == "transform"}  # fmt: skip
 
@@ -85,7 +85,7 @@ def test_the_robot_is_drawn_at_its_start_before_any_kernel_is_compiled(
     document = read_document("panda_obstacle")
     document.override("start={joints: {panda_joint4: -1.0}}")
     loaded = load_scenario(document)
-    recorder = Recorder()
+    recorder = SceneRecorder()
     viewer = Viewer(loaded.robot, transport=recorder)
     draw_before(viewer, loaded)
     captions = [unpack(packed)["title"] for _, kind, packed in recorder.scene.items()

@@ -11,7 +11,7 @@ from hsp_control.cli import steering
 from hsp_control.cli.steering import PageProcess, SteeringPage
 from hsp_control.common.exceptions import ViewerError
 from hsp_control.live import OperatorRequests
-from hsp_control.play.channel import channel_pair
+from hsp_control.play.live_loop import channel_pair
 from hsp_control.play.playable import playable
 
 

@@ -12,8 +12,7 @@ from hsp_control.geometry import link_shapes
 from hsp_control.geometry.enclosing import enclosing_ellipsoid_capsule
 from hsp_control.geometry.links import self_pairs
 from hsp_control.robot import MujocoCoordinates
-from hsp_control.visualization.viewer.robot_drawing import RobotDrawing
-from hsp_control.visualization.viewer.visuals import read_visuals
+from hsp_control.visualization.viewer.robot_drawing import RobotDrawing, read_visuals
 
 mujoco = pytest.importorskip("mujoco")
 

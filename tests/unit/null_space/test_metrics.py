@@ -116,7 +116,7 @@ def test_coordinates_of_the_robot_s_source() -> None:
 
 
 def test_a_metric_s_own_evaluate_is_compiled() -> None:
-    """A subclass that overrides `evaluate` only does not inherit a step plan."""
+    """What a subclass overrides in plain Python is what a step calls."""
 
     class Halved(ConstantMetric):
         """Half of a matrix."""
@@ -128,6 +128,5 @@ def test_a_metric_s_own_evaluate_is_compiled() -> None:
 
     robot = load("panda")
     state, out = robot.state(0.0, robot.home(), np.zeros(7)), MetricSample.allocate(7)
-    (write,) = Halved(np.full(7, 3.0)).compile(state, out).write
-    write()
+    Halved(np.full(7, 3.0)).compile(state, out).run(0.0)
     np.testing.assert_array_equal(out.W, 1.5 * np.eye(7))

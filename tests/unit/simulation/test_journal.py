@@ -1,23 +1,32 @@
 """The journal of a log: whatever ends its writer, all whole rows can be read."""
 
 import os
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
+from live_rigs import PERIOD, Rig, law, start, watched
 
-from hsp_control import Rollout, load_experiment
+from hsp_control import Rollout, load_experiment, simulate
 from hsp_control.cli import main
 from hsp_control.common.exceptions import LogError
+from hsp_control.live import LiveSettings, Phase, StopSettings, run_loop
+from hsp_control.simulation import journal
 from hsp_control.simulation.journal import (
     KILLED,
     MAGIC,
+    JournalReader,
     JournalWriter,
     is_journal,
-    read_journal,
 )
+from hsp_control.tasks import JointPosture
 
 SMALL = {
     "robot": {"name": "planar3r"},
@@ -26,28 +35,30 @@ SMALL = {
     },
     "simulation": {"duration": 0.1},
 }
+PAIR = {"t": (), "q": (2,)}
+
+
+def whole(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    reader = JournalReader(path)
+    reader.read()
+    return reader.rows(0), reader.meta
 
 
 @pytest.fixture(scope="module")
-def rollout() -> Rollout:
-    return load_experiment(SMALL).run()
+def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Rollout, bytes]:
+    """Return a run, and the journal that it wrote meanwhile."""
+    path = tmp_path_factory.mktemp("run") / "a.journal"
+    return load_experiment(SMALL).run(log=path), path.read_bytes()
 
 
-def write(path: Path, rollout: Rollout, *, end: bool = True) -> Path:
-    journal = JournalWriter(path)
-    journal.write_heading(rollout.columns, rollout.meta)
-    for i in range(len(rollout)):
-        journal.write_row({name: a[i : i + 1] for name, a in rollout.columns.items()})
-    if end:
-        journal.write_end("completed", "")
-    journal.close()
-    return path
-
-
-def test_it_is_the_log_that_was_written(rollout: Rollout, tmp_path: Path) -> None:
-    read = Rollout.load(write(tmp_path / "a.journal", rollout))
+def test_it_is_the_log_that_was_written(
+    run: tuple[Rollout, bytes], tmp_path: Path
+) -> None:
+    rollout, data = run
+    (tmp_path / "a.journal").write_bytes(data)
+    read = Rollout.load(tmp_path / "a.journal")
     assert read.meta == rollout.meta
-    assert read.columns.keys() == rollout.columns.keys()
+    assert list(read.columns) == list(rollout.columns)
     for name, column in rollout.columns.items():
         np.testing.assert_array_equal(read[name], column)
     # And it can be kept as every other log is.
@@ -56,11 +67,10 @@ def test_it_is_the_log_that_was_written(rollout: Rollout, tmp_path: Path) -> Non
 
 
 def test_cut_anywhere_all_whole_rows_before_are_there(
-    rollout: Rollout, tmp_path: Path
+    run: tuple[Rollout, bytes], tmp_path: Path
 ) -> None:
-    data = write(tmp_path / "a.journal", rollout).read_bytes()
+    rollout, data = run
     cut = tmp_path / "cut.journal"
-    cut.write_bytes(data[: data.index(b"R", len(MAGIC) + 9) - 1])
     seen = []
     row = sum(a[0].nbytes for a in rollout.columns.values()) + 9
     end = len(data) - len(data) % 7
@@ -80,83 +90,254 @@ def test_cut_anywhere_all_whole_rows_before_are_there(
     assert seen[-1] <= len(rollout) - 2
 
 
+def test_columns_that_come_during_a_run_are_empty_before(tmp_path: Path) -> None:
+    """Also where the writer was killed before the first row that has them."""
+    controller, path = law(), tmp_path / "a.journal"
+    controller.at(0.03).add(JointPosture(start(), priority=2, name="posture"))
+    run = simulate(controller, start(), duration=0.06, control_period=0.01, log=path)
+    read = Rollout.load(path)
+    assert read.columns.keys() == run.columns.keys()
+    for name, column in run.columns.items():
+        np.testing.assert_array_equal(read[name], column)
+    error = run["task.posture.error"]
+    np.testing.assert_array_equal(np.isnan(error).all(axis=1), run.t < 0.035)
+    assert np.isnan(run["singular_values"][0]).sum() == 4
+    data = path.read_bytes()
+    heading = data.rindex(b'{"columns"')
+    length = int.from_bytes(data[heading - 8 : heading - 4], "little")
+    path.write_bytes(data[: heading + length])
+    cut = Rollout.load(path)
+    assert 0 < len(cut) < 7
+    assert np.isnan(cut["task.posture.error"]).all()
+
+
 @given(data=st.data())
 def test_a_changed_byte_ends_it_and_spoils_nothing_before(data: st.DataObject) -> None:
     path = Path(os.environ.get("TMPDIR", "/tmp")) / f"spoilt-{os.getpid()}.journal"
     try:
-        journal = JournalWriter(path)
-        journal.write_heading({"a": np.zeros((0, 2))}, {"what": "ä"})
-        rows = np.arange(12.0).reshape(6, 1, 2)
+        writer = JournalWriter(path)
+        writer.write_heading({"a": (2,)}, {"what": "ä"})
+        rows = np.arange(12.0).reshape(6, 2)
         for row in rows:
-            journal.write_row({"a": row})
-        journal.close()
-        whole = path.read_bytes()
+            writer.write_row(row)
+        writer.close()
+        written = path.read_bytes()
         frame = 9 + 16
-        first = len(whole) - 6 * frame
-        at = data.draw(st.integers(first, len(whole) - 1))
-        spoilt = bytearray(whole)
+        first = len(written) - 6 * frame
+        at = data.draw(st.integers(first, len(written) - 1))
+        spoilt = bytearray(written)
         spoilt[at] ^= 1 << data.draw(st.integers(0, 7))
         path.write_bytes(bytes(spoilt))
-        columns, meta = read_journal(path)
+        columns, meta = whole(path)
         count = (at - first) // frame
-        np.testing.assert_array_equal(columns["a"], rows[:count, 0])
+        np.testing.assert_array_equal(columns["a"], rows[:count])
         assert meta["what"] == "ä"
     finally:
         path.unlink(missing_ok=True)
 
 
 def test_continuous_joints_are_unwound(tmp_path: Path) -> None:
-    journal = JournalWriter(tmp_path / "a.journal")
+    writer = JournalWriter(tmp_path / "a.journal")
     turning = np.linspace(0.0, 9.0, 40)
     wound = np.angle(np.exp(1j * turning))
-    columns = {
-        "t": turning,
-        "q": np.zeros((40, 2)),
-        "v": np.zeros((40, 1)),
-        "tau": np.zeros((40, 1)),
-        "joint_positions": wound[:, None],
-    }
+    shapes = {"t": (), "q": (2,), "v": (1,), "tau": (1,), "joint_positions": (1,)}
     meta = {
         "format": "hsp_control rollout 1",
-        "columns": {name: {"unit": "-", "meaning": ""} for name in columns},
+        "columns": {name: {"unit": "-", "meaning": ""} for name in shapes},
         "robot": {"name": "wheel", "dofs": ["turn"], "units": ["rad"],
                   "skeleton_parents": [-1], "continuous": [0]},
     }  # fmt: skip
-    journal.write_heading(columns, meta)
-    for i in range(40):
-        journal.write_row({name: a[i : i + 1] for name, a in columns.items()})
-    journal.close()
+    writer.write_heading(shapes, meta)
+    for t, angle in zip(turning, wound, strict=True):
+        writer.write_row(np.array([t, 0, 0, 0, 0, angle]))
+    writer.close()
     read = Rollout.load(tmp_path / "a.journal")
     np.testing.assert_allclose(read["joint_positions"][:, 0], turning, atol=1e-12)
 
 
-def test_what_is_no_journal_is_said(tmp_path: Path, rollout: Rollout) -> None:
+def test_what_is_no_journal_is_said(run: tuple[Rollout, bytes], tmp_path: Path) -> None:
     empty = tmp_path / "empty.journal"
     empty.write_bytes(MAGIC)
     with pytest.raises(LogError, match="ends before its first heading"):
         Rollout.load(empty)
-    assert not is_journal(rollout.save(tmp_path / "b.npz"))
+    other = run[0].save(tmp_path / "b.npz")
+    assert not is_journal(other)
+    with pytest.raises(LogError, match="is no journal"):
+        JournalReader(other).read()
     with pytest.raises(LogError, match="cannot write the journal"):
         JournalWriter(empty / "below")
     with pytest.raises(LogError, match="no such file"):
         Rollout.load(tmp_path / "none.journal")
 
 
-def test_a_full_disk_is_an_error_with_the_file_s_name() -> None:
-    full = Path("/dev/full")
-    if not full.exists():
-        pytest.skip("this system has no /dev/full")
-    with pytest.raises(LogError, match="/dev/full"):
-        JournalWriter(full)
+# --- while it grows ------------------------------------------------------------------
+
+
+def test_rows_come_as_they_are_written(tmp_path: Path) -> None:
+    path = tmp_path / "a.journal"
+    reader = JournalReader(path, most=100)
+    assert reader.read() == 0  # it is not there yet
+    writer = JournalWriter(path)
+    assert reader.read() == 0
+    writer.write_heading(PAIR, {"status": "running", "name": "a"})
+    for k in range(3):
+        writer.write_row(np.array([0.1 * k, k, k]))
+        assert reader.read() == 1
+    assert reader.meta["name"] == "a"
+    assert not reader.ended
+    np.testing.assert_allclose(reader.rows(0)["t"], [0.0, 0.1, 0.2])
+    np.testing.assert_array_equal(reader.rows(1)["q"], [[1.0, 1.0], [2.0, 2.0]])
+    assert reader.rows(3)["q"].shape == (0, 2)
+    writer.write_heading({"t": (), "q": (4,)}, {"status": "running"})
+    for k in (3, 4):
+        writer.write_row(np.full(5, float(k)))
+    writer.write_end("completed", "the duration is over")
+    assert reader.read() == 2
+    assert reader.count == 5
+    np.testing.assert_array_equal(reader.rows(3)["q"], [[3.0] * 4, [4.0] * 4])
+    assert reader.ended
+    assert reader.meta["message"] == "the duration is over"
+    writer.close()
+    few = JournalReader(path, most=1)
+    assert few.read() == 5
+    np.testing.assert_array_equal(few.rows(0)["t"], [4.0])  # as far as they are kept
+
+
+@settings(max_examples=30, deadline=None)
+@given(cuts=st.lists(st.integers(0, 2000), max_size=8))
+def test_a_frame_that_is_half_written_waits(
+    tmp_path_factory: pytest.TempPathFactory, cuts: list[int]
+) -> None:
+    folder = tmp_path_factory.mktemp("growing")
+    writer = JournalWriter(folder / "whole")
+    writer.write_heading(PAIR, {"status": "running"})
+    for k in range(10):
+        writer.write_row(np.full(3, float(k)))
+    writer.write_end("completed", "")
+    writer.close()
+    data = (folder / "whole").read_bytes()
+    growing, reader = folder / "growing", JournalReader(folder / "growing")
+    found = 0
+    for cut in sorted({*(min(c, len(data)) for c in cuts), len(data)}):
+        growing.write_bytes(data[:cut])
+        found += reader.read()
+    assert found == 10
+    expected, meta = whole(folder / "whole")
+    np.testing.assert_array_equal(reader.rows(0)["q"], expected["q"])
+    assert reader.meta == meta
+
+
+# --- what cuts a writer short --------------------------------------------------------
+
+
+def test_a_disk_that_is_full_for_a_moment_leaves_a_whole_journal(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A part of a frame is taken back, so that the end can still be written."""
+    path, write = tmp_path / "a.journal", os.write
+
+    def full(file: int, data: bytes) -> int:
+        if 1_000 > len(data) > 900:
+            write(file, data[:100])
+            raise OSError(28, "No space left on device")
+        return write(file, data)
+
+    monkeypatch.setattr(journal.os, "write", full)
+    writer = JournalWriter(path)
+    writer.write_heading({"a": ()}, {"what": 1})
+    writer.write_row(np.ones(1))
+    with pytest.raises(LogError, match=r"a.journal: .*No space left"):
+        writer.write_heading({"a": ()}, {"what": "x" * 930})
+    writer.write_end("stopped", "the disk is full")
+    writer.close()
+    columns, meta = whole(path)
+    assert meta == {"what": 1, "status": "stopped", "message": "the disk is full"}
+    np.testing.assert_array_equal(columns["a"], [1.0])
+
+
+class Interrupting:
+    """`os.write` that is interrupted once, before, within or after a row.
+
+    Attributes:
+        cut: Number of bytes that are written before; None: all.
+    """
+
+    def __init__(self, cut: int | None, at: int) -> None:
+        self.cut, self.at, self.calls = cut, at, 0
+        self.write = os.write
+
+    def __call__(self, file: int, data: bytes) -> int:
+        self.calls += 1
+        if self.calls != self.at:
+            return self.write(file, data)
+        self.write(file, data[: self.cut])
+        raise KeyboardInterrupt
+
+
+@pytest.mark.system
+@pytest.mark.parametrize("cut", [0, 5, 200, None])
+@pytest.mark.parametrize("row", [20, -1])
+def test_ctrl_c_within_a_row_loses_none(
+    cut: int | None, row: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also within the end of the journal, which is its last frame."""
+    quick = LiveSettings(stop=StopSettings(hold=0.02))
+
+    def loop(log: Path) -> Any:
+        options: Any = {"duration": 0.06, "log_period": PERIOD, "settings": quick}
+        return run_loop(law(), Rig(watched(quick)), log=log, **options)
+
+    path = tmp_path / "whole.journal"
+    counted = Interrupting(None, -1)
+    monkeypatch.setattr(journal.os, "write", counted)
+    assert loop(path).ended == "completed"
+    at = row if row > 0 else counted.calls
+    monkeypatch.setattr(journal.os, "write", Interrupting(cut, at))
+    report = loop(tmp_path / "cut.journal")
+    monkeypatch.undo()
+    read, reference = Rollout.load(tmp_path / "cut.journal"), Rollout.load(path)
+    if row > 0:
+        assert report.ended == "operator"
+        assert read.status == "interrupted"
+        assert read["live.phase"][row - 3] == Phase.RUNNING  # magic, heading, rows
+    else:
+        assert report.ended == read.status == "completed"
+        assert len(read) == len(reference)
+    np.testing.assert_allclose(np.diff(read.t), PERIOD, rtol=1e-6)  # none is missing
+    count = row - 2 if row > 0 else len(read)
+    np.testing.assert_array_equal(read.q[:count], reference.q[:count])
 
 
 @pytest.mark.system
 @pytest.mark.slow
-def test_the_commands_take_it(
-    rollout: Rollout, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_what_a_killed_hsp_run_leaves_is_a_log_for_all_commands(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path = write(tmp_path / "run.journal", rollout, end=False)
+    options = ["--no-view", "--out", str(tmp_path), "--set", "simulation.duration=1000"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "hsp_control", "run", "paper/2_rest", *options],
+        stderr=subprocess.DEVNULL,
+    )
+    path, end = tmp_path / "2_rest.journal", time.monotonic() + 60
+    try:
+        while not (path.exists() and path.stat().st_size > 100_000):
+            assert time.monotonic() < end
+            time.sleep(0.05)
+    finally:
+        os.kill(process.pid, signal.SIGKILL)
+        process.wait()
+    read = Rollout.load(path)
+    assert read.status == "interrupted"
+    assert len(read) > 50
     assert main(["plot", str(path), "--out", str(tmp_path)]) == 0
-    assert (tmp_path / "run-paper.png").is_file()
+    assert (tmp_path / "2_rest-paper.png").is_file()
+    assert main(["export", str(path), "--html", str(tmp_path / "a.html")]) == 0
     assert main(["check", str(path)]) == 0
+    capsys.readouterr()
+    # One that is not killed leaves an `.npz` alone.
+    short = ["--no-view", "--out", str(tmp_path), "--set", "simulation.duration=0.02"]
+    assert main(["run", "paper/2_rest", *short]) == 0
+    assert not path.exists()
+    with np.load(tmp_path / "2_rest.npz") as log:
+        assert len(log["t"]) == 3
     capsys.readouterr()

@@ -47,10 +47,7 @@ from hsp_control.tasks.task import ErrorPart
 from hsp_control.trajectories import Circle as Round
 from hsp_control.trajectories import Spin
 from hsp_control.visualization import palette
-from hsp_control.visualization.plots import (
-    logged_geometry,
-    views,
-)
+from hsp_control.visualization.plots import world
 from hsp_control.visualization.viewer.targets import read_targets
 
 pytestmark = pytest.mark.slow
@@ -163,7 +160,7 @@ def test_a_task_of_a_user_s_own_says_itself_what_is_drawn() -> None:
     np.testing.assert_array_equal(
         parts[1].norm, np.abs(log["task.panda_tcp.error"][:, 2])
     )
-    (path,) = logged_geometry.task_paths(log)
+    (path,) = world.task_paths(log)
     desired = log["task.panda_tcp.reference"]
     np.testing.assert_array_equal(path.desired[:, [0, 2, 1]], desired)
     (target,) = read_targets(log)
@@ -206,7 +203,7 @@ def test_obstacles_are_their_outlines(logs: dict[str, Rollout]) -> None:
     arm = Arm()
     task = FramePosition(arm.tcp, arm.circle([1.0, 0.0, 1.0]), gains=GAINS)
     log = arm.run(task, scene=scene)
-    found = {body.name: body for body in logged_geometry.logged_obstacles(log)}
+    found = {body.name: body for body in world.logged_obstacles(log)}
     assert [name for name, body in found.items() if body.oversized] == [
         "table",
         "floor",
@@ -226,14 +223,14 @@ def test_obstacles_are_their_outlines(logs: dict[str, Rollout]) -> None:
         )
         assert np.all(world_points >= low - 1e-9)
         assert np.all(world_points <= high + 1e-9)
-        for view in (views.oblique(), views.plane("xz")):
+        for view in (world.oblique(), world.plane("xz")):
             corners = body.outline(view, row)  # anticlockwise
             edges = np.roll(corners, -1, axis=0) - corners
             page = np.column_stack(view.project(world_points))
             off = page[:, None] - corners
             left = edges[:, 0] * off[..., 1] - edges[:, 1] * off[..., 0]
             assert np.all(left >= -1e-3 * np.linalg.norm(edges, axis=1))
-    everything = logged_geometry.enclosing_points(log)
+    everything = world.enclosing_points(log)
     assert np.ptp(everything, axis=0).max() < 2.0  # the table does not shrink the arm
     for view in ("xz", "xy"):
         axes = drawn(plots.draw_end_effector, log, names=view)

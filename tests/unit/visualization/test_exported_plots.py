@@ -11,8 +11,8 @@ from hsp_control.cli import main
 from hsp_control.common.exceptions import ExportError
 from hsp_control.simulation.log_series import held_period
 from hsp_control.visualization.viewer import ComparedRun, export_html
-from hsp_control.visualization.viewer.packed.packing import ArrayTable
-from hsp_control.visualization.viewer.packed.plot_packing import (
+from hsp_control.visualization.viewer.packing import ArrayTable
+from hsp_control.visualization.viewer.page_plots import (
     Edge,
     Panel,
     PlottedRun,

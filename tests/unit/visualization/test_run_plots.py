@@ -4,15 +4,20 @@ import pytest
 
 from hsp_control import Rollout, load_experiment
 from hsp_control.config import Experiment
-from hsp_control.simulation.recorder import Recorder as Rows
-from hsp_control.visualization.viewer import ComparedRun, InlineView, Recorder, Viewer
+from hsp_control.simulation.log_writer import LogWriter as Rows
+from hsp_control.visualization.viewer import (
+    ComparedRun,
+    InlineView,
+    SceneRecorder,
+    Viewer,
+)
 from hsp_control.visualization.viewer.commands import PLOTS, unpack
-from hsp_control.visualization.viewer.latest_commands import key_of
-from hsp_control.visualization.viewer.run_plots import (
+from hsp_control.visualization.viewer.page_plots import (
     PREVIEW_ROWS,
     plots_of,
     plots_so_far,
 )
+from hsp_control.visualization.viewer.pipe import key_of
 
 MOVING = "paper/4_moving_obstacle"
 
@@ -51,7 +56,7 @@ def test_a_run_so_far_has_the_axis_of_the_whole_and_few_points(computed) -> None
 
 def test_only_an_own_server_gets_them_and_a_notebook_never(computed) -> None:
     experiment, log, _ = computed
-    recorder = Recorder()
+    recorder = SceneRecorder()
     with Viewer(experiment.robot, transport=recorder) as viewer:
         assert not viewer.has_plots
         viewer.play(log, controller=experiment.controller)

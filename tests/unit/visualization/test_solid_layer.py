@@ -5,7 +5,11 @@ import pytest
 
 from hsp_control import load_experiment
 from hsp_control.visualization.viewer.motion import motion_of
-from hsp_control.visualization.viewer.obstacle_layer import SolidLayer
+from hsp_control.visualization.viewer.obstacles import (
+    points_around,
+    solid_layer,
+    solids_of,
+)
 from hsp_control.visualization.viewer.run_drawing import LAYERS, all_layers
 
 pytest.importorskip("mujoco")
@@ -29,8 +33,9 @@ def carried():
 
 def test_solids_are_drawn_where_they_are_and_loose_ones_move(carried):
     experiment, run, motion = carried
-    layer = SolidLayer(motion, "/solids")
-    assert layer.names == ["box", "stand"]
+    layer = solid_layer(motion, "/solids")
+    names = [solid.name for solid in solids_of(run.meta)]
+    assert names == ["box", "stand"]
     commands = list(layer.draw(1.0))
     assert len(poses_of(commands)) == 2
     assert len(commands) == 4
@@ -41,7 +46,7 @@ def test_solids_are_drawn_where_they_are_and_loose_ones_move(carried):
     (entry,) = layer.legend()
     assert entry.name == "solids box, stand"
     # The whole box is in sight.
-    upper = layer.points().max(axis=0)
+    upper = points_around(run).max(axis=0)
     assert upper[2] > run["plant.solid.box.position"][:, 2].max() + 0.1
     assert "solids" in all_layers(experiment.robot, motion, experiment.controller)
     assert "solids" in LAYERS

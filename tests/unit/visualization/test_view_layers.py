@@ -29,17 +29,17 @@ from hsp_control.null_space.metrics import MetricSample
 from hsp_control.visualization.viewer import (
     ComparedRun,
     LiveView,
-    Recorder,
+    SceneRecorder,
     Viewer,
     live,
 )
-from hsp_control.visualization.viewer.commands import CAPTION, CLIP, unpack
-from hsp_control.visualization.viewer.controller_analysis import (
+from hsp_control.visualization.viewer.analysis import (
     null_space_projector,
     terms_of_type,
 )
-from hsp_control.visualization.viewer.ellipsoid import SECONDS
-from hsp_control.visualization.viewer.measured_links import Capsules, zone
+from hsp_control.visualization.viewer.arrows import ELLIPSOID_SECONDS
+from hsp_control.visualization.viewer.clearances import capsules, zone
+from hsp_control.visualization.viewer.commands import CAPTION, CLIP, unpack
 from hsp_control.visualization.viewer.motion import motion_of
 from hsp_control.visualization.viewer.run_drawing import LAYERS
 
@@ -59,23 +59,23 @@ def spatial() -> tuple[Experiment, Rollout]:
 
 
 @pytest.fixture
-def recorder() -> Recorder:
-    return Recorder()
+def recorder() -> SceneRecorder:
+    return SceneRecorder()
 
 
-def drawn(experiment: Experiment, rollout: Rollout, recorder: Recorder) -> Clip:
+def drawn(experiment: Experiment, rollout: Rollout, recorder: SceneRecorder) -> Clip:
     viewer = Viewer(experiment.robot, transport=recorder)
     viewer.play(rollout, controller=experiment.controller)
     return Clip(recorder)
 
 
-def legend(recorder: Recorder) -> list[dict[str, Any]]:
+def legend(recorder: SceneRecorder) -> list[dict[str, Any]]:
     caption = recorder.command(CAPTION, "caption")
     assert caption is not None
     return list(caption["legend"])
 
 
-def names(recorder: Recorder) -> list[str]:
+def names(recorder: SceneRecorder) -> list[str]:
     return [entry["name"] for entry in legend(recorder)]
 
 
@@ -103,7 +103,7 @@ def tip(clip: Clip, path: str, time: float) -> np.ndarray:
 
 
 def test_self_motion_moves_the_joints_and_not_the_hand(
-    planar: tuple[Experiment, Rollout], recorder: Recorder
+    planar: tuple[Experiment, Rollout], recorder: SceneRecorder
 ) -> None:
     experiment, rollout = planar
     clip = drawn(experiment, rollout, recorder)
@@ -142,7 +142,7 @@ def test_self_motion_moves_the_joints_and_not_the_hand(
 
 
 def test_the_velocity_slips_into_its_field(
-    planar: tuple[Experiment, Rollout], recorder: Recorder
+    planar: tuple[Experiment, Rollout], recorder: SceneRecorder
 ) -> None:
     experiment, rollout = planar
     clip = drawn(experiment, rollout, recorder)
@@ -185,7 +185,7 @@ def test_the_projector_is_the_laws_own(name: str) -> None:
 
 
 def test_bars_are_as_long_as_the_distances_in_the_log(
-    spatial: tuple[Experiment, Rollout], recorder: Recorder
+    spatial: tuple[Experiment, Rollout], recorder: SceneRecorder
 ) -> None:
     experiment, rollout = spatial
     clip = drawn(experiment, rollout, recorder)
@@ -206,7 +206,7 @@ def test_bars_are_as_long_as_the_distances_in_the_log(
 
 
 def test_distances_end_on_the_capsules_that_are_measured(
-    spatial: tuple[Experiment, Rollout], recorder: Recorder
+    spatial: tuple[Experiment, Rollout], recorder: SceneRecorder
 ) -> None:
     experiment, rollout = spatial
     clip = drawn(experiment, rollout, recorder)
@@ -241,7 +241,7 @@ def test_distances_end_on_the_capsules_that_are_measured(
 
 
 def drawn_capsules(
-    recorder: Recorder, path: str
+    recorder: SceneRecorder, path: str
 ) -> list[tuple[np.ndarray, np.ndarray, float]]:
     """Return ends and radii of the capsules and spheres of a node, in its frame."""
     thing = recorder.command(path, "object")["object"]  # type: ignore[index]
@@ -265,14 +265,14 @@ def drawn_capsules(
 def test_minimum_distances_of_limits_are_drawn_and_unmeasured_links_are_not(
     planar: tuple[Experiment, Rollout],
     spatial: tuple[Experiment, Rollout],
-    recorder: Recorder,
+    recorder: SceneRecorder,
 ) -> None:
     experiment, rollout = planar
     assert not drawn(experiment, rollout, recorder).paths("/capsules")
     assert not any("(measured)" in name for name in names(recorder))
     limits = "limits={distances: [{type: self}]}"
     kept = load_experiment(SPATIAL, limits, "null_space.fields=[{type: rest}]")
-    layer = Capsules(kept.controller, "/capsules")
+    layer = capsules(kept.controller, "/capsules")
     assert kept.controller.limits is not None
     (limit,) = kept.controller.limits.distances
     shapes = limit.clearance.proximity(kept.controller.state)
@@ -337,7 +337,7 @@ def test_a_zone_lies_at_the_influence_from_its_obstacle(
     shape: Shape, slack: float
 ) -> None:
     influence = 0.2
-    points = surface_points(zone(shape, influence, 2.0))
+    points = surface_points(zone(shape, influence, 0.5))
     point, geometry = coal.Sphere(1e-6), shape.geometry()
     request = coal.DistanceRequest()
     for place in points[:: max(1, len(points) // 60)]:
@@ -356,7 +356,7 @@ def test_a_zone_lies_at_the_influence_from_its_obstacle(
 
 
 def test_the_ellipsoid_is_the_image_of_the_ball_of_joint_speeds(
-    spatial: tuple[Experiment, Rollout], recorder: Recorder
+    spatial: tuple[Experiment, Rollout], recorder: SceneRecorder
 ) -> None:
     experiment, rollout = spatial
     clip = drawn(experiment, rollout, recorder)
@@ -367,14 +367,14 @@ def test_the_ellipsoid_is_the_image_of_the_ball_of_joint_speeds(
         state = experiment.robot.state(t, rollout.q[row], rollout.v[row])
         J = state.frame(frame).jacobian[:3]
         R, scale = clip.pose(path, t)[:3, :3], clip.value(path, "scale", t)
-        shape = R @ np.diag(scale**2) @ R.T / SECONDS**2
+        shape = R @ np.diag(scale**2) @ R.T / ELLIPSOID_SECONDS**2
         np.testing.assert_allclose(shape, J @ J.T, atol=1e-5)
 
 
 # -- contacts -------------------------------------------------------------------------
 
 
-def test_contact_forces_are_arrows_at_their_points(recorder: Recorder) -> None:
+def test_contact_forces_are_arrows_at_their_points(recorder: SceneRecorder) -> None:
     robot = Robot.load("panda")
     mass = sum(inertia.mass for inertia in robot.model.inertias)
     weight = np.array([0.0, 0.0, 9.81 * mass])
@@ -408,7 +408,7 @@ def test_contact_forces_are_arrows_at_their_points(recorder: Recorder) -> None:
 
 
 def test_each_layer_can_be_switched(
-    spatial: tuple[Experiment, Rollout], recorder: Recorder
+    spatial: tuple[Experiment, Rollout], recorder: SceneRecorder
 ) -> None:
     experiment, rollout = spatial
     off = dict.fromkeys([*LAYERS, "grid"], False)
@@ -430,7 +430,7 @@ def test_each_layer_can_be_switched(
 
 
 def comparison(
-    planar: tuple[Experiment, Rollout], recorder: Recorder, **how: Any
+    planar: tuple[Experiment, Rollout], recorder: SceneRecorder, **how: Any
 ) -> tuple[Clip, Rollout]:
     experiment, rollout = planar
     other = load_experiment("paper/2_rest", "simulation.duration=0.5")
@@ -445,7 +445,7 @@ def comparison(
 
 
 def test_runs_of_one_robot_lie_over_each_other_as_ghosts(
-    planar: tuple[Experiment, Rollout], recorder: Recorder
+    planar: tuple[Experiment, Rollout], recorder: SceneRecorder
 ) -> None:
     clip, rest = comparison(planar, recorder)
     assert (clip.start, clip.end) == (0.0, 1.5)
@@ -469,7 +469,7 @@ def test_runs_of_one_robot_lie_over_each_other_as_ghosts(
 # -- live -----------------------------------------------------------------------------
 
 
-class Watched(Recorder):
+class Watched(SceneRecorder):
     """Keeps what was sent, too."""
 
     def __init__(self) -> None:

@@ -2,56 +2,23 @@
 // are moved by hand.
 //
 // The program describes itself by "play_setup" and then reports by the other "play_..."
-// commands; see `handlers` at the end. The page answers over the scene's websocket with
-// JSON: {"do": "move", ...}. Only the page that steers sends anything.
-//
-//   sight.js, drags.js, gizmos.js    what is where on the screen; the targets' handles
-//   play_hand.js, play_keys.js       pointers and keys
-//   play_overlay.js                  names, selection and spring over the scene
-//   play_bar.js, play_panel.js       the bar, the panel
-//   play_hold.js                     the dead-man's key of a live loop
-//   live_plots.js                    the plots in the panel
+// commands; see the end. The page answers over the scene's websocket with JSON:
+// {"do": "move", ...}. Only the page that steers sends anything.
 "use strict";
-
-// Messages to the program; repeated ones, such as moves, at most once a frame.
-class PlayOutbox {
-  constructor(viewer) {
-    this.viewer = viewer;
-    this.pending = new Map();
-  }
-
-  // Send a message with the next frame; a newer one of its key replaces it.
-  later(key, message) {
-    if (!this.pending.size) requestAnimationFrame(() => this.flush());
-    this.pending.set(key, message);
-  }
-
-  flush() {
-    const messages = [...this.pending.values()];
-    this.pending.clear();
-    messages.forEach((message) => this.now(message));
-  }
-
-  now(message) {
-    if (this.pending.size) this.flush();
-    const {connection} = this.viewer;
-    if (connection?.readyState === WebSocket.OPEN) connection.send(JSON.stringify(message));
-  }
-}
 
 class Play {
   static ECHO = 400;  // ms: after a release or a change, the program's older word is not shown
 
+  static targetKey(name) { return `target ${name}`; }
+
+  static obstacleKey(name) { return `obstacle ${name}`; }
+
   constructor(viewer) {
-    this.viewer = viewer;
-    this.sight = new Sight(viewer);
-    this.outbox = new PlayOutbox(viewer);
+    Object.assign(this, {viewer, sight: new Sight(viewer), mine: true, holdKey: null, taken: false});
+    this.pending = new Map();    // messages of the next frame, the newest of each kind
     this.gizmos = new Map();     // key -> Gizmo
     this.obstacles = new Map();  // key -> {name, path, at, radius}
     this.held = new Map();       // key -> until when its own place is shown [ms]
-    this.mine = true;
-    this.holdKey = null;
-    this.taken = false;
     this.state = {t: 0, running: true, rate: 1, message: "", level: "info", away: ""};
     this.setup = this.selected = this.force = this.pull = null;
   }
@@ -67,24 +34,19 @@ class Play {
     const first = !this.ready;
     if (first) this.build();
     else this.hand.end(true);
-    this.setup = setup;
+    this.setup = {targets: [], obstacles: [], controls: [], plots: [], ...setup};
     document.body.classList.toggle("live-loop", !this.simulated);
     if (setup.loop === "held") this.holdKey ??= new PlayHold(this, this.bar.row);
     this.held.clear();
     this.force = null;
     for (const gizmo of this.gizmos.values()) gizmo.dispose();
-    this.gizmos.clear();
-    this.obstacles.clear();
-    for (const target of setup.targets ?? []) {
-      this.gizmos.set(PlayHand.targetKey(target.name), new Gizmo(target, this.viewer.scene));
-    }
-    for (const {position, ...rest} of setup.obstacles ?? []) {
-      const at = new MeshCat.THREE.Vector3(...position);
-      this.obstacles.set(PlayHand.obstacleKey(rest.name), {...rest, at});
-    }
+    this.gizmos = new Map(this.setup.targets.map((target) =>
+      [Play.targetKey(target.name), new Gizmo(target, this.viewer.scene)]));
+    this.obstacles = new Map(this.setup.obstacles.map(({position, ...rest}) =>
+      [Play.obstacleKey(rest.name), {...rest, at: new MeshCat.THREE.Vector3(...position)}]));
     this.overlay.setThings(this.things(), (key) => this.select(key));
-    this.panel.build({targets: [], obstacles: [], controls: [], ...setup});
-    this.setUpPlots(setup.plots ?? []);
+    this.panel.build(this.setup);
+    this.setUpPlots(this.setup.plots);
     if (!this.things().some(({key}) => key === this.selected)) this.selected = null;
     if (first) this.panel.setOpen(!this.panel.narrow.matches);
     this.select(this.selected);
@@ -111,7 +73,7 @@ class Play {
     const sheet = panel.open ? panel.box.offsetHeight - 18 : 0;  // behind its round corners
     const height = Math.max(120, innerHeight - bar.row.offsetHeight - sheet);
     this.viewer.dom_element.style.height = panel.narrow.matches ? `${height}px` : "";
-    layers.measure();
+    legend.measure();
   }
 
   // After a reset the plots are the same: they keep what is shown alone.
@@ -125,12 +87,12 @@ class Play {
 
   showTargets({poses, obstacles}) {
     for (const [name, pose] of Object.entries(poses ?? {})) {
-      const key = PlayHand.targetKey(name), gizmo = this.gizmos.get(key);
-      if (gizmo && this.follows(key)) gizmo.setPose(pose);
+      const key = Play.targetKey(name);
+      if (this.follows(key)) this.gizmos.get(key)?.setPose(pose);
     }
     for (const [name, place] of Object.entries(obstacles ?? {})) {
-      const key = PlayHand.obstacleKey(name), obstacle = this.obstacles.get(key);
-      if (obstacle && this.follows(key)) obstacle.at.set(...place);
+      const key = Play.obstacleKey(name);
+      if (this.follows(key)) this.obstacles.get(key)?.at.set(...place);
     }
   }
 
@@ -149,7 +111,7 @@ class Play {
     Object.assign(this, {mine, taken});
     if (!this.ready) return;
     if (!mine) {
-      this.outbox.pending.clear();
+      this.pending.clear();
       this.hand.end(true);
       this.keys.moving.clear();
       this.holdKey?.set(false);
@@ -159,34 +121,50 @@ class Play {
 
   showDrive() {
     this.bar.showDrive(this.mine, this.taken);
-    this.panel.setDisabled(!this.mine);
+    this.panel.controls.disabled = !this.mine;
     document.body.classList.toggle("watching", !this.mine);
     this.showMarks();
   }
 
   // --- what the hand does ---
 
-  send(message) { if (this.mine) this.outbox.now(message); }
+  // Say something to the program, after what is pending.
+  send(message) { if (this.mine) this.say(message); }
 
-  sendLater(key, message) { if (this.mine) this.outbox.later(key, message); }
+  // Say it with the next frame; a newer message of its key replaces it.
+  sendLater(key, message) {
+    if (!this.mine) return;
+    if (!this.pending.size) requestAnimationFrame(() => this.flush());
+    this.pending.set(key, message);
+  }
+
+  flush() {
+    const messages = [...this.pending.values()];
+    this.pending.clear();
+    messages.forEach((message) => this.say(message));
+  }
+
+  say(message) {
+    this.flush();
+    const {connection} = this.viewer;
+    if (connection?.readyState === WebSocket.OPEN) connection.send(JSON.stringify(message));
+  }
 
   moveTarget(gizmo) {
-    const {name} = gizmo.target, key = PlayHand.targetKey(name);
+    const {name} = gizmo.target, key = Play.targetKey(name);
     this.hold(key);
-    this.panel.showMoved(key, true);
     this.sendLater(key, {do: "move", target: name, pose: gizmo.pose()});
   }
 
-  moveObstacle(obstacle, to) {
-    const key = PlayHand.obstacleKey(obstacle.name);
-    obstacle.at.copy(to);
+  moveObstacle({name, at}, to) {
+    const key = Play.obstacleKey(name);
+    at.copy(to);
     this.hold(key);
-    this.panel.showMoved(key, true);
-    this.sendLater(key, {do: "obstacle", name: obstacle.name, position: to.toArray()});
+    this.sendLater(key, {do: "obstacle", name, position: to.toArray()});
   }
 
   release(name) {
-    this.hold(PlayHand.targetKey(name));
+    this.hold(Play.targetKey(name));
     this.send({do: "release", target: name});
   }
 
@@ -207,18 +185,18 @@ class Play {
     this.send({do: "let_go"});
   }
 
+  // For a moment, show a thing where the hand has put it.
   hold(key) {
     this.held.set(key, performance.now() + Play.ECHO);
+    this.panel.showMoved(key, true);
     this.viewer.set_dirty();
   }
-
-  set(id, value) { this.sendLater(`set ${id}`, {do: "set", id, value}); }
 
   act(what) { this.send({do: what}); }
 
   toggle() { this.act(this.state.running ? "pause" : "go"); }
 
-  takeOver() { this.outbox.now({do: "take_over"}); }
+  takeOver() { this.say({do: "take_over"}); }
 
   // --- what is shown ---
 
@@ -252,9 +230,7 @@ class Play {
       gizmo.layOut(sight);
       this.overlay.placeButton(key, sight.project(gizmo.position));
     }
-    for (const [key, {at}] of this.obstacles) {
-      this.overlay.placeButton(key, sight.project(at));
-    }
+    for (const [key, {at}] of this.obstacles) this.overlay.placeButton(key, sight.project(at));
     this.layOutName(sight);
     this.layOutSpring(sight);
   }
@@ -263,21 +239,17 @@ class Play {
     const {grip, hover} = this.hand;
     const key = grip?.key ?? hover?.key ?? this.selected;
     const gizmo = this.gizmos.get(key), obstacle = this.obstacles.get(key);
-    const thing = gizmo ?? obstacle;
-    if (!thing || grip?.path) return this.overlay.showThing(null);
-    const at = gizmo ? gizmo.position : obstacle.at;
-    const radius = gizmo ? 17 * gizmo.enlarged
-      : Math.max(obstacle.radius / sight.pixel(at) + 3, 12);
-    const name = gizmo ? gizmo.target.name : obstacle.name;
+    if (grip?.path || !(gizmo ?? obstacle)) return this.overlay.showThing(null);
+    const at = gizmo?.position ?? obstacle.at, {name} = gizmo?.target ?? obstacle;
+    const radius = gizmo ? 17 * gizmo.enlarged : Math.max(obstacle.radius / sight.pixel(at) + 3, 12);
     const text = grip?.text ? `${name}   ${grip.text}` : name;
     this.overlay.showThing(sight.project(at), radius, text, key === this.selected);
   }
 
   // The hand's end of the spring is where the pointer is; the link's end moves with it.
   layOutSpring(sight) {
-    const {pull} = this, force = this.force;
+    const {pull, force} = this, {Vector3} = MeshCat.THREE;
     if (!pull && !force) return this.overlay.showSpring(null);
-    const {Vector3} = MeshCat.THREE;
     const from = pull
       ? node(pull.path).localToWorld(pull.local.clone()).applyMatrix4(sight.toScene)
       : new Vector3(...force.from);

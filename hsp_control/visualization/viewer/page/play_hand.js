@@ -1,50 +1,45 @@
-// The hand in the scene: finds what is under the pointer, and drags it.
-//
-// In this order: a handle of a target, an obstacle, a link of the robot; all else is left
-// to the camera, as are drags with Shift, Ctrl or Meta. A drag ends when the pointer is
-// released, but also when it is lost or the page is hidden: nothing stays grabbed.
+// Pointers and keys in the scene of `hsp play`: what is under them, and what they move.
 "use strict";
 
+// The hand finds, in this order: a handle of a target, an obstacle, a link of the robot; all else
+// is left to the camera, as are drags with Shift, Ctrl or Meta. A drag ends when the pointer is
+// released, but also when it is lost or the page is hidden: nothing stays grabbed.
 class PlayHand {
   static STILL = {mouse: 2, pen: 3, touch: 5};  // px: a shorter way is no drag
 
   constructor(play, viewer) {
-    Object.assign(this, {play, viewer, grip: null, hover: null});
-    const pane = this.pane = viewer.dom_element;
-    const on = (type, act) => pane.addEventListener(type, act, {capture: true});
+    Object.assign(this, {play, viewer, grip: null, hover: null, pane: viewer.dom_element});
+    const on = (type, act) => this.pane.addEventListener(type, act, {capture: true});
     on("pointerdown", (event) => this.down(event));
     on("pointermove", (event) => this.move(event));
     on("pointerup", (event) => this.up(event));
     for (const type of ["pointercancel", "lostpointercapture"]) {
-      on(type, (event) => { if (event.pointerId === this.grip?.pointer) this.end(); });
+      on(type, ({pointerId}) => { if (pointerId === this.grip?.pointer) this.end(); });
     }
     on("pointerleave", () => this.setHover(null));
-    document.addEventListener("visibilitychange", () => { if (document.hidden) this.end(); });
-    addEventListener("blur", () => this.end());
-    addEventListener("pagehide", () => this.end());
+    whenAway(() => this.end());
   }
 
   down(event) {
     if (this.grip) return PlayHand.keep(event);  // a second finger changes nothing
+    const {clientX: x, clientY: y, pointerType, pointerId} = event, {play} = this;
     const ours = event.isPrimary && event.button === 0
       && !event.shiftKey && !event.ctrlKey && !event.metaKey;
-    if (!ours || !this.play.mine || !this.play.ready) return;
+    if (!ours || !play.mine || !play.ready) return;
     this.viewer.scene.updateMatrixWorld();
-    const {clientX: x, clientY: y, pointerType} = event;
     const found = this.find(x, y, pointerType);
-    if (!found) return this.play.select(null);
+    if (!found) return play.select(null);
     PlayHand.keep(event);
     this.viewer.controls.enabled = false;
-    this.pane.setPointerCapture(event.pointerId);
-    this.grip = {...found, pointer: event.pointerId, x, y, moved: false,
+    this.pane.setPointerCapture(pointerId);
+    this.grip = {...found, pointer: pointerId, x, y, moved: false,
                  still: PlayHand.STILL[pointerType] ?? 3};
-    if (found.key) this.play.select(found.key);
+    if (found.key) play.select(found.key);
     this.setHover(found);
   }
 
   move(event) {
-    const {grip} = this;
-    const {clientX: x, clientY: y} = event;
+    const {grip} = this, {clientX: x, clientY: y} = event;
     if (!grip) {
       if (event.pointerType !== "touch" && !event.buttons) this.look(x, y, event.pointerType);
       return;
@@ -67,24 +62,20 @@ class PlayHand {
     PlayHand.keep(event);
     if (event.pointerId !== this.grip.pointer) return;
     this.end();
-    if (event.pointerType !== "touch") {
-      this.look(event.clientX, event.clientY, event.pointerType);
-    }
+    if (event.pointerType !== "touch") this.look(event.clientX, event.clientY, event.pointerType);
   }
 
   // End the drag; what it moved is told that it is free. Silent if another page steers.
   end(silent = false) {
-    const {grip, play} = this;
+    const {grip, play, pane} = this;
     if (!grip) return;
     this.grip = null;
     this.viewer.controls.enabled = true;
-    if (this.pane.hasPointerCapture(grip.pointer)) {
-      this.pane.releasePointerCapture(grip.pointer);
-    }
+    if (pane.hasPointerCapture(grip.pointer)) pane.releasePointerCapture(grip.pointer);
     if (grip.moved && !silent) {
       if (grip.gizmo) play.release(grip.gizmo.target.name);
       else if (grip.path) play.letGo();
-      else play.outbox.flush();
+      else play.flush();
     }
     play.pull = null;
     this.setHover(null);
@@ -92,8 +83,7 @@ class PlayHand {
 
   // What a grip does with the pointer, from its first move on.
   begin(grip) {
-    const {play} = this;
-    const {sight} = play;
+    const {play} = this, {sight} = play;
     if (grip.gizmo) {
       const drag = grip.gizmo.grab(grip.handle, sight, grip.x, grip.y);
       return (x, y) => {
@@ -102,8 +92,8 @@ class PlayHand {
         return text;
       };
     }
-    const from = grip.path ? grip.point.clone() : grip.obstacle.at.clone();
-    const place = Drags.plane(sight, from, sight.back.clone(), grip.x, grip.y);
+    const from = (grip.point ?? grip.obstacle.at).clone();
+    const place = sight.inPlane(from, sight.back.clone(), grip.x, grip.y);
     return (x, y) => {
       const to = place(x, y);
       if (!to) return null;
@@ -114,73 +104,51 @@ class PlayHand {
   }
 
   find(x, y, pointer) {
-    const {play} = this;
-    const sight = play.sight.update();
-    let best = null;
-    for (const gizmo of play.gizmos.values()) {
-      const found = gizmo.find(sight, x, y, pointer);
-      if (found && !(best && best.gap <= found.gap)) best = found;
-    }
-    if (best) return {...best, key: PlayHand.targetKey(best.gizmo.target.name)};
-    return this.findObstacle(x, y, pointer) ?? this.findLink(x, y);
-  }
-
-  findObstacle(x, y, pointer) {
-    const {sight, obstacles} = this.play;
-    let best = null;
-    for (const obstacle of obstacles.values()) {
+    const {gizmos, obstacles} = this.play, sight = this.play.sight.update();
+    const found = [...gizmos].map(([key, gizmo]) => ({key, ...gizmo.find(sight, x, y, pointer)}));
+    for (const [key, obstacle] of obstacles) {
       const {ahead, ...center} = sight.project(obstacle.at);
-      const radius = Math.max(obstacle.radius / sight.pixel(obstacle.at),
-                              pointer === "touch" ? 22 : 8);
-      const depth = sight.depth(obstacle.at);
-      if (!ahead || Math.hypot(x - center.x, y - center.y) > radius) continue;
-      if (!best || depth < best.depth) {
-        best = {obstacle, depth, key: PlayHand.obstacleKey(obstacle.name)};
-      }
+      const radius = Math.max(obstacle.radius / sight.pixel(obstacle.at), pointer === "touch" ? 22 : 8);
+      const hit = ahead && Math.hypot(x - center.x, y - center.y) <= radius;
+      // After all handles, and the nearest first.
+      if (hit) found.push({key, obstacle, gap: 1e6 + sight.depth(obstacle.at)});
     }
-    return best;
+    const [best] = found.filter(({gap}) => gap >= 0).sort((one, other) => one.gap - other.gap);
+    return best ?? this.findLink(x, y);
   }
 
   // The link of the robot under a pixel. Joint 0 is the world: what is fixed to it cannot
   // be pulled.
   findLink(x, y) {
-    const {play, viewer} = this;
-    const robot = viewer.scene_tree.children.robot;
+    const {play, viewer} = this, robot = viewer.scene_tree.children.robot;
     if (!play.setup?.pull || !robot) return null;
-    const hits = play.sight.caster(x, y).intersectObject(robot.object, true);
-    const first = hits.find(({object}) => PlayHand.isVisible(object));
+    const visible = (object) => !object || (object.visible && visible(object.parent));
+    const first = play.sight.caster(x, y).intersectObject(robot.object, true)
+      .find(({object}) => visible(object));
     const path = first && PlayHand.pathOf(robot, "/robot", first.object);
     if (!path || path.startsWith("/robot/universe")) return null;
-    const point = first.point.clone().applyMatrix4(play.sight.toScene);
-    const local = node(path).worldToLocal(first.point.clone());
-    return {path, point, local};
+    return {path, point: first.point.clone().applyMatrix4(play.sight.toScene),
+            local: node(path).worldToLocal(first.point.clone())};
   }
 
   // Look what is under a resting pointer, at most once a frame.
   look(x, y, pointer) {
     const waiting = this.looking;
-    this.looking = {x, y, pointer};
+    this.looking = [x, y, pointer];
     if (waiting) return;
     requestAnimationFrame(() => {
-      const {x, y, pointer} = this.looking;
+      const at = this.looking;
       this.looking = null;
       if (this.grip || !this.play.ready) return;
-      this.setHover(this.play.mine ? this.find(x, y, pointer) : null);
+      this.setHover(this.play.mine ? this.find(...at) : null);
     });
   }
 
   setHover(found) {
-    const {style} = this.pane;
-    style.cursor = this.grip ? "grabbing" : found ? "grab" : "";
-    const same = this.hover?.key === found?.key && this.hover?.handle === found?.handle;
+    this.pane.style.cursor = this.grip ? "grabbing" : found ? "grab" : "";
     this.hover = found;
-    if (!same) this.viewer.set_dirty();
     this.play.showMarks();
   }
-
-  static targetKey(name) { return `target ${name}`; }
-
-  static obstacleKey(name) { return `obstacle ${name}`; }
 
   // The event is ours: neither the camera nor the browser's gestures get it.
   static keep(event) {
@@ -188,19 +156,125 @@ class PlayHand {
     event.preventDefault();
   }
 
-  static isVisible(object) {
-    for (let at = object; at; at = at.parent) if (!at.visible) return false;
-    return true;
-  }
-
   // The path of the node that holds an object: the deepest one with a name of its own.
   static pathOf({children, object: own}, path, object) {
     for (const [name, child] of Object.entries(children)) {
-      if (name === "<object>") continue;
-      const found = PlayHand.pathOf(child, `${path}/${name}`, object);
+      const found = name !== "<object>" && PlayHand.pathOf(child, `${path}/${name}`, object);
       if (found) return found;
     }
     for (let at = object; at; at = at.parent) if (at === own) return path;
     return null;
+  }
+}
+
+// Call a function when the user looks away: nothing stays held.
+function whenAway(act) {
+  addEventListener("blur", act);
+  addEventListener("pagehide", act);
+  document.addEventListener("visibilitychange", () => { if (document.hidden) act(); });
+}
+
+// The keys; with a clip, those of player_bar.js hold instead.
+//
+//   tab, 1 … 9    select a target or an obstacle     space   pause, go on
+//   ← → ↑ ↓       move it by 1 cm (shift: 1 mm)      .       one step
+//   page up/down  the same vertically                r       reset
+//   escape        let go, select nothing             s       save
+//
+// In a live loop the space bar is the dead-man's key, if it has one, and there is no pause, step,
+// reset or save. The arrows follow those of the world's horizontal axes that lie nearest to the
+// picture's; a coordinate that the program does not follow is left out. An orientation is turned,
+// by 1° (shift: 0.1°).
+class PlayKeys {
+  static WAYS = {ArrowRight: [1, 0, 0], ArrowLeft: [-1, 0, 0], ArrowUp: [0, 1, 0],
+                 ArrowDown: [0, -1, 0], PageUp: [0, 0, 1], PageDown: [0, 0, -1]};
+
+  constructor(play) {
+    this.play = play;
+    this.moving = new Map();  // keys that are down -> what they move
+    onKey((event) => this.actionOf(event));
+    addEventListener("keyup", ({key}) => this.up(key));
+    whenAway(() => this.releaseAll());
+  }
+
+  actionOf({target, key, shiftKey, repeat}) {
+    const {play} = this, way = PlayKeys.WAYS[key];
+    if (!play.ready || player.loaded) return null;
+    // In the panel, its own controls take the arrows and the space key first.
+    const inControl = target.matches?.("input, button, [tabindex]")
+      && target.closest(".play-panel, .play-bar, #caption");
+    if (inControl && (key === " " || way)) return null;
+    if (key === "Escape") return () => this.escape();
+    if (/^[1-9]$/.test(key)) {
+      const button = play.overlay.buttons.get(play.things()[key - 1]?.key);
+      return button && (() => button.focus());
+    }
+    if (way) return play.selected && (() => this.move(key, way, shiftKey));
+    if (repeat && key !== ".") return null;
+    if (key === " " && play.holdKey) return () => play.holdKey.set(true);
+    return play.simulated && {
+      " ": () => play.toggle(), ".": () => play.act("step"),
+      r: () => play.act("reset"), s: () => play.act("save"),
+    }[key];
+  }
+
+  escape() {
+    const {play} = this;
+    if (play.hand.grip) return play.hand.end();
+    this.releaseAll();
+    if (document.activeElement?.closest(".play-handles")) document.activeElement.blur();
+    play.select(null);
+  }
+
+  move(key, way, fine) {
+    const {play} = this, {selected} = play;
+    if (!play.mine || !selected || play.hand.grip) return;
+    play.sight.update();
+    const gizmo = play.gizmos.get(selected), obstacle = play.obstacles.get(selected);
+    if (gizmo && !gizmo.movable) {
+      this.turn(gizmo, way, (fine ? 0.1 : 1) * Math.PI / 180);
+    } else {
+      const at = gizmo?.position ?? obstacle.at, {axis, sign} = this.axis(way, gizmo);
+      if (axis === null) return;
+      at.setComponent(axis, at.getComponent(axis) + sign * (fine ? 0.001 : 0.01));
+    }
+    if (!gizmo) return play.moveObstacle(obstacle, obstacle.at);
+    play.moveTarget(gizmo);
+    this.moving.set(key, gizmo.target.name);
+  }
+
+  // The world's axis for a key: x or y by the picture, z for page up and down.
+  axis([across, along, up], gizmo) {
+    const {right, up: above} = this.play.sight;
+    const followed = (axis) => !gizmo || gizmo.follows(axis) ? axis : null;
+    if (up) return {axis: followed(2), sign: up};
+    const first = Math.abs(right.x) >= Math.abs(right.y) ? 0 : 1, other = 1 - first;
+    const sideways = Math.sign(right.getComponent(first)) || 1;
+    if (across) return {axis: followed(first), sign: across * sideways};
+    if (followed(other) === null) return {axis: followed(2), sign: along};
+    // To the right of "away from the viewer" is the picture's right.
+    const away = (other === 1 ? 1 : -1) * sideways * (above.z < -0.5 ? -1 : 1);
+    return {axis: other, sign: along * away};
+  }
+
+  turn(gizmo, [across, along, up], angle) {
+    const {right, up: above, back} = this.play.sight;
+    const turned = new MeshCat.THREE.Quaternion().setFromAxisAngle(
+      across ? above : along ? right : back, (across || -along || up) * angle);
+    gizmo.turn.premultiply(turned).normalize();
+  }
+
+  up(key) {
+    if (key === " ") this.play.holdKey?.set(false);
+    const name = this.moving.get(key);
+    this.moving.delete(key);
+    const held = name === undefined || [...this.moving.values()].includes(name);
+    if (!held) this.play.release(name);
+  }
+
+  releaseAll() {
+    const names = new Set(this.moving.values());
+    this.moving.clear();
+    for (const name of names) this.play.release(name);
   }
 }

@@ -1,39 +1,131 @@
-// The panel beside the scene: the targets, the controls in their groups, the live plots.
-//
-// A value is the program's: a change is sent, and the value that the program then reports
-// is shown, so a refused one goes back. While a slider is held, and a moment after each
-// change, what the program said before does not count.
+// What is around the scene of `hsp play`: the bar below it, the panel beside it, and what is drawn
+// over it in pixels.
 "use strict";
 
-class PlayPanel {
-  static OBSTACLE = "#D55E00";  // appearance.OBSTACLE
-  static NARROW = "(max-width: 620px), (max-width: 860px) and (max-aspect-ratio: 6/5)";
+// The bar: pause, step, reset, save, the time and the rate; above it which targets are out of
+// reach, the status line, and who steers the robot.
+class PlayBar {
+  static ICONS = {
+    pause: "M7 5h3.6v14H7zM13.4 5H17v14h-3.6z",
+    go: "M8 5v14l11-7z",
+    step: "M6 5v14l9.6-7zM16.6 5H19v14h-2.4z",
+    reset: "M12 5V1.6L6.6 6.2 12 10.8V7.4a5.4 5.4 0 1 1-5.4 5.4H4.2A7.8 7.8 0 1 0 12 5z",
+    stop: "M6 6h12v12H6z",
+    save: "M10.8 3.5h2.4v8.2l3-3 1.7 1.7L12 16.3 6.1 10.4l1.7-1.7 3 3zM4.5 18.1h15v2.4h-15z",
+    panel: "M4 6.2h8.2a3 3 0 0 1 5.6 0H20v2h-2.2a3 3 0 0 1-5.6 0H4zM4 15.8h2.2a3 3 0 0 1 5.6 "
+      + "0H20v2h-8.2a3 3 0 0 1-5.6 0H4z",
+  };
 
   constructor(play, parent) {
     this.play = play;
-    this.open = false;
-    this.narrow = matchMedia(PlayPanel.NARROW);
-    this.box = document.createElement("aside");
-    this.box.className = "play-panel";
-    this.box.setAttribute("aria-label", "Controls and plots");
-    this.box.innerHTML = `
-      <header><h2></h2><button type="button" aria-label="Close the panel" title="Close">
-        <svg viewBox="0 0 24 24" aria-hidden="true"><path d="M6.4 5 12 10.6 17.6 5 19 6.4 13.4
-          12l5.6 5.6-1.4 1.4-5.6-5.6L6.4 19 5 17.6l5.6-5.6L5 6.4z"/></svg></button></header>
-      <div class="play-content"><fieldset class="play-controls"></fieldset>
-        <div class="play-plots"></div>
-        <p class="play-help">Drag a handle, an obstacle or a link; drag beside them to turn
-          the view. <kbd>Tab</kbd> selects, <kbd>← → ↑ ↓</kbd> <kbd>Page ↑ ↓</kbd> move by
-          1 cm, with <kbd>Shift</kbd> by 1 mm. <span class="simulated"><kbd>Space</kbd>
-          pauses, <kbd>.</kbd> steps, <kbd>R</kbd> resets, <kbd>S</kbd> saves.</span>
-          <kbd>P</kbd> presents.</p></div>`;
-    this.title = this.box.querySelector("h2");
-    this.controls = this.box.querySelector(".play-controls");
-    this.plots = this.box.querySelector(".play-plots");
-    this.box.querySelector("header button").onclick = () => this.setOpen(false);
+    const button = (name, label, act, key = "") => makeButton(
+      {className: name, ariaLabel: label, title: key ? `${label} (${key})` : label}, act,
+      makeIcon(PlayBar.ICONS[name] ?? PlayBar.ICONS.pause));
+    const acts = (name, label, key) => button(name, label, () => play.act(name), key);
+    this.toggle = button("toggle", "Pause", () => play.toggle(), "space");
+    this.acting = [this.toggle, acts("step", "One step", "."), acts("reset", "Reset", "r"),
+                   acts("save", "Save the run", "s"), acts("stop", "Stop the robot")];
+    this.panel = button("panel", "Controls and plots", () => play.panel.setOpen(!play.panel.open));
+    this.clock = make("output", {className: "clock", ariaLabel: "Time"});
+    this.rate = make("output", {className: "rate", ariaLabel: "Rate"});
+    this.row = make("div", {className: "play-bar", role: "toolbar", ariaLabel: "Simulation"},
+                    ...this.acting, this.clock, this.rate, this.panel);
+    const line = (name) => make("div", {className: `play-status ${name}`, role: "status",
+                                        hidden: true});
+    [this.away, this.status] = [line("away"), line("message")];
+    this.who = make("span");
+    this.watching = make("div", {className: "play-watching", hidden: true}, this.who,
+                         makeButton({}, () => play.takeOver(), "Take over"));
+    presentation.addButton(this.row);
+    parent.append(make("div", {className: "play-foot"},
+                       this.away, this.status, this.watching, this.row));
+  }
+
+  showState({t, running, rate, message, level, away}) {
+    this.clock.textContent = `${t.toFixed(2)} s`;
+    this.rate.replaceChildren(...running
+      ? [`${Number(rate).toFixed(2)} ×`, make("span", {}, " real time")]
+      : [this.play.simulated ? "paused" : "stopped"]);
+    const label = running ? "Pause" : "Go";
+    if (this.toggle.ariaLabel !== label) {
+      Object.assign(this.toggle, {ariaLabel: label, title: `${label} (space)`});
+      this.toggle.replaceChildren(makeIcon(PlayBar.ICONS[label.toLowerCase()]));
+    }
+    for (const [line, text = ""] of [[this.status, message], [this.away, away]]) {
+      line.hidden = !text;
+      if (line.textContent !== text) line.textContent = text;
+    }
+    this.status.classList.toggle("warning", level === "warning");
+  }
+
+  showDrive(mine, taken) {
+    this.watching.hidden = mine;
+    this.who.textContent = `You are watching: ${taken ? "another page" : "nobody"} steers.`;
+    for (const button of this.acting) button.disabled = !mine;
+  }
+}
+
+// The dead-man's key of a live loop: the robot moves only while somebody holds the space bar, or
+// this button. The page repeats that it is held; the loop stops the robot when it hears nothing,
+// whatever the reason.
+class PlayHold {
+  static EVERY = 50;  // ms; the loop waits for 500
+
+  constructor(play, bar) {
+    Object.assign(this, {play, held: false});
+    const title = "The robot moves while this, or the space bar, is held";
+    this.button = make("button", {type: "button", className: "hold", title}, "Hold to run");
+    bar.prepend(this.button);
+    this.button.addEventListener("pointerdown", ({pointerId}) => {
+      this.button.setPointerCapture(pointerId);
+      this.set(true);
+    });
+    for (const kind of ["pointerup", "pointercancel", "lostpointercapture"]) {
+      this.button.addEventListener(kind, () => this.set(false));
+    }
+    this.button.addEventListener("contextmenu", (event) => event.preventDefault());
+    whenAway(() => this.set(false));
+  }
+
+  set(held) {
+    if (held === this.held) return;
+    this.held = held;
+    this.button.ariaPressed = held;
+    clearInterval(this.timer);
+    const say = () => this.play.send({do: "hold", held});
+    say();
+    if (held) this.timer = setInterval(say, PlayHold.EVERY);
+  }
+}
+
+// The panel: the targets, the controls in their groups, the live plots. A value is the program's:
+// a change is sent, and the value that the program then reports is shown, so a refused one goes
+// back. While a slider is held, and a moment after each change, what the program said before does
+// not count.
+class PlayPanel {
+  static OBSTACLE = "#D55E00";  // palette.OBSTACLE
+  static NARROW = "(max-width: 620px), (max-width: 860px) and (max-aspect-ratio: 6/5)";
+  static CLOSE = "M6.4 5 12 10.6 17.6 5 19 6.4 13.4 12l5.6 5.6-1.4 1.4-5.6-5.6L6.4 19 5 17.6l5.6"
+    + "-5.6L5 6.4z";
+  static HELP = `Drag a handle, an obstacle or a link; drag beside them to turn the view.
+    <kbd>Tab</kbd> selects, <kbd>← → ↑ ↓</kbd> <kbd>Page ↑ ↓</kbd> move by 1 cm, with
+    <kbd>Shift</kbd> by 1 mm. <span class="simulated"><kbd>Space</kbd> pauses, <kbd>.</kbd> steps,
+    <kbd>R</kbd> resets, <kbd>S</kbd> saves.</span> <kbd>P</kbd> presents.`;
+
+  constructor(play, parent) {
+    Object.assign(this, {play, open: false, narrow: matchMedia(PlayPanel.NARROW)});
+    this.title = make("h2");
+    this.controls = make("fieldset", {className: "play-controls"});
+    this.plots = make("div", {className: "play-plots"});
+    const close = makeButton({ariaLabel: "Close the panel", title: "Close"},
+                             () => this.setOpen(false), makeIcon(PlayPanel.CLOSE));
+    this.box = make("aside", {className: "play-panel", ariaLabel: "Controls and plots"},
+      make("header", {}, this.title, close),
+      make("div", {className: "play-content"}, this.controls, this.plots,
+           make("p", {className: "play-help", innerHTML: PlayPanel.HELP})));
     // On a phone there is room for the sheet or the legend.
-    layers.toggle.addEventListener("click", () => {
-      if (layers.open && this.narrow.matches) this.setOpen(false);
+    legend.toggle.addEventListener("click", () => {
+      if (legend.open && this.narrow.matches) this.setOpen(false);
     });
     parent.append(this.box);
     this.setters = new Map();
@@ -41,65 +133,47 @@ class PlayPanel {
   }
 
   setOpen(open) {
+    const {play} = this;
     this.open = open;
-    if (open && this.narrow.matches) layers.setOpen(false);
+    if (open && this.narrow.matches) legend.setOpen(false);
     this.box.inert = !open;
     document.body.classList.toggle("with-panel", open);
-    this.play.bar.showPanel(open);
-    this.play.plots?.schedule();
-    this.play.fit();
+    play.bar.panel.ariaPressed = play.bar.panel.ariaExpanded = open;
+    play.fit();
   }
 
   build({title, targets, obstacles, controls}) {
     this.title.textContent = title || "Play";
     this.setters.clear();
     this.asked.clear();
-    const groups = new Map();
-    for (const control of controls) {
-      const group = control.group || "Settings";
-      if (!groups.has(group)) groups.set(group, []);
-      groups.get(group).push(control);
-    }
     this.things = new Map();
-    const things = {
-      Targets: targets.map((one) => this.thing(PlayHand.targetKey(one.name), one)),
-      Obstacles: obstacles.map((one) =>
-        this.thing(PlayHand.obstacleKey(one.name), {...one, color: PlayPanel.OBSTACLE})),
-    };
-    const sections = Object.entries(things).filter(([, rows]) => rows.length)
-      .map(([name, rows]) => PlayPanel.section(name, rows));
-    for (const [name, own] of groups) {
-      sections.push(PlayPanel.section(name, own.map((control) => this.control(control))));
+    const groups = new Map();
+    const put = (group, row) => groups.set(group, [...groups.get(group) ?? [], row]);
+    for (const one of targets) put("Targets", this.thing(Play.targetKey(one.name), one));
+    for (const one of obstacles) {
+      const row = this.thing(Play.obstacleKey(one.name), {...one, color: PlayPanel.OBSTACLE});
+      put("Obstacles", row);
     }
-    this.controls.replaceChildren(...sections);
-  }
-
-  static section(name, rows) {
-    const section = document.createElement("section");
-    const heading = document.createElement("h3");
-    heading.textContent = name;
-    section.append(heading, ...rows);
-    return section;
+    for (const control of controls) {
+      const row = control.kind === "switch" ? this.switch(control) : this.slider(control);
+      put(control.group || "Settings", row);
+    }
+    this.controls.replaceChildren(...[...groups].map(([name, rows]) =>
+      make("section", {}, make("h3", {}, name), ...rows)));
   }
 
   // The name of a target or an obstacle, which selects it, and the way back to its own path.
   thing(key, {name, kind, color}) {
-    const row = PlayPanel.row("target", `<button type="button" class="select"><i></i>
-      <span></span><small></small></button>
-      <button type="button" class="resume">Back to its path</button>`);
-    const [select, resume] = row.querySelectorAll("button");
-    row.querySelector("span").textContent = name;
-    row.querySelector("small").textContent = kind ?? "";
-    if (color) row.querySelector("i").style.background = color;
-    select.setAttribute("aria-label", `Select ${name}`);
-    resume.setAttribute("aria-label", `${name}: back to its own path`);
-    select.onclick = () => {
-      this.play.overlay.buttons.get(key)?.focus();
+    const {play} = this;
+    const select = makeButton({className: "select", ariaLabel: `Select ${name}`}, () => {
+      play.overlay.buttons.get(key)?.focus();
       if (this.narrow.matches) this.setOpen(false);
-    };
-    resume.onclick = () => this.play.resume(key, name);
-    this.things.set(key, row);
-    return row;
+    }, make("i", {style: color ? `background: ${color}` : ""}), make("span", {}, name),
+    make("small", {}, kind ?? ""));
+    const resume = makeButton({className: "resume", ariaLabel: `${name}: back to its own path`},
+                              () => play.resume(key, name), "Back to its path");
+    this.things.set(key, make("div", {className: "play-row target"}, select, resume));
+    return this.things.get(key);
   }
 
   // Show that a thing was moved away from its path, or is on it again.
@@ -109,63 +183,53 @@ class PlayPanel {
     for (const [key, row] of this.things) row.classList.toggle("selected", key === selected);
   }
 
-  control(control) {
-    return control.kind === "switch" ? this.switch(control) : this.slider(control);
-  }
-
   slider({id, label, unit, value, low, high, log}) {
-    const row = PlayPanel.row("slider", `<label><span></span><output></output></label>
-      <input type="range" min="0" max="1" step="0.005">`);
-    const [input, shown] = ["input", "output"].map((tag) => row.querySelector(tag));
-    row.querySelector("span").textContent = label;
-    row.querySelector("label").htmlFor = input.id = `play-${id}`;
+    const input = make("input", {type: "range", min: 0, max: 1, step: 0.005, id: `play-${id}`});
+    const shown = make("output");
     const place = (x) => log ? Math.log(x / low) / Math.log(high / low) : (x - low) / (high - low);
-    const value_at = (share) => log ? low * (high / low) ** share : low + share * (high - low);
+    const valueAt = (share) => log ? low * (high / low) ** share : low + share * (high - low);
     const show = (x, move = true) => {
       if (move) input.value = place(x);
       const words = `${PlayPanel.number(x)}${unit && unit !== "–" ? ` ${unit}` : ""}`;
-      shown.textContent = words;
-      input.setAttribute("aria-valuetext", words);
-      input.style.setProperty("--share", `${100 * Math.min(Math.max(place(x), 0), 1)}%`);
+      shown.textContent = input.ariaValueText = words;
+      input.style.setProperty("--share", `${100 * clamp(place(x), 0, 1)}%`);
     };
     let held = false, reported = null;
     input.oninput = () => {
-      const next = PlayPanel.rounded(value_at(Number(input.value)), low, high);
+      // Three significant digits are enough to set a gain, and its ends are exact.
+      const next = clamp(Number(valueAt(Number(input.value)).toPrecision(3)), low, high);
       reported = null;
       show(next, false);
       this.set(id, next);
     };
-    const let_go = () => {
-      held = false;
-      if (reported !== null) show(reported);
-    };
     input.onpointerdown = () => { held = true; };
     for (const type of ["pointerup", "pointercancel", "change", "blur"]) {
-      input.addEventListener(type, let_go);
+      input.addEventListener(type, () => {
+        held = false;
+        if (reported !== null) show(reported);
+      });
     }
     this.setters.set(id, (x) => {
       reported = x;
       if (!held) show(x);
     });
     show(value);
-    return row;
+    const name = make("label", {htmlFor: input.id}, make("span", {}, label), shown);
+    return make("div", {className: "play-row slider"}, name, input);
   }
 
   switch({id, label, value}) {
-    const row = PlayPanel.row("switch", `<label><span></span>
-      <input type="checkbox" role="switch"></label>`);
-    const input = row.querySelector("input");
-    row.querySelector("span").textContent = label;
-    input.checked = value;
+    const input = make("input", {type: "checkbox", role: "switch", checked: value});
     input.onchange = () => this.set(id, input.checked);
     this.setters.set(id, (on) => { input.checked = on; });
-    return row;
+    return make("div", {className: "play-row switch"},
+                make("label", {}, make("span", {}, label), input));
   }
 
   // Ask for a value; what the program said before it heard of it is not shown.
   set(id, value) {
     this.asked.set(id, performance.now());
-    this.play.set(id, value);
+    this.play.sendLater(`set ${id}`, {do: "set", id, value});
   }
 
   setValues(values) {
@@ -175,23 +239,94 @@ class PlayPanel {
     }
   }
 
-  setDisabled(disabled) { this.controls.disabled = disabled; }
-
-  static row(kind, content) {
-    const row = document.createElement("div");
-    row.className = `play-row ${kind}`;
-    row.innerHTML = content;
-    return row;
-  }
-
-  // Three significant digits are enough to set a gain, and its ends are exact.
-  static rounded(value, low, high) {
-    return Math.min(Math.max(Number(value.toPrecision(3)), low), high);
-  }
-
   static number(value) {
     const text = value !== 0 && (Math.abs(value) < 1e-3 || Math.abs(value) >= 1e5)
       ? value.toExponential(1) : String(Number(value.toPrecision(3)));
-    return text.replace(/-/g, "−");
+    return Plot.minus(text);
+  }
+}
+
+// Over the scene: the name of what is selected or dragged, a circle around it, and the spring by
+// which a link is pulled. It also holds one invisible button per target and obstacle, at its
+// place, so that the Tab key and screen readers find them.
+class PlayOverlay {
+  constructor(parent) {
+    this.box = make("div", {className: "play-overlay", innerHTML: `<div class="play-handles"></div>
+      <svg aria-hidden="true"><circle class="focus"/>
+        <g class="spring"><path class="halo"/><path class="coil"/><circle class="from" r="4"/>
+        <circle class="to" r="7"/></g></svg>
+      <div class="play-label name" aria-hidden="true"></div>
+      <div class="play-label force" role="status"></div>`});
+    [this.handles, this.circle, this.spring, this.name, this.force] =
+      [".play-handles", ".focus", ".spring", ".name", ".force"].map((s) => this.box.querySelector(s));
+    parent.append(this.box);
+    this.buttons = new Map();
+  }
+
+  // One button per thing: {key, label}; select(key) is called when one gets the focus.
+  setThings(things, select) {
+    this.buttons = new Map(things.map(({key, label}, k) => {
+      const number = k < 9 ? `, key ${k + 1}` : "";
+      const ariaLabel = `${label}${number}: arrow keys and page up, page down move it`;
+      return [key, make("button", {type: "button", ariaLabel, onfocus: () => select(key)})];
+    }));
+    this.handles.replaceChildren(...this.buttons.values());
+  }
+
+  placeButton(key, {x, y, ahead}) {
+    const {style} = this.buttons.get(key) ?? {};
+    if (style && ahead) style.transform = `translate(${x.toFixed(0)}px, ${y.toFixed(0)}px)`;
+  }
+
+  // A circle of a radius [px] around a thing, and its name above it; null hides both.
+  showThing(at, radius, text, strong) {
+    const visible = Boolean(at?.ahead);
+    this.circle.style.display = visible ? "" : "none";
+    this.name.hidden = !visible;
+    if (!visible) return;
+    PlayOverlay.set(this.circle, {cx: at.x, cy: at.y, r: radius});
+    this.circle.classList.toggle("strong", strong);
+    this.name.textContent = text;
+    PlayOverlay.place(this.name, at.x, at.y - radius - 12);
+  }
+
+  // A spring between two pixels with its force [N]; null hides it.
+  showSpring(from, to, newtons) {
+    const visible = Boolean(from?.ahead && to?.ahead);
+    this.spring.style.display = visible ? "" : "none";
+    this.force.hidden = !visible || newtons === null;
+    if (!visible) return;
+    const [halo, coil, start, end] = this.spring.children;
+    for (const line of [halo, coil]) PlayOverlay.set(line, {d: PlayOverlay.coil(from, to)});
+    PlayOverlay.set(start, {cx: from.x, cy: from.y});
+    PlayOverlay.set(end, {cx: to.x, cy: to.y});
+    if (newtons === null) return;
+    this.force.textContent = `${newtons < 10 ? newtons.toFixed(1) : newtons.toFixed(0)} N`;
+    PlayOverlay.place(this.force, to.x, to.y - 18);
+  }
+
+  // The path of a coil spring: it becomes thinner as it is stretched.
+  static coil(from, to) {
+    const [dx, dy] = [to.x - from.x, to.y - from.y], length = Math.hypot(dx, dy) || 1;
+    const [ux, uy] = [dx / length, dy / length], lead = Math.min(14, 0.2 * length), turns = 9;
+    const height = Math.max(2, Math.min(7, 900 / (length + 60), 0.2 * length));
+    const point = (along, across) => `${(from.x + along * ux - across * uy).toFixed(1)} `
+      + `${(from.y + along * uy + across * ux).toFixed(1)}`;
+    const wave = Array.from({length: 12 * turns + 1}, (_, k) => point(
+      lead + (length - 2 * lead) * k / (12 * turns), height * Math.sin(Math.PI * k / 6)));
+    return `M${[point(0, 0), ...wave, point(length, 0)].join("L")}`;
+  }
+
+  static set(element, attributes) {
+    for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+  }
+
+  // Centre a label above a pixel, inside the window.
+  static place(label, x, y) {
+    const half = label.offsetWidth / 2 + 6;
+    const inside = Math.min(Math.max(x, half), innerWidth - half);
+    const below = Math.max(y, label.offsetHeight + 6);
+    label.style.transform = `translate(${inside.toFixed(1)}px, ${below.toFixed(1)}px) `
+      + "translate(-50%, -100%)";
   }
 }

@@ -1,11 +1,7 @@
-// The player: moves the scene along a clip, and sends events with the time.
-//
-// All pages use this player. It depends on neither a server nor a file: it needs a scene
-// tree and a clip. The live page receives its clip over the websocket, the exported page
-// contains it.
+// The player: moves the scene along a clip, and sends events with the time. It depends on
+// neither a server nor a file: it needs a scene tree and a clip.
 //
 //   const player = new Player(viewer);        // a MeshCat.Viewer
-//   new Controls(player, document.body);      // controls.js: the bar and the keys
 //   player.load(clip);                        // shows the clip's start; plays if clip.play is set
 //   player.seek(2.5);                         // shows t = 2.5 s, exactly and immediately
 //   player.addEventListener("time", ({detail}) => cursor.moveTo(detail.time));
@@ -22,18 +18,11 @@
 //                       Float32Array. Before its first time and after its last one, a
 //                       track keeps its first and its last value.
 //   bands               [{name, caption, color, spans}]: what the time line marks; `spans` are
-//                       [start, end] [s], ascending. See bands.js.
+//                       [start, end] [s], ascending. See player_bar.js.
 //
-// Properties: "position" (3), "quaternion" (x, y, z, w), "scale" (3), "color" (red, green,
-// blue from 0 to 1), "opacity" (1) and "length" (1: the number of drawn rings of a trail
-// after its first, see trail.js) are interpolated, the quaternion spherically. "visible"
-// (1: 0 or 1) is not interpolated; it acts on the node's object, so that the node's switch
-// in the scene tree remains the user's. A path that is not in the scene is ignored.
+// The properties are those of Track.PROPERTIES. All but "visible" are interpolated, quaternions
+// spherically. A path that is not in the scene is ignored.
 //
-// Attributes (read): time, start, end, horizon, open, playing, speed, loop, loaded,
-// bands (by name).
-// Methods: load(clip), extend(clip), unload(), play(), pause(), toggle(), seek(t),
-// step(dt), faster(), slower(), setSpeed(x), setLoop(on), refresh().
 // Events: "time" (detail: {time, start, end}) when another time is shown; "state" when
 // playing, speed, loop or the clip has changed.
 "use strict";
@@ -43,9 +32,7 @@ class Player extends EventTarget {
 
   constructor(viewer) {
     super();
-    this.viewer = viewer;
-    this.speed = 1;
-    this.loop = false;
+    Object.assign(this, {viewer, speed: 1, loop: false});
     this.unload();
   }
 
@@ -60,20 +47,20 @@ class Player extends EventTarget {
 
   // Replace the clip. With `keep`, time, speed and state of the last clip are kept.
   load(clip, keep = false) {
-    const {time, playing, loaded} = this;
+    const {time, playing} = this, kept = keep && this.loaded;
     this.tracks = new Map();
     this.bands = new Map();
     this.start = this.end = clip.start;
-    if (!(keep && loaded)) {
+    this.loaded = true;
+    if (!kept) {
       this.speed = clip.speed ?? this.speed;
       this.loop = clip.loop ?? this.loop;
       this.time = clip.start;
       this.playing = false;
     }
-    this.loaded = true;
     this.extend(clip);
-    if (keep && loaded) this.seek(time);
-    if (keep && loaded ? playing : clip.play) this.play();
+    if (kept) this.seek(time);
+    if (kept ? playing : clip.play) this.play();
   }
 
   // Append an extension to the clip.
@@ -102,7 +89,7 @@ class Player extends EventTarget {
     const frame = (now) => {
       if (this._frame !== frame || !this.playing) return;
       // A page that was hidden continues where it was: limit the step.
-      this._advance(Math.min(Math.max(now - last, 0) / 1000, 0.25));
+      this._advance(clamp((now - last) / 1000, 0, 0.25));
       last = now;
       if (this.playing) requestAnimationFrame(frame);
     };
@@ -120,9 +107,9 @@ class Player extends EventTarget {
 
   // Show a time [s], limited to the clip.
   seek(time) {
-    this.time = Math.min(Math.max(time, this.start), this.end);
-    this.refresh();
     const {start, end} = this;
+    this.time = clamp(time, start, end);
+    this.refresh();
     this._emit("time", {time: this.time, start, end});
   }
 
@@ -149,18 +136,14 @@ class Player extends EventTarget {
   // Show one instant of some tracks, which replaces what they show now.
   pose(tracks) {
     for (const {path, property, values} of tracks) {
-      const node = this._node(path);
-      if (node) new Track(path, property, [0], values).apply(node, 0);
+      new Track(path, property, [0], values).show(this.viewer, 0);
     }
     this.viewer.set_dirty();
   }
 
   // Show the current time again, after the scene has changed.
   refresh() {
-    for (const track of this.tracks.values()) {
-      const node = this._node(track.path);
-      if (node) track.apply(node, this.time);
-    }
+    for (const track of this.tracks.values()) track.show(this.viewer, this.time);
     this.viewer.set_dirty();
   }
 
@@ -183,31 +166,29 @@ class Player extends EventTarget {
   }
 
   // Add a band; what goes on where the last interval of its name ended is one with it.
-  _mark({name, caption, color, spans}) {
-    const known = this.bands.get(name)?.spans ?? [];
+  _mark({spans, ...band}) {
+    const known = this.bands.get(band.name)?.spans ?? [];
     for (const [from, to] of spans) {
       const last = known.at(-1);
       if (last && from <= last[1]) last[1] = Math.max(last[1], to);
       else known.push([from, to]);
     }
-    this.bands.set(name, {name, caption, color, spans: known});
-  }
-
-  _node(path) {
-    let node = this.viewer.scene_tree;
-    for (const name of path.split("/")) {
-      if (name && node) node = node.children[name];
-    }
-    return node;
+    this.bands.set(band.name, {...band, spans: known});
   }
 
   _emit(kind, detail = {}) { this.dispatchEvent(new CustomEvent(kind, {detail})); }
 }
 
+// A node of the scene tree; none is created.
+function findNode(viewer, path) {
+  return path.split("/").filter(Boolean)
+    .reduce((node, name) => node?.children[name], viewer.scene_tree);
+}
+
 // The animation of one property of one node.
 class Track {
   constructor(path, property, times, values) {
-    Object.assign(this, {path, property, times, values, count: times.length});
+    Object.assign(this, {path, times, values, count: times.length});
     this.width = times.length ? values.length / times.length : 1;
     this.apply = Track.PROPERTIES[property] ?? (() => {});
     this._at = 0;
@@ -220,19 +201,21 @@ class Track {
     this.count += times.length;
   }
 
+  show(viewer, time) {
+    const node = findNode(viewer, this.path);
+    if (node) this.apply(node, time);
+  }
+
   // The rows before and after a time, and the fraction of the way between them.
   bracket(time) {
     const {times, count} = this;
     let low = this._at, high = count - 1;
     if (!(times[low] <= time)) low = 0;
     else if (low + 2 < count && time < times[low + 2]) high = Math.min(high, low + 2);
-    while (high - low > 1) {
-      const middle = (low + high) >> 1;
-      if (times[middle] <= time) low = middle; else high = middle;
-    }
+    [low, high] = bracketed(times, time, low, high);
     this._at = low;
     const fraction = high > low ? (time - times[low]) / (times[high] - times[low]) : 0;
-    return [low, high, Math.min(Math.max(fraction, 0), 1)];
+    return [low, high, clamp(fraction, 0, 1)];
   }
 
   linear(time) {
@@ -264,6 +247,7 @@ class Track {
       const scale = this.linear(time);
       object.scale.fromArray(scale.map((x) => x || 1e-9));  // a scale of 0 is not invertible
     },
+    // Acts on the node's object, so that the node's switch in the legend remains the user's.
     visible({children}, time) {
       const thing = children["<object>"];
       if (thing) thing.object.visible = this.stepped(time) > 0.5;
@@ -275,12 +259,21 @@ class Track {
     opacity({object}, time) {
       const [opacity] = this.linear(time);
       eachMaterial(object, (material) => {
-        material.opacity = opacity;
-        material.transparent = opacity < 1;
+        Object.assign(material, {opacity, transparent: opacity < 1});
       });
     },
-    length({object}, time) { drawLength(object, this.linear(time)[0]); },
+    // The number of drawn rings of a trail after its first: see scene.js.
+    length({object}, time) { drawRings(object, this.linear(time)[0]); },
   };
+}
+
+// The places in ascending times before and after a time, between two places.
+function bracketed(times, time, low = 0, high = times.length - 1) {
+  while (high - low > 1) {
+    const middle = (low + high) >> 1;
+    if (times[middle] <= time) low = middle; else high = middle;
+  }
+  return [low, high];
 }
 
 function eachMaterial(object, use) {

@@ -1,8 +1,5 @@
 // Presenting: the scene, its title and what happens now, as large as the screen.
 //
-//   const presentation = new Presentation(refit);    // called when there is more or less space
-//   presentation.addButton(bar);
-//
 //   p        begins and ends it             escape   ends it
 //
 // Legend, panels and details are put away. The bar and the pointer go, too, when the pointer
@@ -12,12 +9,12 @@
 class Presentation {
   static REST = 2000;  // ms
 
+  // `changed` is called when there is more or less space.
   constructor(changed) {
-    this.changed = changed;
-    this.on = this.full = false;
-    this.at = [NaN, NaN];
-    this.buttons = [];
-    addEventListener("keydown", (event) => this.key(event));
+    Object.assign(this, {changed, on: false, full: false, at: [NaN, NaN], buttons: []});
+    onKey(({key, repeat}) => repeat ? null
+      : key === "p" ? () => this.toggle()
+        : key === "Escape" && this.on ? () => this.set(false) : null);
     addEventListener("pointermove", ({clientX, clientY}) => {
       // A browser also tells of a pointer that rests while the page moves below it.
       if (clientX === this.at[0] && clientY === this.at[1]) return;
@@ -34,29 +31,12 @@ class Presentation {
 
   // Add a button to a bar, which goes with the pointer while presenting.
   addButton(bar) {
-    const button = document.createElement("button");
-    button.className = "present";
-    button.type = "button";
-    button.title = "Present (p)";
-    button.setAttribute("aria-label", "Present");
-    button.setAttribute("aria-pressed", this.on);
-    button.innerHTML = `<svg viewBox="0 0 24 24" aria-hidden="true"><path d="M4 4h6v2.2H6.2V10H4z
-      M14 4h6v6h-2.2V6.2H14zM4 14h2.2v3.8H10V20H4zM17.8 14H20v6h-6v-2.2h3.8z"/></svg>`;
-    button.onclick = ({detail}) => {
-      if (detail) button.blur();  // return the keyboard to the player
-      this.toggle();
-    };
+    const button = makeButton(
+      {className: "present", title: "Present (p)", ariaLabel: "Present", ariaPressed: this.on},
+      () => this.toggle(),
+      makeIcon("M4 4h6v2.2H6.2V10H4zM14 4h6v6h-2.2V6.2H14zM4 14h2.2v3.8H10V20H4zM17.8 14H20v6h-6v-2.2h3.8z"));
     bar.append(button);
     this.buttons.push(button);
-  }
-
-  key(event) {
-    if (event.key === "Tab") this.wake();
-    if (event.ctrlKey || event.metaKey || event.altKey || event.repeat) return;
-    const editable = "select, textarea, input:not([type=range], [type=checkbox])";
-    if (event.target.matches?.(editable)) return;
-    if (event.key === "p") this.toggle();
-    else if (event.key === "Escape" && this.on) this.set(false);
   }
 
   toggle() { this.set(!this.on); }
@@ -65,7 +45,7 @@ class Presentation {
     if (on === this.on) return;
     this.on = on;
     document.body.classList.toggle("presenting", on);
-    for (const button of this.buttons) button.setAttribute("aria-pressed", on);
+    for (const button of this.buttons) button.ariaPressed = on;
     // It may not be allowed, such as in a frame: then the window is all there is.
     if (on) document.documentElement.requestFullscreen?.().catch(() => {});
     else if (document.fullscreenElement) this.leaveFullScreen();

@@ -1,4 +1,4 @@
-// Unpacks the arrays that viewer/packed/packing.py packed, for live and exported pages.
+// Unpacks the arrays that viewer/packing.py packed, for live and exported pages.
 "use strict";
 
 function unpackArray({kind, rows, columns, width, bytes, offset, step}) {

@@ -1,0 +1,384 @@
+"""Writes the log of a run row by row, in memory or into a journal, or both."""
+
+import platform
+from collections.abc import Mapping
+from dataclasses import replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import ConfigError
+from hsp_control.common.identity_cache import IdentityCache
+from hsp_control.common.version import __version__
+from hsp_control.control.active_stack import ActiveStack
+from hsp_control.control.controller import Controller
+from hsp_control.control.measurement import LogChannel
+from hsp_control.control.output import ControlOutput
+from hsp_control.control.plan import RunningPlan
+from hsp_control.declaration.nested import parts_within, with_parts_replaced
+from hsp_control.declaration.plain_data import plain_data
+from hsp_control.geometry.scene import Obstacle, Scene
+from hsp_control.geometry.shapes import shape_to_log
+from hsp_control.law.problem import Record
+from hsp_control.null_space.metrics import FixedMetric
+from hsp_control.robot import Robot, RobotState
+from hsp_control.simulation.journal import JournalWriter
+from hsp_control.simulation.limit_excess import VELOCITY, LimitExcess
+from hsp_control.simulation.log_columns import (
+    ContactColumns,
+    LogColumns,
+    TaskColumns,
+    TermColumns,
+    write_channels,
+)
+from hsp_control.simulation.rollout import FORMAT, Rollout, complete_columns
+from hsp_control.trajectories.streams.stream import Streamed
+
+_EFFORT_UNITS = {"rad": "N·m", "m": "N"}
+
+
+class LogWriter:
+    """Writes the log of a run; an incomplete row is never written.
+
+    Attributes:
+        path: The journal that gets each row at once; None: rows stay in memory only.
+        plan: What the robot follows; its streams are recorded. None: no plan.
+    """
+
+    def __init__(
+        self,
+        controller: Controller,
+        scene: Scene,
+        rows: int,
+        plan: RunningPlan | None = None,
+        *,
+        path: Path | None = None,
+        meta: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Declare the columns.
+
+        Args:
+            controller: The controller.
+            scene: Obstacles to log.
+            rows: How many rows are kept in memory; 0: none, and then any number of
+                them can be written.
+            plan: What the robot follows.
+            path: The journal to write; `Rollout.load` reads it also after a crash.
+            meta: JSON data to add to the log's.
+
+        Raises:
+            SimulationError: If so many rows are too large.
+            LogError: If the journal cannot be created.
+        """
+        self.path, self.plan = path, plan
+        self._controller, self._scene = controller, scene
+        self._columns = columns = LogColumns(rows)
+        self._settled: object = None
+        self._law: Record | None = None  # of the present row
+        self._sources = IdentityCache(self._find_sources)
+        robot, column = controller.robot, columns.add
+        nv, units = robot.nv, dict.fromkeys(robot.units)
+        joint_unit = " or ".join(units)
+        effort_unit = " or ".join(_EFFORT_UNITS[unit] for unit in units)
+        column("t", (), "s", "time")
+        column("q", (robot.nq,), joint_unit, "configuration")
+        column("v", (nv,), f"{joint_unit}/s", "velocity")
+        column("tau", (nv,), effort_unit, "effort M a + N")
+        column("acceleration", (nv,), f"({joint_unit})/s²", "commanded acceleration")
+        column("joint_positions", (nv,), joint_unit, "joint positions, unwrapped")
+        self._tasks = TaskColumns(controller, columns)
+        column("field.g", (nv,), f"{joint_unit}/s", "null-space field")
+        column("field.value", (), "-", "cost f, or norm of a vector field")
+        column("null_space_error", (nv,), f"{joint_unit}/s", "e_N = (I - J#J)(g - v)")
+        column("null_space_norm", (), f"{joint_unit}/s", "norm of e_N in the metric")
+        column("manipulability", (), "-", "det(J W⁻¹ Jᵀ) of all tasks")
+        rows_of_tasks = sum(task.rows for task in controller.tasks)
+        column("singular_values", (rows_of_tasks,), "-", "of J L⁻ᵀ, W = L Lᵀ")
+        column(
+            "damped",
+            (),
+            "-",
+            "first level, 1 the highest, that is damped at a singularity; 0: exact",
+        )
+        column("status", (), "-", "0 exact law; 1 forces redistributed; 2 limited; "
+               "3 limits relaxed")  # fmt: skip
+        column("relaxation", (), "(rad or m)/s²", "largest violation of a limit")
+        self._contacts = ContactColumns(controller, columns)
+        self._excess = LimitExcess(robot)
+        self._frames, self._parents = _skeleton(robot, controller)
+        column("skeleton", (len(self._parents), 3), "m", "joints and task frames")
+        self._terms = TermColumns(controller, columns)
+        for obstacle in scene.values():
+            prefix = f"obstacle.{obstacle.name}"
+            column(prefix, (3,), "m", "position of its frame")
+            column(f"{prefix}.quaternion", (4,), "-", "orientation (x, y, z, w)")
+        columns.lay_out()
+        self._meta = dict(meta or {})
+        self._journal = None if path is None else JournalWriter(path)
+        self._headed: Array | None = None  # the row for which there is a heading
+
+    def record(
+        self,
+        state: RobotState,
+        output: ControlOutput | None,
+        tau: Array,
+        log_channels: Mapping[str, LogChannel],
+    ) -> None:
+        """Write a row.
+
+        Args:
+            state: The state.
+            output: The controller's output for it; None: the law's columns are empty.
+            tau: The effort of the motors, shape (nv,).
+            log_channels: Further values to log, by name.
+
+        Raises:
+            LogError: If the journal cannot be written.
+        """
+        self._fill_row(state, output, tau, log_channels)
+        if self._journal is not None:
+            self._write_heading()
+            self._journal.write_row(self._columns.numbers)
+        self._columns.keep_row()
+
+    def warm_up(
+        self,
+        state: RobotState,
+        output: ControlOutput | None,
+        tau: Array,
+        log_channels: Mapping[str, LogChannel],
+    ) -> None:
+        """Do all for a row but write it: kernels are compiled, and the heading is."""
+        self._fill_row(state, output, tau, log_channels)
+        self._write_heading()
+
+    def _fill_row(
+        self,
+        state: RobotState,
+        output: ControlOutput | None,
+        tau: Array,
+        log_channels: Mapping[str, LogChannel],
+    ) -> None:
+        controller, columns = self._controller, self._columns
+        columns.begin_row()
+        settled = controller.settled
+        if settled is None or settled is not self._settled:
+            self._settled = settled
+            self._tasks.update()
+            self._terms.update()
+            columns.lay_out()
+            self._sources = IdentityCache(self._find_sources)
+        row = columns.row
+        row["t"][...] = state.t
+        row["q"][:], row["v"][:], row["tau"][:] = state.q, state.v, tau
+        row["joint_positions"][:] = controller.robot.joint_positions(state.q)
+        self._tasks.write(state)
+        skeleton = row["skeleton"]
+        joints = len(skeleton) - len(self._frames)
+        skeleton[:joints] = state.world.placements[1:, 9:]
+        for k, frame in self._frames:
+            skeleton[k] = state.position(frame)
+        moved = controller.scene
+        for known in self._scene.values():
+            # No `get`: a scene raises its own error, not KeyError.
+            obstacle = moved[known.name] if known.name in moved else known  # noqa: SIM401
+            placement = pin.SE3ToXYZQUAT(obstacle.placement(state.t))
+            row[f"obstacle.{obstacle.name}"][:] = placement[:3]
+            row[f"obstacle.{obstacle.name}.quaternion"][:] = placement[3:]
+        if output is not None:
+            self._fill_law(state, output)
+        if VELOCITY not in log_channels:  # the state was seen in this row alone
+            self._excess.see(controller.limits, state.q, state.v)
+            log_channels = {**self._excess.take(controller.limits), **log_channels}
+        write_channels(columns, log_channels)
+
+    def _fill_law(self, state: RobotState, output: ControlOutput) -> None:
+        controller, columns = self._controller, self._columns
+        active = controller.active_stack
+        self._law = law = output.explanation(self._law)
+        diagnostics = controller.diagnose()
+        values = diagnostics.singular_values
+        columns.widen("singular_values", len(values))
+        columns.lay_out()
+        row = columns.row
+        for name, source in self._sources.get(active, law):
+            row[name][:] = source
+        self._tasks.write_law(active, output)
+        row["field.value"][...] = diagnostics.field_value
+        row["null_space_norm"][...] = diagnostics.null_space_norm
+        row["manipulability"][...] = diagnostics.manipulability
+        row["singular_values"][: len(values)] = values
+        row["damped"][...] = active.damped_level if output.damped else 0
+        row["status"][...] = output.status
+        row["relaxation"][...] = output.relaxation
+        self._contacts.write(state.t, output)
+        self._terms.write(state)
+
+    def _find_sources(
+        self, active: ActiveStack, law: Record
+    ) -> list[tuple[str, Array]]:
+        """Return what the law writes for each column."""
+        return [
+            ("acceleration", law.acceleration),
+            ("field.g", law.field.g),
+            ("null_space_error", law.null_space_error),
+            *self._tasks.sources(active, law),
+            *self._terms.sources(active),
+        ]
+
+    def _write_heading(self) -> None:
+        """Write a heading to the journal, if there are other columns than before."""
+        columns = self._columns
+        if self._journal is not None and self._headed is not columns.numbers:
+            self._journal.write_heading(columns.shapes, self.meta("running", ""))
+            self._headed = columns.numbers
+
+    @property
+    def count(self) -> int:
+        """How many rows are written."""
+        return self._columns.count
+
+    def rows(self, start: int) -> dict[str, Array]:
+        """Return the columns from a row to the last one, of the rows in memory."""
+        return self._columns.rows(start)
+
+    def end(self, status: str, message: str, **meta: Any) -> None:
+        """Write how the run ended to the journal, if there is one, and close it."""
+        if self._journal is None:
+            return
+        try:
+            self._journal.write_end(status, message, **self._came_during_run(), **meta)
+        except Exception:  # not Ctrl-C, after which it may be called again
+            self._journal.close()
+            raise
+        self._journal.close()
+
+    def rollout(self, status: str, message: str, **meta: Any) -> Rollout:
+        """Return the rows in memory as a rollout."""
+        columns = {name: a.copy() for name, a in self._columns.rows().items()}
+        complete_columns(columns, continuous_dofs(self._controller.robot))
+        return Rollout(columns, self.meta(status, message, **meta))
+
+    def meta(self, status: str, message: str, **meta: Any) -> dict[str, Any]:
+        """Return the meta data of a rollout of these rows, as JSON data."""
+        controller = self._controller
+        robot, metric = controller.robot, controller.metric
+        return {
+            "format": FORMAT,
+            "status": status,
+            "message": message,
+            "columns": self._columns.descriptions,
+            "robot": {
+                "name": robot.name,
+                "nq": robot.nq,
+                "nv": robot.nv,
+                "dofs": list(robot.dof_names),
+                "units": list(robot.units),
+                "continuous": continuous_dofs(robot),
+                "skeleton_parents": self._parents,
+                "joint_coordinates": robot.source.joint_coordinates,
+            },
+            "tasks": self._tasks.meta(),
+            **self._came_during_run(),
+            "field": controller.field.name,
+            "controls_null_space": controller.field.controls,
+            "null_space_gain": controller.null_space_gain.tolist(),
+            "metric": type(metric).__name__,
+            "metric_matrix": (
+                metric.W.tolist() if isinstance(metric, FixedMetric) else None
+            ),
+            "obstacles": {o.name: _obstacle_meta(o) for o in self._scene.values()},
+            "versions": versions(),
+            **self._meta,
+            **meta,
+        }
+
+    def _came_during_run(self) -> dict[str, Any]:
+        """Return changes that were made, and what streams have taken, as JSON data.
+
+        With them, a run can be repeated from its log.
+        """
+        streams = {
+            name: list(parts_within(task, Streamed))
+            for name, task in self._tasks.logged.items()
+            if task.remembers
+        }
+        heard = {name: [list(s.record) for s in each] for name, each in streams.items()}
+        lost = sum(s.unrecorded for each in streams.values() for s in each)
+        found = _changes(self._controller) | ({"streams": heard} if heard else {})
+        if self.plan is not None:
+            planned = list(parts_within(self.plan.plan, Streamed))
+            lost += sum(stream.unrecorded for stream in planned)
+            if planned:
+                found["plan_streams"] = [list(stream.record) for stream in planned]
+        return found | ({"streams_lost": lost} if lost else {})
+
+
+def _changes(controller: Controller) -> dict[str, Any]:
+    """Return the changes that were made, their streams as they were recorded."""
+    try:
+        changes = [
+            plain_data(with_parts_replaced(change, Streamed, _as_recorded))
+            for change in controller.changes
+        ]
+    except ConfigError as error:
+        return {"changes": None, "changes_lost": str(error)}
+    return {"changes": changes}
+
+
+def _as_recorded(stream: Streamed) -> Streamed:
+    return replace(stream, source=None, messages=stream.record)
+
+
+def _obstacle_meta(obstacle: Obstacle) -> dict[str, Any]:
+    """Return what a log says of an obstacle."""
+    radius = obstacle.shape.bounding_radius
+    return {
+        "shape": type(obstacle.shape).__name__,
+        "parameters": shape_to_log(obstacle.shape),
+        "radius": radius if np.isfinite(radius) else None,
+    }
+
+
+def continuous_dofs(robot: Robot) -> list[int]:
+    """Return the dofs of continuous joints, whose configuration is (cos, sin)."""
+    joints = robot.single_dof_joints
+    return [int(i) for i in joints[joints[:, 2] == 2, 0]]
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of the packages that a run depends on."""
+    packages = ("pin", "numpy", "scipy", "numba")
+    return {
+        "hsp_control": __version__,
+        "python": platform.python_version(),
+        **{package: version(package) for package in packages},
+    }
+
+
+def _skeleton(
+    robot: Robot, controller: Controller
+) -> tuple[list[tuple[int, str]], list[int]]:
+    """Return which of the points to draw are frames, and the parent of each point.
+
+    A point for each joint in order, then for each frame of a task (index and name); a
+    parent is the index of another point, -1 for none.
+    """
+    named: list[tuple[int, str]] = []
+    parents: list[int] = []
+    index = {0: -1}
+    for joint in range(1, robot.model.njoints):
+        index[joint] = len(parents)
+        parents.append(index[robot.model.parents[joint]])
+    frames = dict.fromkeys(
+        frame for task in controller.tasks if (frame := getattr(task, "frame", None))
+    )
+    for frame in frames:
+        joint = robot.model.frames[robot.frame_id(frame)].parentJoint
+        named.append((len(parents), frame))
+        parents.append(index[joint])
+    return named, parents

@@ -1,1 +1,0 @@
-"""What is shown, as one page that needs no server."""

@@ -1,1 +1,0 @@
-"""What live and exported pages get packed: arrays, keyframes, and plots."""

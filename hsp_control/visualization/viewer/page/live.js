@@ -1,0 +1,162 @@
+// The plots of the live page: a run's, while it is computed and after, in `side`; see
+// viewer/page_plots.py. And those of `hsp play`: the last seconds of every curve, in LivePlots.
+"use strict";
+
+{
+  const PHONE = "(max-width: 560px)";
+  let side = null;  // none before there are plots: a page without a run keeps its look
+  const names = make("ul", {className: "run-names"});  // several runs, with the lines of their curves
+
+  commandHandlers.plots = ({arrays, plots}) => {
+    if (!side) {
+      side = new Side(player);
+      if (matchMedia(PHONE).matches) side.toggle();  // away at first: the scene needs the space
+      side.box.append(names);
+    }
+    side.show(withArrays(plots, arrays.map(unpackArray)));
+    const told = plots.runs.length > 1 ? plots.runs : [];
+    names.hidden = !told.length;
+    names.replaceChildren(...told.map((name, run) => make("li", {}, Side.sample(run), name)));
+  };
+
+  commandHandlers.no_plots = () => side?.clear();
+}
+
+// Rows of all series of all plots, in order. A time that jumps back clears them; a gap in time, as
+// after a page has stalled, is drawn as one. Drawn at most 20 times a second, and not while the
+// panel is closed, the page is hidden, or a plot is scrolled out of sight.
+class LivePlots {
+  static SPAN = 10;  // s
+  static PERIOD = 50;  // ms
+
+  constructor(parent, definitions, isOpen) {
+    Object.assign(this, {isOpen});
+    let first = 0;
+    this.plots = definitions.map((definition) => {
+      first += definition.series.length;
+      return new LivePlot(this, definition, first - definition.series.length);
+    });
+    this.clear();
+    this.width = first;
+    parent.replaceChildren(...this.plots.map(({box}) => box));
+    this.timer = setInterval(() => this.draw(), LivePlots.PERIOD);
+  }
+
+  dispose() { clearInterval(this.timer); }
+
+  clear() {
+    this.times = [];
+    this.rows = [];  // as `add` gets them; null: a gap
+    this.spacing = null;  // s, usual time between two rows
+    for (const plot of this.plots) plot.stale = true;
+  }
+
+  add(times, values) {
+    const {width, rows} = this;
+    if (values.length !== times.length * width) return;
+    times.forEach((time, k) => {
+      const step = time - (this.times.at(-1) ?? -Infinity);
+      if (Math.abs(step) < 1e-9) return;  // the same row again
+      if (step < 0) this.clear();
+      else if (step > Math.max(0.1, 4 * this.spacing) && this.times.length) this.put(time - 1e-6, null);
+      else if (this.spacing === null || step < this.spacing) this.spacing = step;
+      else if (step < 3 * this.spacing) this.spacing += 0.05 * (step - this.spacing);
+      this.put(time, values.subarray(k * width, (k + 1) * width));
+    });
+    const old = this.times.findIndex((time) => time > this.end - LivePlots.SPAN - 1);
+    if (old > 100) for (const kept of [this.times, this.rows]) kept.splice(0, old);
+    for (const plot of this.plots) plot.stale = true;
+  }
+
+  put(time, row) {
+    this.times.push(time);
+    this.rows.push(row);
+  }
+
+  get end() { return this.times.at(-1) ?? 0; }
+
+  draw() {
+    if (!this.isOpen() || document.hidden) return;
+    for (const plot of this.plots) {
+      const {top, bottom} = plot.box.getBoundingClientRect();
+      if (bottom > 0 && top < innerHeight) plot.update();
+    }
+  }
+}
+
+class LivePlot extends Plot {
+  constructor(plots, definition, first) {
+    super("h3", definition, definition.series);
+    Object.assign(this, {plots, log: definition.log, first, known: null});
+    Object.assign(this.figure, {role: "img",
+                                ariaLabel: `${definition.title}, the last ${LivePlots.SPAN} s`});
+  }
+
+  value(row, k) {
+    const value = this.plots.rows[row]?.[this.first + k] ?? NaN;
+    const shown = this.log ? Math.log10(value) : value;
+    return Number.isFinite(shown) ? shown : null;
+  }
+
+  data() {
+    const {times, rows} = this.plots;
+    return [times, ...this.entries.map((_, k) => rows.map((_, row) => this.value(row, k)))];
+  }
+
+  build() {
+    if (!this.figure.clientWidth) return;
+    const {plots} = this;
+    this.known = null;
+    this.draw(this.data(), {
+      logarithmic: this.log,
+      series: this.entries.map(({color}, k) => ({
+        stroke: Plot.shade(color), width: 1.6, show: this.shows(k),
+        points: {show: true, size: 5, fill: Plot.shade(color), filter: () => [plots.times.length - 1]},
+      })),
+      scales: {
+        x: {time: false, range: () => [0, LivePlots.SPAN].map(
+          (t) => t + Math.max(plots.end - LivePlots.SPAN, 0))},
+        y: {range: (_, least, most) => this.range(least, most)},
+      },
+      cursor: {points: {size: 7, width: 0, fill: (_, k) => Plot.shade(this.entries[k - 1].color)}},
+      hooks: {setCursor: [() => this.showValues()]},
+    });
+  }
+
+  update() {
+    if (!this.chart) this.build();
+    this.fit();
+    if (!this.stale || !this.chart) return;
+    this.stale = false;
+    this.chart.setData(this.data());
+    this.showValues();
+  }
+
+  // The range of the axis: it grows at once, and shrinks when much of it is unused.
+  range(low, high) {
+    if (low === null) return this.log ? [-3, 0] : [0, 1];
+    if (this.log) {
+      const least = Math.floor(low - 0.05);
+      return [least, Math.max(Math.ceil(high + 0.05), least + 1)];
+    }
+    const least = Math.max(1e-9, 0.02 * Math.max(Math.abs(low), Math.abs(high)));
+    const room = Math.max(high - low, least), [from, to] = this.known ?? [];
+    if (!(low >= from && high <= to && room > 0.55 * (to - from))) {
+      const middle = (low + high) / 2;
+      this.known = [middle - 0.62 * room, middle + 0.62 * room];
+    }
+    return this.known;
+  }
+
+  // The values under the pointer, or else the present ones.
+  showValues() {
+    if (!this.chart) return;
+    const {left, idx} = this.chart.cursor, {times} = this.plots;
+    const hovered = left >= 0 && idx !== null, row = hovered ? idx : times.length - 1;
+    this.moment.textContent = hovered ? `t = ${times[row].toFixed(2)} s` : "";
+    this.outputs.forEach((output, k) => {
+      const value = this.value(row, k);
+      output.textContent = Plot.number(value === null || !this.log ? value : 10 ** value);
+    });
+  }
+}

@@ -1,0 +1,250 @@
+// The handles of the targets: a ball, arrows along the world's axes, rings about the
+// target's own axes.
+//
+// Sizes are in pixels, whatever the distance. Where the robot hides a handle it is drawn
+// through it, translucent. A pointer finds handles by its distance from them on the screen,
+// as thin things are hard to hit; a finger's reach is larger.
+"use strict";
+
+class Gizmo {
+  static BALL = 8;           // px, radius
+  static ARROW = [17, 78];   // px, its start and its tip
+  static HEAD = 17;          // px
+  static RING = 54;          // px, radius
+  static REACH = {mouse: {ball: 13, arrow: 8, ring: 7}, touch: {ball: 24, arrow: 22, ring: 22}};
+  static COLORS = ["#D55E00", "#009E73", "#0072B2"];  // those of the axes of targets.py
+  static BALL_COLOR = "#E69F00";                      // palette.DESIRED
+
+  constructor(target, parent) {
+    const {Group, Vector3, Quaternion} = MeshCat.THREE;
+    Object.assign(this, {target, position: new Vector3(), turn: new Quaternion(), parts: [],
+                         group: new Group(), rings: new Group()});
+    this.axes = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map((axis) => new Vector3(...axis));
+    this.enlarged = this.usual = matchMedia("(pointer: coarse)").matches ? 1.2 : 1;
+    this.group.add(this.rings);
+    this._build();
+    this.setPose(target.pose);
+    parent.add(this.group);
+  }
+
+  get movable() { return this.target.kind !== "orientation"; }
+
+  // Whether the program follows this coordinate of the target.
+  follows(axis) { return this.movable && this.target.axes?.[axis] !== false; }
+
+  setPose([x, y, z, ...turn]) {
+    this.position.set(x, y, z);
+    if (turn.length === 4) this.turn.fromArray(turn);
+  }
+
+  pose() { return [...this.position.toArray(), ...this.turn.toArray()]; }
+
+  // An axis of the target itself, in the world.
+  own(axis) { return this.axes[axis].clone().applyQuaternion(this.turn); }
+
+  // Fit its size to the camera.
+  layOut(sight) {
+    // In a small picture, as above a phone's open sheet, the handles would hide the robot.
+    const room = Math.min(sight.box.height / 450, sight.box.width / 480);
+    this.enlarged = this.usual * clamp(room, 0.65, 1);
+    this.group.position.copy(this.position);
+    this.group.scale.setScalar(sight.pixel(this.position) * this.enlarged);
+    this.rings.quaternion.copy(this.turn);
+    for (const {handle, meshes} of this.parts) {
+      if (handle.kind !== "arrow") continue;
+      const shown = this._arrowEnds(handle, sight).long;
+      for (const mesh of meshes) mesh.visible = shown;
+    }
+    this.group.updateMatrixWorld();
+  }
+
+  // The handle under a pixel, and its distance on the screen; null if none is in reach.
+  find(sight, x, y, pointer) {
+    const reach = Gizmo.REACH[pointer === "touch" ? "touch" : "mouse"];
+    const center = sight.project(this.position);
+    if (!center.ahead) return null;
+    const measures = {  // distance, and thickness
+      ball: () => [Math.hypot(x - center.x, y - center.y), Gizmo.BALL * this.enlarged + 4],
+      arrow: (handle) => {
+        const {start, tip, long} = this._arrowEnds(handle, sight);
+        return [long ? Gizmo.toSegment(x, y, start, tip) : Infinity, 3];
+      },
+      ring: (handle) => [this._toRing(handle, sight, x, y), 2],
+    };
+    let best = null;
+    for (const {handle} of this.parts) {
+      const [distance, thickness] = measures[handle.kind](handle);
+      const gap = Math.max(0, distance - thickness);
+      if (distance <= Math.max(reach[handle.kind], thickness) && !(best && best.gap <= gap)) {
+        best = {gizmo: this, handle, gap};
+      }
+    }
+    return best;
+  }
+
+  // Start to drag a handle: returns a function from pixels to what it says, after which
+  // position and turn are the new ones.
+  grab(handle, sight, x, y) {
+    const from = this.position.clone(), turn = this.turn.clone();
+    const radius = Gizmo.RING * this.enlarged;
+    const rotate = (axis, angle) => this.turn.premultiply(
+      new MeshCat.THREE.Quaternion().setFromAxisAngle(axis, angle)).normalize();
+    if (handle.kind === "ring") {
+      const axis = this.own(handle.axis), angle = sight.about(from, axis, radius, x, y);
+      return (x, y) => {
+        const value = angle(x, y);
+        if (value === null) return null;
+        this.turn.copy(turn);
+        rotate(axis, value);
+        return `${Gizmo.signed(value * 180 / Math.PI)}°`;
+      };
+    }
+    if (!this.movable) {  // the ball of an orientation rolls under the pointer
+      return (to_x, to_y) => {
+        this.turn.copy(turn);
+        rotate(sight.up, (to_x - x) / radius);
+        rotate(sight.right, (to_y - y) / radius);
+        return `${(this.turn.angleTo(turn) * 180 / Math.PI).toFixed(1)}°`;
+      };
+    }
+    const place = handle.kind === "arrow"
+      ? sight.onLine(from, this.axes[handle.axis], x, y) : this._ballDrag(sight, from, x, y);
+    return (x, y) => {
+      const to = place(x, y);
+      if (!to) return null;
+      this.position.copy(to);
+      return Gizmo.way(from, to);
+    };
+  }
+
+  // The ball moves in the picture's plane, or in that of the two coordinates, or along
+  // the one coordinate, that the program follows.
+  _ballDrag(sight, from, x, y) {
+    const followed = [0, 1, 2].filter((axis) => this.follows(axis));
+    if (followed.length === 1) return sight.onLine(from, this.axes[followed[0]], x, y);
+    const left = [0, 1, 2].filter((axis) => !this.follows(axis));
+    if (left.length === 1 && Math.abs(this.axes[left[0]].dot(sight.towards(from))) > 0.1) {
+      return sight.inPlane(from, this.axes[left[0]], x, y);
+    }
+    const free = sight.inPlane(from, sight.back.clone(), x, y);
+    return (x, y) => {
+      const to = free(x, y);
+      for (const axis of to ? left : []) to.setComponent(axis, from.getComponent(axis));
+      return to;
+    };
+  }
+
+  // Show which handle is under the pointer or dragged, and whether any may be.
+  mark(handle, dragged, disabled) {
+    const white = new MeshCat.THREE.Color("#FFFFFF");
+    for (const {handle: own, meshes, color, faint} of this.parts) {
+      const hot = handle === own;
+      const strength = disabled ? 0.35 : dragged && !hot ? 0.3 : 1;
+      for (const {material, scale} of meshes) {
+        material.color.set(color);
+        if (hot) material.color.lerp(white, dragged ? 0.15 : 0.35);
+        material.opacity = strength * (material.depthTest ? 1 : hot ? 0.75 : faint);
+        scale.setScalar(hot && own.kind === "ball" ? 1.15 : 1);
+        if (hot && own.kind === "arrow") scale.set(1.35, 1, 1.35);
+      }
+    }
+  }
+
+  dispose() {
+    this.group.parent.remove(this.group);
+    for (const {geometry, material} of this.parts.flatMap(({meshes}) => meshes)) {
+      geometry.dispose();
+      material.dispose();
+    }
+  }
+
+  // A thing's displacement in words: along an axis with its name.
+  static way(from, to) {
+    const step = to.clone().sub(from);
+    const moved = ["x", "y", "z"].filter((name) => Math.abs(step[name]) > 5e-5);
+    const told = moved.map((name) => `${name} ${Gizmo.signed(100 * step[name])}`);
+    return `${told.join("  ") || "0.0"} cm`;
+  }
+
+  static signed(value) {
+    const text = Math.abs(value).toFixed(1);
+    return Number(text) === 0 ? text : (value < 0 ? "−" : "+") + text;
+  }
+
+  static toSegment(x, y, a, b) {
+    const [dx, dy] = [b.x - a.x, b.y - a.y];
+    const share = clamp(((x - a.x) * dx + (y - a.y) * dy) / (dx * dx + dy * dy || 1), 0, 1);
+    return Math.hypot(x - a.x - share * dx, y - a.y - share * dy);
+  }
+
+  // The pixels of an arrow's ends; one that points at the eye is too short to be used.
+  _arrowEnds({axis}, sight) {
+    const size = sight.pixel(this.position) * this.enlarged;
+    const [start, tip] = Gizmo.ARROW.map((length) => sight.project(
+      this.position.clone().addScaledVector(this.axes[axis], length * size)));
+    return {start, tip, long: Math.hypot(tip.x - start.x, tip.y - start.y) > 16};
+  }
+
+  // The distance from the visible half of a ring.
+  _toRing({axis}, sight, x, y) {
+    const size = sight.pixel(this.position) * this.enlarged * Gizmo.RING;
+    const eye = sight.towards(this.position);
+    const [u, v] = [this.own((axis + 1) % 3), this.own((axis + 2) % 3)];
+    const faces = Math.abs(this.own(axis).dot(eye)) > 0.95;  // seen as a whole circle
+    let closest = Infinity, last = null;
+    for (let k = 0; k <= 48; k++) {
+      const angle = 2 * Math.PI * k / 48;
+      const spoke = u.clone().multiplyScalar(Math.cos(angle)).addScaledVector(v, Math.sin(angle));
+      const here = faces || spoke.dot(eye) > -0.08
+        ? sight.project(spoke.multiplyScalar(size).add(this.position)) : null;
+      if (here && last) closest = Math.min(closest, Gizmo.toSegment(x, y, last, here));
+      last = here;
+    }
+    return closest;
+  }
+
+  _build() {
+    const {SphereGeometry, CylinderGeometry, TorusGeometry, BackSide, Mesh, MeshBasicMaterial} =
+      MeshCat.THREE;
+    const {BALL, ARROW: [start, tip], HEAD, RING} = Gizmo, ball = {kind: "ball"};
+    this._part(ball, [new SphereGeometry(BALL + 2.2, 32, 20)], "#FFFFFF", 1004, 0.8);
+    // Its rim is the far half of a larger ball, which never hides the ball itself.
+    for (const {material} of this.parts[0].meshes) material.side = BackSide;
+    const color = this.target.color ?? Gizmo.BALL_COLOR;
+    this._part(ball, [new SphereGeometry(BALL, 32, 20)], color, 1005, 0.9);
+    const along = [{z: -Math.PI / 2}, {}, {x: Math.PI / 2}];  // from y to the three axes
+    for (const axis of [0, 1, 2].filter((axis) => this.follows(axis))) {
+      const shaft = new CylinderGeometry(1.6, 1.6, tip - HEAD - start, 16)
+        .translate(0, (tip - HEAD + start) / 2, 0);
+      const cone = new CylinderGeometry(0, 5.6, HEAD, 24).translate(0, tip - HEAD / 2, 0);
+      this._part({kind: "arrow", axis}, [shaft, cone], Gizmo.COLORS[axis], 1001, 0.35, along[axis]);
+    }
+    if (this.target.kind === "position") return;
+    // An invisible ball inside the rings, which makes their far halves faint.
+    const veil = new Mesh(new SphereGeometry(RING - 2, 40, 24),
+                          new MeshBasicMaterial({colorWrite: false, transparent: true}));
+    veil.renderOrder = 1002;
+    this.group.add(veil);
+    const across = [{y: Math.PI / 2}, {x: Math.PI / 2}, {}];
+    for (const axis of [0, 1, 2]) {
+      this._part({kind: "ring", axis}, [new TorusGeometry(RING, 1.5, 10, 96)], Gizmo.COLORS[axis],
+                 1003, 0.22, across[axis], this.rings);
+    }
+  }
+
+  // A handle's shapes, each drawn twice: faint through everything, and solid where it is seen.
+  _part(handle, geometries, color, order, faint, turned = {}, parent = this.group) {
+    const {Mesh, MeshBasicMaterial} = MeshCat.THREE;
+    const meshes = geometries.flatMap((geometry) => [false, true].map((depthTest) => {
+      const mesh = new Mesh(geometry, new MeshBasicMaterial({
+        color, transparent: true, depthTest, depthWrite: false, toneMapped: false,
+        opacity: depthTest ? 1 : faint,
+      }));
+      Object.assign(mesh, {renderOrder: depthTest ? order : order - 20, frustumCulled: false});
+      Object.assign(mesh.rotation, turned);
+      parent.add(mesh);
+      return mesh;
+    }));
+    this.parts.push({handle, meshes, color, faint});
+  }
+}

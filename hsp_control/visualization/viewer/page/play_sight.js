@@ -1,0 +1,108 @@
+// What the camera sees, and how a pointer moves things in it.
+//
+// All points and directions are in Pinocchio's axes (z up), which are the axes inside Meshcat's
+// scene; pixels are those of pointer events (clientX, clientY).
+"use strict";
+
+class Sight {
+  static REACH = 20;  // m: no drag leads farther from the eye
+
+  constructor(viewer) { this.viewer = viewer; }
+
+  // Take over the camera's present place; call it before a series of questions.
+  update() {
+    const {camera, scene, renderer} = this.viewer, {Vector3} = MeshCat.THREE;
+    camera.updateWorldMatrix(true, false);
+    this.box = renderer.domElement.getBoundingClientRect();
+    this.toScene = scene.matrixWorld.clone().invert();
+    [this.right, this.up, this.back] = [0, 1, 2].map((column) => new Vector3()
+      .setFromMatrixColumn(camera.matrixWorld, column).transformDirection(this.toScene));
+    this.eye = new Vector3().setFromMatrixPosition(camera.matrixWorld).applyMatrix4(this.toScene);
+    return this;
+  }
+
+  // A point's pixel, and whether it lies in front of the camera.
+  project(point) {
+    const {camera, scene} = this.viewer, {left, top, width, height} = this.box;
+    const seen = point.clone().applyMatrix4(scene.matrixWorld).project(camera);
+    const ahead = this.depth(point) > camera.near;
+    return {x: left + (1 + seen.x) / 2 * width, y: top + (1 - seen.y) / 2 * height, ahead};
+  }
+
+  depth(point) { return this.eye.clone().sub(point).dot(this.back); }
+
+  // The length at a point that covers one pixel [m].
+  pixel(point) {
+    const {fov} = this.viewer.camera;
+    return Math.max(this.depth(point), 1e-6) * 2 * Math.tan(fov * Math.PI / 360) / this.box.height;
+  }
+
+  // The direction from a point to the eye.
+  towards(point) { return this.eye.clone().sub(point).normalize(); }
+
+  // A raycaster of three.js through a pixel, in three.js's own axes; and its ray in ours.
+  caster(x, y) {
+    const {left, top, width, height} = this.box;
+    const caster = new MeshCat.THREE.Raycaster();
+    caster.setFromCamera({x: 2 * (x - left) / width - 1, y: 1 - 2 * (y - top) / height},
+                         this.viewer.camera);
+    return caster;
+  }
+
+  ray(x, y) { return this.caster(x, y).ray.clone().applyMatrix4(this.toScene); }
+
+  // The point of a plane under a pixel; null at its horizon.
+  hit(through, normal, x, y) {
+    const {origin, direction} = this.ray(x, y);
+    const along = direction.dot(normal);
+    if (Math.abs(along) < 0.02) return null;
+    const reach = through.clone().sub(origin).dot(normal) / along;
+    if (!(reach > 0 && reach < Sight.REACH + this.depth(through))) return null;
+    return origin.addScaledVector(direction, reach);
+  }
+
+  // The next three take the pixel at which a thing is grabbed, and return a function from later
+  // pixels to its new place or angle; null where the pointer tells none. The thing keeps its
+  // offset from the pointer: it never jumps.
+
+  // A point's places in the plane through it.
+  inPlane(from, normal, x, y) {
+    const offset = from.clone().sub(this.hit(from, normal, x, y) ?? from);
+    return (x, y) => this.hit(from, normal, x, y)?.add(offset) ?? null;
+  }
+
+  // A point's places on the line through it.
+  onLine(from, axis, x, y) {
+    const nearest = (x, y) => {
+      const {origin, direction} = this.ray(x, y), between = from.clone().sub(origin);
+      const cosine = axis.dot(direction), sine2 = 1 - cosine * cosine;
+      return sine2 < 0.01 ? null : (cosine * direction.dot(between) - axis.dot(between)) / sine2;
+    };
+    const start = nearest(x, y) ?? 0;
+    return (x, y) => {
+      const way = nearest(x, y);
+      if (way === null || Math.abs(way - start) > Sight.REACH) return null;
+      return from.clone().addScaledVector(axis, way - start);
+    };
+  }
+
+  // Angles about an axis [rad]; more than a turn is counted on. The radius is in pixels.
+  about(center, axis, radius, x, y) {
+    if (Math.abs(this.towards(center).dot(axis)) < 0.2) {  // from its edge: its near side is moved
+      const along = this.towards(center).cross(axis).negate().normalize();
+      const here = this.project(center);
+      const there = this.project(center.clone().addScaledVector(along, this.pixel(center)));
+      const [dx, dy] = [there.x - here.x, there.y - here.y], length = Math.hypot(dx, dy) || 1;
+      return (to_x, to_y) => ((to_x - x) * dx + (to_y - y) * dy) / length / radius;
+    }
+    const spoke = (x, y) => this.hit(center, axis, x, y)?.sub(center);
+    let last = spoke(x, y), total = 0;
+    return (x, y) => {
+      const next = spoke(x, y);
+      if (!next) return null;
+      if (last) total += Math.atan2(last.clone().cross(next).dot(axis), last.dot(next));
+      last = next;
+      return total;
+    };
+  }
+}

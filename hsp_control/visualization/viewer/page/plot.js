@@ -1,0 +1,105 @@
+// A plot over time, drawn by uPlot (github.com/leeoniya/uPlot): what the plots of a run and those
+// of `hsp play` share. The legend is below it, with values; a name shows its curve alone.
+"use strict";
+
+class Plot {
+  static HEIGHT = 118;  // px
+  static FONT = '10.5px system-ui, "Segoe UI", "Helvetica Neue", Arial, sans-serif';
+  // Colours of the palette on a dark background.
+  static DARK = {"#22272B": "#E3E8EC", "#6B7680": "#A4AFB8", "#DFE3E6": "#2F373E",
+                 "#0072B2": "#3B9FDB", "#882255": "#D8689B", "#FFFFFF": "#1B2025"};
+
+  static shade(color) {
+    return document.body.classList.contains("dark") ? Plot.DARK[color] ?? color : color;
+  }
+
+  // Entries of the legend: {name, color, dashed, band}.
+  constructor(heading, {title, note, unit}, entries) {
+    Object.assign(this, {title, unit, entries, alone: null});
+    this.moment = make("time");  // right of the title
+    this.figure = make("figure");
+    this.outputs = entries.map(() => make("output", {ariaLive: "off"}));  // beside the names
+    this.buttons = entries.map(({name, color, dashed, band}, k) => makeButton(
+      {title: "Show it alone, or all", ariaPressed: false,
+       style: `--color: ${Plot.shade(color)}`,
+       className: dashed ? "dashed" : band ? "band" : ""},
+      () => this.isolate(this.alone === k ? null : k), make("span", {}, name), this.outputs[k]));
+    this.box = make("section", {className: "plot"},
+      make(heading, {}, title, " ", make("small", {}, note ?? ""), this.moment), this.figure,
+      make("ul", {}, ...this.buttons.map((button) => make("li", {}, button))));
+  }
+
+  // Show one curve alone, by its place in the legend; null: all.
+  isolate(place) {
+    this.alone = place;
+    this.buttons.forEach((button, k) => {
+      button.ariaPressed = place === k;
+      button.classList.toggle("off", !this.shows(k));
+    });
+    this.build();
+  }
+
+  shows(place) { return this.alone === null || this.alone === place; }
+
+  // Draw it anew, with options of uPlot beside those that all plots have.
+  draw(data, {logarithmic, series, scales, cursor, hooks}) {
+    const muted = Plot.shade("#6B7680"), grid = Plot.shade("#DFE3E6"), font = Plot.FONT;
+    const axis = {stroke: muted, font, ticks: {stroke: muted, width: 1, size: 3}};
+    const label = this.unit === "–" ? null : `[${this.unit}]`;
+    const labelled = {label, labelFont: font, labelSize: 14, labelGap: 0};
+    this.chart?.destroy();
+    this.chart = null;  // what is told while the next one is made is not for the last one
+    this.chart = new uPlot({
+      width: this.figure.clientWidth || 300, height: Plot.HEIGHT, padding: [6, 12, 0, label ? 0 : 14],
+      legend: {show: false}, scales, hooks, series: [{}, ...series.map((each) => ({points: {show: false}, pxAlign: 0, ...each}))],
+      axes: [
+        {...axis, size: 20, gap: 2, space: 45, grid: {show: false}, values: Plot.numbers(" s"),
+         border: {show: true, stroke: muted, width: 1}},
+        {...axis, size: 46, gap: 4, space: 20, grid: {stroke: grid, width: 1}, ...labelled,
+         ticks: {show: false}, ...(logarithmic ? Plot.DECADES : {values: Plot.numbers("")})},
+      ],
+      cursor: {y: false, drag: {x: false, y: false}, ...cursor,
+               bind: {mousedown: () => null, mouseup: () => null, dblclick: () => null}},
+    }, data, this.figure);
+  }
+
+  // Take the width that there is.
+  fit() {
+    const {clientWidth} = this.figure;
+    if (clientWidth && this.chart && this.chart.width !== clientWidth) {
+      this.chart.setSize({width: clientWidth, height: Plot.HEIGHT});
+    }
+  }
+
+  // The labels of ticks; the last one has the unit.
+  static numbers(unit) {
+    return (_, ticks, axis, space, step) => {
+      const digits = (String(step).split(".")[1] ?? "").length;
+      return ticks.map((tick, k) => {
+        const text = step < 1e-4 && tick ? tick.toExponential(1) : tick.toFixed(Math.min(digits, 6));
+        return Plot.minus(text) + (k === ticks.length - 1 ? unit : "");
+      });
+    };
+  }
+
+  // Ticks where values are exponents of ten: at most five.
+  static DECADES = {
+    splits: (_, axis, low, high) => {
+      const every = Math.max(1, Math.ceil((high - low) / 4.5)), ticks = [];
+      for (let k = every * Math.ceil(low / every); k <= high; k += every) ticks.push(k);
+      return ticks;
+    },
+    values: (_, ticks) => ticks.map((tick) => tick === 0 ? "1"
+      : `10${[...String(tick)].map((c) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[c] ?? "⁻").join("")}`),
+  };
+
+  // A number with few characters, always of about the same width.
+  static number(value) {
+    if (value === null || !Number.isFinite(value)) return "–";
+    const size = Math.abs(value);
+    return Plot.minus(size !== 0 && (size < 1e-3 || size >= 1e5)
+      ? value.toExponential(1) : value.toFixed(size < 10 ? 3 : size < 1000 ? 1 : 0));
+  }
+
+  static minus(text) { return text.replace(/-/g, "−"); }
+}

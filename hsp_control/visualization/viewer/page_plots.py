@@ -1,0 +1,386 @@
+"""The plots beside the scene: which curves of a log they show, packed for the page."""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from hsp_control.common.arrays import Array, Indices
+from hsp_control.control.controller import Controller
+from hsp_control.law import MetricSample
+from hsp_control.robot import Robot, RobotState
+from hsp_control.simulation import Rollout, log_series
+from hsp_control.simulation.log_series import (
+    held_period,
+    logged_distances,
+    predicted_decay,
+)
+from hsp_control.simulation.log_writer import LogWriter, continuous_dofs
+from hsp_control.simulation.rollout import complete_columns
+from hsp_control.visualization import palette
+from hsp_control.visualization.viewer.analysis import (
+    from_the_start,
+    null_space_projector,
+)
+from hsp_control.visualization.viewer.commands import Json, PageCommand, set_plots
+from hsp_control.visualization.viewer.comparison import ComparedRun
+from hsp_control.visualization.viewer.packing import (
+    CLOCK_STEP,
+    ArrayTable,
+    distance_error,
+    keyframe_rows,
+    linear,
+)
+
+_COARSEST = 1.0
+"""Largest K_N times the time between two rows: else the rows miss what decays."""
+
+
+def expected_floor(rollout: Rollout, controller: Controller | None) -> Array | None:
+    """Return the expected floor of ‖e_N‖_W, shape (N,), to first order in the period.
+
+    The derivation is in ``docs/law.md``, *Sampled control*: an effort that is held for
+    h lags the law's by h/2 on average, so that
+
+        e_N' = -K_N e_N + h/2 P M⁻¹ τ'.
+
+    Its solution from e_N = 0 is the floor. The efforts are taken to change linearly
+    between two rows. None where the equation is not known or does not hold: without a
+    controller, a control period or a gain, with contacts or a floating base, if the law
+    changes during the run, or if the rows are too far apart.
+    """
+    period, gain = held_period(rollout), rollout.meta.get("null_space_gain")
+    if controller is None or period is None or gain is None or len(rollout) < 2:
+        return None
+    if not rollout.meta.get("controls_null_space", True):
+        return None
+    robot, K_N = controller.robot, np.asarray(gain, float)
+    if controller.contacts or robot.unactuated or controller.changes:
+        return None
+    if K_N.shape != (robot.nv, robot.nv) or rollout.tau.shape[1] != robot.nv:
+        return None
+    steps = np.diff(rollout.t)
+    if not 0.0 < np.linalg.norm(K_N, 2) * steps.max() <= _COARSEST:
+        return None
+    if np.linalg.cond(K_N) > 1e9 or not np.isfinite(rollout.tau).all():
+        return None
+    return _solve(rollout, from_the_start(controller), K_N, period)
+
+
+def _solve(
+    rollout: Rollout, controller: Controller, K_N: Array, period: float
+) -> Array:
+    """Integrate the error equation along the rows; return ‖e_N‖_W, shape (N,)."""
+    from scipy.linalg import expm  # here: SciPy takes long to import
+
+    nv = controller.robot.nv
+    state = RobotState(controller.robot)
+    metric = MetricSample.allocate(nv)
+    decays: dict[float, tuple[Array, Array]] = {}
+    error, floor = np.zeros(nv), np.zeros(len(rollout))
+    for row in range(len(rollout) - 1):
+        step = round(float(rollout.t[row + 1] - rollout.t[row]), 9)
+        if step not in decays:
+            decay = expm(-K_N * step)
+            rest = np.linalg.solve(K_N, np.eye(nv) - decay) / max(step, 1e-9)
+            decays[step] = decay, np.asarray(rest)
+        decay, rest = decays[step]
+        state.update(float(rollout.t[row]), rollout.q[row], rollout.v[row])
+        change = np.linalg.solve(
+            state.mass_matrix, rollout.tau[row + 1] - rollout.tau[row]
+        )
+        projector = null_space_projector(controller, state)
+        error = decay @ error + 0.5 * period * rest @ projector @ change
+        error = projector @ error  # the null space turns
+        metric = controller.metric.evaluate(state, metric)
+        floor[row + 1] = float(np.linalg.norm(metric.L.T @ error))
+    return floor
+
+
+_MAX_CURVES, _SELECTED = 14, 7
+"""Of more than 14 curves, only the 7 that vary most are shown."""
+
+
+class Series(NamedTuple):
+    """One curve."""
+
+    name: str  # its name in the legend
+    values: Array  # one per row of the log, (N,)
+    color: str  # its colour, ``#RRGGBB``
+    dashed: bool = False
+    # It is a prediction, not measured: the axis need not reach it.
+    predicted: bool = False
+    band: bool = False  # fill the plot below it
+
+
+class Edge(NamedTuple):
+    """A value that curves must not fall below, drawn as a line: contact."""
+
+    value: float  # the value, in the panel's unit
+    name: str  # its label; "" for zero, which needs none
+
+
+class Panel(NamedTuple):
+    """One plot over time."""
+
+    title: str
+    unit: str  # the unit of the curves
+    series: Sequence[Series]
+    logarithmic: bool = False  # whether its axis is logarithmic
+    edges: Sequence[Edge] = ()  # values that the axis includes and draws as lines
+    note: str = ""  # A remark beside the title, or ""
+
+
+def panels_of(rollout: Rollout, controller: Controller | None = None) -> list[Panel]:
+    """Return the plots of a log, without those whose columns it lacks."""
+    return list(_panels(rollout, controller))
+
+
+def _panels(rollout: Rollout, controller: Controller | None) -> Iterator[Panel]:
+    errors = [
+        Series(
+            f"{part.label} [{part.unit}]",
+            part.norm,
+            palette.task(part.task),
+            part.unit == "rad",
+        )
+        for part in log_series.task_errors(rollout)
+    ]
+    units = ", ".join(dict.fromkeys(p.unit for p in log_series.task_errors(rollout)))
+    if errors:
+        yield Panel("Task error ‖e‖", units, errors, logarithmic=True)
+    period = log_series.held_period(rollout)
+    yield Panel(
+        "Null-space error ‖e_N‖",
+        log_series.rate_unit(rollout),
+        list(_null_space(rollout, controller)),
+        logarithmic=True,
+        note=f"effort held for {1e3 * period:g} ms" if period else "",
+    )
+    watched = logged_distances(rollout)
+    if watched:
+        values = np.column_stack([each.values for each in watched])
+        curves, unit = _lines(values, [each.label for each in watched])
+        edges = dict.fromkeys(
+            Edge(each.edge, each.edge_name) for each in watched if each.edge is not None
+        )
+        yield Panel("Minimum distance", "m", curves, edges=list(edges))
+    joints = log_series.joint_names(rollout)
+    some = f"{_SELECTED} of {len(joints)}" if len(joints) > _MAX_CURVES else ""
+    positions, what = log_series.joint_positions(rollout)
+    curves, unit = _lines(positions, joints, log_series.position_units(rollout))
+    yield Panel(what.capitalize() + "s", unit, curves, note=some)
+    manipulability = Series("det(J W⁻¹ Jᵀ)", rollout["manipulability"], palette.TASK)
+    yield Panel(
+        "Manipulability",
+        log_series.column_unit(rollout, "manipulability"),
+        [manipulability],
+    )
+    name = str(rollout.meta.get("field", "field")).replace("_", " ")
+    value = Series(name, rollout["field.value"], palette.FIELD)
+    unit = log_series.column_unit(rollout, "field.value")
+    if np.ptp(value.values) > 0.0:
+        yield Panel("Value of the field", unit, [value])
+    curves, unit = _lines(rollout.tau, joints, log_series.effort_units(rollout))
+    yield Panel("Efforts τ", unit, curves, note=some)
+
+
+def _null_space(rollout: Rollout, controller: Controller | None) -> Iterator[Series]:
+    decay = predicted_decay(rollout)
+    for predicted, gain in zip((decay.slow, decay.fast), decay.gains, strict=True):
+        if predicted is not None:
+            yield Series(
+                f"predicted: exp(−{gain:g} t)",
+                predicted,
+                palette.INK,
+                dashed=True,
+                predicted=True,
+            )
+            if decay.fast is decay.slow:
+                break
+    yield Series("‖e_N‖", rollout["null_space_norm"], palette.FIELD)
+    floor = expected_floor(rollout, controller)
+    if floor is not None:
+        name = "held effort: expected floor"
+        yield Series(name, floor, palette.MUTED, predicted=True, band=True)
+
+
+def _lines(
+    values: Array, names: Sequence[str], units: Sequence[str] | None = None
+) -> tuple[list[Series], str]:
+    """Return one curve per column (of many, those that vary most), and units."""
+    count = len(names) if len(names) <= _MAX_CURVES else _SELECTED
+    order = np.argsort(-np.ptp(values, axis=0), kind="stable")[:count]
+    units = list(units or [""] * len(names))
+    kinds = list(dict.fromkeys(units[column] for column in sorted(order.tolist())))
+    mixed = len(kinds) > 1
+    curves = [
+        Series(
+            f"{names[column]} [{units[column]}]" if mixed else names[column],
+            values[:, column],
+            palette.series(place),
+            place >= len(palette.SERIES),
+        )
+        for place, column in enumerate(sorted(order.tolist()))
+    ]
+    return curves, ", ".join(kinds)
+
+
+CURVE_BOUND = 1 / 500  # maximum error of a curve, over the height of its plot
+_FLOOR, _TOP = 1e-17, 1e-6
+"""Values up to the floor are rounding errors; a logarithmic axis reaches the top."""
+
+
+class PlottedRun(NamedTuple):
+    """A run whose curves are plotted."""
+
+    name: str  # its name in the page's switch
+    rollout: Rollout
+    controller: Controller | None = None  # its controller: see `panels_of`
+
+
+class _Curve(NamedTuple):
+    """A curve of one of the runs."""
+
+    run: int  # the number of its run
+    times: Array  # its times [s], (N,)
+    series: Series
+
+
+def pack_panels(runs: Sequence[PlottedRun], arrays: ArrayTable) -> Json:
+    """Return plots of runs for ``plots.js``, one for each title and unit."""
+    panels: dict[tuple[str, str], Panel] = {}
+    curves: dict[tuple[str, str], list[_Curve]] = {}
+    for number, run in enumerate(runs):
+        for panel in panels_of(run.rollout, run.controller):
+            key = panel.title, panel.unit
+            both = dict.fromkeys((*panels.get(key, panel).edges, *panel.edges))
+            panels[key] = panels.get(key, panel)._replace(edges=list(both))
+            known = curves.setdefault(key, [])
+            colors = {curve.series.name: curve.series.color for curve in known}
+            known += [
+                _Curve(
+                    number,
+                    run.rollout.t,
+                    each._replace(color=colors.get(each.name, each.color)),
+                )
+                for each in panel.series
+            ]
+    return {
+        "runs": [run.name for run in runs],
+        "start": min(float(run.rollout.t[0]) for run in runs),
+        "end": max(float(run.rollout.t[-1]) for run in runs),
+        "damped": [_damped(run.rollout) for run in runs],
+        "panels": [_packed(panels[key], curves[key], arrays) for key in panels],
+        "colors": {
+            "ink": palette.INK,
+            "muted": palette.MUTED,
+            "grid": palette.GRID,
+            "contact": palette.OBSTACLE,
+            "warning": palette.WARNING,
+        },
+    }
+
+
+def _damped(rollout: Rollout) -> list[list[float]]:
+    """Return the first and the last time of every damped part of a run [s]."""
+    damped = np.concatenate([[False], rollout["damped"] > 0.0, [False]])
+    edges = np.flatnonzero(np.diff(damped)).reshape(-1, 2)
+    times = rollout.t
+    return [[float(times[first]), float(times[stop - 1])] for first, stop in edges]
+
+
+def _packed(panel: Panel, curves: Sequence[_Curve], arrays: ArrayTable) -> Json:
+    measured = [c.series.values for c in curves if not c.series.predicted]
+    low, high = _range(panel, np.concatenate(measured))
+    span = high - low
+    bound = CURVE_BOUND * span
+    step = bound / 8.0
+    packed = []
+    for run, times, series in curves:
+        shown = np.asarray(series.values, float)
+        if panel.logarithmic:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                shown = np.log10(shown)
+        # All values outside the axis are clipped to one height beyond its end.
+        shown = np.nan_to_num(shown, nan=low - span).clip(low - span, high + span)
+        shown = shown[:, None]
+        rounded = step * np.rint(shown / step)
+        keys = keyframe_rows(times, shown, rounded, linear, distance_error(bound))
+        packed.append(
+            {
+                "name": series.name,
+                "run": run,
+                "color": series.color,
+                "dashed": series.dashed,
+                "band": series.band,
+                "predicted": series.predicted,
+                "times": arrays.numbers(times[keys], CLOCK_STEP, np.float64),
+                "values": arrays.numbers(rounded[keys], step),
+            }
+        )
+    return {
+        "title": panel.title,
+        "unit": panel.unit,
+        "note": panel.note,
+        "logarithmic": panel.logarithmic,
+        "edges": [edge._asdict() for edge in panel.edges],
+        "low": low,
+        "high": high,
+        "series": packed,
+    }
+
+
+def _range(panel: Panel, values: Array) -> tuple[float, float]:
+    """Return the limits of the axis; as powers of ten if it is logarithmic."""
+    shown = values[np.isfinite(values)]
+    if panel.logarithmic:
+        shown = shown[shown > _FLOOR]
+        high = max(float(shown.max(initial=_TOP)), _TOP)
+        # A norm that crosses zero has dips at single rows; the axis ignores them.
+        low = float(np.quantile(shown, 0.005)) if shown.size else high
+        return float(np.log10(0.4 * low)), float(np.log10(3.0 * high))
+    low, high = float(shown.min(initial=np.inf)), float(shown.max(initial=-np.inf))
+    if not low <= high:
+        return 0.0, 1.0
+    for edge in panel.edges:
+        low, high = min(low, edge.value), max(high, edge.value)
+    room = 0.06 * (high - low) or max(0.05 * abs(low), 0.5)
+    return low - room, high + room
+
+
+PREVIEW_ROWS = 500  # about so many rows of a run that is being computed are plotted
+
+
+def plots_of(runs: Sequence[ComparedRun]) -> PageCommand:
+    """Return the command that shows the plots of complete runs."""
+    return _command(runs, None)
+
+
+def plots_so_far(
+    recorder: LogWriter, meta: Json, robot: Robot, duration: float
+) -> PageCommand:
+    """Return the command that plots a run so far, on the whole run's axis."""
+    rows = recorder.rows(0)
+    chosen = _chosen(len(rows["t"]))
+    columns = {name: values[chosen] for name, values in rows.items()}  # copies
+    complete_columns(columns, continuous_dofs(robot))
+    # Without the controller: the expected floor takes too long to compute meanwhile.
+    return _command([ComparedRun("", robot, Rollout(columns, meta), None)], duration)
+
+
+def _command(runs: Sequence[ComparedRun], end: float | None) -> PageCommand:
+    arrays = ArrayTable()
+    plotted = [PlottedRun(run.name, run.rollout, run.controller) for run in runs]
+    plots = pack_panels(plotted, arrays)
+    if end is not None:
+        plots["end"] = max(end, plots["end"])
+    return set_plots(plots, arrays.entries)
+
+
+def _chosen(count: int) -> Indices:
+    """Return rows at distances of a power of two, so that curves don't flicker."""
+    step = 1
+    while count > step * PREVIEW_ROWS:
+        step *= 2
+    return np.append(np.arange(0, count - 1, step), count - 1)
