@@ -19,7 +19,7 @@ from hsp_control.control.first_state import warn_of_jump, warn_of_slow_efforts
 from hsp_control.inspection.inspect import too_weak
 from hsp_control.robot import Robot
 from hsp_control.robot.description.inertias import impossible_inertias
-from hsp_control.robot.description.urdf_checks import read_urdf
+from hsp_control.robot.description.urdf import read_urdf
 from hsp_control.simulation.reach_check import out_of_reach
 from hsp_control.simulation.start_search import posture_search
 

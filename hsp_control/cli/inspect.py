@@ -13,7 +13,7 @@ from hsp_control.common.exceptions import ModelError
 from hsp_control.inspection import Inspection
 from hsp_control.inspection import inspect as inspect_robot
 from hsp_control.robot import RobotDescription
-from hsp_control.robot.description.repaired import write_repaired
+from hsp_control.robot.description.urdf import write_repaired
 
 _WIDTH = 80
 _SHOWN = 12

@@ -6,3 +6,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Flags = NDArray[np.bool_]
+
+
+def matrix_view(matrix: Array) -> Array:
+    """Return a matrix of Pinocchio's as a view of two dimensions, also if nv = 1."""
+    return matrix.reshape(-1, 1) if matrix.ndim == 1 else matrix

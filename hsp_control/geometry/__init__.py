@@ -3,10 +3,10 @@
 from .links import LinkShape as LinkShape
 from .links import Proxy as Proxy
 from .links import link_shapes as link_shapes
+from .links import self_pairs as self_pairs
 from .proximity import Proximity as Proximity
 from .scene import Obstacle as Obstacle
 from .scene import Scene as Scene
-from .self_pairs import self_pairs as self_pairs
 from .shapes import Box as Box
 from .shapes import Capsule as Capsule
 from .shapes import Cylinder as Cylinder

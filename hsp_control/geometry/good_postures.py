@@ -13,10 +13,9 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ConfigurationError, ModelError
-from hsp_control.geometry.links import link_shapes
+from hsp_control.geometry.links import link_shapes, self_pairs
 from hsp_control.geometry.proximity import Proximity
 from hsp_control.geometry.scene import Obstacle
-from hsp_control.geometry.self_pairs import self_pairs
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.inverse_kinematics import Reached, Target, reach
 

@@ -1,7 +1,7 @@
-"""Shapes of the robot's links for distances: capsules or its collision geometry."""
+"""Shapes of the robot's links for distances, and which of their pairs can collide."""
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 from weakref import WeakKeyDictionary, WeakSet
@@ -14,18 +14,18 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ModelError
 from hsp_control.common.suggestions import listing
-from hsp_control.geometry.capsule_fit import (
-    body_geometry,
+from hsp_control.geometry.enclosing import (
+    convex_hull,
     enclosing_capsule,
     enclosing_ellipsoid_capsule,
+    hull_corners,
 )
-from hsp_control.geometry.hulls import convex_hull, hull_corners
 from hsp_control.robot import Robot
 from hsp_control.robot.description import mesh_files
-from hsp_control.robot.description.combining import Part
-from hsp_control.robot.description.loading import parser_text
-from hsp_control.robot.description.sources import RobotSource
-from hsp_control.robot.description.urdf_checks import read_urdf
+from hsp_control.robot.description.access import XmlError, read_xml
+from hsp_control.robot.description.loading import RobotPart
+from hsp_control.robot.description.sources import BodyShape, RobotSource
+from hsp_control.robot.description.urdf import parser_text, read_urdf
 
 Proxy = Literal["capsules", "spheres", "hulls", "meshes"]
 
@@ -97,13 +97,13 @@ def _shapes_of(robot: Robot, proxy: Proxy) -> list[LinkShape]:
     return [sphere for capsule in capsules for sphere in _spheres_along(capsule)]
 
 
-def part_of(robot: Robot, name: str) -> Part:
+def part_of(robot: Robot, name: str) -> RobotPart:
     """Return the part of a combined robot that a joint or link name belongs to."""
     parts = [part for part in robot.parts if name.startswith(part.prefix)]
     return max(parts, key=lambda part: len(part.prefix))
 
 
-def _collision_shapes(robot: Robot, part: Part) -> list[LinkShape]:
+def _collision_shapes(robot: Robot, part: RobotPart) -> list[LinkShape]:
     """Return the collision geometry of a part, fixed to the joints of the robot."""
     if part.source.shapes is None:
         return _shapes_of_urdf(robot, part)
@@ -113,12 +113,35 @@ def _collision_shapes(robot: Robot, part: Part) -> list[LinkShape]:
             name = part.prefix + shape.body
             frame = robot.model.frames[robot.frame_id(name)]
             place = frame.placement * pin.SE3(shape.pose)
-            geometry = body_geometry(shape)
+            geometry = _body_geometry(shape)
             shapes.append(LinkShape(name, frame.parentJoint, place, geometry))
     return shapes
 
 
-def _shapes_of_urdf(robot: Robot, part: Part) -> list[LinkShape]:
+def _body_geometry(shape: BodyShape) -> Any:
+    """Return Coal's geometry; of a mesh its convex hull, or a flat mesh as it is."""
+    match shape.kind:
+        case "box":
+            return coal.Box(*shape.size)
+        case "sphere":
+            return coal.Sphere(*shape.size)
+        case "capsule":
+            return coal.Capsule(*shape.size)
+        case "cylinder":
+            return coal.Cylinder(*shape.size)
+        case "ellipsoid":
+            return coal.Ellipsoid(*shape.size)
+    assert shape.mesh is not None
+    vertices, triangles = shape.mesh
+    mesh = coal.BVHModelOBBRSS()
+    mesh.beginModel(len(triangles), len(vertices))
+    for triangle in vertices[triangles]:
+        mesh.addTriangle(*triangle)
+    mesh.endModel()
+    return convex_hull(mesh) or mesh
+
+
+def _shapes_of_urdf(robot: Robot, part: RobotPart) -> list[LinkShape]:
     """Return the URDF's collision geometry, fixed to the joints of the robot.
 
     The robot may have fewer joints than the URDF, since joints can be locked. So the
@@ -178,7 +201,7 @@ def _locate_meshes(xml: Element, source: RobotSource) -> dict[str, str]:
 
 
 def _report_missing(
-    robot: Robot, part: Part, missing: Mapping[str, str], left: int
+    robot: Robot, part: RobotPart, missing: Mapping[str, str], left: int
 ) -> None:
     """Warn of meshes that do not exist, once for each robot."""
     name = next(iter(missing.values()))
@@ -204,7 +227,7 @@ def _finite(geometry: Any) -> bool:
     return bool(np.isfinite(np.array(geometry.vertices())).all())
 
 
-def _between_joints(robot: Robot, part: Part) -> list[LinkShape]:
+def _between_joints(robot: Robot, part: RobotPart) -> list[LinkShape]:
     """Return capsules between the joints, and a sphere at each last joint."""
     model = robot.model
     joints = [
@@ -343,3 +366,55 @@ def _placement_along(first: Array, second: Array) -> tuple[pin.SE3, float]:
 
 def _replaced(shape: LinkShape, geometry: Any) -> LinkShape:
     return LinkShape(shape.link, shape.joint, shape.placement, geometry)
+
+
+# --- pairs of them that can collide ---------------------------------------------------
+
+
+def self_pairs(robot: Robot, links: Sequence[LinkShape]) -> list[tuple[int, int]]:
+    """Return the pairs of link shapes that can collide, as indices into ``links``.
+
+    Neighbours, which always touch, and pairs that the SRDF or MJCF disables are none.
+    """
+    disabled = _disabled(robot)
+    parents = list(robot.model.parents)
+    pairs = []
+    for i, first in enumerate(links):
+        for j in range(i + 1, len(links)):
+            second = links[j]
+            a, b = first.joint, second.joint
+            if a == b or _neighbours(robot, first, second, parents):
+                continue
+            if frozenset((first.link, second.link)) in disabled:
+                continue
+            pairs.append((i, j))
+    return pairs
+
+
+def _neighbours(
+    robot: Robot, first: LinkShape, second: LinkShape, parents: Sequence[int]
+) -> bool:
+    """Return whether a link's joint is the parent of the other's, in one part."""
+    a, b = first.joint, second.joint
+    if parents[a] != b and parents[b] != a:
+        return False
+    return min(a, b) > 0 or part_of(robot, first.link) is part_of(robot, second.link)
+
+
+def _disabled(robot: Robot) -> set[frozenset[str]]:
+    disabled = set()
+    for part in robot.parts:
+        for pair in part.source.excluded:
+            disabled.add(frozenset(part.prefix + link for link in pair))
+        if part.source.srdf is None:
+            continue
+        try:
+            srdf = read_xml(part.source.srdf)
+        except XmlError as error:
+            raise ModelError(error.within(part.source.srdf)) from None
+        except OSError as error:
+            raise ModelError(f"{part.source.srdf}: {error.strerror}") from error
+        for element in srdf.iter("disable_collisions"):
+            links = (element.get("link1", ""), element.get("link2", ""))
+            disabled.add(frozenset(part.prefix + link for link in links))
+    return disabled

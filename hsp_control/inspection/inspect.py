@@ -22,7 +22,7 @@ from hsp_control.robot.description.mesh_files import (
     where_to_put,
 )
 from hsp_control.robot.description.sources import RobotSource
-from hsp_control.robot.description.urdf_checks import parse_urdf, problems
+from hsp_control.robot.description.urdf import parse_urdf, problems
 
 Severity = Literal["error", "warning", "note"]
 """Of an error, the robot does not load; of a warning, something does not work well; a

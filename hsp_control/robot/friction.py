@@ -10,7 +10,6 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import Weights
-from hsp_control.robot.per_joint import per_dof
 from hsp_control.robot.robot import Robot
 
 
@@ -34,9 +33,9 @@ class JointFriction:
         """Return friction from one number for all joints, or nv numbers."""
         given = Friction(coulomb, viscous)
         with within("coulomb"):
-            dry = per_dof(robot, given.coulomb)
+            dry = robot.per_dof(given.coulomb)
         with within("viscous"):
-            return cls(dry, per_dof(robot, given.viscous))
+            return cls(dry, robot.per_dof(given.viscous))
 
     @classmethod
     def of_model(cls, robot: Robot) -> Self:

@@ -18,9 +18,8 @@ from hsp_control.common.native import NativeCall, are_native, bind
 from hsp_control.common.step_plan import in_order
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Positive
-from hsp_control.robot.acceleration import Acceleration
+from hsp_control.robot.motion import Acceleration, number_of_steps
 from hsp_control.robot.robot import Robot
-from hsp_control.robot.step_count import number_of_steps
 
 Dynamics = Callable[[float, Array, Array], Array]
 """(t, q, v) ↦ v'."""

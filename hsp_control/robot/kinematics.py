@@ -7,11 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.arrays import Array, Indices, matrix_view
 from hsp_control.common.exceptions import ModelError
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind, once
-from hsp_control.robot.matrix_view import matrix_view
 from hsp_control.robot.pinocchio_calls import bind_pinocchio
 
 

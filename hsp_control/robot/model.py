@@ -1,36 +1,29 @@
-"""The robot's model: loaded, taken from a scene, or combined."""
+"""A robot's model: configurations, names, and dynamics, whatever it was loaded from."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cached_property
-from pathlib import Path
-from typing import Any, Self
+from math import atan2
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from hsp_control.common.arrays import Array
+from hsp_control.common.arrays import Array, Flags, Indices
 from hsp_control.common.exceptions import (
+    ConfigurationError,
     FrameNotFoundError,
     JointNotFoundError,
     ModelError,
+    NonFiniteError,
+    ShapeError,
+    SimulationError,
 )
+from hsp_control.common.kernels import kernel
 from hsp_control.common.native import NativeCall
 from hsp_control.common.suggestions import did_you_mean, listing
-from hsp_control.declaration import within
-from hsp_control.robot.acceleration import Acceleration
-from hsp_control.robot.configuration_space import ConfigurationSpace
-from hsp_control.robot.description.access import ANYWHERE, Access
-from hsp_control.robot.description.combining import Part, combine, placement
-from hsp_control.robot.description.loading import (
-    end_effector_frame,
-    load_model,
-    reference_posture,
-)
-from hsp_control.robot.description.mujoco.selection import select
-from hsp_control.robot.description.mujoco.source import load_mjcf, load_selection
-from hsp_control.robot.description.robot_description import RobotDescription, ToolFrame
-from hsp_control.robot.description.sources import RobotSource, Root
+from hsp_control.robot.description.loading import moving_joints
+from hsp_control.robot.motion import Acceleration
 from hsp_control.robot.pinocchio_calls import bind_pinocchio
 
 _ARM_RATE, _LEG_RATE = 11.0, 500.0
@@ -40,34 +33,51 @@ _LIMB = 4
 """Fewest joints of an arm or a leg; heads and fingers have fewer."""
 
 
-class RobotModel(ConfigurationSpace):
+class RobotModel:
     """A robot's model: its joints, frames, limits and dynamics.
 
     Configurations q have shape (nq,). Velocities, accelerations, efforts, gradients
-    and errors are tangent vectors of shape (nv,). Nothing assumes nq = nv. A robot does
+    and errors are tangent vectors of shape (nv,). Nothing assumes nq = nv. A model does
     not change after it has been built, and it contains no meshes.
 
     Attributes:
-        source: Where it was loaded from.
-        description: What `load` was given; None for a robot made otherwise.
-        parts: The robots that it consists of: itself only, unless it was combined.
+        name: The robot's name, for messages.
+        model: The Pinocchio model.
+        nq: Size of a configuration.
+        nv: Size of a velocity: the number of degrees of freedom.
+        joints: Pinocchio's models of the joints with degrees of freedom, by name, in
+            the order of v.
+        joint_names: Their names.
         frame_names: Names of all frames.
+        dof_names: A name for each degree of freedom: that of its joint, or
+            ``root_joint.x`` if the joint has several, ``neck.roll`` if it is a ball.
+        units: The unit of each degree of freedom, ``rad`` or ``m``.
+        single_dof_joints: (index in v, start in q, size in q) of every joint with one
+            degree of freedom, shape (k, 3); the size is 2 for continuous joints.
+        unit_blocks: (start, size) of every quaternion and (cos, sin) pair in q.
+        flat: Whether every joint has one degree of freedom, so that δ' = v holds
+            globally for q = base ⊕ δ.
+        linear: Whether moreover q is a vector, so that q = base + δ.
+        mimics: Whether some joints mimic others.
+        unactuated: Indices in v that have no motor: those of a free-flyer root.
+        dof_indices: Index in q of each degree of freedom's coordinate, shape (nv,); -1
+            if it has none of its own (roots, continuous joints).
     """
 
     def __init__(
-        self,
-        model: pin.Model,
-        source: RobotSource,
-        parts: Sequence[Part] = (),
-        description: RobotDescription | None = None,
+        self, model: pin.Model, name: str, home: Sequence[float] | None = None
     ) -> None:
-        """Wrap a Pinocchio model; `Robot.load` is the usual way to create a robot."""
-        super().__init__(
-            model, source.name, source.home or reference_posture(model, source)
-        )
-        self.source = source
-        self.description = description
-        self.parts = tuple(parts) or (Part("", source, pin.SE3.Identity()),)
+        """Wrap a Pinocchio model.
+
+        ``home`` is the displacement from neutral (nv,) of the home posture, ignored if
+        it has another size.
+        """
+        self.model = model
+        self.name = name
+        self.nq: int = model.nq
+        self.nv: int = model.nv
+        self.joints = moving_joints(model)
+        self.joint_names: tuple[str, ...] = tuple(self.joints)
         self.frame_names: tuple[str, ...] = tuple(f.name for f in model.frames)
         # If a joint and a link have the same name, it means the link's frame.
         links = {f.name for f in model.frames if f.type == pin.FrameType.BODY}
@@ -76,284 +86,208 @@ class RobotModel(ConfigurationSpace):
             for i, frame in enumerate(model.frames)
             if frame.type == pin.FrameType.BODY or frame.name not in links
         }
+        joints = self.joints.values()
+        dofs = [
+            (joint, f"{name}.{label}" if label else name, label)
+            for name, joint in self.joints.items()
+            for label in _dof_labels(joint)
+        ]
+        self.dof_names: tuple[str, ...] = tuple(name for _, name, _ in dofs)
+        self.units: tuple[str, ...] = tuple(
+            "m" if label in ("x", "y", "z") or (not label and _slides(joint)) else "rad"
+            for joint, _, label in dofs
+        )
+        self.single_dof_joints: Indices = np.array(
+            [(j.idx_v, j.idx_q, j.nq) for j in joints if j.nv == 1], dtype=np.int64
+        ).reshape(-1, 3)
+        self.unit_blocks: tuple[tuple[int, int], ...] = tuple(
+            _unit_block(joint) for joint in joints if joint.nq == joint.nv + 1
+        )
+        self.flat: bool = all(joint.nv == 1 for joint in joints)
+        self.linear: bool = self.flat and self.nq == self.nv
+        self.mimics: bool = model.nvExtended != model.nv
+        self.unactuated: tuple[int, ...] = tuple(
+            joint.idx_v + k for joint in joints if _floats(joint) for k in range(6)
+        )
+        self.dof_indices: Indices = np.full(self.nv, -1, dtype=np.int64)
+        for joint in joints:
+            if joint.nq == joint.nv == 1:
+                self.dof_indices[joint.idx_v] = joint.idx_q
+        self._home: Array | None = None
+        if home is not None and len(home) == self.nv:
+            # some SRDFs give postures beyond the limits
+            self._home = np.clip(np.array(home), *self.position_limits())
         self._data = model.createData()
 
-    @classmethod
-    def load(
-        cls,
-        name: str | Path | RobotDescription,
-        *,
-        root: Root | None = None,
-        locked: Mapping[str, float] | None = None,
-        tool_frames: Mapping[str, ToolFrame] | None = None,
-        gravity: ArrayLike | None = None,
-        mimic: bool = True,
-        project_inertias: bool = False,
-        xacro_args: Mapping[str, str | bool | float] | None = None,
-        access: Access = ANYWHERE,
-    ) -> Self:
-        """Load a bundled robot, one of an installed package, or a URDF or xacro file.
+    # -- configurations ---------------------------------------------------------------
 
-        Args:
-            name: For example ``"panda"``, ``"talos_arm"``, ``"gen3_description"`` or
-                ``"my_arm/arm.urdf"``; or a whole description, and then nothing else.
-            root: How its base is attached to the world: ``fixed``, ``planar``
-                (x, y, yaw) or ``free_flyer``. None: as its source says; ``fixed`` for a
-                file.
-            locked: Joints to lock, name to value [rad or m]. None: as its source says
-                (the bundled Panda locks its fingers); ``{}``: none.
-            tool_frames: Frames to add, by name.
-            gravity: Acceleration of gravity in the world [m/s²], shape (3,). None:
-                -9.81 along z.
-            mimic: Whether ``<mimic>`` joints follow their leader. False: they are
-                independent joints.
-            project_inertias: Whether inertias that no body can have are replaced by the
-                nearest that one can have; mass and centre of mass stay.
-            xacro_args: Arguments of a xacro file, by name.
-            access: Which files may be read: a URDF given by path, and the meshes that
-                it names. Use `access.only_within` for untrusted files.
+    def neutral(self) -> Array:
+        """Return the configuration with all joints at zero, shape (nq,)."""
+        return np.asarray(pin.neutral(self.model))
 
-        Raises:
-            RobotNotFoundError: If there is no such robot.
-            AccessError: If a file is not allowed.
-            ModelError: If an option is wrong or does not fit the model, the URDF is
-                invalid, or the mass matrix is singular.
-            JointNotFoundError: If a joint to lock does not exist.
-            FrameNotFoundError: If a tool frame's parent does not exist.
+    def home(self) -> Array:
+        """Return the home posture of the robot's source, shape (nq,).
+
+        If the source has none, it is the neutral configuration, with joints whose
+        limits do not contain zero in the middle of their limits.
         """
-        if not isinstance(name, RobotDescription):
-            name = RobotDescription(
-                name,
-                root=root,
-                locked=locked,
-                tool_frames=tool_frames or {},
-                gravity=gravity,
-                mimic=mimic,
-                project_inertias=project_inertias,
-                xacro_args=xacro_args or {},
-            )
-        elif (
-            not mimic
-            or project_inertias
-            or any(
-                option is not None
-                for option in (root, locked, tool_frames, gravity, xacro_args)
-            )
-        ):
-            raise ModelError(
-                "a RobotDescription says all about the robot: give root, locked, "
-                "tool_frames, gravity, mimic, project_inertias and xacro_args in it"
-            )
-        return cls._described(name, access)
-
-    @classmethod
-    def from_mujoco(
-        cls,
-        model: Any,
-        root: str | None = None,
-        joints: Sequence[str] | None = None,
-        *,
-        qpos: ArrayLike | None = None,
-        keyframe: str | None = None,
-        locked: Mapping[str, float] | None = None,
-        tool_frames: Mapping[str, ToolFrame] | None = None,
-    ) -> Self:
-        """Return a robot in a compiled MuJoCo model: with the numbers MuJoCo uses.
-
-        Bodies and sites are its frames, under their names. Bodies that are not below
-        the root are no part of it; those above the root stand still. What MuJoCo has
-        and the robot lacks, such as a closed loop, is in `source.omitted`, and logged
-        once as a warning. `MujocoCoordinates` converts states.
-
-        Args:
-            model: The scene, a ``mujoco.MjModel``.
-            root: Name of the body whose subtree is the robot, with the body's own
-                joints; None: the whole scene.
-            joints: Names of its joints that move; None: all. The others are locked.
-                q and v have MuJoCo's order, whatever the order here.
-            qpos: The scene's configuration, shape (model.nq,), in which the other
-                joints are locked and the robot is at home; None: ``model.qpos0``, but
-                then the home of a joint that is not within its limits there is in
-                their middle.
-            keyframe: The name of that configuration in the model, instead.
-            locked: Hinges and slides to lock elsewhere, name to value [rad or m].
-            tool_frames: Frames to add, by name.
-
-        Raises:
-            ModelError: If MuJoCo is not installed, the configuration is not one of the
-                scene, no joint moves, or the mass matrix is singular.
-            FrameNotFoundError: If the root or a tool frame's parent does not exist.
-            JointNotFoundError: If a joint does not exist or is not below the root.
-        """
-        selection = select(model, root, joints, qpos, keyframe, locked)
-        return cls(*load_selection(selection, tool_frames or {}))
-
-    @classmethod
-    def _described(cls, description: RobotDescription, access: Access) -> Self:
-        """Return the robot of a description."""
-        gravity = description.gravity
-        if description.mjcf is not None:
-            return cls(*load_mjcf(description, access), description=description)
-        if description.parts is None:
-            source = description.find(access)
-            model = load_model(source, description, gravity)
-            return cls(model, source, description=description)
-        robots = {}
-        for name, part in description.parts.items():
-            with within("parts", name, "name" if part.name else "description"):
-                source = part.find(access)
-                robot = cls(load_model(source, part, gravity), source)
-            robots[name] = robot, placement(part.position, part.rotation)
-        with within("parts"):
-            whole = cls.combine(robots)
-        whole.description = description
-        return whole
-
-    @classmethod
-    def combine(cls, robots: Mapping[str, tuple["RobotModel", pin.SE3]]) -> Self:
-        """Return one robot that consists of several robots in one workspace.
-
-        Args:
-            robots: For each name a robot and the placement of its root in the world.
-                Joints and frames are renamed to ``<name>_<own name>``.
-
-        Raises:
-            ModelError: If there are fewer than two robots, one is already combined,
-                their gravity differs, or one has mimic joints.
-        """
-        parts = [
-            (Part(f"{name}_", robot.source, place), robot.model)
-            for name, (robot, place) in robots.items()
-        ]
-        model = combine(parts)
-        homes = [robot.joint_positions(robot.home()) for robot, _ in robots.values()]
-        source = RobotSource(
-            name="+".join(part.source.name for part, _ in parts),
-            urdf=parts[0][0].source.urdf,
-            origin="combined",
-            home=tuple(float(x) for home in homes for x in home),
-        )
-        return cls(model, source, [part for part, _ in parts])
-
-    def __repr__(self) -> str:
-        return f"Robot({self.name!r}, nq={self.nq}, nv={self.nv})"
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        if self.mimics:
-            # A restored model would crash the process: Pinocchio's archives omit what
-            # mimic joints refer to (seen with 4.1).
-            raise ModelError(
-                f"{self.name}: a robot with mimic joints cannot be pickled; "
-                "load it in each process, or with mimic=False"
-            )
-        own = self.model, self.source, self.parts, self.description
-        return (type(self), own)
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        return type(self)(self.model.copy(), self.source, self.parts, self.description)
-
-    @property
-    def joint_coordinates(self) -> Array | None:
-        """The matrix A of the coordinates theta = A q in the literature, or None.
-
-        Shape (nv, nv). For the planar arm, theta are the absolute angles of its links,
-        measured from the horizontal.
-        """
-        if self.source.joint_coordinates != "absolute":
-            return None
-        return np.tril(np.ones((self.nv, self.nv)))
-
-    @property
-    def end_effector(self) -> str:
-        """The frame of the hand: as the source says, or else `end_effector_frame`."""
-        named = self.source.end_effector
-        if named is not None and named in self._frame_ids:
-            return named
-        return end_effector_frame(self.model)
-
-    @cached_property
-    def size(self) -> float:
-        """Length of the longest chain from the first joint to a frame [m].
-
-        It is the sum of the distances between the origins of consecutive joints, and of
-        the ranges of prismatic ones: an arm reaches no farther from its first joint.
-        """
-        model, lengths = self.model, np.zeros(self.model.njoints)
+        if self._home is not None:
+            return self.integrate(self.neutral(), self._home)
         lower, upper = self.position_limits()
-        for joint in range(1, model.njoints):
-            parent = model.parents[joint]
-            if parent > 0:
-                away = np.linalg.norm(model.jointPlacements[joint].translation)
-                lengths[joint] = lengths[parent] + away
-            moved = model.joints[joint]
-            if moved.nv == 1 and self.units[moved.idx_v] == "m":
-                slid = (upper - lower)[moved.idx_v]
-                lengths[joint] += slid if np.isfinite(slid) else 0.0
-        longest = lengths.max()
-        for frame in model.frames:
-            if frame.parentJoint > 0:
-                away = np.linalg.norm(frame.placement.translation)
-                longest = max(longest, lengths[frame.parentJoint] + away)
-        return float(longest)
+        bounded = np.isfinite(lower) & np.isfinite(upper)
+        middle = np.zeros(self.nv)
+        middle[bounded] = 0.5 * (lower[bounded] + upper[bounded])
+        inside = (lower < 0.0) & (upper > 0.0)
+        middle[inside] = 0.0
+        return self.integrate(self.neutral(), middle)
 
-    @property
-    def effort_rate(self) -> Array:
-        """Maximum rate of the efforts, shape (nv,) [N·m/s or N/s]; inf for none.
+    def random_configuration(self, rng: np.random.Generator) -> Array:
+        """Return a random configuration, shape (nq,).
 
-        No URDF has one. It is 11 times the largest maximum effort each second, for all
-        joints of the same unit, a little less than a Panda may at 87 N·m: a light wrist
-        has to answer a push as quickly as a shoulder. It is 500 times where legs meet
-        the ground.
+        Joints are uniform within their limits, or in ±π if they have none. A free-flyer
+        root is uniform in a box of ±1 m, with a uniform orientation.
         """
-        effort = np.array(self.model.effortLimit)
-        effort[(effort <= 0.0) | (effort >= np.finfo(np.float32).max)] = np.inf
-        effort[list(self.unactuated)] = np.inf
-        rate = np.full(self.nv, np.inf)
-        for unit in set(self.units):
-            alike = np.isfinite(effort) & (np.array(self.units) == unit)
-            rate[alike] = effort[alike].max(initial=0.0)
-        return (_LEG_RATE if self.unactuated else _ARM_RATE) * rate
+        lower, upper = self.position_limits()
+        bounded = np.isfinite(lower) & np.isfinite(upper)
+        low = np.where(bounded, lower, -np.pi)
+        high = np.where(bounded, upper, np.pi)
+        q = self.integrate(self.neutral(), rng.uniform(low, high))
+        for joint in filter(_floats, self.joints.values()):
+            turn, i = rng.standard_normal(4), joint.idx_q
+            q[i : i + 3] = rng.uniform(-1.0, 1.0, 3)
+            q[i + 3 : i + 7] = turn / np.linalg.norm(turn)
+        return q
 
-    @cached_property
-    def spring_force(self) -> tuple[float, float]:
-        """The largest force and moment of springs by default [N, N·m]; inf for none.
+    def integrate(self, q: Any, displacement: Any) -> Array:
+        """Return q ⊕ displacement, shape (nq,), for shapes (nq,) and (nv,).
 
-        The force is what the strongest motor holds at half of `size`, the moment half
-        of that motor's effort. Only motors that slide count as they are.
+        Raises:
+            ShapeError: If the arguments are not nq and nv numbers.
         """
-        effort = np.array(self.model.effortLimit)
-        effort[(effort <= 0.0) | (effort >= np.finfo(np.float32).max)] = np.inf
-        effort[list(self.unactuated)] = np.inf
-        turns = np.array(self.units) == "rad"
-        found = effort[turns & np.isfinite(effort)]
-        if found.size and self.size > 0.0:
-            strongest = float(found.max())
-            return strongest / (0.5 * self.size), 0.5 * strongest
-        found = effort[~turns & np.isfinite(effort)]
-        return (float(found.max()) if found.size else np.inf), np.inf
+        try:
+            return np.asarray(pin.integrate(self.model, q, displacement))
+        except (TypeError, ValueError):  # lists are converted, wrong shapes reported
+            q = self.check_configuration(q)
+            displacement = self.check_tangent(displacement, "displacement")
+            return np.asarray(pin.integrate(self.model, q, displacement))
 
-    @cached_property
-    def largest_inertias(self) -> Array:
-        """Largest M_ii in any posture, nearly, shape (nv,) [kg·m² or kg].
+    def difference(self, start: Any, end: Any) -> Array:
+        """Return end ⊖ start: the displacement from start to end, shape (nv,).
 
-        It is the largest of home and 64 postures, drawn once and for all.
+        Raises:
+            ShapeError: If the arguments are not nq numbers each.
         """
-        rng, largest = np.random.default_rng(0), np.zeros(self.nv)
-        q = self.home()
-        for _ in range(65):
-            self._data.M[:] = 0.0
-            largest = np.maximum(largest, np.diag(pin.crba(self.model, self._data, q)))
-            turned = rng.uniform(-np.pi, np.pi, self.nv)
-            q = pin.integrate(self.model, self.neutral(), turned)
-        return largest
+        try:
+            return np.asarray(pin.difference(self.model, start, end))
+        except (TypeError, ValueError):
+            start, end = self.check_configuration(start), self.check_configuration(end)
+            return np.asarray(pin.difference(self.model, start, end))
 
-    @cached_property
-    def typical_inertia(self) -> float:
-        """Geometric mean of the joints' largest inertias [kg·m²], nearly."""
-        joints = np.setdiff1d(np.arange(self.nv), self.unactuated)
-        inertias = self.largest_inertias[joints]
-        inertias = inertias[inertias > 0.0]
-        return float(np.exp(np.log(inertias).mean())) if inertias.size else 1.0
+    def joint_positions(self, q: Array) -> Array:
+        """Return q ⊖ neutral: the joint positions [rad or m], shape (nv,).
+
+        Continuous joints have angles in (-π, π].
+        """
+        if self.linear:  # then neutral is 0
+            return q.copy()
+        return self.difference(self.neutral(), q)
+
+    def position_limits(self) -> tuple[Array, Array]:
+        """Return lower and upper joint position limits, shape (nv,) [rad or m].
+
+        They are ±inf where there is no limit: for continuous joints and the root,
+        whatever the model says, and for a joint whose two limits are equal, which
+        means that its URDF gives none.
+        """
+        lower = np.full(self.nv, -np.inf)
+        upper = np.full(self.nv, np.inf)
+        for joint in self.joints.values():
+            if joint.nq == 1 and joint.nv == 1:
+                low = self.model.lowerPositionLimit[joint.idx_q]
+                high = self.model.upperPositionLimit[joint.idx_q]
+                if low < high:
+                    lower[joint.idx_v], upper[joint.idx_v] = low, high
+        largest = np.finfo(float).max  # Pinocchio's value for unlimited
+        lower[lower <= -largest] = -np.inf
+        upper[upper >= largest] = np.inf
+        return lower, upper
+
+    def check_configuration(self, q: ArrayLike) -> Array:
+        """Return q as a float array of shape (nq,) after checking that it is valid.
+
+        Raises:
+            ShapeError: If its shape is not (nq,).
+            NonFiniteError: If it contains NaN or inf.
+            ConfigurationError: If a quaternion or a (cos, sin) pair is not of norm 1.
+        """
+        configuration = self._finite(q, self.nq, "configuration q")
+        for start, size in self.unit_blocks:
+            block = configuration[start : start + size]
+            norm = float(np.linalg.norm(block))
+            if abs(norm - 1.0) > 1e-6:
+                kind = "(cos, sin) pair" if size == 2 else "quaternion"
+                raise ConfigurationError(
+                    f"q[{start}:{start + size}] = {block.tolist()} is a {kind} "
+                    f"of norm {norm:.6g}; needs norm 1"
+                )
+        return configuration
+
+    def check_tangent(self, vector: ArrayLike, what: str) -> Array:
+        """Return a velocity, acceleration or effort as a float array of shape (nv,).
+
+        Args:
+            vector: The numbers.
+            what: Their name, for messages.
+
+        Raises:
+            ShapeError: If the shape is not (nv,).
+            NonFiniteError: If it contains NaN or inf.
+        """
+        return self._finite(vector, self.nv, what)
+
+    def _finite(self, vector: ArrayLike, size: int, what: str) -> Array:
+        """Return numbers as doubles (size,); ``what`` is their name in messages."""
+        try:
+            array = np.asarray(vector)
+            if array.dtype.kind not in "fiu" and array.size:
+                raise TypeError  # complex numbers, booleans, text, objects
+            array = array.astype(float)
+        except (TypeError, ValueError):
+            text = f"{vector!r}"
+            dtype = getattr(vector, "dtype", None)
+            kind = getattr(dtype, "name", type(vector).__name__)
+            raise ShapeError(
+                f"{what} is {text[:60]}{'...' * (len(text) > 60)} ({kind}); needs "
+                f"{size} numbers"
+            ) from None
+        if array.shape != (size,):
+            sizes = f" (nq = {self.nq}, nv = {self.nv})" if self.nq != self.nv else ""
+            raise ShapeError(
+                f"{what} has shape {array.shape}; {self.name} needs ({size},){sizes}"
+            )
+        for bad in np.flatnonzero(~np.isfinite(array)):
+            raise NonFiniteError(f"{what}[{bad}] is {array[bad]}; needs finite numbers")
+        return array
+
+    def is_single_dof(self) -> Flags:
+        """Return a mask of the degrees of freedom of single-dof joints, shape (nv,)."""
+        mask = np.zeros(self.nv, dtype=bool)
+        mask[self.single_dof_joints[:, 0]] = True
+        return mask
+
+    def per_dof(self, value: ArrayLike) -> Array:
+        """Return a setting for each dof (nv,); one number is for single-dof joints.
+
+        Raises:
+            SimulationError: If it is neither one number nor nv numbers.
+        """
+        array = np.asarray(value, dtype=float)
+        if array.shape not in ((), (self.nv,)):
+            raise SimulationError(
+                f"has shape {array.shape}; needs one number, or one for each of the "
+                f"{self.nv} degrees of freedom of {self.name}"
+            )
+        return np.where(self.is_single_dof(), array, 0.0) if array.ndim == 0 else array
 
     # -- names ------------------------------------------------------------------------
 
@@ -407,6 +341,95 @@ class RobotModel(ConfigurationSpace):
                 limbs += max(beyond, int(1 + length >= _LIMB))
         return limbs, longest
 
+    # -- sizes, for defaults ----------------------------------------------------------
+
+    @cached_property
+    def size(self) -> float:
+        """Length of the longest chain from the first joint to a frame [m].
+
+        It is the sum of the distances between the origins of consecutive joints, and of
+        the ranges of prismatic ones: an arm reaches no farther from its first joint.
+        """
+        model, lengths = self.model, np.zeros(self.model.njoints)
+        lower, upper = self.position_limits()
+        for joint in range(1, model.njoints):
+            parent = model.parents[joint]
+            if parent > 0:
+                away = np.linalg.norm(model.jointPlacements[joint].translation)
+                lengths[joint] = lengths[parent] + away
+            moved = model.joints[joint]
+            if moved.nv == 1 and self.units[moved.idx_v] == "m":
+                slid = (upper - lower)[moved.idx_v]
+                lengths[joint] += slid if np.isfinite(slid) else 0.0
+        longest = lengths.max()
+        for frame in model.frames:
+            if frame.parentJoint > 0:
+                away = np.linalg.norm(frame.placement.translation)
+                longest = max(longest, lengths[frame.parentJoint] + away)
+        return float(longest)
+
+    @property
+    def effort_rate(self) -> Array:
+        """Maximum rate of the efforts, shape (nv,) [N·m/s or N/s]; inf for none.
+
+        No URDF has one. It is 11 times the largest maximum effort each second, for all
+        joints of the same unit, a little less than a Panda may at 87 N·m: a light wrist
+        has to answer a push as quickly as a shoulder. It is 500 times where legs meet
+        the ground.
+        """
+        effort = self._largest_effort()
+        rate = np.full(self.nv, np.inf)
+        for unit in set(self.units):
+            alike = np.isfinite(effort) & (np.array(self.units) == unit)
+            rate[alike] = effort[alike].max(initial=0.0)
+        return (_LEG_RATE if self.unactuated else _ARM_RATE) * rate
+
+    @cached_property
+    def spring_force(self) -> tuple[float, float]:
+        """The largest force and moment of springs by default [N, N·m]; inf for none.
+
+        The force is what the strongest motor holds at half of `size`, the moment half
+        of that motor's effort. Only motors that slide count as they are.
+        """
+        effort = self._largest_effort()
+        turns = np.array(self.units) == "rad"
+        found = effort[turns & np.isfinite(effort)]
+        if found.size and self.size > 0.0:
+            strongest = float(found.max())
+            return strongest / (0.5 * self.size), 0.5 * strongest
+        found = effort[~turns & np.isfinite(effort)]
+        return (float(found.max()) if found.size else np.inf), np.inf
+
+    def _largest_effort(self) -> Array:
+        """Return the largest effort of each motor, shape (nv,); inf for none."""
+        effort = np.array(self.model.effortLimit)
+        effort[(effort <= 0.0) | (effort >= np.finfo(np.float32).max)] = np.inf
+        effort[list(self.unactuated)] = np.inf
+        return effort
+
+    @cached_property
+    def largest_inertias(self) -> Array:
+        """Largest M_ii in any posture, nearly, shape (nv,) [kg·m² or kg].
+
+        It is the largest of home and 64 postures, drawn once and for all.
+        """
+        rng, largest = np.random.default_rng(0), np.zeros(self.nv)
+        q = self.home()
+        for _ in range(65):
+            self._data.M[:] = 0.0
+            largest = np.maximum(largest, np.diag(pin.crba(self.model, self._data, q)))
+            turned = rng.uniform(-np.pi, np.pi, self.nv)
+            q = pin.integrate(self.model, self.neutral(), turned)
+        return largest
+
+    @cached_property
+    def typical_inertia(self) -> float:
+        """Geometric mean of the joints' largest inertias [kg·m²], nearly."""
+        joints = np.setdiff1d(np.arange(self.nv), self.unactuated)
+        inertias = self.largest_inertias[joints]
+        inertias = inertias[inertias > 0.0]
+        return float(np.exp(np.log(inertias).mean())) if inertias.size else 1.0
+
     # -- dynamics ---------------------------------------------------------------------
 
     def inverse_dynamics(self, q: Array, v: Array, a: Array) -> Array:
@@ -448,3 +471,50 @@ class RobotModel(ConfigurationSpace):
             raise ModelError(
                 f"{self.name}: the mass matrix is singular at this configuration"
             ) from None
+
+
+def _floats(joint: Any) -> bool:
+    return bool(joint.shortname() == "JointModelFreeFlyer")
+
+
+def _is_ball(joint: Any) -> bool:
+    return bool(joint.shortname() == "JointModelSpherical")
+
+
+def _slides(joint: Any) -> bool:
+    kinds = "JointModelPX", "JointModelPY", "JointModelPZ", "JointModelPrismatic"
+    return bool(joint.shortname().startswith(kinds))
+
+
+def _dof_labels(joint: Any) -> tuple[str, ...]:
+    """Return what tells apart a joint's degrees of freedom; of one: an empty text."""
+    if joint.nv == 1:
+        return ("",)
+    if _is_ball(joint):
+        return "roll", "pitch", "yaw"
+    roots = {3: ("x", "y", "yaw"), 6: ("x", "y", "z", "roll", "pitch", "yaw")}
+    return roots.get(joint.nv, tuple(map(str, range(joint.nv))))
+
+
+def _unit_block(joint: Any) -> tuple[int, int]:
+    """Return start and size of a joint's (cos, sin) pair or quaternion in q."""
+    size = 2 if joint.nv in {1, 3} and not _is_ball(joint) else 4
+    return joint.idx_q + joint.nq - size, size
+
+
+@kernel
+def joint_displacements(
+    q: Array, reference: Array, single_dof_joints: Indices, out: Array
+) -> None:
+    """Write q ⊖ reference for single-dof joints; continuous joints are within ±π."""
+    for k in range(single_dof_joints.shape[0]):
+        i, at, size = (
+            single_dof_joints[k, 0],
+            single_dof_joints[k, 1],
+            single_dof_joints[k, 2],
+        )
+        if size == 1:
+            out[i] = q[at] - reference[at]
+        else:  # (cos, sin)
+            c, s, c_ref, s_ref = q[at], q[at + 1], reference[at], reference[at + 1]
+            out[i] = atan2(s * c_ref - c * s_ref, c * c_ref + s * s_ref)

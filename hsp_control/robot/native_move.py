@@ -10,8 +10,7 @@ from hsp_control.common.adapters import entry_point, run
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import NativeCall, table
-from hsp_control.robot.step_count import number_of_steps
-from hsp_control.robot.valid_state import REFUSED, copy_valid
+from hsp_control.robot.motion import REFUSED, copy_valid, number_of_steps
 
 
 class NativeMove(partial[float]):

@@ -19,10 +19,9 @@ import numpy as np
 import pinocchio as pin
 from pinocchio import pinocchio_pywrap_default
 
-from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.arrays import Array, Indices, matrix_view
 from hsp_control.common.kernels import PLAIN, kernel
 from hsp_control.common.native import NativeCall, Timed, sequence
-from hsp_control.robot.matrix_view import matrix_view
 
 _MODEL = b"N9pinocchio8ModelTplIdLi0ENS_25JointCollectionDefaultTplEEE"
 _DATA = b"N9pinocchio7DataTplIdLi0ENS_25JointCollectionDefaultTplEEE"

@@ -1,24 +1,41 @@
 """The robot and its state: kinematic and dynamic terms, each computed once per state.
 
 The controller gets its kinematics and dynamics from `RobotState`, which calls Pinocchio
-here, in `kinematics` and in `centroidal`. Other modules call Pinocchio directly only
-for what a state does not offer: loading and checks of models, integration, collision
-geometry, derivatives of gravity, plants with models of their own, and the viewer.
+here and in `kinematics`. Other modules call Pinocchio directly only for what a state
+does not offer: loading and checks of models, integration, collision geometry,
+derivatives of gravity, plants with models of their own, and the viewer.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from operator import attrgetter
-from typing import TYPE_CHECKING, Any, NoReturn, Self, TypeVar
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self, TypeVar
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.exceptions import ImmutableError, NonFiniteError
-from hsp_control.common.native import NativeCall
-from hsp_control.robot.configuration_space import as_numbers
+from hsp_control.common.arrays import Array, Indices, matrix_view
+from hsp_control.common.exceptions import (
+    ImmutableError,
+    ModelError,
+    NonFiniteError,
+    ShapeError,
+)
+from hsp_control.common.native import NativeCall, once
+from hsp_control.declaration import within
+from hsp_control.declaration.quantities import Vector
+from hsp_control.robot.description.access import ANYWHERE, Access
+from hsp_control.robot.description.loading import (
+    RobotPart,
+    combine,
+    end_effector_frame,
+    load_model,
+    placement,
+    reference_posture,
+)
+from hsp_control.robot.description.robot_description import RobotDescription, ToolFrame
+from hsp_control.robot.description.sources import RobotSource, Root
 from hsp_control.robot.kinematics import (
     CentroidalMotion,
     FrameKinematics,
@@ -26,10 +43,11 @@ from hsp_control.robot.kinematics import (
     inertia_terms,
     joint_placements,
 )
-from hsp_control.robot.matrix_view import matrix_view
 from hsp_control.robot.model import RobotModel
+from hsp_control.robot.motion import REFUSED, copy_valid
+from hsp_control.robot.mujoco.loading import load_mjcf, load_selection
+from hsp_control.robot.mujoco.scene import select
 from hsp_control.robot.pinocchio_calls import bind_pinocchio
-from hsp_control.robot.valid_state import REFUSED, copy_valid
 
 Made = TypeVar("Made")
 
@@ -43,7 +61,218 @@ _MADE_LIMIT = 1000
 
 
 class Robot(RobotModel):
-    """A robot: its `RobotModel`, and states of it."""
+    """A robot: its `RobotModel`, where that comes from, and states of it.
+
+    Attributes:
+        source: Where it was loaded from.
+        description: What `load` was given; None for a robot made otherwise.
+        parts: The robots that it consists of: itself only, unless it was combined.
+    """
+
+    def __init__(
+        self,
+        model: pin.Model,
+        source: RobotSource,
+        parts: Sequence[RobotPart] = (),
+        description: RobotDescription | None = None,
+    ) -> None:
+        """Wrap a Pinocchio model; `Robot.load` is the usual way to create a robot."""
+        home = source.home or reference_posture(model, source)
+        super().__init__(model, source.name, home)
+        self.source = source
+        self.description = description
+        self.parts = tuple(parts) or (RobotPart("", source, pin.SE3.Identity()),)
+
+    @classmethod
+    def load(
+        cls,
+        name: str | Path | RobotDescription,
+        *,
+        root: Root | None = None,
+        locked: Mapping[str, float] | None = None,
+        tool_frames: Mapping[str, ToolFrame] | None = None,
+        gravity: ArrayLike | None = None,
+        mimic: bool = True,
+        project_inertias: bool = False,
+        xacro_args: Mapping[str, str | bool | float] | None = None,
+        access: Access = ANYWHERE,
+    ) -> Self:
+        """Load a bundled robot, one of an installed package, or a URDF or xacro file.
+
+        Args:
+            name: For example ``"panda"``, ``"talos_arm"``, ``"gen3_description"`` or
+                ``"my_arm/arm.urdf"``; or a whole description, and then nothing else.
+            root: How its base is attached to the world: ``fixed``, ``planar``
+                (x, y, yaw) or ``free_flyer``. None: as its source says; ``fixed`` for a
+                file.
+            locked: Joints to lock, name to value [rad or m]. None: as its source says
+                (the bundled Panda locks its fingers); ``{}``: none.
+            tool_frames: Frames to add, by name.
+            gravity: Acceleration of gravity in the world [m/s²], shape (3,). None:
+                -9.81 along z.
+            mimic: Whether ``<mimic>`` joints follow their leader. False: they are
+                independent joints.
+            project_inertias: Whether inertias that no body can have are replaced by the
+                nearest that one can have; mass and centre of mass stay.
+            xacro_args: Arguments of a xacro file, by name.
+            access: Which files may be read: a URDF given by path, and the meshes that
+                it names. Use `access.only_within` for untrusted files.
+
+        Raises:
+            RobotNotFoundError: If there is no such robot.
+            AccessError: If a file is not allowed.
+            ModelError: If an option is wrong or does not fit the model, the URDF is
+                invalid, or the mass matrix is singular.
+            JointNotFoundError: If a joint to lock does not exist.
+            FrameNotFoundError: If a tool frame's parent does not exist.
+        """
+        if not isinstance(name, RobotDescription):
+            name = RobotDescription(
+                name,
+                root=root,
+                locked=locked,
+                tool_frames=tool_frames or {},
+                gravity=gravity,
+                mimic=mimic,
+                project_inertias=project_inertias,
+                xacro_args=xacro_args or {},
+            )
+        elif (
+            project_inertias
+            or not mimic
+            or any(x is not None for x in (root, locked, tool_frames))
+            or any(x is not None for x in (gravity, xacro_args))
+        ):
+            raise ModelError(
+                "a RobotDescription says all about the robot: give root, locked, "
+                "tool_frames, gravity, mimic, project_inertias and xacro_args in it"
+            )
+        return cls._described(name, access)
+
+    @classmethod
+    def from_mujoco(
+        cls,
+        model: Any,
+        root: str | None = None,
+        joints: Sequence[str] | None = None,
+        *,
+        qpos: ArrayLike | None = None,
+        keyframe: str | None = None,
+        locked: Mapping[str, float] | None = None,
+        tool_frames: Mapping[str, ToolFrame] | None = None,
+    ) -> Self:
+        """Return a robot in a compiled MuJoCo model: with the numbers MuJoCo uses.
+
+        Bodies and sites are its frames, under their names. Bodies that are not below
+        the root are no part of it; those above the root stand still. What MuJoCo has
+        and the robot lacks, such as a closed loop, is in `source.omitted`, and logged
+        once as a warning. `MujocoCoordinates` converts states.
+
+        Args:
+            model: The scene, a ``mujoco.MjModel``.
+            root: Name of the body whose subtree is the robot, with the body's own
+                joints; None: the whole scene.
+            joints: Names of its joints that move; None: all. The others are locked.
+                q and v have MuJoCo's order, whatever the order here.
+            qpos: The scene's configuration, shape (model.nq,), in which the other
+                joints are locked and the robot is at home; None: ``model.qpos0``, but
+                then the home of a joint that is not within its limits there is in
+                their middle.
+            keyframe: The name of that configuration in the model, instead.
+            locked: Hinges and slides to lock elsewhere, name to value [rad or m].
+            tool_frames: Frames to add, by name.
+
+        Raises:
+            ModelError: If MuJoCo is not installed, the configuration is not one of the
+                scene, no joint moves, or the mass matrix is singular.
+            FrameNotFoundError: If the root or a tool frame's parent does not exist.
+            JointNotFoundError: If a joint does not exist or is not below the root.
+        """
+        selection = select(model, root, joints, qpos, keyframe, locked)
+        return cls(*load_selection(selection, tool_frames or {}))
+
+    @classmethod
+    def _described(cls, description: RobotDescription, access: Access) -> Self:
+        """Return the robot of a description."""
+        gravity = description.gravity
+        if description.mjcf is not None:
+            return cls(*load_mjcf(description, access), description=description)
+        if description.parts is None:
+            source = description.find(access)
+            model = load_model(source, description, gravity)
+            return cls(model, source, description=description)
+        robots = {}
+        for name, part in description.parts.items():
+            with within("parts", name, "name" if part.name else "description"):
+                source = part.find(access)
+                robot = cls(load_model(source, part, gravity), source)
+            robots[name] = robot, placement(part.position, part.rotation)
+        with within("parts"):
+            whole = cls.combine(robots)
+        whole.description = description
+        return whole
+
+    @classmethod
+    def combine(cls, robots: Mapping[str, tuple["Robot", pin.SE3]]) -> Self:
+        """Return one robot that consists of several robots in one workspace.
+
+        Args:
+            robots: For each name a robot and the placement of its root in the world.
+                Joints and frames are renamed to ``<name>_<own name>``.
+
+        Raises:
+            ModelError: If there are fewer than two robots, one is already combined,
+                their gravity differs, or one has mimic joints.
+        """
+        parts = [
+            (RobotPart(f"{name}_", robot.source, place), robot.model)
+            for name, (robot, place) in robots.items()
+        ]
+        model = combine(parts)
+        homes = [robot.joint_positions(robot.home()) for robot, _ in robots.values()]
+        source = RobotSource(
+            name="+".join(part.source.name for part, _ in parts),
+            urdf=parts[0][0].source.urdf,
+            origin="combined",
+            home=tuple(float(x) for home in homes for x in home),
+        )
+        return cls(model, source, [part for part, _ in parts])
+
+    def __repr__(self) -> str:
+        return f"Robot({self.name!r}, nq={self.nq}, nv={self.nv})"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        if self.mimics:
+            # A restored model would crash the process: Pinocchio's archives omit what
+            # mimic joints refer to (seen with 4.1).
+            raise ModelError(
+                f"{self.name}: a robot with mimic joints cannot be pickled; "
+                "load it in each process, or with mimic=False"
+            )
+        own = self.model, self.source, self.parts, self.description
+        return (type(self), own)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        return type(self)(self.model.copy(), self.source, self.parts, self.description)
+
+    @property
+    def joint_coordinates(self) -> Array | None:
+        """The matrix A of the coordinates theta = A q in the literature, or None.
+
+        Shape (nv, nv). For the planar arm, theta are the absolute angles of its links,
+        measured from the horizontal.
+        """
+        if self.source.joint_coordinates != "absolute":
+            return None
+        return np.tril(np.ones((self.nv, self.nv)))
+
+    @property
+    def end_effector(self) -> str:
+        """The frame of the hand: as the source says, or else `end_effector_frame`."""
+        named = self.source.end_effector
+        if named is not None and named in self._frame_ids:
+            return named
+        return end_effector_frame(self.model)
 
     def state(self, t: float, q: Any, v: Any) -> "RobotState":
         """Return a new `RobotState` at time t [s], q (nq,) and v (nv,).
@@ -96,10 +325,12 @@ class RobotState:
         self._unit_blocks = np.array(robot.unit_blocks, dtype=np.int64).reshape(-1, 2)
         self._frames: dict[str, FrameKinematics] = {}
         self.stamp_array: Indices = np.zeros(1, dtype=np.int64)
+        model, stamp = robot.model, self.stamp_array
         self.inertia, self.inertia_rate = inertia_terms(
-            robot.model, self.data, *self._memory, self.stamp_array
+            model, self.data, *self._memory, stamp
         )
-        self._effects_stamp = -1
+        effects = partial(pin.nonLinearEffects, model, self.data, *self._memory)
+        self._compute_effects = once([effects], stamp)
         self._centroidal: CentroidalMotion | None = None
         self._displaced: RobotState | None = None
         self._made: dict[tuple[int, str], tuple[object, Any]] = {}
@@ -125,8 +356,8 @@ class RobotState:
         except AttributeError:  # a list, for example
             known = False
         if not known:
-            q_in = as_numbers(q, self.robot.nq, "configuration q", self.robot)
-            v_in = as_numbers(v, self.robot.nv, "velocity v", self.robot)
+            q_in = self.robot.check_configuration(q)
+            v_in = self.robot.check_tangent(v, "velocity v")
         before, self.t = self.t, t  # calls in Python read it
         try:
             value = move(t, q_in, v_in)
@@ -141,20 +372,18 @@ class RobotState:
 
     def bind_move(self, calls: Sequence[Callable[[float], Any]] = ()) -> Move:
         """Return how `advance` moves this state, with calls of the time that follow."""
-        first = self._compute_jacobians
+        first, rest = self._compute_jacobians, tuple(calls)
         memory = *self._memory, self._unit_blocks, self.stamp_array
+        move: Move = partial(_move, memory, first)
         if isinstance(first, NativeCall):
             from hsp_control.robot.native_move import NativeMove
 
             native = [first]
-            for call in calls:
-                if not isinstance(call, NativeCall):
-                    break
-                native.append(call)
-            rest = tuple(calls[len(native) - 1 :])
-            move: Move = NativeMove.of(native, *memory)
-            return partial(_and_then, move, rest) if rest else move
-        return partial(_move, memory, first, tuple(calls))
+            while rest and isinstance(rest[0], NativeCall):
+                native.append(rest[0])
+                rest = rest[1:]
+            move = NativeMove.of(native, *memory)
+        return partial(_and_then, move, rest) if rest else move
 
     def _refuse(self, t: float, q: ArrayLike, v: ArrayLike) -> None:
         """Raise the error that says what is wrong with t, q and v."""
@@ -217,9 +446,7 @@ class RobotState:
     @property
     def nonlinear_effects(self) -> Array:
         """N(q, v): Coriolis, centrifugal and gravity efforts, shape (nv,) (RNEA)."""
-        if self._effects_stamp != self.stamp:
-            pin.nonLinearEffects(self.robot.model, self.data, self.q, self.v)
-            self._effects_stamp = self.stamp
+        self._compute_effects()
         return self.data.nle  # type: ignore[no-any-return]
 
     def inverse_dynamics(self, acceleration: Array) -> Array:
@@ -296,23 +523,6 @@ class RobotState:
         return self.displaced(dt, self.v * dt)
 
 
-def _shown(name: str) -> Any:
-    """Return a property that shows an attribute and refuses its assignment."""
-
-    def refuse(state: object, value: object) -> NoReturn:
-        raise ImmutableError(
-            f"state.{name} cannot be assigned, as all terms belong to one t, q and v: "
-            "call state.update(t, q, v)"
-        )
-
-    get: Callable[[Any], Any] = attrgetter(f"_shown_{name}")
-    return property(get if name != "t" else _time, refuse)
-
-
-def _time(state: "SeenState") -> float:
-    return state._own.t
-
-
 class SeenState(RobotState):
     """A state whose t, q and v change only together, by `update`.
 
@@ -320,15 +530,27 @@ class SeenState(RobotState):
     native calls read q and v stay writable there, and are read-only here.
     """
 
-    __slots__ = ("_own", "_shown_q", "_shown_v")
+    __slots__ = ("_own", "_shown")
     _own: RobotState
-    if not TYPE_CHECKING:
-        t, q, v = _shown("t"), _shown("q"), _shown("v")
+    _shown: tuple[Array, Array]
 
     def __init__(self, own: RobotState) -> None:
         self.__dict__ = own.__dict__
-        self._own = own
-        self._shown_q, self._shown_v = _read_only(own.q), _read_only(own.v)
+        self._own, self._shown = own, (own.q.view(), own.v.view())
+        for view in self._shown:
+            view.flags.writeable = False
+
+    t = property(lambda self: self._own.t)
+    q = property(lambda self: self._shown[0])
+    v = property(lambda self: self._shown[1])
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if name in ("t", "q", "v"):
+            raise ImmutableError(
+                f"state.{name} cannot be assigned, as all terms belong to one t, q and "
+                "v: call state.update(t, q, v)"
+            )
+        super().__setattr__(name, value)
 
     def update(self, t: float, q: ArrayLike, v: ArrayLike) -> Self:
         """Move the state that it shows; see `RobotState.update`."""
@@ -339,10 +561,14 @@ class SeenState(RobotState):
         return _copy, (self.robot, self.t, np.array(self.q), np.array(self.v))
 
 
+def _copy(robot: Robot, t: float, q: Array, v: Array) -> RobotState:
+    """Return a state of its own: what a copy, or a pickle, is."""
+    return RobotState(robot).update(t, q, v)
+
+
 def _move(
     memory: tuple[Array, Array, Indices, Indices],
     first: Callable[[], object],
-    calls: tuple[Callable[[float], Any], ...],
     t: float,
     q: Array,
     v: Array,
@@ -351,10 +577,7 @@ def _move(
     if not copy_valid(t, q, v, *memory):
         return REFUSED
     first()
-    value = 0.0
-    for call in calls:
-        value = call(t)
-    return value
+    return 0.0
 
 
 def _and_then(
@@ -368,12 +591,20 @@ def _and_then(
     return value
 
 
-def _read_only(array: Array) -> Array:
-    view = array.view()
-    view.flags.writeable = False
-    return view
+Posture = Annotated[Literal["start", "home"] | Vector, "posture"]
+"""``start``, ``home``, the positions of the joints, shape (nv,) [rad or m], or a
+configuration, shape (nq,); see `configuration`."""
 
 
-def _copy(robot: Any, t: float, q: Array, v: Array) -> RobotState:
-    """Return a state of its own: what a copy, or a pickle, is."""
-    return RobotState(robot).update(t, q, v)
+def configuration(posture: ArrayLike | str, start: RobotState) -> Array:
+    """Return the configuration of a `Posture`, shape (nq,)."""
+    robot = start.robot
+    if isinstance(posture, str):
+        return start.q.copy() if posture == "start" else robot.home()
+    given = np.asarray(posture, dtype=float)
+    if given.shape == (robot.nq,):
+        return np.array(robot.check_configuration(given))
+    if given.shape == (robot.nv,):
+        return robot.integrate(robot.neutral(), robot.check_tangent(given, "posture"))
+    numbers = f"{robot.nv}" if robot.nv == robot.nq else f"{robot.nv} or {robot.nq}"
+    raise ShapeError(f"a posture has shape {given.shape}; needs {numbers} numbers")

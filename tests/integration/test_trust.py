@@ -20,14 +20,15 @@ from hsp_control.common.exceptions import (
     SimulationError,
 )
 from hsp_control.geometry.shapes import Mesh
-from hsp_control.robot.description.access import ANYWHERE, only_within
-from hsp_control.robot.description.urdf_checks import MAX_DOFS, MAX_LINKS
-from hsp_control.robot.description.xml_files import (
+from hsp_control.robot.description.access import (
+    ANYWHERE,
     MAX_DEPTH,
     XmlError,
     check_no_document_type,
+    only_within,
     parse_xml,
 )
+from hsp_control.robot.description.urdf import MAX_DOFS, MAX_LINKS
 from hsp_control.simulation import Rollout
 from hsp_control.visualization.plots.figures import diagnostics_figure
 from hsp_control.visualization.viewer.threejs import collada_object
@@ -227,7 +228,7 @@ def test_depth_and_elements_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None
     deep = "<x>" * (MAX_DEPTH + 1) + "</x>" * (MAX_DEPTH + 1)
     with pytest.raises(XmlError, match="nested deeper than 100 levels"):
         parse_xml(deep.encode())
-    monkeypatch.setattr("hsp_control.robot.description.xml_files.MAX_ELEMENTS", 10)
+    monkeypatch.setattr("hsp_control.robot.description.access.MAX_ELEMENTS", 10)
     with pytest.raises(XmlError, match="more than 10 elements"):
         parse_xml(b"<x>" + b"<y/>" * 10 + b"</x>")
 
@@ -270,7 +271,7 @@ def test_links_are_bounded(home: Path) -> None:
         Robot.load(home / "arm.urdf")
 
 
-@pytest.mark.parametrize("module", ["xml_files", "mesh_files"])
+@pytest.mark.parametrize("module", ["access", "mesh_files"])
 def test_files_are_bounded(
     module: str, home: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

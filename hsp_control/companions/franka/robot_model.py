@@ -10,8 +10,8 @@ import pinocchio as pin
 
 from hsp_control.common.exceptions import ModelError
 from hsp_control.robot import Robot
-from hsp_control.robot.description.urdf_checks import read_urdf
-from hsp_control.robot.description.xml_files import XmlError, parse_xml
+from hsp_control.robot.description.access import XmlError, parse_xml
+from hsp_control.robot.description.urdf import read_urdf
 
 _FLANGE = "link8"
 _CARRIED = "carried"

@@ -10,7 +10,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LiveError
 from hsp_control.companions.franka.layouts import JOINTS
 from hsp_control.robot import Robot
-from hsp_control.robot.description.urdf_checks import read_urdf
+from hsp_control.robot.description.urdf import read_urdf
 
 FLANGE = "link8"
 """What the name of the flange's frame ends with in Franka's descriptions."""

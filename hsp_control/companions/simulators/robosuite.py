@@ -23,8 +23,7 @@ from hsp_control.companions.simulators.hand_control import HandControl
 from hsp_control.companions.simulators.mujoco_arm import arm_of
 from hsp_control.declaration import within
 from hsp_control.robot import MujocoCoordinates
-from hsp_control.robot.description.mujoco.motors import joint_actuators, motor
-from hsp_control.robot.description.mujoco.names import Names
+from hsp_control.robot.mujoco.scene import Names, joint_actuators, motor
 from hsp_control.tasks import Gains
 
 try:

@@ -10,8 +10,8 @@ from hsp_control.common.exceptions import CompensationError
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Count
 from hsp_control.robot import Robot
-from hsp_control.robot.acceleration import Acceleration
 from hsp_control.robot.integrators import Rk4
+from hsp_control.robot.motion import Acceleration
 
 
 class Predictor(Part, error=CompensationError):

@@ -17,8 +17,8 @@ from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields.barrier import barrier_at
 from hsp_control.null_space.fields.cost import Cost
 from hsp_control.robot import Robot, RobotState
-from hsp_control.robot.configuration_space import joint_displacements
-from hsp_control.robot.postures import Posture, configuration
+from hsp_control.robot.model import joint_displacements
+from hsp_control.robot.robot import Posture, configuration
 from hsp_control.trajectories import Hold, Trajectory, TrajectorySample
 
 

@@ -1,13 +1,18 @@
-"""Build the Pinocchio model of a robot from its URDF, without meshes."""
+"""Build the Pinocchio model of a robot from its URDF, without meshes, or of several.
+
+Of several robots in one workspace the Jacobians are decoupled, so each follows the
+control law as if it were alone. For collision avoidance each robot is an obstacle for
+the others, and its true velocity is known.
+"""
 
 import os
 import re
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any, cast
-from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -20,16 +25,16 @@ from hsp_control.common.exceptions import (
     ModelError,
 )
 from hsp_control.common.suggestions import did_you_mean, listing
-from hsp_control.robot.description.combining import placement
+from hsp_control.declaration.rotation import matrix_of
 from hsp_control.robot.description.inertias import impossible_inertias, project_inertias
 from hsp_control.robot.description.mesh_files import check_mesh_name
 from hsp_control.robot.description.robot_description import (
-    PlacedRobot,
+    OneRobot,
     RobotDescription,
     ToolFrame,
 )
 from hsp_control.robot.description.sources import RobotSource, Root
-from hsp_control.robot.description.urdf_checks import named_files, read_urdf
+from hsp_control.robot.description.urdf import named_files, parser_text, read_urdf
 
 _ROOT_JOINTS = {"planar": pin.JointModelPlanar, "free_flyer": pin.JointModelFreeFlyer}
 _NO_HAND = re.compile(
@@ -45,7 +50,7 @@ Many files contain rounded or guessed inertias; the mass matrix is checked later
 
 def load_model(
     source: RobotSource,
-    settings: RobotDescription | PlacedRobot | None = None,
+    settings: OneRobot | None = None,
     gravity: ArrayLike | None = None,
 ) -> pin.Model:
     """Return the Pinocchio model of a URDF; what mimics a locked joint is locked."""
@@ -76,10 +81,8 @@ def completed(
 
 def moving_joints(model: pin.Model) -> dict[str, Any]:
     """Return the joints with degrees of freedom, by name, in the order of v."""
-    named = list(zip(model.names, model.joints, strict=True))[
-        1:
-    ]  # without the universe
-    return {name: joint for name, joint in named if joint.nv > 0}
+    named = list(zip(model.names, model.joints, strict=True))
+    return {name: joint for name, joint in named[1:] if joint.nv > 0}  # no universe
 
 
 def reference_posture(
@@ -135,7 +138,7 @@ def _carries_fingers(chains: list[list[int]], joint: int) -> bool:
     return len(lengths) > 2 or (len(lengths) == 2 and 2 * lengths[0] > lengths[1])
 
 
-def _parse(source: RobotSource, settings: RobotDescription | PlacedRobot) -> pin.Model:
+def _parse(source: RobotSource, settings: OneRobot) -> pin.Model:
     urdf, mimic = source.urdf, settings.mimic
     xml = read_urdf(source)
     if source.access.strict:
@@ -168,14 +171,6 @@ def _parse(source: RobotSource, settings: RobotDescription | PlacedRobot) -> pin
             f"{urdf}: Pinocchio leaves out a part of the model: {left_out}"
         )
     return model
-
-
-def parser_text(xml: Element, *unused: str) -> str:
-    """Return a URDF's text for the parser, without ``unused`` elements of links."""
-    for link in xml.iter("link"):
-        for element in [each for each in link if each.tag in unused]:
-            link.remove(element)
-    return ElementTree.tostring(xml, encoding="unicode")
 
 
 def _check_inertias(xml: Element, source: RobotSource) -> None:
@@ -352,3 +347,52 @@ def _check_mass_matrix(model: pin.Model, source: RobotSource) -> None:
         f"{values[-1]:.1e}); give the links an inertia, or "
         + (f"lock the joints: locked: {{{locks}}}" if single else "root: fixed")
     )
+
+
+# --- several robots ------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class RobotPart:
+    """One robot of a combined robot."""
+
+    prefix: str  # the names of its joints and frames begin with this, e.g. ``left_``
+    source: RobotSource  # where the robot comes from
+    placement: pin.SE3  # placement of its root in the world
+
+
+def combine(parts: Sequence[tuple[RobotPart, pin.Model]]) -> pin.Model:
+    """Return one model that contains all robots, which have no mimic joints."""
+    prefixes = [part.prefix for part, _ in parts]
+    if len(parts) < 2 or len(set(prefixes)) < len(prefixes):
+        raise ModelError(
+            "robots to combine must be two or more, with different names; got prefixes "
+            f"{prefixes}"
+        )
+    whole = pin.Model()
+    for part, model in parts:
+        if part.source.origin == "combined":
+            raise ModelError(
+                f"{part.prefix}{part.source.name} is already a combined robot; "
+                "combine all robots in one call"
+            )
+        if model.nvExtended != model.nv:
+            raise ModelError(
+                f"{part.prefix}{part.source.name}: a robot with mimic joints cannot be "
+                "combined; lock these joints, or load the robot with mimic=False"
+            )
+        own = model.copy()
+        for index in range(1, own.njoints):
+            own.names[index] = part.prefix + own.names[index]
+        for index in range(1, own.nframes):
+            own.frames[index].name = part.prefix + own.frames[index].name
+        whole = pin.appendModel(whole, own, 0, part.placement)
+    if any(model.gravity != parts[0][1].gravity for _, model in parts):
+        raise ModelError("robots to combine differ in gravity; load all with one value")
+    whole.gravity = parts[0][1].gravity
+    return whole
+
+
+def placement(position: ArrayLike, rotation: ArrayLike) -> pin.SE3:
+    """Return a placement from a position [m], shape (3,), and a `Rotation`."""
+    return pin.SE3(matrix_of(rotation), np.asarray(position, dtype=float))

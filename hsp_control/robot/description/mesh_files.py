@@ -11,10 +11,13 @@ from urllib.parse import unquote
 
 from hsp_control.common.exceptions import AccessError
 from hsp_control.common.files import is_file
-from hsp_control.robot.description.access import Access
+from hsp_control.robot.description.access import (
+    Access,
+    XmlError,
+    check_no_document_type,
+)
 from hsp_control.robot.description.sources import RobotSource
 from hsp_control.robot.description.xacro_files import package_folders
-from hsp_control.robot.description.xml_files import XmlError, check_no_document_type
 
 MAX_SIZE = 100_000_000
 """Maximum size of a mesh file [bytes]; example-robot-data has up to 13 MB."""

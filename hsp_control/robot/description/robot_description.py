@@ -31,7 +31,7 @@ from hsp_control.robot.description.sources import (
 from hsp_control.robot.description.xacro_files import xacro_text
 
 _ZERO = (0.0, 0.0, 0.0)
-_OF_ONE = ("root", "locked", "tool_frames", "mimic", "project_inertias", "xacro_args")
+_OF_ONE = {"root", "locked", "tool_frames", "mimic", "project_inertias", "xacro_args"}
 
 
 class ToolFrame(Part, error=ModelError):
@@ -46,8 +46,8 @@ class ToolFrame(Part, error=ModelError):
     (x, y, z, w) [-], or a matrix [-]."""
 
 
-class PlacedRobot(Part, error=ModelError):
-    """One of several robots in a workspace."""
+class OneRobot(Part, error=ModelError):
+    """One robot of a name or a file, and how it is loaded."""
 
     name: FileName | None = None
     """Name of a bundled robot or of example-robot-data, or the path of a URDF or xacro
@@ -56,7 +56,7 @@ class PlacedRobot(Part, error=ModelError):
     description: Name | None = None
     """Instead of `name`: a robot's name in the package robot_descriptions, such as
     gen3_description."""
-    root: Root | None = None
+    root: Root | Name | None = None
     """Connection of the root to the world; by default as the robot's source defines."""
     locked: Annotated[Mapping[str, Number], READ_ONLY] | None = None
     """Locked joints: position [rad or m] by name; by default as the robot's source
@@ -74,6 +74,40 @@ class PlacedRobot(Part, error=ModelError):
         default_factory=ReadOnlyDict
     )
     """Arguments of a xacro file, by name; others have their defaults [-]."""
+
+    def find(self, access: Access = ANYWHERE) -> RobotSource:
+        """Return where it comes from; see `find_robot` and `find_description`.
+
+        Raises:
+            ModelError: If it is several robots.
+        """
+        arguments = {name: xacro_text(text) for name, text in self.xacro_args.items()}
+        if self.description is not None:
+            return find_description(self.description, access, arguments)
+        if self.name is None:
+            raise ModelError("several robots come from several files")
+        return find_robot(self.name, access, arguments)
+
+    def located(self, folder: Path) -> Self:
+        """Return it with the full path of each file that is in a folder.
+
+        A relative path is first looked up there, so that a folder with a configuration
+        and its robots can be moved.
+        """
+        if self.name is None:
+            return self
+        return replace(self, name=_located(self.name, folder))
+
+    def _check_one_of(self, *names: str) -> None:
+        if sum(getattr(self, name) is not None for name in names) != 1:
+            raise ModelError(f"give one of {', '.join(names[:-1])} and {names[-1]}")
+
+
+class PlacedRobot(OneRobot):
+    """One of several robots in a workspace."""
+
+    root: Root | None = None
+    """Connection of the root to the world; by default as the robot's source defines."""
     position: Vector3 = _ZERO
     """Position of its root in the world [m]."""
     rotation: Rotation = _ZERO
@@ -81,58 +115,25 @@ class PlacedRobot(Part, error=ModelError):
     (x, y, z, w) [-], or a matrix [-]."""
 
     def __post_init__(self) -> None:
-        _check_one(self, "name", "description")
-
-    def find(self, access: Access = ANYWHERE) -> RobotSource:
-        """Return where it comes from; see `find_robot` and `find_description`."""
-        return _find(self, access)
-
-    def located(self, folder: Path) -> Self:
-        """Return it with the full path of a URDF that is in a folder."""
-        if self.name is None:
-            return self
-        return replace(self, name=_located(self.name, folder))
+        self._check_one_of("name", "description")
 
 
-class RobotDescription(Part, error=ModelError):
+class RobotDescription(OneRobot):
     """A robot: one of a name or file, one in a MuJoCo scene, or several robots.
 
     `Robot.load` makes the robot.
     """
 
-    name: FileName | None = None
-    """Name of a bundled robot or of example-robot-data, or the path of a URDF or xacro
-    file."""
-    _: KW_ONLY
-    description: Name | None = None
-    """Instead of `name`: a robot's name in the package robot_descriptions, such as
-    gen3_description."""
-    mjcf: FileName | None = None
-    """Instead of `name`: the path of an MJCF, a scene that contains the robot."""
     root: Root | Name | None = None
     """Connection of the root to the world; by default as the robot's source defines.
     With `mjcf`: the body whose subtree is the robot; by default the whole scene."""
+    mjcf: FileName | None = None
+    """Instead of `name`: the path of an MJCF, a scene that contains the robot."""
     joints: Names | None = None
     """With `mjcf`: the joints that move; by default all. The others are locked."""
     keyframe: Name | None = None
     """With `mjcf`: the keyframe where the robot is at home, and the other joints are
     locked; by default the scene's reference configuration."""
-    locked: Annotated[Mapping[str, Number], READ_ONLY] | None = None
-    """Locked joints: position [rad or m] by name; by default as the robot's source
-    defines."""
-    tool_frames: Annotated[Mapping[Name, ToolFrame], READ_ONLY] = field(
-        default_factory=ReadOnlyDict
-    )
-    """Frames to add, by name."""
-    mimic: Flag = True
-    """Whether mimic joints follow their leading joints; if not, they move freely."""
-    project_inertias: Flag = False
-    """Whether inertias that no body can have are replaced by the nearest that one can
-    have; mass and centre of mass stay."""
-    xacro_args: Annotated[Mapping[str, str | bool | Number], READ_ONLY] = field(
-        default_factory=ReadOnlyDict
-    )
-    """Arguments of a xacro file, by name; others have their defaults [-]."""
     gravity: Vector3 | None = None
     """Gravitational acceleration in the world [m/s²]; [0, 0, -9.81] by default."""
     parts: Annotated[Mapping[Name, PlacedRobot], READ_ONLY] | None = None
@@ -140,18 +141,16 @@ class RobotDescription(Part, error=ModelError):
     ``<part>_<own name>``."""
 
     def __post_init__(self) -> None:
-        _check_one(self, "name", "description", "mjcf", "parts")
-        if self.mjcf is None:
-            self._check_without_mjcf()
-        else:
-            self._check_with_mjcf()
-        of_one = {*_OF_ONE} & {*self.changed_fields()}
-        if self.parts is not None and of_one:
-            raise ModelError(
-                f"{', '.join(sorted(of_one))}: give it for each of the parts"
-            )
-
-    def _check_without_mjcf(self) -> None:
+        self._check_one_of("name", "description", "mjcf", "parts")
+        if self.mjcf is not None:
+            if not self.mimic:
+                raise ModelError(
+                    "mimic is not for mjcf, which has equality constraints"
+                )
+            for key in ("project_inertias", "xacro_args"):
+                if getattr(self, key):
+                    raise ModelError(f"{key} is not for mjcf")
+            return
         allowed = get_args(Root)
         if self.root is not None and self.root not in allowed:
             with within("root"):
@@ -162,51 +161,20 @@ class RobotDescription(Part, error=ModelError):
         for key in ("joints", "keyframe"):
             if getattr(self, key) is not None:
                 raise ModelError(f"{key} is only for mjcf")
-
-    def _check_with_mjcf(self) -> None:
-        if not self.mimic:
-            raise ModelError("mimic is not for mjcf, which has equality constraints")
-        for key in ("project_inertias", "xacro_args"):
-            if getattr(self, key):
-                raise ModelError(f"{key} is not for mjcf")
-
-    def find(self, access: Access = ANYWHERE) -> RobotSource:
-        """Return where it comes from; see `find_robot` and `find_description`.
-
-        Raises:
-            ModelError: If it is several robots.
-        """
-        return _find(self, access)
+        of_one = _OF_ONE & {*self.changed_fields()}
+        if self.parts is not None and of_one:
+            raise ModelError(
+                f"{', '.join(sorted(of_one))}: give it for each of the parts"
+            )
 
     def located(self, folder: Path) -> Self:
-        """Return it with the full path of each file that is in a folder.
-
-        A relative path is first looked up there, so that a folder with a configuration
-        and its robots can be moved.
-        """
+        """Return it with the full path of each file that is in a folder."""
         if self.mjcf is not None:
             return replace(self, mjcf=_located(self.mjcf, folder))
-        if self.name is not None:
-            return replace(self, name=_located(self.name, folder))
         if self.parts is None:
-            return self
+            return super().located(folder)
         parts = {name: part.located(folder) for name, part in self.parts.items()}
         return replace(self, parts=parts)
-
-
-def _check_one(robot: Part, *names: str) -> None:
-    given = [name for name in names if getattr(robot, name) is not None]
-    if len(given) != 1:
-        raise ModelError(f"give one of {', '.join(names[:-1])} and {names[-1]}")
-
-
-def _find(robot: PlacedRobot | RobotDescription, access: Access) -> RobotSource:
-    arguments = {name: xacro_text(value) for name, value in robot.xacro_args.items()}
-    if robot.description is not None:
-        return find_description(robot.description, access, arguments)
-    if robot.name is None:
-        raise ModelError("several robots come from several files")
-    return find_robot(robot.name, access, arguments)
 
 
 def _located(name: str | Path, folder: Path) -> str:

@@ -11,73 +11,20 @@ from collections.abc import Mapping
 from contextlib import redirect_stdout, suppress
 from dataclasses import dataclass, field
 from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import yaml
 
+from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import AccessError, ModelError, RobotNotFoundError
 from hsp_control.common.files import is_folder
 from hsp_control.common.resources import bundled_robots
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.robot.description.access import ANYWHERE, Access
-from hsp_control.robot.description.body_shape import BodyShape
 from hsp_control.robot.description.xacro_files import expand, is_xacro
 
 PACKAGE = "robot_descriptions"
-
-
-class Described(NamedTuple):
-    """Where the files of a robot are."""
-
-    file: Path  # its URDF, or the xacro file that makes it
-    xacro_args: dict[str, str]  # arguments of the xacro file, by name
-    package_dirs: tuple[Path, ...]  # folders in which ``package://`` is looked up
-    srdf: Path | None  # its SRDF, if it has one
-
-
-def described_names() -> tuple[str, ...]:
-    """Return the names of all robots with a URDF; empty without the package."""
-    if find_spec(PACKAGE) is None:
-        return ()
-    known = import_module(PACKAGE).DESCRIPTIONS
-    return tuple(name for name, about in known.items() if about.has_urdf)
-
-
-def find_described(name: str) -> Described:
-    """Return the files of a robot; its repository is cloned if it is not yet there."""
-    if find_spec(PACKAGE) is None:
-        raise RobotNotFoundError(
-            f"robot {name!r} is described by the package {PACKAGE}: "
-            f"pip install {PACKAGE}"
-        )
-    known = described_names()
-    if name not in known:
-        raise RobotNotFoundError(
-            f"{PACKAGE} has no URDF of {name!r}{did_you_mean(name, known)} "
-            f"(it has {listing(known)})"
-        )
-    try:
-        with redirect_stdout(sys.stderr):  # it says there what it clones
-            module = import_module(f"{PACKAGE}.{name}")
-    except Exception as error:  # of git, or of a repository that has moved
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise RobotNotFoundError(
-            f"{PACKAGE} cannot fetch {name!r}: {reason}"
-        ) from error
-    own = vars(module)
-    package, repository = Path(own["PACKAGE_PATH"]), Path(own["REPOSITORY_PATH"])
-    file = Path(own.get("URDF_PATH") or own["XACRO_PATH"])
-    others = own.get("XACRO_PACKAGE_PATHS", {}).values()
-    folders = (package, repository, package.parent, repository.parent, file.parent)
-    return Described(
-        file,
-        {key: str(value) for key, value in own.get("XACRO_ARGS", {}).items()},
-        tuple(dict.fromkeys([*folders, *(Path(other).parent for other in others)])),
-        Path(own["SRDF_PATH"]) if "SRDF_PATH" in own else None,
-    )
-
 
 Root = Literal["fixed", "planar", "free_flyer"]
 FILE_ENDINGS = (".urdf", ".xml", ".xacro")
@@ -94,6 +41,29 @@ _END_EFFECTORS = {
     "talos_legs": "gripper_right_base_link",
     "z1": "gripperStator",
 }
+
+
+ShapeKind = Literal["box", "sphere", "capsule", "cylinder", "ellipsoid", "mesh"]
+
+
+@dataclass(frozen=True, eq=False)
+class BodyShape:
+    """A shape that is fixed to a body, as it is seen or as it collides."""
+
+    body: str  # name of the body's frame
+    kind: ShapeKind  # what it is
+    # the lengths of a box, the radius and the length (of a cylinder, of a capsule
+    # without its ends), the radius of a sphere, the semi-axes of an ellipsoid [m]; of a
+    # mesh: nothing
+    size: tuple[float, ...]
+    pose: Array  # its pose in the body's frame, shape (4, 4)
+    # red, green, blue and opacity, from 0 to 1
+    color: tuple[float, float, float, float]
+    seen: bool  # whether it is drawn
+    collides: bool  # whether distances and collisions count it
+    # of a mesh: its vertices [m], shape (k, 3), and triangles of their indices, shape
+    # (n, 3). What collides is its convex hull
+    mesh: tuple[Array, Indices] | None = None
 
 
 @dataclass(frozen=True)
@@ -160,7 +130,7 @@ def find_robot(
         )
     if text and is_folder(Path(text)):
         return _from_path(Path(text), access, xacro_args)  # which says what is in it
-    known = [*bundled, *sorted(set(others) - set(bundled)), *described_names()]
+    known = [*bundled, *sorted(set(others) - set(bundled)), *_described_names()]
     hint = (
         "list all with: hsp robots"
         if others
@@ -175,22 +145,56 @@ def find_robot(
 def find_description(
     name: str, access: Access = ANYWHERE, xacro_args: Mapping[str, str] | None = None
 ) -> RobotSource:
-    """Find a robot of the package robot_descriptions, such as ``gen3_description``."""
+    """Find a robot of the package robot_descriptions, such as ``gen3_description``.
+
+    Its repository is cloned if it is not yet there.
+    """
     if access.strict:
         raise AccessError(
             f"robot {name!r}: strict reading allows no robot of robot_descriptions, "
             "because it may be fetched from a network"
         )
-    found = find_described(name)
-    folders = found.package_dirs
+    if importlib.util.find_spec(PACKAGE) is None:
+        raise RobotNotFoundError(
+            f"robot {name!r} is described by the package {PACKAGE}: "
+            f"pip install {PACKAGE}"
+        )
+    known = _described_names()
+    if name not in known:
+        raise RobotNotFoundError(
+            f"{PACKAGE} has no URDF of {name!r}{did_you_mean(name, known)} "
+            f"(it has {listing(known)})"
+        )
+    try:
+        with redirect_stdout(sys.stderr):  # it says there what it clones
+            own = vars(import_module(f"{PACKAGE}.{name}"))
+    except Exception as error:  # of git, or of a repository that has moved
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise RobotNotFoundError(
+            f"{PACKAGE} cannot fetch {name!r}: {reason}"
+        ) from error
+    file = Path(own.get("URDF_PATH") or own["XACRO_PATH"])
+    package, repository = Path(own["PACKAGE_PATH"]), Path(own["REPOSITORY_PATH"])
+    others = map(Path, own.get("XACRO_PACKAGE_PATHS", {}).values())
+    places = [package, repository, package.parent, repository.parent, file.parent]
+    folders = tuple(dict.fromkeys([*places, *(other.parent for other in others)]))
+    defaults = {key: str(value) for key, value in own.get("XACRO_ARGS", {}).items()}
     return RobotSource(
         name=name,
-        urdf=found.file,
-        srdf=found.srdf,
+        urdf=file,
+        srdf=Path(own["SRDF_PATH"]) if "SRDF_PATH" in own else None,
         package_dirs=folders,
         origin="robot_descriptions",
-        expanded=_expanded(found.file, access, folders, xacro_args, found.xacro_args),
+        expanded=_expanded(file, access, folders, xacro_args, defaults),
     )
+
+
+def _described_names() -> tuple[str, ...]:
+    """Return the robots of robot_descriptions with a URDF; empty without it."""
+    if importlib.util.find_spec(PACKAGE) is None:
+        return ()
+    known = import_module(PACKAGE).DESCRIPTIONS
+    return tuple(name for name, about in known.items() if about.has_urdf)
 
 
 def is_path(name: str) -> bool:
@@ -200,16 +204,21 @@ def is_path(name: str) -> bool:
 
 def is_robot(name: str) -> bool:
     """Return whether a name is that of a robot, or of a URDF or xacro file."""
-    known = {*bundled_robots(), *example_robots(), *described_names()}
+    known = {*bundled_robots(), *example_robots(), *_described_names()}
     return name in known or name.endswith((".urdf", ".xacro"))
 
 
 def example_robots() -> dict[str, RobotSource]:
     """Return the robots of example-robot-data by name; empty if it is not installed."""
     loaders = _example_loaders()
+    root = _example_data()
     if not loaders:
         return {}
-    root = _example_robot_data_folder()
+    if root is None:
+        raise RobotNotFoundError(
+            "example-robot-data is installed without its robots; "
+            "reinstall it with: pip install --force-reinstall example-robot-data"
+        )
     sources = {}
     for name, loader in loaders.items():
         folder = root / "robots" / loader.path
@@ -237,11 +246,8 @@ def examples_without_urdf() -> tuple[str, ...]:
 
 def packaged_folders() -> list[Path]:
     """Return the folder of example-robot-data, or nothing if it is not installed."""
-    if importlib.util.find_spec("example_robot_data") is None:
-        return []
-    with suppress(RobotNotFoundError):  # installed without its data
-        return [_example_robot_data_folder()]
-    return []
+    folder = _example_data()
+    return [] if folder is None else [folder]
 
 
 def _expanded(
@@ -275,12 +281,10 @@ def _from_path(
         path = path.expanduser()
     access.check(path, "robot")
     if path.is_dir():
-        inside = listing(
-            sorted(file.name for file in path.glob("*") if is_path(file.name))
-        )
+        robots = sorted(file.name for file in path.glob("*") if is_path(file.name))
         raise RobotNotFoundError(
             f"{path} is a folder; give a .urdf file in it"
-            + (f" (it contains {inside})" if inside else " (it contains none)")
+            f" (it contains {listing(robots) or 'none'})"
         )
     if not path.is_file():
         near = sorted(file.name for file in path.parent.glob("*.urdf"))
@@ -302,15 +306,12 @@ def _from_bundle(name: str, folder: Path) -> RobotSource:
     file = folder / "robot.yaml"
     if file.is_file():
         settings = yaml.safe_load(file.read_text(encoding="utf-8")) or {}
-    packages: tuple[Path, ...] = (folder.parent,)
-    if importlib.util.find_spec("example_robot_data") is not None:
-        packages = (*packages, _example_robot_data_folder().parent)
     home = settings.get("home")
     return RobotSource(
         name=name,
         urdf=folder / f"{name}.urdf",
         srdf=srdf if (srdf := folder / f"{name}.srdf").is_file() else None,
-        package_dirs=packages,
+        package_dirs=(folder.parent, *(each.parent for each in packaged_folders())),
         origin="bundled",
         locked=dict(settings.get("locked") or {}),
         end_effector=settings.get("end_effector"),
@@ -327,15 +328,9 @@ def _example_loaders() -> dict[str, Any]:
     return dict(ROBOTS)
 
 
-def _example_robot_data_folder() -> Path:
-    """Return ``<prefix>/share/example-robot-data`` of the installed package."""
+def _example_data() -> Path | None:
+    """Return ``<prefix>/share/example-robot-data`` of the installed package, if any."""
     spec = importlib.util.find_spec("example_robot_data")
-    origin = spec.origin if spec is not None else None
-    for parent in Path(origin or "").parents:
-        folder = parent / "share" / "example-robot-data"
-        if folder.is_dir():
-            return folder
-    raise RobotNotFoundError(
-        "example-robot-data is installed without its robots; "
-        "reinstall it with: pip install --force-reinstall example-robot-data"
-    )
+    above = Path(spec.origin or "").parents if spec is not None else ()
+    places = (parent / "share" / "example-robot-data" for parent in above)
+    return next((folder for folder in places if folder.is_dir()), None)

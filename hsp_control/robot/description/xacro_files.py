@@ -13,7 +13,7 @@ from typing import Any
 
 from hsp_control.common.exceptions import ModelError
 from hsp_control.common.suggestions import did_you_mean
-from hsp_control.robot.description.xml_files import MAX_SIZE, XmlError, read_xml
+from hsp_control.robot.description.access import MAX_SIZE, XmlError, read_xml
 
 
 def package_folders(package: str, folders: Iterable[Path]) -> list[Path]:

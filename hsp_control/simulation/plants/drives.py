@@ -14,7 +14,6 @@ from hsp_control.declaration import Part, within
 from hsp_control.declaration.by_type import ByType
 from hsp_control.declaration.quantities import NonNegative, Periods, Share, Weights
 from hsp_control.robot import Robot
-from hsp_control.robot.per_joint import joint_dofs, per_dof
 
 Driving: TypeAlias = Callable[[Array], tuple[Array, float]]
 """Effort from the drive before, shape (nv,) ↦ the effort that acts, and how long after
@@ -138,7 +137,7 @@ class EffortNoise(Drive, type="noise"):
     def begin(self, robot: Robot, random: np.random.Generator) -> Driving:
         """Return what adds noise to the effort; see `Drive.begin`."""
         with within("std"):
-            std = per_dof(robot, self.std)
+            std = robot.per_dof(self.std)
         return lambda tau: (tau + std * random.standard_normal(std.shape), 0.0)
 
 
@@ -180,9 +179,9 @@ class Saturation(Drive, type="saturation"):
     def _limit(self, robot: Robot) -> Array:
         """Return the limits, shape (nv,), with 0 for none."""
         if not isinstance(self.limit, str):
-            return per_dof(robot, self.limit)
+            return robot.per_dof(self.limit)
         own = np.asarray(robot.model.upperEffortLimit, dtype=float)
-        given = joint_dofs(robot) & (own > 0.0) & np.isfinite(own)
+        given = robot.is_single_dof() & (own > 0.0) & np.isfinite(own)
         if not given.any():
             raise SimulationError(
                 f"the URDF of {robot.name} gives no effort limits; state them"

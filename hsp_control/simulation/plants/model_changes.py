@@ -17,7 +17,6 @@ from hsp_control.declaration.quantities import (
     Weights,
 )
 from hsp_control.robot import Robot
-from hsp_control.robot.per_joint import per_dof
 from hsp_control.simulation.plants.imperfect_plant import seeded_generator
 
 
@@ -112,7 +111,7 @@ class MotorInertia(ModelChange):
 
     def apply(self, model: pin.Model, robot: Robot, seed: int) -> None:
         """Add the inertia."""
-        model.armature += per_dof(robot, self.inertia)
+        model.armature += robot.per_dof(self.inertia)
 
 
 class Payload(ModelChange):

@@ -11,7 +11,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.control.measurement import NO_WRENCHES, Inertial, LogChannel
 from hsp_control.robot import Robot
-from hsp_control.robot.acceleration import Acceleration
+from hsp_control.robot.motion import Acceleration
 
 
 class Plant:

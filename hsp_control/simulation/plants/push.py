@@ -5,12 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 import pinocchio as pin
 
-from hsp_control.common.arrays import Array
+from hsp_control.common.arrays import Array, matrix_view
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import Number, Positive, Vector3
 from hsp_control.robot import Robot
-from hsp_control.robot.matrix_view import matrix_view
 
 
 class Push(Part, error=SimulationError):

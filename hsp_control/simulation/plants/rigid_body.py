@@ -10,10 +10,9 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.common.kernels import kernel
 from hsp_control.robot import Robot
-from hsp_control.robot.acceleration import Acceleration
 from hsp_control.robot.friction import JointFriction
 from hsp_control.robot.integrators import Integrator
-from hsp_control.robot.step_count import number_of_steps
+from hsp_control.robot.motion import Acceleration, number_of_steps
 from hsp_control.simulation.plants.declared import FrictionalPart
 from hsp_control.simulation.plants.plant import (
     ContinuousPlant,

@@ -18,7 +18,6 @@ from hsp_control.declaration import Part, within
 from hsp_control.declaration.by_type import ByType
 from hsp_control.declaration.quantities import NonNegative, Periods, Weights
 from hsp_control.robot import Robot
-from hsp_control.robot.per_joint import joint_dofs, per_dof
 
 Sensing: TypeAlias = Callable[[float, Array, Array], tuple[Array, Array]]
 """(t, q, v) from the sensor before ↦ (q, v) as measured; called once per period."""
@@ -89,7 +88,7 @@ class DifferencedVelocity(Sensor, type="differenced_velocity"):
         self, robot: Robot, q: Array, v: Array, random: np.random.Generator
     ) -> Sensing:
         """Return what replaces the joints' velocities; see `Sensor.begin`."""
-        joints = joint_dofs(robot)
+        joints = robot.is_single_dof()
         last: tuple[float, Array] | None = None
 
         def sense(t: float, q: Array, v: Array) -> tuple[Array, Array]:
@@ -122,7 +121,7 @@ class Encoder(Sensor, type="encoder_resolution"):
     ) -> Sensing:
         """Return what rounds to the nearest count; see `Sensor.begin`."""
         with within("resolution"):
-            given = per_dof(robot, self.resolution)
+            given = robot.per_dof(self.resolution)
         rounded = given > 0.0
         count = np.where(rounded, given, 1.0)
 
@@ -152,7 +151,7 @@ class PositionNoise(Sensor, type="position_noise"):
     ) -> Sensing:
         """Return what moves q by a random tangent vector; see `Sensor.begin`."""
         with within("std"):
-            std = per_dof(robot, self.std)
+            std = robot.per_dof(self.std)
         return lambda t, q, v: (
             robot.integrate(q, std * random.standard_normal(robot.nv)),
             v,
@@ -177,7 +176,7 @@ class VelocityNoise(Sensor, type="velocity_noise"):
     ) -> Sensing:
         """Return what adds noise to the velocity; see `Sensor.begin`."""
         with within("std"):
-            std = per_dof(robot, self.std)
+            std = robot.per_dof(self.std)
         return lambda t, q, v: (q, v + std * random.standard_normal(std.shape))
 
 

@@ -11,7 +11,7 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import SceneError
 from hsp_control.geometry import shapes
-from hsp_control.geometry.hulls import hull_corners
+from hsp_control.geometry.enclosing import hull_corners
 from hsp_control.geometry.scene import Scene
 from hsp_control.geometry.shapes import Shape, shape_from_log
 from hsp_control.simulation import Rollout

@@ -12,11 +12,10 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import ModelError, RobotNotFoundError
 from hsp_control.robot import Robot
-from hsp_control.robot.description.body_shape import BodyShape
-from hsp_control.robot.description.combining import Part
+from hsp_control.robot.description.loading import RobotPart
 from hsp_control.robot.description.mesh_files import candidates, find_problem
-from hsp_control.robot.description.sources import RobotSource
-from hsp_control.robot.description.urdf_checks import read_urdf
+from hsp_control.robot.description.sources import BodyShape, RobotSource
+from hsp_control.robot.description.urdf import read_urdf
 from hsp_control.visualization.palette import JOINT, LINK
 from hsp_control.visualization.viewer import threejs
 from hsp_control.visualization.viewer.commands import (
@@ -76,7 +75,7 @@ def read_visuals(robot: Robot) -> list[Visual]:
     return [visual for part in robot.parts for visual in _of_part(robot, part)]
 
 
-def _of_part(robot: Robot, part: Part) -> Iterator[Visual]:
+def _of_part(robot: Robot, part: RobotPart) -> Iterator[Visual]:
     if part.source.shapes is not None:
         yield from _given(robot, part, part.source.shapes)
         return
@@ -96,7 +95,9 @@ def _of_part(robot: Robot, part: Part) -> Iterator[Visual]:
                 yield visual
 
 
-def _given(robot: Robot, part: Part, shapes: Iterable[BodyShape]) -> Iterator[Visual]:
+def _given(
+    robot: Robot, part: RobotPart, shapes: Iterable[BodyShape]
+) -> Iterator[Visual]:
     for shape in shapes:
         if shape.seen:
             frame = robot.model.frames[robot.frame_id(part.prefix + shape.body)]

@@ -6,10 +6,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from hsp_control.common.arrays import Array
+from hsp_control.common.arrays import Array, matrix_view
 from hsp_control.config.view_settings import ViewSettings
 from hsp_control.robot import Robot
-from hsp_control.robot.matrix_view import matrix_view
 from hsp_control.visualization import palette
 from hsp_control.visualization.viewer import threejs
 from hsp_control.visualization.viewer.commands import (

@@ -23,7 +23,7 @@ from hsp_control.common.linalg import (
     triangularise_rows,
 )
 from hsp_control.law import CONSTANT, law
-from hsp_control.robot import kinematics, valid_state
+from hsp_control.robot import kinematics, motion
 from hsp_control.tasks import TaskSample
 
 Array = NDArray[np.float64]
@@ -299,7 +299,7 @@ KERNELS: dict[str, Callable[..., Any]] = {
     },
     "acceleration": law.acceleration,
     "frame_kinematics": kinematics.frame_kinematics,
-    "copy_valid": valid_state.copy_valid,
+    "copy_valid": motion.copy_valid,
 }
 
 

@@ -10,7 +10,7 @@ from hsp_control.common.kernels import PLAIN
 from hsp_control.control.actuation import Status
 from hsp_control.control.actuation.actuation import CODES, FLAGS
 from hsp_control.law.outcome import BEYOND_ANY_LEVEL
-from hsp_control.robot.valid_state import REFUSED
+from hsp_control.robot.motion import REFUSED
 
 if PLAIN:
     pytest.skip("plain Python has no native calls", allow_module_level=True)

@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
 from hsp_control.geometry import link_shapes
-from hsp_control.geometry.capsule_fit import enclosing_capsule
+from hsp_control.geometry.enclosing import enclosing_capsule
 
 Array = NDArray[np.float64]
 

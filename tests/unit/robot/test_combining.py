@@ -25,7 +25,7 @@ from hsp_control.common.exceptions import (
     ModelError,
 )
 from hsp_control.common.resources import bundled_robots
-from hsp_control.robot.description.combining import Part, combine, placement
+from hsp_control.robot.description.loading import RobotPart, combine, placement
 from hsp_control.robot.description.sources import RobotSource
 from hsp_control.robot.integrators import Rk4
 
@@ -183,7 +183,7 @@ MISTAKES: list[tuple[Callable[[], object], type[HspControlError], str]] = [
      "robots to combine must be two or more, with different names; got prefixes "
      "['only_']"),
     (lambda: combine([]), ModelError, "with different names; got prefixes []"),
-    (lambda: combine([(Part("a_", source(), HERE), load("panda").model)] * 2),
+    (lambda: combine([(RobotPart("a_", source(), HERE), load("panda").model)] * 2),
      ModelError, "with different names; got prefixes ['a_', 'a_']"),
     (lambda: Robot.combine({"a": (load("panda"), HERE),
                             "b": (Robot.load("panda", gravity=[0, 0, 0]), HERE)}),

@@ -18,8 +18,8 @@ from hsp_control.common.exceptions import (
     ModelError,
 )
 from hsp_control.robot import JointFriction, MujocoCoordinates, ToolFrame
-from hsp_control.robot.description.mujoco import source
-from hsp_control.robot.description.mujoco.names import Names
+from hsp_control.robot.mujoco import loading
+from hsp_control.robot.mujoco.scene import Names
 
 mujoco = pytest.importorskip("mujoco")
 from mujoco_oracle import differences, velocity_map  # noqa: E402
@@ -227,7 +227,7 @@ OMISSIONS = [
 
 @pytest.fixture
 def _nothing_said() -> None:
-    source._warn.cache_clear()
+    loading._warn.cache_clear()
 
 
 @pytest.mark.usefixtures("_nothing_said")

@@ -8,13 +8,13 @@ import numpy as np
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import ModelError, SimulationError
 from hsp_control.common.kernels import kernel
-from hsp_control.robot.description.mujoco import constants
+from hsp_control.robot.mujoco import scene
 
 
 def import_mujoco() -> Any:
     """Return the module ``mujoco``; its warnings go to our log, not to a file."""
     try:
-        return constants.import_mujoco()
+        return scene.import_mujoco()
     except ModelError as error:
         raise SimulationError(f"the plant cannot be made: {error}") from error
 

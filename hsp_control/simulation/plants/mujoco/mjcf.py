@@ -27,8 +27,7 @@ from hsp_control.declaration.quantities import (
 )
 from hsp_control.declaration.rotation import Rotation, matrix_of
 from hsp_control.geometry import link_shapes
-from hsp_control.geometry.capsule_fit import enclosing_capsule
-from hsp_control.geometry.hulls import hull_corners
+from hsp_control.geometry.enclosing import enclosing_capsule, hull_corners
 from hsp_control.geometry.shapes import Box, Capsule, Cylinder, Shape, Sphere
 from hsp_control.robot import Robot
 from hsp_control.robot.friction import JointFriction

@@ -16,8 +16,8 @@ from hsp_control.declaration.quantities import Flag, Positive
 from hsp_control.robot import Robot
 from hsp_control.robot.friction import JointFriction
 from hsp_control.robot.integrators import Integrator
+from hsp_control.robot.motion import number_of_steps
 from hsp_control.robot.mujoco_coordinates import MujocoCoordinates, joints_of
-from hsp_control.robot.step_count import number_of_steps
 from hsp_control.simulation.plants.declared import FrictionalPart
 from hsp_control.simulation.plants.mujoco.engine import (
     check_motion,

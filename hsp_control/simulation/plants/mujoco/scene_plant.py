@@ -21,11 +21,10 @@ from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Flag
 from hsp_control.declaration.quantities import Names as NameList
 from hsp_control.robot import MujocoCoordinates, Robot
-from hsp_control.robot.description.mujoco.motors import Motor, joint_actuators, motor
-from hsp_control.robot.description.mujoco.names import Names
-from hsp_control.robot.description.mujoco.source import compile_mjcf
 from hsp_control.robot.integrators import Integrator
-from hsp_control.robot.step_count import number_of_steps
+from hsp_control.robot.motion import number_of_steps
+from hsp_control.robot.mujoco.loading import compile_mjcf
+from hsp_control.robot.mujoco.scene import Motor, Names, joint_actuators, motor
 from hsp_control.simulation.plants.declared import PlantPart
 from hsp_control.simulation.plants.mujoco.engine import (
     check_motion,

@@ -1,12 +1,36 @@
-"""What a state accepts: numbers of the right sizes, finite, and of norm 1 where due."""
+"""What moves a state: valid numbers, accelerations, and steps of equal length."""
+
+from collections.abc import Callable
+from math import ceil
+from typing import NamedTuple
 
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
+from hsp_control.common.native import NativeCall
 
 REFUSED = -1.0
 """What a move returns if it was refused; kernels' results are not negative."""
+
+
+class Acceleration(NamedTuple):
+    """v' for what some arrays hold when it is computed.
+
+    Attributes:
+        compute: Writes `value` for a time [s].
+        value: v', shape (nv,) [rad/s² or m/s²]; the next call overwrites it.
+        native: `compute` as a native call, where it does not depend on time; or None.
+    """
+
+    compute: Callable[[float], object]
+    value: Array
+    native: NativeCall | None = None
+
+
+def number_of_steps(duration: float, step: float) -> int:
+    """Return the smallest number of equal steps that are not longer than ``step``."""
+    return max(1, ceil(duration / step - 1e-9))
 
 
 @kernel
@@ -19,7 +43,7 @@ def copy_valid(
     unit_blocks: Indices,
     stamp: Indices,
 ) -> bool:
-    """Copy q and v if they are valid; return whether they are."""
+    """Copy q and v if they are finite, of the right sizes and norms; return whether."""
     if q_in.shape[0] != q.shape[0] or v_in.shape[0] != v.shape[0]:
         return False
     total = t

@@ -1,4 +1,4 @@
-"""The Pinocchio model of a robot in a compiled MuJoCo model.
+"""The Pinocchio model of a robot in a compiled MuJoCo model, and its bodies' shapes.
 
 It is made of the numbers that MuJoCo computes with, so that nothing depends on how the
 MJCF was written: defaults, included files, inertias from geoms are all resolved.
@@ -10,18 +10,31 @@ A body's joints follow one another in the body's frame (MuJoCo's documentation,
 
 So the bodies' poses at q = qpos are MuJoCo's, and q is qpos but for the order of a
 quaternion's numbers.
+
+A geom collides if its contype or its conaffinity is not zero; with what, does not
+matter here: many models let a robot collide with the floor only, to be faster. As in
+MuJoCo, a mesh collides as its convex hull. What does not collide is there to be seen,
+if it is in one of the groups that MuJoCo's viewers show at first (0 to 2). Of a body
+without such geoms, those are seen that collide.
 """
 
+from functools import cache
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
-from hsp_control.common.arrays import Array
+from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import ModelError
-from hsp_control.robot.description.mujoco import motors
-from hsp_control.robot.description.mujoco.constants import constants
-from hsp_control.robot.description.mujoco.selection import Selection
+from hsp_control.robot.description.sources import BodyShape, ShapeKind
+from hsp_control.robot.mujoco.scene import (
+    Selection,
+    constants,
+    dofs_of,
+    effort_range,
+    is_scalar,
+    joint_total,
+)
 
 _AXES = np.eye(3)
 _HINGES = pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ
@@ -38,14 +51,6 @@ def pose(position: Array, wxyz: Array) -> pin.SE3:
 def build_model(selection: Selection) -> pin.Model:
     """Return the Pinocchio model, with a frame for each body, joint and site."""
     return _Builder(selection).model
-
-
-def dofs_of(model: Any, joint: int) -> slice:
-    """Return the indices of a joint's degrees of freedom in qvel."""
-    kinds = constants("mjtJoint")
-    sizes = {kinds.mjJNT_FREE: 6, kinds.mjJNT_BALL: 3}
-    first = int(model.jnt_dofadr[joint])
-    return slice(first, first + sizes.get(int(model.jnt_type[joint]), 1))
 
 
 class _Builder:
@@ -89,12 +94,11 @@ class _Builder:
 
     def _locked(self, joint: int) -> pin.SE3:
         """Return the motion of a joint that is locked."""
-        scene, kinds = self._scene, self._kinds
-        at = int(scene.jnt_qposadr[joint])
-        qpos, kind = self._selection.qpos, scene.jnt_type[joint]
-        if kind == kinds.mjJNT_FREE:
+        at = int(self._scene.jnt_qposadr[joint])
+        qpos, kind = self._selection.qpos, self._scene.jnt_type[joint]
+        if kind == self._kinds.mjJNT_FREE:
             return pose(qpos[at : at + 3], qpos[at + 3 : at + 7])
-        if kind == kinds.mjJNT_BALL:
+        if kind == self._kinds.mjJNT_BALL:
             return pose(np.zeros(3), qpos[at : at + 4])
         return self._moved(joint, float(qpos[at]))
 
@@ -108,39 +112,36 @@ class _Builder:
         return pin.SE3(np.eye(3), vector)
 
     def _add_joint(self, parent: int, place: pin.SE3, joint: int) -> int:
-        scene, kind = self._scene, self._scene.jnt_type[joint]
+        scene, model, kinds = self._scene, self.model, self._kinds
         name = self._selection.names.joints[joint]
-        dofs = dofs_of(scene, joint)
-        if self.model.existJointName(name):
+        if model.existJointName(name):
             raise ModelError(f"joint {name!r}: the model has this name already")
-        if kind == self._kinds.mjJNT_FREE:
-            index = self.model.addJoint(parent, pin.JointModelFreeFlyer(), place, name)
-        elif kind == self._kinds.mjJNT_BALL:
-            index = self.model.addJoint(parent, pin.JointModelSpherical(), place, name)
-        else:
+        if is_scalar(scene, joint):
             place = place * self._moved(joint, 0.0)  # so that q is qpos, not qpos - ref
-            turns = kind == self._kinds.mjJNT_HINGE
+            turns = scene.jnt_type[joint] == kinds.mjJNT_HINGE
             made = _scalar_joint(np.array(scene.jnt_axis[joint]), turns=turns)
-            limits = self._limits(joint)
-            index = self.model.addJoint(parent, made, place, name, *limits)
-        at = self.model.idx_vs[index]
+            index = model.addJoint(parent, made, place, name, *self._limits(joint))
+        else:
+            free = scene.jnt_type[joint] == kinds.mjJNT_FREE
+            made = pin.JointModelFreeFlyer() if free else pin.JointModelSpherical()
+            index = model.addJoint(parent, made, place, name)
+        dofs, at = dofs_of(scene, joint), model.idx_vs[index]
         own = slice(at, at + dofs.stop - dofs.start)
-        self.model.armature[own] = motors.armature(scene, joint, dofs)
-        self.model.damping[own] = motors.damping(scene, joint, dofs)
-        self.model.upperDryFrictionLimit[own] = scene.dof_frictionloss[dofs]
-        self.model.lowerDryFrictionLimit[own] = -scene.dof_frictionloss[dofs]
-        self.model.addJointFrame(index)
+        model.armature[own] = joint_total(scene, joint, "armature")
+        model.damping[own] = joint_total(scene, joint, "damping")
+        model.upperDryFrictionLimit[own] = scene.dof_frictionloss[dofs]
+        model.lowerDryFrictionLimit[own] = -scene.dof_frictionloss[dofs]
+        model.addJointFrame(index)
         return int(index)
 
-    def _limits(self, joint: int) -> tuple[Array, Array, Array, Array]:
+    def _limits(self, joint: int) -> list[Array]:
         """Return effort, velocity, lower and upper limit of a hinge or a slide."""
-        scene = self._scene
-        low, high = -np.inf, np.inf
+        scene, low, high = self._scene, -np.inf, np.inf
         if scene.jnt_limited[joint]:
             low, high = map(float, scene.jnt_range[joint])
-        weakest, strongest = motors.effort_range(scene, joint)
+        weakest, strongest = effort_range(scene, joint)
         effort = max(0.0, min(-weakest, strongest))
-        return tuple(np.array([x]) for x in (effort, np.inf, low, high))  # type: ignore[return-value]
+        return [np.array([limit]) for limit in (effort, np.inf, low, high)]
 
     def _fill(self, body: int) -> None:
         """Add a body's inertia and its frame."""
@@ -184,3 +185,111 @@ def _scalar_joint(axis: Array, *, turns: bool) -> Any:
     if turns:
         return pin.JointModelRevoluteUnaligned(axis)
     return pin.JointModelPrismaticUnaligned(axis)
+
+
+# --- shapes --------------------------------------------------------------------------
+
+_SHOWN_GROUPS = 3
+_DEFAULT_COLOR = np.array([0.5, 0.5, 0.5, 1.0], dtype=np.float32)
+"""Where a geom has this colour, that of its material counts."""
+
+
+def body_shapes(selection: Selection) -> tuple[BodyShape, ...]:
+    """Return the shapes of the robot's bodies, without those of the world."""
+    scene, found = selection.model, []
+    meshes: dict[int, tuple[Array, Indices]] = {}  # several geoms may have one
+    for body in filter(None, selection.bodies):
+        geoms = [g for g in _geoms(scene, body) if int(scene.geom_type[g]) in _kinds()]
+        colliding = set(_colliding(scene, body))
+        shown = {g for g in geoms if scene.geom_group[g] < _SHOWN_GROUPS}
+        seen = (shown - colliding) or colliding
+        for geom in geoms:
+            if geom not in seen and geom not in colliding:
+                continue
+            kind, color = _kinds()[int(scene.geom_type[geom])], _color(scene, geom)
+            number = int(scene.geom_dataid[geom])
+            if kind == "mesh" and number not in meshes:
+                meshes[number] = _mesh(scene, number)
+            shape = BodyShape(
+                body=selection.names.bodies[body],
+                kind=kind,
+                size=_size(kind, [float(x) for x in scene.geom_size[geom]]),
+                pose=pose(scene.geom_pos[geom], scene.geom_quat[geom]).homogeneous,
+                color=color,
+                seen=geom in seen and color[3] > 0.0,
+                collides=geom in colliding,
+                mesh=meshes[number] if kind == "mesh" else None,
+            )
+            found.append(shape)
+    return tuple(found)
+
+
+def excluded_pairs(selection: Selection) -> frozenset[frozenset[str]]:
+    """Return the pairs of bodies that the model excludes from collisions, by name."""
+    names = selection.names.bodies
+    signatures = map(int, selection.model.exclude_signature)  # two numbers in one
+    return frozenset(
+        frozenset((names[signature >> 16], names[signature & 0xFFFF]))
+        for signature in signatures
+    )
+
+
+def shapeless_geoms(selection: Selection) -> list[str]:
+    """Return the colliding geoms of the robot that have no counterpart here."""
+    scene = selection.model
+    return [
+        scene.geom(geom).name or f"geom_{geom}"
+        for body in filter(None, selection.bodies)
+        for geom in _colliding(scene, body)
+        if int(scene.geom_type[geom]) not in _kinds()
+    ]
+
+
+@cache
+def _kinds() -> dict[int, ShapeKind]:
+    kinds = constants("mjtGeom")
+    return {
+        kinds.mjGEOM_SPHERE: "sphere",
+        kinds.mjGEOM_CAPSULE: "capsule",
+        kinds.mjGEOM_ELLIPSOID: "ellipsoid",
+        kinds.mjGEOM_CYLINDER: "cylinder",
+        kinds.mjGEOM_BOX: "box",
+        kinds.mjGEOM_MESH: "mesh",
+    }
+
+
+def _size(kind: ShapeKind, half: list[float]) -> tuple[float, ...]:
+    if kind == "box":
+        return tuple(2.0 * x for x in half)
+    if kind == "ellipsoid":
+        return tuple(half)
+    return {"sphere": (half[0],), "mesh": ()}.get(kind, (half[0], 2.0 * half[1]))
+
+
+def _mesh(scene: Any, mesh: int) -> tuple[Array, Indices]:
+    first, count = int(scene.mesh_vertadr[mesh]), int(scene.mesh_vertnum[mesh])
+    vertices = np.array(scene.mesh_vert[first : first + count], dtype=float)
+    first, count = int(scene.mesh_faceadr[mesh]), int(scene.mesh_facenum[mesh])
+    triangles = np.array(scene.mesh_face[first : first + count], dtype=np.int64)
+    return vertices, triangles
+
+
+def _geoms(scene: Any, body: int) -> range:
+    first = int(scene.body_geomadr[body])
+    return range(first, first + int(scene.body_geomnum[body]))
+
+
+def _colliding(scene: Any, body: int) -> list[int]:
+    return [
+        geom
+        for geom in _geoms(scene, body)
+        if scene.geom_contype[geom] or scene.geom_conaffinity[geom]
+    ]
+
+
+def _color(scene: Any, geom: int) -> tuple[float, float, float, float]:
+    own, material = scene.geom_rgba[geom], int(scene.geom_matid[geom])
+    if material >= 0 and np.array_equal(own, _DEFAULT_COLOR):
+        own = scene.mat_rgba[material]
+    red, green, blue, opacity = map(float, own)
+    return red, green, blue, opacity

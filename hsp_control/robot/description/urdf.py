@@ -1,19 +1,22 @@
-"""Check the numbers and the size of a URDF before other parsers read it.
+"""Read a URDF, with its numbers and its size checked before other parsers read it.
 
 These parsers accept NaN as a mass, abort the process on some numbers, and do not limit
 the size. Faults that they detect and report themselves are left to them.
 """
 
 import math
+import os
 from collections import Counter
 from collections.abc import Iterator
+from pathlib import Path
+from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from hsp_control.common.exceptions import ModelError, RobotNotFoundError
 from hsp_control.common.suggestions import listing
-from hsp_control.robot.description.inertias import ENTRIES
+from hsp_control.robot.description.access import XmlError, parse_xml, read_xml
+from hsp_control.robot.description.inertias import ENTRIES, project_inertias
 from hsp_control.robot.description.sources import RobotSource
-from hsp_control.robot.description.xml_files import XmlError, parse_xml, read_xml
 
 MAX_LINKS = 1000
 """Maximum number of links: the depth of recursions grows with it."""
@@ -38,9 +41,9 @@ _NUMBERS = {
     "mesh": {"scale": 3},
     "dynamics": {"damping": 1, "friction": 1},
     "color": {"rgba": 4},
+    "limit": dict.fromkeys(("lower", "upper", "effort", "velocity"), 1),
 }
-_LIMITS = {"limit": dict.fromkeys(("lower", "upper", "effort", "velocity"), 1)}
-"""Attributes that may be arbitrarily large: very large limits mean no limit."""
+"""How many numbers an element's attributes are."""
 _LENGTHS = {"box", "cylinder", "capsule", "sphere"}
 _SINGLE = {
     "link": {"inertial"},
@@ -63,7 +66,7 @@ def read_urdf(source: RobotSource) -> Element:
     for where, problem in problems(robot):
         raise ModelError(f"{source.urdf}: {where}: {problem}")
     for element in robot.iter():
-        for name in (*_NUMBERS.get(element.tag, ()), *_LIMITS.get(element.tag, ())):
+        for name in _NUMBERS.get(element.tag, ()):
             if (text := element.get(name)) is not None:
                 element.set(name, _plain(text))
     return robot
@@ -120,6 +123,29 @@ def named_files(robot: Element) -> Iterator[tuple[str, str]]:
             yield name, f"{owner}<{element.tag}>"
 
 
+def parser_text(xml: Element, *unused: str) -> str:
+    """Return a URDF's text for the parser, without ``unused`` elements of links."""
+    for link in xml.iter("link"):
+        for element in [each for each in link if each.tag in unused]:
+            link.remove(element)
+    return ElementTree.tostring(xml, encoding="unicode")
+
+
+def write_repaired(source: RobotSource, path: Path) -> Path:
+    """Write a robot's URDF with projected inertias; all else stays, but comments."""
+    xml = read_urdf(source)
+    if path.exists() and path.samefile(source.urdf):
+        raise ModelError(f"{path}: is the robot's own file; give another one")
+    project_inertias(xml)
+    for element in xml.iter():
+        name = element.get("filename")
+        if name is not None and "://" not in name and not Path(name).is_absolute():
+            file = source.urdf.resolve().parent / name
+            element.set("filename", os.path.relpath(file, path.resolve().parent))
+    ElementTree.ElementTree(xml).write(path, encoding="utf-8", xml_declaration=True)
+    return path
+
+
 def _elements(robot: Element) -> Iterator[tuple[str, Element]]:
     """Yield the link, joint or material that an element is in, and the element."""
     for child in robot:
@@ -132,13 +158,10 @@ def _elements(robot: Element) -> Iterator[tuple[str, Element]]:
 def _find_problem(element: Element) -> str:
     """Return what is wrong with an element, or an empty string."""
     tag = element.tag
+    largest = math.inf if tag == "limit" else MAX_NUMBER  # large limits mean none
     for name, count in _NUMBERS.get(tag, {}).items():
         text = element.get(name)
-        if text is not None and (wrong := _check_numbers(text, count, MAX_NUMBER)):
-            return f'{name}="{_short(text)}" {wrong}'
-    for name, count in _LIMITS.get(tag, {}).items():
-        text = element.get(name)
-        if text is not None and (wrong := _check_numbers(text, count, math.inf)):
+        if text is not None and (wrong := _check_numbers(text, count, largest)):
             return f'{name}="{_short(text)}" {wrong}'
     if tag == "mass" and float(element.get("value", 0.0)) < 0.0:
         return f'value="{element.get("value")}": a mass must not be negative'
@@ -158,7 +181,7 @@ def _find_problem(element: Element) -> str:
 
 def _repeated(element: Element) -> str:
     """Return what an element contains more than once, or an empty string."""
-    single = _SINGLE.get(element.tag, set())
+    single = _SINGLE.get(element.tag, ())
     found = Counter(child.tag for child in element if child.tag in single)
     if element.tag == "geometry" and found.total() > 1:
         return f"contains {listing(found.elements())}; must be one shape"

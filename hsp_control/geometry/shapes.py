@@ -1,4 +1,10 @@
-"""The shapes: each is one of Coal's geometries."""
+"""Shapes of obstacles and contacts, as Coal computes distances between them.
+
+The gradient of a capsule's distance to a sphere is continuous. To a flat face, it jumps
+where the capsule becomes parallel to the face; to another capsule, where both become
+parallel. The gradient of a sphere's distance to a convex shape is continuous.
+`ObstacleClearance` chooses the proxies of links accordingly.
+"""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -24,7 +30,7 @@ from hsp_control.declaration.quantities import (
     PositiveVector3,
     plain,
 )
-from hsp_control.geometry.hulls import convex_hull
+from hsp_control.geometry.enclosing import convex_hull
 from hsp_control.robot.description import mesh_files
 
 

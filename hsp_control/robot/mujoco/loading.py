@@ -1,4 +1,4 @@
-"""From an MJCF or a compiled MuJoCo model to a Pinocchio model."""
+"""A robot out of an MJCF or a compiled MuJoCo model."""
 
 import logging
 from collections.abc import Iterator, Mapping
@@ -15,20 +15,29 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import AccessError, ModelError, RobotNotFoundError
 from hsp_control.common.suggestions import did_you_mean
 from hsp_control.declaration import within
-from hsp_control.robot.description.access import ANYWHERE, Access
-from hsp_control.robot.description.loading import completed
-from hsp_control.robot.description.mujoco.constants import constants, import_mujoco
-from hsp_control.robot.description.mujoco.dynamics import build_model
-from hsp_control.robot.description.mujoco.selection import Selection, select
-from hsp_control.robot.description.mujoco.shapes import (
-    body_shapes,
-    excluded_pairs,
-    omissions,
+from hsp_control.robot.description.access import (
+    ANYWHERE,
+    Access,
+    XmlError,
+    read_xml,
 )
+from hsp_control.robot.description.loading import completed
 from hsp_control.robot.description.robot_description import RobotDescription, ToolFrame
 from hsp_control.robot.description.sources import RobotSource
-from hsp_control.robot.description.urdf_checks import MAX_DOFS, MAX_LINKS
-from hsp_control.robot.description.xml_files import XmlError, read_xml
+from hsp_control.robot.description.urdf import MAX_DOFS, MAX_LINKS
+from hsp_control.robot.mujoco.conversion import (
+    body_shapes,
+    build_model,
+    excluded_pairs,
+)
+from hsp_control.robot.mujoco.omissions import omissions
+from hsp_control.robot.mujoco.scene import (
+    Selection,
+    constants,
+    import_mujoco,
+    is_scalar,
+    select,
+)
 
 _FOLDERS = "meshdir", "texturedir", "assetdir"
 _REFUSED = "plugin", "replicate", "composite", "flexcomp"
@@ -116,19 +125,13 @@ def load_mjcf(
     description: RobotDescription, access: Access
 ) -> tuple[pin.Model, RobotSource]:
     """Return the Pinocchio model of a description with an MJCF, and its source."""
-    assert description.mjcf is not None
-    file = Path(description.mjcf)
+    told = description
+    file = Path(told.mjcf or "")
     with within("mjcf"):
         scene = compile_mjcf(file, access)
-    selection = select(
-        scene,
-        description.root,
-        description.joints,
-        keyframe=description.keyframe,
-        locked=description.locked,
-    )
-    tools, gravity = description.tool_frames, description.gravity
-    return load_selection(selection, tools, gravity, file, access)
+    given = told.root, told.joints, None, told.keyframe, told.locked
+    selection = select(scene, *given)
+    return load_selection(selection, told.tool_frames, told.gravity, file, access)
 
 
 def load_selection(
@@ -168,11 +171,11 @@ def _warn(robot: str, sentence: str) -> None:
 
 def _locked(selection: Selection) -> dict[str, float]:
     """Return where the locked hinges and slides of the robot are [rad or m]."""
-    scene, kinds = selection.model, constants("mjtJoint")
+    scene, names = selection.model, selection.names.joints
     return {
-        selection.names.joints[joint]: float(selection.qpos[scene.jnt_qposadr[joint]])
+        names[joint]: float(selection.qpos[scene.jnt_qposadr[joint]])
         for joint in selection.locked
-        if scene.jnt_type[joint] in (kinds.mjJNT_HINGE, kinds.mjJNT_SLIDE)
+        if is_scalar(scene, joint)
     }
 
 

@@ -1,16 +1,35 @@
-"""Capsules that enclose points and ellipsoids, and Coal's geometry of a body."""
+"""What encloses points, meshes and ellipsoids: convex hulls and capsules."""
 
 from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-import coal
 import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
-from hsp_control.geometry.hulls import convex_hull
-from hsp_control.robot.description.body_shape import BodyShape
+
+
+def convex_hull(mesh: Any) -> Any:
+    """Return the hull of one of Coal's meshes; None if it is flat: Coal would abort."""
+    from scipy.spatial import ConvexHull, QhullError  # here: SciPy takes long to import
+
+    try:
+        ConvexHull(np.array(mesh.vertices()), qhull_options="Qt")
+    except QhullError:
+        return None
+    mesh.buildConvexHull(True, "Qt")
+    return mesh.convex
+
+
+def hull_corners(points: Array) -> Array:
+    """Return those of the points (k, 3) that are their hull's vertices; all without."""
+    from scipy.spatial import ConvexHull, QhullError  # here: SciPy takes long to import
+
+    try:
+        return points[ConvexHull(points, qhull_options="QJ").vertices]
+    except QhullError:
+        return points
 
 
 def enclosing_capsule(points: Array) -> tuple[Array, Array, float]:
@@ -71,29 +90,6 @@ def _segment(
         low = high = 0.5 * (low + high)
         radius = float(np.hypot(across, along - low).max())
     return low, high, radius
-
-
-def body_geometry(shape: BodyShape) -> Any:
-    """Return Coal's geometry; of a mesh its convex hull, or a flat mesh as it is."""
-    match shape.kind:
-        case "box":
-            return coal.Box(*shape.size)
-        case "sphere":
-            return coal.Sphere(*shape.size)
-        case "capsule":
-            return coal.Capsule(*shape.size)
-        case "cylinder":
-            return coal.Cylinder(*shape.size)
-        case "ellipsoid":
-            return coal.Ellipsoid(*shape.size)
-    assert shape.mesh is not None
-    vertices, triangles = shape.mesh
-    mesh = coal.BVHModelOBBRSS()
-    mesh.beginModel(len(triangles), len(vertices))
-    for triangle in vertices[triangles]:
-        mesh.addTriangle(*triangle)
-    mesh.endModel()
-    return convex_hull(mesh) or mesh
 
 
 def enclosing_ellipsoid_capsule(ellipsoid: Any) -> tuple[pin.SE3, float, float]:
