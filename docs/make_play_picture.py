@@ -34,15 +34,16 @@ def main() -> None:
         pose = np.array(session.handles.targets["hand"].where(session.controller.state))
         for _ in range(40):
             pose[:3] += [0.001, 0.004, 0.001]
-            session.take({"do": "move", "target": "hand", "pose": pose.tolist()})
+            session.receive({"do": "move", "target": "hand", "pose": pose.tolist()})
             go(3)
-        session.take({"do": "obstacle", "name": "ball", "position": [0.1, 0.45, 0.75]})
+        ball = {"do": "obstacle", "name": "ball", "position": [0.1, 0.45, 0.75]}
+        session.receive(ball)
         go(200)
         point = session.controller.state.data.oMi[4].translation.copy()
         message = {"do": "pull", "path": ELBOW, "point": point.tolist()}
         for _ in range(150):
             hand = point + np.array([-0.05, -0.3, 0.12])
-            session.take(message | {"to": hand.tolist()})
+            session.receive(message | {"to": hand.tolist()})
             session.advance()
         page = browser.new_page(viewport=SIZE, device_scale_factor=1.5)
         page.goto(server.url)

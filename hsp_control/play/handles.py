@@ -20,6 +20,7 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HspControlError, StreamError
+from hsp_control.control.changes import Changes
 from hsp_control.control.controller import Controller
 from hsp_control.declaration.nested import parts_within
 from hsp_control.geometry.scene import Obstacle
@@ -46,6 +47,7 @@ _TURNING: dict[str, Any] = {
     "angular_jerk": 200.0,
 }
 """The same for turning [rad/s, rad/s², rad/s³]."""
+_FARTHEST = 1e3  # nothing is dragged farther [m]
 DELAY = 0.03  # time to a target that is dragged [s]: about two of a page's pictures
 
 
@@ -60,17 +62,17 @@ class Grip(ABC):
 
     def move(self, value: Any, t: float) -> None:
         """Lead it somewhere from time t on [s]."""
-        wanted = self._wanted(np.asarray(value, dtype=float))
-        stream = self._stream or self._make_stream()
-        stream.send(wanted)  # before it leads: it may refuse
-        if self._stream is None:
-            self._let_follow(stream, t)
+        known = self._stream is not None
+        stream = self._stream or self._new_stream()
+        stream.send(self._wanted(np.asarray(value, dtype=float)))  # it may refuse
+        if not known:
+            self._follow(stream, self._controller.at(t).ramp(RAMP))
             self._stream = stream
 
     def resume(self, t: float) -> None:
         """Let it return to its own path from time t on [s]."""
         if self._stream is not None:
-            self._return(t)
+            self._follow(None, self._controller.at(t).ramp(BACK))
         self._stream = None
 
     @abstractmethod
@@ -82,16 +84,22 @@ class Grip(ABC):
         """Return where it is now: x, y, z and a quaternion, or less."""
 
     @abstractmethod
-    def _make_stream(self) -> Streamed: ...
+    def _new_stream(self) -> Streamed: ...
 
     @abstractmethod
-    def _wanted(self, value: Array) -> Array: ...
+    def _wanted(self, value: Array) -> Array:
+        """Return what a page asks for as the stream takes it."""
 
     @abstractmethod
-    def _let_follow(self, stream: Streamed, t: float) -> None: ...
+    def _follow(self, stream: Any, at: Changes) -> None:
+        """Follow a stream, or its own path for None."""
 
-    @abstractmethod
-    def _return(self, t: float) -> None: ...
+
+def _pose(value: Array) -> Array:
+    """Return a pose that a page sent."""
+    if value.shape != (7,) or not (np.abs(value) < _FARTHEST).all():
+        raise StreamError(f"a pose is x, y, z and a quaternion; got {value}")
+    return value
 
 
 class TargetGrip(Grip):
@@ -100,65 +108,45 @@ class TargetGrip(Grip):
     def __init__(self, task: Task, controller: Controller) -> None:
         """Remember the task's own path."""
         super().__init__(task.name, controller)
-        self._kind = type(task)
         self._frame = task.frame  # type: ignore[attr-defined]
         self._own = task.followed
         axes = task.axes if isinstance(task, FramePosition) else "xyz"
         self._axes = [axis in axes for axis in "xyz"]
-        self._tracked = ["xyz".index(axis) for axis in axes]
+        # What of x, y, z and a quaternion the task follows.
+        self._kind, self._tracked = "pose", list(range(7))
+        if isinstance(task, FramePosition):
+            self._kind, self._tracked = "position", ["xyz".index(axis) for axis in axes]
+        elif isinstance(task, FrameOrientation):
+            self._kind, self._tracked = "orientation", [3, 4, 5, 6]
 
     def describe(self, state: RobotState) -> dict[str, Any]:
         """Return its name, its kind, its axes and its pose."""
-        kinds = {FramePose: "pose", FramePosition: "position"}
-        return {
-            "name": self.name,
-            "kind": kinds.get(self._kind, "orientation"),
-            "axes": self._axes,
-            "pose": self.where(state),
-        }
+        pose = self.where(state)
+        return {"name": self.name, "kind": self._kind, "axes": self._axes, "pose": pose}
 
     def where(self, state: RobotState) -> list[float]:
         """Return x, y, z and a quaternion; the frame's own where the task is free."""
         frame = state.frame(self._frame)
         pose = pin.SE3ToXYZQUAT(pin.SE3(frame.rotation, frame.position))
-        task = self._task()
-        if task is not None:
-            reference, _ = task.measure(state)
-            if self._kind is FramePosition:
-                pose[self._tracked] = reference
-            elif self._kind is FrameOrientation:
-                pose[3:] = reference
-            else:
-                pose[:] = reference
+        for task in self._controller.tasks:
+            if task.name == self.name:
+                pose[self._tracked], _ = task.measure(state)
         return [float(x) for x in pose]
 
-    def _task(self) -> Task | None:
-        found = [each for each in self._controller.tasks if each.name == self.name]
-        return found[0] if found else None
-
-    def _make_stream(self) -> Streamed:
-        if self._kind is FramePosition:
+    def _new_stream(self) -> Streamed:
+        if self._kind == "position":
             return Stream(**_MOVING, delay=DELAY)
-        if self._kind is FrameOrientation:
+        if self._kind == "orientation":
             return StreamOrientation(**_TURNING, delay=DELAY)
         return StreamPose(**_MOVING, **_TURNING, delay=DELAY)
 
     def _wanted(self, value: Array) -> Array:
-        if value.shape != (7,) or not np.isfinite(value).all():
-            raise StreamError(f"a pose is x, y, z and a quaternion; got {value}")
-        if self._kind is FramePosition:
-            return value[self._tracked]
-        return value[3:] if self._kind is FrameOrientation else value
+        return _pose(value)[self._tracked]
 
-    def _let_follow(self, stream: Streamed, t: float) -> None:
-        self._refer(stream, t, RAMP)  # type: ignore[arg-type]
-
-    def _return(self, t: float) -> None:
-        assert self._own is not None
-        self._refer(self._own, t, BACK)
-
-    def _refer(self, reference: AnyReference, t: float, ramp: float) -> None:
-        self._controller.at(t).ramp(ramp).reference(self.name, reference)
+    def _follow(self, stream: AnyReference | None, at: Changes) -> None:
+        reference = stream or self._own
+        assert reference is not None
+        at.reference(self.name, reference)
 
 
 class ObstacleGrip(Grip):
@@ -171,33 +159,25 @@ class ObstacleGrip(Grip):
 
     def describe(self, state: RobotState) -> dict[str, Any]:
         """Return its name, its position and its size."""
-        radius = self._obstacle.shape.bounding_radius
-        return {
-            "name": self.name,
-            "position": self.where(state),
-            "radius": radius if np.isfinite(radius) else 0.0,
-        }
+        reach = self._obstacle.shape.bounding_radius
+        radius = reach if np.isfinite(reach) else 0.0
+        return {"name": self.name, "position": self.where(state), "radius": radius}
 
     def where(self, state: RobotState) -> list[float]:
         """Return the position of its frame."""
         place = self._controller.scene[self.name].placement(state.t)
         return [float(x) for x in place.translation]
 
-    def _make_stream(self) -> Streamed:
+    def _new_stream(self) -> Streamed:
         return Stream(**_MOVING, delay=DELAY)
 
     def _wanted(self, value: Array) -> Array:
-        if value.shape != (3,) or not np.isfinite(value).all():
+        if value.shape != (3,) or not (np.abs(value) < _FARTHEST).all():
             raise StreamError(f"a position is x, y and z; got {value}")
         return value
 
-    def _let_follow(self, stream: Streamed, t: float) -> None:
-        assert isinstance(stream, Stream)
-        self._controller.at(t).ramp(RAMP).obstacle(self.name, stream)
-
-    def _return(self, t: float) -> None:
-        own = self._obstacle.center
-        self._controller.at(t).ramp(BACK).obstacle(self.name, own)
+    def _follow(self, stream: Stream | None, at: Changes) -> None:
+        at.obstacle(self.name, stream or self._obstacle.center)
 
 
 def targets_of(controller: Controller) -> dict[str, TargetGrip]:
@@ -247,13 +227,8 @@ class PostureGrip(Grip):
 
     def describe(self, state: RobotState) -> dict[str, Any]:
         """Return its name, its kind, its axes and its pose."""
-        return {
-            "name": self.name,
-            "kind": "position",
-            "axes": [True, True, True],
-            "color": FIELD,
-            "pose": self.where(state),
-        }
+        about = {"kind": "position", "axes": [True] * 3, "color": FIELD}
+        return {"name": self.name, **about, "pose": self.where(state)}
 
     def where(self, state: RobotState) -> list[float]:
         """Return the joint's pose in the target posture, x, y, z and a quaternion."""
@@ -271,23 +246,20 @@ class PostureGrip(Grip):
         pin.forwardKinematics(self._robot.model, self._data, q)
         return [float(x) for x in pin.SE3ToXYZQUAT(self._data.oMi[self._joint])]
 
-    def _make_stream(self) -> Streamed:
+    def _new_stream(self) -> Streamed:
         return Stream(np.zeros(self._robot.nv), **_JOINTS_MOVING, delay=DELAY)
 
     def _wanted(self, value: Array) -> Array:
-        if value.shape != (7,) or not (np.abs(value) < 1e3).all():
-            raise StreamError(f"a pose is x, y, z and a quaternion; got {value}")
-        self._target = self._posture_with(self._target, value[:3])
+        self._target = self._posture_with(self._target, _pose(value)[:3])
         return self._robot.difference(self._own, self._target)
 
-    def _let_follow(self, stream: Streamed, t: float) -> None:
-        assert isinstance(stream, Stream)
-        moving = replace(self._field, displacement=stream)
-        self._controller.at(t).ramp(RAMP).exchange(self._field.name, moving)
-
-    def _return(self, t: float) -> None:
-        self._target = self._own.copy()
-        self._controller.at(t).ramp(BACK).exchange(self._field.name, self._field)
+    def _follow(self, stream: Stream | None, at: Changes) -> None:
+        if stream is None:
+            self._target = self._own.copy()
+            at.exchange(self._field.name, self._field)
+        else:
+            moving = replace(self._field, displacement=stream)
+            at.exchange(self._field.name, moving)
 
     def _posture_with(self, q: Array, point: Array) -> Array:
         """Return the posture near q whose joint is nearest to a point [m]."""
@@ -360,19 +332,18 @@ class Handles:
         """Add a knob."""
         self.knobs[knob.id], self.values[knob.id] = knob, knob.value
 
-    def take(self, message: Mapping[str, Any]) -> None:
+    def receive(self, message: Mapping[str, Any]) -> None:
         """Do what a page says; what is wrong is answered in `message`.
 
         ``move`` a target or an ``obstacle``, let it ``resume`` its own path, ``set`` a
         knob. A target that is ``release``d stays where it is.
         """
         try:
-            self.obey(message)
+            self._do(message)
         except (HspControlError, ValueError, TypeError, OverflowError) as error:
             self.say(str(error), warning=True)
 
-    def obey(self, message: Mapping[str, Any]) -> None:
-        """Do what a page says; see `take`."""
+    def _do(self, message: Mapping[str, Any]) -> None:
         t = self._controller.state.t
         match message:
             case {"do": "move", "target": str(name), "pose": list(pose)}:
@@ -419,12 +390,12 @@ class Handles:
         """Ask for everything once, so that what it needs is compiled."""
         targets, obstacles = self.places()
         for name, pose in targets.items():
-            self.take({"do": "move", "target": name, "pose": pose})
+            self.receive({"do": "move", "target": name, "pose": pose})
         for name, where in obstacles.items():
-            self.take({"do": "obstacle", "name": name, "position": where})
+            self.receive({"do": "obstacle", "name": name, "position": where})
         for name, value in self.values.items():
             off = not value if isinstance(value, bool) else value
-            self.take({"do": "set", "id": name, "value": off})
+            self.receive({"do": "set", "id": name, "value": off})
 
     def places(self) -> tuple[dict[str, list[float]], dict[str, list[float]]]:
         """Return where the targets and the obstacles are, by name."""

@@ -135,7 +135,7 @@ class SteeredLoop:
                 case {"do": "stop"}:
                     self._requests.stop("stopped from the page")
                 case _ if self._requests.reason is None:
-                    self.handles.take(message)
+                    self.handles.receive(message)
         if self.key is not None and self._channel.lost:  # nobody can hold it any more
             self._requests.stop("the process of the page has ended")
 
@@ -235,7 +235,7 @@ class Mirror:
         """Pass on what a page says."""
         self._channel.send(message)
         if "name" in message:  # of an obstacle
-            self.handles.take(message)  # zones and distances follow it here, too
+            self.handles.receive(message)  # zones and distances follow it here, too
 
     def read(self) -> None:
         """Read what has come from the loop."""

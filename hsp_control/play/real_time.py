@@ -43,7 +43,7 @@ def play(
                     session.handles.say(save())
                     due = monotonic()
                 case _:
-                    session.take(message)
+                    session.receive(message)
         now = monotonic()
         for _ in range(steps):
             session.advance()

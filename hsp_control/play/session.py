@@ -123,7 +123,7 @@ class Session:
 
     # -- messages ---------------------------------------------------------------------
 
-    def take(self, message: Mapping[str, Any]) -> None:
+    def receive(self, message: Mapping[str, Any]) -> None:
         """Do what a page says: ``pull`` at a link and ``let_go``, or see `Handles`."""
         try:
             match message:
@@ -133,7 +133,7 @@ class Session:
                 case {"do": "let_go" | "left"}:
                     self.let_go()
                 case _:
-                    self.handles.take(message)
+                    self.handles.receive(message)
         except (ValueError, TypeError, OverflowError) as error:
             self.handles.say(str(error), warning=True)
 

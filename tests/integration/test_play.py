@@ -53,15 +53,15 @@ def test_what_is_dragged_is_reached_and_the_log_repeats_it(
     wanted = pose_of(session)
     for k in range(20):  # a drag, picture by picture
         wanted[:3] += [0.002, -0.004, 0.005]
-        session.take({"do": "move", "target": "hand", "pose": wanted.tolist()})
-        session.take(
+        session.receive({"do": "move", "target": "hand", "pose": wanted.tolist()})
+        session.receive(
             {"do": "obstacle", "name": "ball", "position": [0.1, 0.3, 0.7 - 0.005 * k]}
         )
         go(session, 0.03)
-    session.take({"do": "release", "target": "hand"})
-    session.take({"do": "set", "id": "null_space_gain", "value": 20.0})
-    session.take({"do": "set", "id": "weight.target_posture", "value": 3.0})
-    session.take({"do": "set", "id": "frequency.hand", "value": 15.0})
+    session.receive({"do": "release", "target": "hand"})
+    session.receive({"do": "set", "id": "null_space_gain", "value": 20.0})
+    session.receive({"do": "set", "id": "weight.target_posture", "value": 3.0})
+    session.receive({"do": "set", "id": "frequency.hand", "value": 15.0})
     go(session, 1.5)
     assert not session.handles.message
     frame = session.controller.state.frame("panda_tcp")
@@ -83,18 +83,20 @@ def test_its_own_path_comes_back(session: Session) -> None:
     go(session, 0.5)
     pose = pose_of(session)
     pose[2] += 0.1
-    session.take({"do": "move", "target": "hand", "pose": pose.tolist()})
-    session.take({"do": "obstacle", "name": "ball", "position": [0.5, 0.5, 0.5]})
+    session.receive({"do": "move", "target": "hand", "pose": pose.tolist()})
+    session.receive({"do": "obstacle", "name": "ball", "position": [0.5, 0.5, 0.5]})
     go(session, 0.5)
     assert abs(pose_of(session)[2] - pose[2]) < 1e-3
-    session.take({"do": "resume", "target": "hand"})
+    session.receive({"do": "resume", "target": "hand"})
     session.handles.obstacles["ball"].resume(session.t)
     go(session, 2.0)
     go(untouched, 3.0)
     np.testing.assert_allclose(pose_of(session), pose_of(untouched), atol=1e-9)
     for each in (session, untouched):
         assert each.controller.scene["ball"].placement(2.0).translation[2] < 0.9
-    session.take({"do": "move", "target": "hand", "pose": pose.tolist()})  # once more
+    session.receive(
+        {"do": "move", "target": "hand", "pose": pose.tolist()}
+    )  # once more
     go(session, 0.8)
     np.testing.assert_allclose(pose_of(session)[:3], pose[:3], atol=1e-3)
 
@@ -107,7 +109,7 @@ def test_the_elbow_of_the_posture_leads_the_null_space(tmp_path: Path) -> None:
     wanted, elbow = start.copy(), session.controller.state.data.oMi[3].copy()
     for _ in range(20):
         wanted[1] += 0.005
-        session.take({"do": "move", "target": "posture", "pose": wanted.tolist()})
+        session.receive({"do": "move", "target": "posture", "pose": wanted.tolist()})
         go(session, 0.03)
     go(session, 2.0)
     # The elbow stays at its distance from the shoulder: not quite there.
@@ -117,7 +119,7 @@ def test_the_elbow_of_the_posture_leads_the_null_space(tmp_path: Path) -> None:
     log = session.rollout()
     assert np.abs(log["task.hand.error"]).max() < 1e-4
     assert log["null_space_norm"].max() < 0.05  # of a motion of 1 rad/s, held for 1 ms
-    session.take({"do": "resume", "target": "posture"})
+    session.receive({"do": "resume", "target": "posture"})
     go(session, 2.0)
     np.testing.assert_allclose(pose_of(session, "posture"), start, atol=1e-9)
     log = session.rollout()
@@ -175,7 +177,7 @@ BAD: list[dict[str, Any]] = [
 def test_nonsense_is_answered_and_moves_nothing(
     session: Session, message: dict[str, Any]
 ) -> None:
-    session.take(message)
+    session.receive(message)
     assert session.handles.message
     assert session.handles.warning
     assert not session.controller.changes
@@ -207,7 +209,7 @@ def test_knobs_keep_damping_ratios() -> None:
 
 def test_a_slider_that_is_dragged_makes_few_changes(session: Session) -> None:
     for k in range(100):
-        session.take({"do": "set", "id": "null_space_gain", "value": 10.0 + 0.1 * k})
+        session.receive({"do": "set", "id": "null_space_gain", "value": 10.0 + 0.1 * k})
         session.advance()
     go(session, 0.2)
     assert session.handles.values["null_space_gain"] == pytest.approx(19.9)
@@ -226,7 +228,7 @@ def test_somebody_pulls_at_the_elbow_and_the_hand_goes_on(
     hand = point + np.array([0.0, 0.15, 0.0])
     message = {"do": "pull", "path": path, "point": point.tolist()}
     for _ in range(100):
-        session.take(message | {"to": hand.tolist()})
+        session.receive(message | {"to": hand.tolist()})
         session.advance()
     pull = session.pull()
     assert pull is not None
@@ -237,7 +239,7 @@ def test_somebody_pulls_at_the_elbow_and_the_hand_goes_on(
     np.testing.assert_allclose(at, moved, atol=1e-9)
     assert moved[1] - point[1] > 0.01
     assert np.abs(session.controller.state.q - q).max() > 0.05
-    session.take({"do": "let_go"})
+    session.receive({"do": "let_go"})
     assert session.pull() is None
     go(session, 0.5)
     log = session.rollout().save(tmp_path / "pulled.npz")
@@ -248,8 +250,8 @@ def test_somebody_pulls_at_the_elbow_and_the_hand_goes_on(
 def test_it_begins_anew(session: Session) -> None:
     go(session, 0.3)
     first = session.rollout().q
-    session.take({"do": "set", "id": "null_space_gain", "value": 30.0})
-    session.take({"do": "obstacle", "name": "ball", "position": [0.4, 0.4, 0.4]})
+    session.receive({"do": "set", "id": "null_space_gain", "value": 30.0})
+    session.receive({"do": "obstacle", "name": "ball", "position": [0.4, 0.4, 0.4]})
     go(session, 0.3)
     session.reset()
     assert session.handles.values["null_space_gain"] == 10.0
@@ -301,7 +303,7 @@ def test_the_picture_follows_what_is_dragged(session: Session) -> None:
         "Task error", "Task error", "Null-space error", "Smallest distance", "Effort",
     ]  # fmt: skip
     assert {each["id"] for each in setup["controls"]} == set(session.handles.knobs)
-    session.take({"do": "obstacle", "name": "ball", "position": [0.2, 0.4, 0.5]})
+    session.receive({"do": "obstacle", "name": "ball", "position": [0.2, 0.4, 0.5]})
     go(session, 1.5)
     picture.draw(running=True, rate=1.0)
     pose = told(recorder, "/play", "pose")
@@ -316,11 +318,11 @@ def test_the_picture_follows_what_is_dragged(session: Session) -> None:
     np.testing.assert_allclose(targets["poses"]["hand"], pose_of(session))
     samples = told(recorder, "/play", "samples 2")
     assert len(samples["times"]) == 150
-    session.take({"do": "set", "id": "field", "value": False})
+    session.receive({"do": "set", "id": "field", "value": False})
     go(session, 0.25)  # past the ramp: its zone is no longer one
     picture.draw(running=True, rate=1.0)
     assert not recorder.paths("/influence")
-    session.take({"do": "set", "id": "field", "value": True})
+    session.receive({"do": "set", "id": "field", "value": True})
     go(session, 0.25)
     picture.draw(running=True, rate=1.0)
     assert recorder.paths("/influence")
@@ -339,7 +341,7 @@ def test_a_target_out_of_reach_is_said_and_by_how_much(still: Session) -> None:
     wanted = pose_of(still)
     assert said() == ""
     wanted[2] += 1.0
-    still.take({"do": "move", "target": "hand", "pose": wanted.tolist()})
+    still.receive({"do": "move", "target": "hand", "pose": wanted.tolist()})
     heard = []
     for _ in range(130):
         go(still, 0.03)
@@ -350,7 +352,7 @@ def test_a_target_out_of_reach_is_said_and_by_how_much(still: Session) -> None:
         "hand: target far away",
         f"hand: target out of reach, {away:.2f} m",
     ]
-    still.take({"do": "resume", "target": "hand"})
+    still.receive({"do": "resume", "target": "hand"})
     go(still, 3.0)
     assert said() == ""
 
@@ -415,7 +417,7 @@ def test_the_operational_space_law_keeps_the_tasks_and_not_the_field(
     logs = []
     for operational in (False, True):
         session = Session(experiment)
-        session.take({"do": "set", "id": "operational", "value": operational})
+        session.receive({"do": "set", "id": "operational", "value": operational})
         go(session, 3.0)
         logs.append(session.rollout())
     exact, compared = logs

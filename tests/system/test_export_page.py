@@ -108,6 +108,20 @@ def test_the_pointer_shows_values_in_all_plots_and_leaves_the_time(page: Any) ->
     assert numbers(outputs(page, JOINTS)) == pytest.approx(numbers(hovered), abs=0.02)
 
 
+def test_a_finger_taps_a_time_and_leaves_no_pointer(
+    browser: Any, page_file: Path
+) -> None:
+    page = browser.new_page(
+        viewport={"width": 390, "height": 844}, is_mobile=True, has_touch=True
+    )
+    page.goto(f"{page_file.resolve().as_uri()}#t=1")
+    page.wait_for_selector("body[data-ready]", state="attached")
+    page.touchscreen.tap(*place(page, 1, 3.0))
+    browsers.until(page, "Math.abs(player.time - 3) < 0.03")
+    assert page.locator("#side .u-cursor-x:not(.u-off)").count() == 0
+    page.close()
+
+
 def test_all_plots_zoom_together_and_back(page: Any) -> None:
     first = span(page, 0)
     drag(page, JOINTS, 2.0, 3.0)

@@ -19,10 +19,7 @@ from hsp_control.visualization.viewer.comparison import (
 from hsp_control.visualization.viewer.offline_page import assemble
 from hsp_control.visualization.viewer.packed_scene import reduce_scene
 from hsp_control.visualization.viewer.packing import ArrayTable
-from hsp_control.visualization.viewer.page_plots import (
-    PlottedRun,
-    pack_panels,
-)
+from hsp_control.visualization.viewer.page_plots import pack_panels
 from hsp_control.visualization.viewer.replay import rebuild_run
 from hsp_control.visualization.viewer.transport import SceneRecorder
 from hsp_control.visualization.viewer.viewer import Viewer
@@ -95,11 +92,10 @@ def page_of(runs: Sequence[ComparedRun], view: dict[str, Any]) -> str:
         else:
             viewer.compare(runs, beside=beside, ghosts=False)
     commands = [unpack(packed) for _, _, packed in recorder.scene.items()]
-    plotted = [PlottedRun(run.name, run.rollout, run.controller) for run in runs]
     content: Json = {
         "type": "show",
         "commands": reduce_scene(commands, arrays),
-        "plots": pack_panels(plotted, arrays),
+        "plots": pack_panels(runs, arrays),
         "about": [_about(run) for run in runs],
     }
     if len(runs) > 1:

@@ -7,21 +7,16 @@ import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.control.controller import Controller
-from hsp_control.law import MetricSample
-from hsp_control.robot import Robot, RobotState
+from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout, log_series
 from hsp_control.simulation.log_series import (
-    held_period,
     logged_distances,
     predicted_decay,
 )
 from hsp_control.simulation.log_writer import LogWriter, continuous_dofs
 from hsp_control.simulation.rollout import complete_columns
 from hsp_control.visualization import palette
-from hsp_control.visualization.viewer.analysis import (
-    from_the_start,
-    null_space_projector,
-)
+from hsp_control.visualization.viewer.analysis import expected_floor
 from hsp_control.visualization.viewer.commands import Json, PageCommand, set_plots
 from hsp_control.visualization.viewer.comparison import ComparedRun
 from hsp_control.visualization.viewer.packing import (
@@ -31,71 +26,6 @@ from hsp_control.visualization.viewer.packing import (
     keyframe_rows,
     linear,
 )
-
-_COARSEST = 1.0
-"""Largest K_N times the time between two rows: else the rows miss what decays."""
-
-
-def expected_floor(rollout: Rollout, controller: Controller | None) -> Array | None:
-    """Return the expected floor of ‖e_N‖_W, shape (N,), to first order in the period.
-
-    The derivation is in ``docs/law.md``, *Sampled control*: an effort that is held for
-    h lags the law's by h/2 on average, so that
-
-        e_N' = -K_N e_N + h/2 P M⁻¹ τ'.
-
-    Its solution from e_N = 0 is the floor. The efforts are taken to change linearly
-    between two rows. None where the equation is not known or does not hold: without a
-    controller, a control period or a gain, with contacts or a floating base, if the law
-    changes during the run, or if the rows are too far apart.
-    """
-    period, gain = held_period(rollout), rollout.meta.get("null_space_gain")
-    if controller is None or period is None or gain is None or len(rollout) < 2:
-        return None
-    if not rollout.meta.get("controls_null_space", True):
-        return None
-    robot, K_N = controller.robot, np.asarray(gain, float)
-    if controller.contacts or robot.unactuated or controller.changes:
-        return None
-    if K_N.shape != (robot.nv, robot.nv) or rollout.tau.shape[1] != robot.nv:
-        return None
-    steps = np.diff(rollout.t)
-    if not 0.0 < np.linalg.norm(K_N, 2) * steps.max() <= _COARSEST:
-        return None
-    if np.linalg.cond(K_N) > 1e9 or not np.isfinite(rollout.tau).all():
-        return None
-    return _solve(rollout, from_the_start(controller), K_N, period)
-
-
-def _solve(
-    rollout: Rollout, controller: Controller, K_N: Array, period: float
-) -> Array:
-    """Integrate the error equation along the rows; return ‖e_N‖_W, shape (N,)."""
-    from scipy.linalg import expm  # here: SciPy takes long to import
-
-    nv = controller.robot.nv
-    state = RobotState(controller.robot)
-    metric = MetricSample.allocate(nv)
-    decays: dict[float, tuple[Array, Array]] = {}
-    error, floor = np.zeros(nv), np.zeros(len(rollout))
-    for row in range(len(rollout) - 1):
-        step = round(float(rollout.t[row + 1] - rollout.t[row]), 9)
-        if step not in decays:
-            decay = expm(-K_N * step)
-            rest = np.linalg.solve(K_N, np.eye(nv) - decay) / max(step, 1e-9)
-            decays[step] = decay, np.asarray(rest)
-        decay, rest = decays[step]
-        state.update(float(rollout.t[row]), rollout.q[row], rollout.v[row])
-        change = np.linalg.solve(
-            state.mass_matrix, rollout.tau[row + 1] - rollout.tau[row]
-        )
-        projector = null_space_projector(controller, state)
-        error = decay @ error + 0.5 * period * rest @ projector @ change
-        error = projector @ error  # the null space turns
-        metric = controller.metric.evaluate(state, metric)
-        floor[row + 1] = float(np.linalg.norm(metric.L.T @ error))
-    return floor
-
 
 _MAX_CURVES, _SELECTED = 14, 7
 """Of more than 14 curves, only the 7 that vary most are shown."""
@@ -231,14 +161,6 @@ _FLOOR, _TOP = 1e-17, 1e-6
 """Values up to the floor are rounding errors; a logarithmic axis reaches the top."""
 
 
-class PlottedRun(NamedTuple):
-    """A run whose curves are plotted."""
-
-    name: str  # its name in the page's switch
-    rollout: Rollout
-    controller: Controller | None = None  # its controller: see `panels_of`
-
-
 class _Curve(NamedTuple):
     """A curve of one of the runs."""
 
@@ -247,7 +169,7 @@ class _Curve(NamedTuple):
     series: Series
 
 
-def pack_panels(runs: Sequence[PlottedRun], arrays: ArrayTable) -> Json:
+def pack_panels(runs: Sequence[ComparedRun], arrays: ArrayTable) -> Json:
     """Return plots of runs for ``plots.js``, one for each title and unit."""
     panels: dict[tuple[str, str], Panel] = {}
     curves: dict[tuple[str, str], list[_Curve]] = {}
@@ -371,8 +293,7 @@ def plots_so_far(
 
 def _command(runs: Sequence[ComparedRun], end: float | None) -> PageCommand:
     arrays = ArrayTable()
-    plotted = [PlottedRun(run.name, run.rollout, run.controller) for run in runs]
-    plots = pack_panels(plotted, arrays)
+    plots = pack_panels(runs, arrays)
     if end is not None:
         plots["end"] = max(end, plots["end"])
     return set_plots(plots, arrays.entries)

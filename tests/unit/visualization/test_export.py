@@ -20,7 +20,7 @@ from scipy.spatial import cKDTree
 from hsp_control import Robot, Rollout, load_experiment
 from hsp_control.cli import main
 from hsp_control.common.exceptions import ExportError, ViewerError
-from hsp_control.visualization.viewer import export_html
+from hsp_control.visualization.viewer import ComparedRun, export_html, robot_of
 from hsp_control.visualization.viewer.export_page import write_page
 from hsp_control.visualization.viewer.packed_scene import VERTEX_STEP, read_mesh
 from hsp_control.visualization.viewer.packing import (
@@ -34,7 +34,6 @@ from hsp_control.visualization.viewer.packing import (
 )
 from hsp_control.visualization.viewer.page_plots import (
     CURVE_BOUND,
-    PlottedRun,
     pack_panels,
 )
 
@@ -428,9 +427,13 @@ def test_the_page_needs_nothing_from_anywhere(planar: Rollout, tmp_path: Path) -
     assert page.stat().st_size < 0.5 * MEGABYTE
 
 
+def logged(rollout: Rollout) -> ComparedRun:
+    return ComparedRun("", robot_of(rollout), rollout)
+
+
 def test_the_plots_are_the_logs(panda: Rollout) -> None:
     table = ArrayTable()
-    packed = pack_panels([PlottedRun("", panda)], table)
+    packed = pack_panels([logged(panda)], table)
     arrays = [unpacked(entry) for entry in table.entries]
     assert (packed["start"], packed["end"]) == (0.0, 10.0)
     panels = {panel["title"]: panel for panel in packed["panels"]}
@@ -469,7 +472,7 @@ def test_where_the_law_is_bounded_the_plots_say_so(planar: Rollout) -> None:
     changed = Rollout({**planar.columns, "damped": damped}, planar.meta)
     t = planar.t
     expected = [[t[10], t[12]], [t[50], t[50]], [t[-3], t[-1]]]
-    packed = pack_panels([PlottedRun("", changed)], ArrayTable())
+    packed = pack_panels([logged(changed)], ArrayTable())
     assert packed["damped"] == [expected]
 
 
@@ -484,7 +487,7 @@ def test_what_cannot_be_drawn_does_not_break_the_page(
         )
         columns[name] = columns[name].reshape(planar[name][:4].shape)
     table = ArrayTable()
-    run = PlottedRun("", Rollout(columns, planar.meta))
+    run = logged(Rollout(columns, planar.meta))
     for panel in pack_panels([run], table)["panels"]:
         assert np.isfinite([panel["low"], panel["high"]]).all()
         assert panel["low"] < panel["high"]

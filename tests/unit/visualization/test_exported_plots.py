@@ -11,12 +11,11 @@ from hsp_control.cli import main
 from hsp_control.common.exceptions import ExportError
 from hsp_control.simulation.log_series import held_period
 from hsp_control.visualization.viewer import ComparedRun, export_html
+from hsp_control.visualization.viewer.analysis import expected_floor
 from hsp_control.visualization.viewer.packing import ArrayTable
 from hsp_control.visualization.viewer.page_plots import (
     Edge,
     Panel,
-    PlottedRun,
-    expected_floor,
     pack_panels,
     panels_of,
 )
@@ -93,7 +92,7 @@ def test_a_distance_to_a_centre_says_so_and_has_the_radius_as_its_line(
     (curve,) = panel.series
     assert curve.name == "joint to centre of disk"
     assert panel.edges == [Edge(0.2, "radius 0.2 m")]
-    packed = pack_panels([PlottedRun("", log)] * 2, ArrayTable())
+    packed = pack_panels([planar, planar], ArrayTable())
     (plot,) = (p for p in packed["panels"] if p["title"] == "Minimum distance")
     assert plot["edges"] == [{"value": 0.2, "name": "radius 0.2 m"}]  # once
     assert plot["low"] < 0.2

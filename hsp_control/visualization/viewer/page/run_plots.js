@@ -291,6 +291,8 @@ class RunPlot extends Plot {
     const {figure, side} = this;
     // A click of the mouse must not take the keyboard from the player.
     figure.addEventListener("mousedown", (event) => event.preventDefault());
+    // Nor must a finger leave a pointer behind, where the browser plays a mouse after a tap.
+    figure.addEventListener("touchend", (event) => event.preventDefault());
     figure.addEventListener("pointerdown", (event) => this.press(event));
     figure.addEventListener("pointermove", (event) => this.move(event));
     figure.addEventListener("pointerup", (event) => this.release(event));
