@@ -1,11 +1,13 @@
 """What a controller returns: an effort, and everything that explains it."""
 
 from collections.abc import Callable, Sequence
+from typing import Self
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.control.actuation.status import Status
+from hsp_control.control.active_stack import ActiveStack
+from hsp_control.control.actuation import Delivered, Status
 from hsp_control.law import FieldSample, TaskSample, singular_values
 from hsp_control.law.problem import Record
 
@@ -57,6 +59,32 @@ class ControlOutput:
     _rows: int
     _views: Record | None  # of the memory, once they were asked for
 
+    @classmethod
+    def of(cls, delivered: Delivered, stack: ActiveStack, damped: str) -> Self:
+        """Return the output of a step."""
+        out = cls()
+        out.tau, out._memory = delivered[0].copy(), stack.memory.tobytes()
+        out._views = None
+        out._keep(delivered, stack, damped)
+        return out
+
+    def overwrite(self, delivered: Delivered, stack: ActiveStack, damped: str) -> None:
+        """Make this the output of another step."""
+        self.tau[:] = delivered[0]
+        own, memory = self._memory, stack.memory
+        if isinstance(own, bytes) or own.shape != memory.shape:
+            self._memory, self._views = memory.copy(), None
+        else:
+            own[:] = memory
+        self._keep(delivered, stack, damped)
+
+    def _keep(self, delivered: Delivered, stack: ActiveStack, damped: str) -> None:
+        _, a, forces, self.status, self.relaxation = delivered
+        self._rows, self._bounds = stack.row_count, stack.bounds
+        self._acceleration = None if a is stack.acceleration else a.tobytes()
+        self.forces = forces.copy() if stack.has_forces else forces
+        self.damped = damped
+
     @property
     def acceleration(self) -> Array:
         """The acceleration that the effort produces, shape (nv,)."""
@@ -106,14 +134,6 @@ class ControlOutput:
         if self._acceleration is not None:
             own.acceleration[:] = np.frombuffer(self._acceleration)
         return own
-
-    def _keep(self, memory: Array) -> None:
-        """Copy the record of a step, into the memory of the last one if it fits."""
-        own = self._memory
-        if isinstance(own, bytes) or own.shape != memory.shape:
-            self._memory, self._views = memory.copy(), None
-        else:
-            own[:] = memory
 
     @property
     def _record(self) -> Record:
