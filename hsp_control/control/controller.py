@@ -278,8 +278,7 @@ class Controller:
                 delivered[0] @ delivered[0]
             ):
                 stack.raise_not_finite()
-            if out is None:
-                return ControlOutput.of(delivered, stack, damped)
+            out = ControlOutput() if out is None else out
             out.overwrite(delivered, stack, damped)
             return out
 

@@ -230,19 +230,22 @@ class BoundStep:
         self.direct = actuation.direct
         self.move = state.bind_move([*active.calls, *actuation.calls()])
         self._state, self._actuation = state, actuation
+        self._code = active.resolution.code
 
     def make(self, t: float, q: ArrayLike, v: ArrayLike) -> Delivered:
         """Move to a state; return what is delivered there."""
         value = self._state.advance(self.move, t, q, v)
-        active, actuation = self.active, self._actuation
         self.damped = ""
-        if value:
-            if active.damped_level == BEYOND_ANY_LEVEL:
-                active.raise_not_finite()
+        if value == 0.0 and self.direct:
+            return self._actuation.own
+        active, level = self.active, self._code.item(0)
+        if level == BEYOND_ANY_LEVEL:
+            active.raise_not_finite()
+        if level:
             self.damped = active.damped
         if self.direct and value < LOOK:
-            return actuation.own
-        return actuation.delivered(active.acceleration)
+            return self._actuation.own
+        return self._actuation.delivered(active.acceleration)
 
 
 def _mean(shares: Sequence[float], parts: Sequence[Array]) -> Array:

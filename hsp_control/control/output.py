@@ -1,7 +1,6 @@
 """What a controller returns: an effort, and everything that explains it."""
 
 from collections.abc import Callable, Sequence
-from typing import Self
 
 import numpy as np
 
@@ -10,6 +9,10 @@ from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation import Delivered, Status
 from hsp_control.law import FieldSample, TaskSample, singular_values
 from hsp_control.law.problem import Record
+
+
+_NOTHING = b""
+"""The memory of an output before its first step."""
 
 
 class ControlOutput:
@@ -59,27 +62,22 @@ class ControlOutput:
     _rows: int
     _views: Record | None  # of the memory, once they were asked for
 
-    @classmethod
-    def of(cls, delivered: Delivered, stack: ActiveStack, damped: str) -> Self:
-        """Return the output of a step."""
-        out = cls()
-        out.tau, out._memory = delivered[0].copy(), stack.memory.tobytes()
-        out._views = None
-        out._keep(delivered, stack, damped)
-        return out
+    def __init__(self) -> None:
+        """Allocate nothing yet: see `overwrite`."""
+        self._memory = _NOTHING
 
     def overwrite(self, delivered: Delivered, stack: ActiveStack, damped: str) -> None:
-        """Make this the output of another step."""
-        self.tau[:] = delivered[0]
+        """Make this the output of a step."""
+        tau, a, forces, self.status, self.relaxation = delivered
         own, memory = self._memory, stack.memory
-        if isinstance(own, bytes) or own.shape != memory.shape:
-            self._memory, self._views = memory.copy(), None
+        if own is _NOTHING:
+            self.tau, self._memory, self._views = tau.copy(), memory.tobytes(), None
         else:
-            own[:] = memory
-        self._keep(delivered, stack, damped)
-
-    def _keep(self, delivered: Delivered, stack: ActiveStack, damped: str) -> None:
-        _, a, forces, self.status, self.relaxation = delivered
+            self.tau[:] = tau
+            if isinstance(own, bytes) or len(own) != len(memory):
+                self._memory, self._views = memory.copy(), None
+            else:
+                own[:] = memory
         self._rows, self._bounds = stack.row_count, stack.bounds
         self._acceleration = None if a is stack.acceleration else a.tobytes()
         self.forces = forces.copy() if stack.has_forces else forces

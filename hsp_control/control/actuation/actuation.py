@@ -96,6 +96,8 @@ class Actuation:
         self._qp: LimitedStep | None = None
         if limits.limits is not None or support.size:
             self._qp = self._limited_step(0)
+            # what is delivered where it was solved at once
+            self._solved = Delivered(*self._qp.result, LIMITED, 0.0)
 
     def _bind_check(self) -> Callable[[float], float]:
         """Return the call that compares a and M a + N with their bounds."""
@@ -147,10 +149,9 @@ class Actuation:
 
     def delivered(self, a: Array, offset: Array | None = None) -> Delivered:
         """Return what is delivered, after `calls`; for the arguments see `deliver`."""
-        violated, status = self.found.tolist()
-        if status != UNSOLVED:
-            assert self._qp is not None
-            return Delivered(*self._qp.result, LIMITED, 0.0)
+        if self.found.item(1) != UNSOLVED:
+            return self._solved
+        violated = self.found.item(0)
         if self.direct and not violated and offset is None:
             return Delivered(self._state.effort, a, self.own.forces, EXACT, 0.0)
         motion_ok, effort_ok = not violated & MOTION, not violated & EFFORT
