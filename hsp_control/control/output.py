@@ -10,7 +10,6 @@ from hsp_control.control.actuation import Delivered, Status
 from hsp_control.law import FieldSample, TaskSample, singular_values
 from hsp_control.law.problem import Record
 
-
 _NOTHING = b""
 """The memory of an output before its first step."""
 
