@@ -160,7 +160,9 @@ def parts_table(case: Standing, states: list[State]) -> str:
     controller = case.controller()
     controller.compute(*states[0])
     state = controller.state
-    active, actuation = controller.active_stack, controller._actuation
+    active = controller.active_stack
+    ((limits, _),) = controller._limits.sets
+    actuation = controller._mixture.actuation(active, limits)
     support = active.support
     times: dict[str, list[int]] = {}
 
@@ -178,27 +180,14 @@ def parts_table(case: Standing, states: list[State]) -> str:
         timed("contacts, tasks, field, metric and law", law)
         a = active.resolution.acceleration
         wanted = timed("inverse dynamics", lambda: state.inverse_dynamics(a).copy())  # noqa: B023
+        timed("map of the corner forces", lambda: support.update(active.resolution))
         timed(
-            "map of the corner forces", lambda: support.update(state, active.resolution)
-        )
-        base = actuation.base
-        forces = timed(
             "minimum-norm forces",
-            lambda: support.minimum_norm_forces(base, wanted)[0],  # noqa: B023
+            lambda: support.minimum_norm_forces(wanted),  # noqa: B023
         )
-        timed("cones", lambda: support.permits(forces))  # noqa: B023
+        timed("cones", support.permits)
         # Pinocchio's pass is kept until the state changes: the second call is cheap.
-        violated = actuation.violated(state, a, active.resolution.code)
-        delivered = timed(
-            "deliver, total",
-            lambda: actuation.deliver(
-                state,
-                a,  # noqa: B023
-                violated,  # noqa: B023
-                active.resolution,
-                support,
-            ),
-        )
+        delivered = timed("deliver, total", lambda: actuation.deliver(a))  # noqa: B023
         key = f"deliver, status {delivered[3]}"
         times.setdefault(key, []).append(times["deliver, total"][-1])
     lines = "| part | median [µs] | steps |\n|---|--:|--:|\n"

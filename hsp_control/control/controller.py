@@ -19,24 +19,21 @@ from hsp_control.common.identity_cache import IdentityCache
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits, RobotLimits
 from hsp_control.control.active_stack import ActiveStack
-from hsp_control.control.actuation import Actuation
-from hsp_control.control.actuation.actuation import CODES, FLAGS
-from hsp_control.control.actuation.status import EXACT, RELAXED
+from hsp_control.control.actuation.limited_step import RELAXED
+from hsp_control.control.actuation.limits_in_force import LimitsInForce
 from hsp_control.control.changes import Change, Changes, TimeLine
 from hsp_control.control.first_state import check_angles, warn_of_jump
 from hsp_control.control.gains_in_force import GainsInForce, check_held
-from hsp_control.control.guards import StepLock, read_only
-from hsp_control.control.mixture import AccelerationModifier, Mixture
+from hsp_control.control.guards import StepLock
+from hsp_control.control.mixture import AccelerationModifier, BoundStep, Mixture
 from hsp_control.control.output import ControlOutput, Diagnostics
 from hsp_control.control.setup import Base, Declared
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.start import Start
 from hsp_control.law import TaskSample
-from hsp_control.law.outcome import BEYOND_ANY_LEVEL, NOT_FINITE
 from hsp_control.null_space.fields import NullSpaceField
 from hsp_control.null_space.metrics import Metric
 from hsp_control.robot import Robot, RobotState
-from hsp_control.robot.robot import Move
 from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.impedance import parts_of
@@ -132,13 +129,10 @@ class Controller:
     def _allocate(self, changes: Sequence[Change]) -> None:
         """Set up what a copy has of its own, and compose the parts."""
         robot, given = self._declared.robot, self._declared.start
-        self._lock = StepLock(_HOLDERS)
+        self._lock = StepLock()
         self._state = RobotState(robot)
         self._gains = GainsInForce(robot.nv)
-        self._now, self._begun = -np.inf, False
-        # While nothing changes: the stack, all calls of a step as one, and whether the
-        # effort is M a + N wherever no limit is violated.
-        self._whole: tuple[ActiveStack, Move, bool] | None = None
+        self._run = _Run(self._declared.robot.nv)
         self._free = IdentityCache(_free_step)  # what it gives a compiled loop
         q = robot.home() if given is None else given
         state = robot.state(0.0, q, np.zeros(robot.nv))
@@ -151,12 +145,12 @@ class Controller:
         """Place all parts, and apply the changes."""
         placed, robot = self._declared.placed(start), self._declared.robot
         driven = self._declared.base == "driven"
-        unactuated = () if driven else robot.unactuated
-        self._actuation = Actuation(robot, placed.limits, unactuated)
         time_line = TimeLine.of(placed, changes)
+        self._limits = LimitsInForce(self._state, placed.limits)
         self._mixture = Mixture(
             self._state,
-            self._actuation,
+            () if driven else robot.unactuated,
+            self._limits,
             self._gains,
             time_line.setup,
             self._declared.threshold,
@@ -165,16 +159,17 @@ class Controller:
 
     def _follow(self, time_line: TimeLine) -> None:
         """Let the steps follow a time line."""
-        self._whole = None
+        self._run.bound = None
         self._time_line, self._setup = time_line, time_line.setup
         exchanged = self._gains.plan(self._setup, self._latest)
+        self._limits.plan(self._setup.limits, self._latest)
         self._mixture.plan(self._setup, exchanged=exchanged)
-        self._actuation.plan(self._setup.limits, self._latest)
 
     @property
     def _latest(self) -> float:
         """The latest time of a step [s]; -inf before the first one."""
-        return max(self._now, self._state.t) if self._begun else -np.inf
+        run = self._run
+        return max(run.now, self._state.t) if run.begun else -np.inf
 
     def _here(self) -> Start:
         """Return where the robot was at the last step."""
@@ -187,42 +182,23 @@ class Controller:
         check_angles(self._declared.robot, self._state.q)
         if self._declared.start is None:
             here = self._here()._replace(scene=self._declared.scene)
-            last_effort = self._actuation.memory()
+            sent = self._limits.sent.memory()
             self._compose(here, self._time_line.made)
-            self._actuation.remember(last_effort)
-        self._begun = True
+            self._limits.remember(sent)
+        self._run.begun = True
 
-    def _resolve(self) -> str:
-        """Resolve the law for what counts now; return what is damped."""
-        t, whole = self._state.t, self._whole
-        if whole is not None:  # nothing changes
-            active, _, _ = whole
-            if active.resolve(t) is NOT_FINITE:
-                self.active_stack.raise_not_finite()
-            return active.damped
-        if not self._begun:
+    def _advance(self) -> None:
+        """Write the gains and the limits of the time of the state."""
+        run, t = self._run, self._state.t
+        if not run.begun:
             self._begin()
-        self._now = max(self._now, t)
+        run.now = max(run.now, t)
         opened = self._time_line.open
         if opened:
-            if self._now > opened[0].end + _MEMORY:
-                self._follow(self._time_line.settled_at(self._now - _MEMORY))
+            if run.now > opened[0].end + _MEMORY:
+                self._follow(self._time_line.settled_at(run.now - _MEMORY))
             self._gains.write(t)
-            self._actuation.update_limits(t)
-        mixture = self._mixture
-        if mixture.resolve(t) is NOT_FINITE:
-            self.active_stack.raise_not_finite()
-        if mixture.steady:
-            self._bind()
-        return mixture.damped
-
-    def _bind(self) -> None:
-        """Bind the move, the law and the check of its limits as one call."""
-        active, state = self.active_stack, self._state
-        actuation, law = self._actuation, active.resolution
-        checks = actuation.checks(state, active.acceleration, law, active.support)
-        move = state.bind_move([*active.calls, *checks])
-        self._whole = active, move, self._actuation.is_direct(active.support)
+            self._limits.write(t)
 
     # -- the step ---------------------------------------------------------------------
 
@@ -276,60 +252,35 @@ class Controller:
             ControllerError: If the state belongs to another robot, or what a step
                 calls, such as a field, calls its own controller.
         """
-        lock = self._lock
-        if not lock.acquire(False):
-            lock.wait()
-        try:
-            state, whole, mixed = self._state, self._whole, None
-            if whole is None or modifier is not None or q is None or v is None:
-                self._observe(t, q, v)
-                damped = self._resolve()
-                active = self.active_stack
-                mixed = self._mixture.deliver(modifier)
-                violated, direct = 0, False
+        with self._lock:
+            run, bound = self._run, self._run.bound
+            if (
+                bound is not None
+                and modifier is None
+                and q is not None
+                and v is not None
+            ):
+                # While nothing changes, all of what follows is one call.
+                delivered = bound.make(t, q, v)  # type: ignore[arg-type]
+                stack, damped = bound.active, bound.damped
             else:
-                active, move, direct = whole
-                a, damped, violated = active.acceleration, "", 0
-                value = state.advance(move, t, q, v)  # type: ignore[arg-type]
-                if value != 0.0:
-                    code, violated = divmod(int(value), CODES)
-                    if code == BEYOND_ANY_LEVEL:
-                        self.active_stack.raise_not_finite()
-                    if code:
-                        damped = active.damped
-                    direct = direct and not violated
-            if direct:
-                tau, forces = state.effort, active.forces
-                status, relaxation = EXACT, 0.0
-            elif violated % FLAGS:  # the call that found it has limited the step
-                tau, a, forces, status, relaxation = self._actuation.limited
-            else:
-                if mixed is None:
-                    law, support = active.resolution, active.support
-                    mixed = self._actuation.deliver(state, a, violated, law, support)
-                tau, a, forces, status, relaxation = mixed
-                # The kernel of limited steps has looked at all other efforts already.
-                if (status is RELAXED or modifier is not None) and not isfinite(
-                    tau @ tau
-                ):
-                    self.active_stack.raise_not_finite()
-            # Not on the controller itself: its own attributes cost 0.4 µs to set.
-            self._actuation.delivered = a
-            # By name, and without a call of nine arguments, which costs 1 µs.
-            if out is None:
-                out = ControlOutput()
-                out.tau, out._memory = tau.copy(), active.memory.tobytes()
-                out._views = None
-            else:
-                out.tau[:] = tau
-                out._keep(active.memory)
-            out._rows, out._bounds = active.row_count, active.bounds
-            out._acceleration = None if a is active.acceleration else a.tobytes()
-            out.forces = forces.copy() if active.has_forces else forces
-            out.damped, out.status, out.relaxation = damped, status, relaxation
+                self._observe(t, q, v)  # the state
+                if bound is None:
+                    self._advance()  # what counts at its time
+                mixture = self._mixture
+                mixture.resolve(self._state.t)  # references, and the law
+                delivered = mixture.deliver(modifier)  # within the limits
+                stack, damped = self.active_stack, mixture.damped
+                run.bound = bound or mixture.bound_step()
+            run.acceleration, status = delivered[1], delivered[3]
+            # Kernels have looked at all other efforts already.
+            if (status is RELAXED or modifier is not None) and not isfinite(
+                delivered[0] @ delivered[0]
+            ):
+                stack.raise_not_finite()
+            out = ControlOutput() if out is None else out
+            out.overwrite(delivered, stack, damped)
             return out
-        finally:
-            lock.release()
 
     def _observe(
         self,
@@ -370,7 +321,7 @@ class Controller:
             NonFiniteError: If the effort or the period contains NaN or inf.
             ControllerError: If the period is not positive.
         """
-        own = self._actuation.delivered  # an array of the same kind needs no conversion
+        own = self._state.effort  # an array of the same kind needs no conversion
         if (
             type(tau) is not np.ndarray
             or tau.shape != own.shape
@@ -382,9 +333,9 @@ class Controller:
             raise NonFiniteError(f"period is {period}; needs a finite number")
         if not period > 0.0:
             raise ControllerError(f"period is {period} s; must be positive")
-        if not self._actuation.period:
+        if not self._limits.sent.period:
             warn_of_jump(self._declared.robot, self._state.q, self._state.v, tau)
-        self._actuation.applied(self._state, tau, period)
+        self._limits.applied(tau, self._run.acceleration, period)
         if self._gains.stiffening:
             self._gains.wait(self.active_stack, self._state.t, period)
 
@@ -403,10 +354,14 @@ class Controller:
             streamed, is no native call, or the last effort was not the law's own.
         """
         with self._lock:
-            whole = None if self._gains.stiffening else self._whole
-            if whole is None or self._actuation.delivered is not whole[0].acceleration:
+            run, bound = self._run, self._run.bound
+            if (
+                bound is None
+                or self._gains.stiffening
+                or run.acceleration is not bound.active.acceleration
+            ):
                 return 0
-            step = self._free.get(whole, self._state, self._actuation)
+            step = self._free.get(bound, self._state, self._limits)
             return 0 if step is None else advance(step)
 
     def disturbed(self, acceleration: ArrayLike) -> None:
@@ -425,7 +380,7 @@ class Controller:
             NonFiniteError: If it contains NaN or inf.
         """
         known = self._declared.robot.check_tangent(acceleration, "acceleration")
-        self._actuation.disturbed(known)
+        self._limits.sent.held.disturbance[:] = known
 
     def restart(self) -> None:
         """Begin anew: forget the last effort, the offsets of tasks, and where it began.
@@ -433,10 +388,9 @@ class Controller:
         Changes that were made stay on the time line.
         """
         with self._lock:
-            self._actuation.forget()
-            self._now, self._begun = -np.inf, False
+            self._limits.forget()
             self._gains.forget()
-            self._whole = None
+            self._run = _Run(self._declared.robot.nv)
             self._mixture.active = None  # the next step places what is relative
             made = self._time_line.made
             if made or any(each.task.remembers for each in self._setup.tasks):
@@ -484,30 +438,30 @@ class Controller:
         """
         with self._lock:
             here, now = None, self._latest
-            if self._begun:
+            if self._run.begun:
                 change = replace(change, at=max(change.at, now))
                 here = self._here()
             time_line = self._time_line.with_change(change, here)
-            if self._actuation.period:
+            if period := self._limits.sent.period:
                 state = (here or time_line.start).state
-                check_held(self._setup, time_line.setup, state, self._actuation.period)
+                check_held(self._setup, time_line.setup, state, period)
             self._follow(time_line)
-            if self._begun:  # compile now, not in a step
+            if self._run.begun:  # compile now, not in a step
                 self._mixture.prepare(self._mixture.stack_at(now))
 
     # -- what it is made of -----------------------------------------------------------
 
-    @read_only()
+    @property
     def robot(self) -> Robot:
         """The robot."""
         return self._declared.robot
 
-    @read_only("use at(t).add(task) and at(t).remove(name)")
+    @property
     def tasks(self) -> tuple[Task, ...]:
         """The tasks that count now or fade, placed, the highest priority first."""
         return tuple(task for level in self.levels for task in level)
 
-    @read_only("use at(t).add(task) and at(t).remove(name)")
+    @property
     def levels(self) -> tuple[tuple[Task, ...], ...]:
         """The tasks that count now or fade, by level, the highest priority first."""
         now = self._latest
@@ -517,60 +471,60 @@ class Controller:
         ]
         return tuple(level for level in levels if level)
 
-    @read_only("use at(t).field(...)")
+    @property
     def field(self) -> NullSpaceField:
         """The null-space field, placed; while it changes, all terms of old and new."""
         return self._mixture.field
 
-    @read_only("use at(t).null_space_gain(...)")
+    @property
     def null_space_gain(self) -> Array:
         """K_N in force, shape (nv, nv) [1/s]."""
         return self._gains.null_space.copy()
 
-    @read_only()
+    @property
     def metric(self) -> Metric:
         """The joint-space metric."""
         return self._setup.metric
 
-    @read_only()
+    @property
     def singularity_threshold(self) -> float:
         """Singular value below which an inverse is bounded instead of exact."""
         return self._declared.threshold
 
-    @read_only("use at(t).limits(...)")
+    @property
     def limits(self) -> RobotLimits | None:
         """The limits, as numbers of this robot."""
-        return self._actuation.limits
+        return self._limits.limits
 
-    @read_only("use at(t).contact(name, bears=...)")
+    @property
     def contacts(self) -> tuple[Contact, ...]:
         """The contacts."""
         return tuple(each.contact for each in self._setup.contacts)
 
-    @read_only()
+    @property
     def base(self) -> Base | None:
         """What else than contacts acts on a floating base."""
         return self._declared.base
 
-    @read_only("use at(t).obstacle(name, center)")
+    @property
     def scene(self) -> Scene:
         """The obstacles that fields and limits name."""
         return self._setup.start.scene
 
-    @read_only("use at(t)")
+    @property
     def changes(self) -> tuple[Change, ...]:
         """All changes that were made, in order of their times."""
         return tuple(sorted(self._time_line.made, key=lambda each: each.at))
 
-    @read_only()
+    @property
     def settled(self) -> object:
         """An object that stays the same while nothing changes; None while it does.
 
         As long as it is the same, so are the tasks, the field and the limits.
         """
-        return self._whole
+        return self._run.bound
 
-    @read_only("call compute")
+    @property
     def state(self) -> RobotState:
         """The state that the last effort was computed for; the next one overwrites it.
 
@@ -649,7 +603,7 @@ class Controller:
 
     # -- what explains it -------------------------------------------------------------
 
-    @read_only("call compute")
+    @property
     def active_stack(self) -> ActiveStack:
         """The contacts and tasks that the last `compute` resolved.
 
@@ -665,10 +619,11 @@ class Controller:
         """Return the rows of all active contacts and tasks at a state."""
         with self._lock:
             self._observe(state)
-            self._resolve()
+            self._advance()
+            self._mixture.resolve(self._state.t)
             return self.active_stack.rows
 
-    @read_only("call compute")
+    @property
     def task_rows(self) -> Mapping[str, slice]:
         """The rows of each task in the last output's stack, by name."""
         return self.active_stack.task_rows
@@ -692,11 +647,15 @@ class Controller:
         return self.active_stack.flow()
 
     def __setattr__(self, name: str, value: object) -> None:
-        if not name.startswith("_") and not hasattr(type(self), name):
+        if name.startswith("_"):
+            object.__setattr__(self, name, value)
+        elif hasattr(type(self), name):
+            instead = _INSTEAD.get(name, "build another one")
+            raise ImmutableError(f"Controller.{name} cannot be assigned: {instead}")
+        else:
             raise ImmutableError(
                 f"Controller has no {name!r} to assign; at(t) changes it while it runs"
             )
-        object.__setattr__(self, name, value)
 
     def preview(self) -> "Controller":
         """Return a copy at the beginning of a run: to look ahead, or at a log.
@@ -715,36 +674,57 @@ class Controller:
         return {
             "declared": self._declared,
             "time_line": self._time_line,
-            "begun": self._begun,
-            "now": self._now,
+            "begun": self._run.begun,
+            "now": self._run.now,
             "at": (state.t, state.q.copy(), state.v.copy()),
             "gains": self._gains.memory(),
-            "last_effort": self._actuation.memory(),
+            "sent": self._limits.sent.memory(),
         }
 
     def __setstate__(self, saved: dict[str, Any]) -> None:
         self._declared = saved["declared"]
         self._allocate(())
-        self._begun, self._now = saved["begun"], saved["now"]
+        self._run.begun, self._run.now = saved["begun"], saved["now"]
         self._follow(saved["time_line"])
         self._gains.remember(saved["gains"])
         self._state.update(*saved["at"])
-        self._actuation.remember(saved["last_effort"])
+        self._limits.remember(saved["sent"])
 
 
-_HOLDERS = frozenset(
-    getattr(Controller, name).__code__
-    for name in ("compute", "while_free", "restart", "prepare", "change", "stack")
-)
-"""The methods that hold the lock."""
+class _Run:
+    """What a controller knows of the present run."""
+
+    # Not on the controller itself, whose own attributes cost 0.4 µs to set.
+    __slots__ = ("acceleration", "begun", "bound", "now")
+
+    def __init__(self, nv: int) -> None:
+        self.acceleration = np.zeros(nv)  # what the last step delivered
+        self.begun, self.now = False, -np.inf  # latest time of a step [s]
+        self.bound: BoundStep | None = None  # the step, while nothing changes
 
 
 def _free_step(
-    whole: tuple[ActiveStack, Move, bool], state: RobotState, actuation: Actuation
+    bound: BoundStep, state: RobotState, limits: LimitsInForce
 ) -> "FreeStep | None":
     from hsp_control.control.free_step import free_step  # here: it imports Numba
 
-    active, move, direct = whole
-    if active.streamed or not direct:
+    active = bound.active
+    if active.streamed or not bound.direct:
         return None
-    return free_step(move, state.effort, actuation.sending(state, active.acceleration))
+    return free_step(bound.move, state.effort, limits.applying(active.acceleration))
+
+
+_INSTEAD = {
+    "tasks": "use at(t).add(task) and at(t).remove(name)",
+    "levels": "use at(t).add(task) and at(t).remove(name)",
+    "field": "use at(t).field(...)",
+    "null_space_gain": "use at(t).null_space_gain(...)",
+    "limits": "use at(t).limits(...)",
+    "contacts": "use at(t).contact(name, bears=...)",
+    "scene": "use at(t).obstacle(name, center)",
+    "changes": "use at(t)",
+    "state": "call compute",
+    "active_stack": "call compute",
+    "task_rows": "call compute",
+}
+"""What to do instead of assigning an attribute."""

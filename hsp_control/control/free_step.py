@@ -6,8 +6,7 @@ from typing import Any, NamedTuple
 from hsp_control.common.arrays import Array
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import NativeCall, are_native
-from hsp_control.control.actuation.actuation import CODES
-from hsp_control.law.outcome import BEYOND_ANY_LEVEL
+from hsp_control.control.actuation.actuation import LOOK
 from hsp_control.robot.native_move import NativeMove
 from hsp_control.robot.robot import Move
 
@@ -36,4 +35,4 @@ def free_step(
 @kernel
 def is_free(value: float) -> bool:
     """Return whether what a move returned means: valid, finite, no limit violated."""
-    return 0.0 <= value < CODES * BEYOND_ANY_LEVEL and value % CODES == 0.0
+    return 0.0 <= value < LOOK

@@ -4,16 +4,18 @@ from collections.abc import Callable, Collection, Sequence, Set
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation import Actuation, Delivered
+from hsp_control.control.actuation.actuation import LOOK
+from hsp_control.control.actuation.limits_in_force import LimitSet, LimitsInForce
 from hsp_control.control.actuation.support import Support
 from hsp_control.control.gains_in_force import GainsInForce
 from hsp_control.control.planned import PlannedContact
 from hsp_control.control.setup import PlannedTask, Setup, levels_of
-from hsp_control.law import Outcome
-from hsp_control.law.outcome import DAMPED, EXACT
+from hsp_control.law.outcome import BEYOND_ANY_LEVEL, DAMPED, NOT_FINITE
 from hsp_control.robot import RobotState
 
 AccelerationModifier = Callable[
@@ -51,16 +53,16 @@ class Mixture:
     def __init__(
         self,
         state: RobotState,
-        actuation: Actuation,
+        base: Sequence[int],
+        limits: LimitsInForce,
         gains: GainsInForce,
         setup: Setup,
         threshold: float,
     ) -> None:
-        self._state, self._actuation = state, actuation
+        self._state, self._base, self._limits = state, base, limits
         self._gains, self._threshold = gains, threshold
         self._stacks: dict[tuple[frozenset[int], frozenset[int]], ActiveStack] = {}
-        nv = state.robot.nv
-        self._modified, self._acceleration = np.zeros(nv), np.zeros(nv)
+        self._actuations: dict[tuple[ActiveStack, LimitSet], Actuation] = {}
         self._parts: list[ActiveStack] = []
         # tasks of the first level with a bounded inverse in the last `resolve`, by
         # name; empty: none
@@ -78,13 +80,19 @@ class Mixture:
         there = {id(each) for each in setup.contacts}
         for key in [key for key in self._stacks if not key[0] <= there]:
             del self._stacks[key]
+        alive = {*self._stacks.values()}, {*self._limits.all}
+        self._actuations = {
+            (stack, limits): each
+            for (stack, limits), each in self._actuations.items()
+            if stack in alive[0] and limits in alive[1]
+        }
         self._fading = [each for each in setup.tasks if not each.always]
         self.levels = levels_of(setup.tasks, self._state.robot)
         self.steady = setup.steady and setup.end == -np.inf
         self.active = None
 
-    def resolve(self, t: float) -> Outcome:
-        """Resolve the law for each set of tasks that counts: the worst outcome."""
+    def resolve(self, t: float) -> None:
+        """Resolve the law for each set of tasks that counts."""
         tasks = [(each.weight(t), each) for each in self._fading]
         contacts = [(each.share(t), each) for each in self._setup.contacts]
         coming = sorted(
@@ -97,8 +105,7 @@ class Mixture:
             if share < 1.0 and each.active(t)  # also at the time when it begins
         }
         shares = [1.0, *(share for share, _ in coming), 0.0]
-        outcome, self.damped = EXACT, ""
-        self._parts = []
+        self._parts, self.damped = [], ""
         for k, (share, following) in enumerate(pairwise(shares)):
             if share == following:
                 continue
@@ -113,58 +120,62 @@ class Mixture:
             self.active = active = self._stack(bearing, off)
             active.share = share - following
             self._parts.append(active)
-            found = active.resolve(t)
-            if found > outcome:
-                outcome = found
-                self.damped = active.damped if found is DAMPED else ""
-        return outcome
+            outcome = active.resolve(t)
+            if outcome is NOT_FINITE:
+                active.raise_not_finite()
+            if outcome is DAMPED and not self.damped:
+                self.damped = active.damped
 
     def deliver(self, modifier: AccelerationModifier | None) -> Delivered:
         """Return what is delivered of the law that was resolved last."""
         # While one set of limits follows another, it is the mixture of the steps within
         # each of them.
-        actuation, sets = self._actuation, self._actuation.sets
+        sets = self._limits.sets
         single = len(self._parts) == len(sets) == 1
         shares: list[float] = []
         parts: list[Delivered] = []
-        efforts: list[Array] = []
-        accelerations: list[Array] = []
-        forces: list[Array] = []
         whole = self._parts[-1].support
         for active in self._parts:
             a, offset = active.acceleration, None
             if modifier is not None:
-                self._modified[:], offset = modifier(self._state, active, a)
-                a = self._modified
-            for kept, share in sets:
-                actuation.enforce(kept)
-                one = self._within_limits(active, a, offset)
+                a, offset = modifier(self._state, active, a)
+            for limits, share in sets:
+                one = self.actuation(active, limits).deliver(a, offset)
                 if single:
                     return one
                 shares.append(active.share * share)
-                parts.append(one)
+                forces = _placed(one.forces, active.support, whole)
                 # The next part overwrites them.
-                efforts.append(one[0].copy())
-                accelerations.append(one[1].copy())
-                forces.append(_placed(one[2], active.support, whole))
-        mixed = self._acceleration  # the same in all steps: others bind it
-        mixed[:] = _mean(shares, accelerations)
-        _, _, _, statuses, relaxations = zip(*parts, strict=True)
-        tau, force = _mean(shares, efforts), _mean(shares, forces)
-        return tau, mixed, force, max(statuses), max(relaxations)
+                copies = one.effort.copy(), one.acceleration.copy(), forces
+                parts.append(Delivered(*copies, one.status, one.relaxation))
+        efforts, accelerations, forces_of, statuses, relaxations = zip(
+            *parts, strict=True
+        )
+        effort, a, force = (
+            _mean(shares, each) for each in (efforts, accelerations, forces_of)
+        )
+        return Delivered(effort, a, force, max(statuses), max(relaxations))
 
-    def _within_limits(
-        self, active: ActiveStack, a: Array, offset: Array | None
-    ) -> Delivered:
-        """Return what is delivered of one law, within the limits that are enforced."""
-        state, actuation, law = self._state, self._actuation, active.resolution
-        violated = actuation.violated(state, a, law.code)
-        return actuation.deliver(state, a, violated, law, active.support, offset)
+    def bound_step(self) -> "BoundStep | None":
+        """Return the step that was made last as one call; None if it may change."""
+        if not self.steady or self.active is None:
+            return None
+        ((limits, _),) = self._limits.sets
+        return BoundStep(self._state, self.active, self.actuation(self.active, limits))
 
     def prepare(self, stack: ActiveStack) -> None:
         """Compile what a step with a stack calls, now instead of in the step."""
         stack.calls  # noqa: B018 (compiled, and kept)
-        self._actuation.prepare(self._state, stack.resolution, stack.support)
+        for limits in self._limits.all:
+            self.actuation(stack, limits)
+
+    def actuation(self, stack: ActiveStack, limits: LimitSet) -> Actuation:
+        """Return what delivers the law of a stack within a set of limits."""
+        found = self._actuations.get((stack, limits))
+        if found is None:
+            found = Actuation(self._state, stack.resolution, stack.support, limits)
+            self._actuations[stack, limits] = found
+        return found
 
     def stack_at(self, t: float, off: Set[int] = frozenset()) -> ActiveStack:
         """Return the stack of the contacts that bear at a time, without some tasks."""
@@ -189,21 +200,52 @@ class Mixture:
             levels = [
                 [each for each in level if each.key in on] for level in self.levels
             ]
-            actuation = self._actuation
+            support = Support(bearing, self._state, self._base)
             stack = ActiveStack(
                 self._state,
-                actuation.support(bearing),
+                support,
                 levels,
                 self._gains.feedback,
-                actuation.base,
+                support.base,
                 self._setup.metric,
                 self.field,
                 self._gains.null_space,
                 self._threshold,
             )
-            actuation.prepare(self._state, stack.resolution, stack.support)
+            for limits in self._limits.all:
+                self.actuation(stack, limits)
             self._stacks[key] = stack
         return self._stacks[key]
+
+
+class BoundStep:
+    """A step while nothing changes: state, references, law and limits as one call."""
+
+    def __init__(
+        self, state: RobotState, active: ActiveStack, actuation: Actuation
+    ) -> None:
+        self.active = active
+        self.damped = ""  # tasks of the first level with a bounded inverse, by name
+        # whether the effort is M a + N wherever no limit is violated
+        self.direct = actuation.direct
+        self.move = state.bind_move([*active.calls, *actuation.calls()])
+        self._state, self._actuation = state, actuation
+        self._code = active.resolution.code
+
+    def make(self, t: float, q: ArrayLike, v: ArrayLike) -> Delivered:
+        """Move to a state; return what is delivered there."""
+        value = self._state.advance(self.move, t, q, v)
+        self.damped = ""
+        if value == 0.0 and self.direct:
+            return self._actuation.own
+        active, level = self.active, self._code.item(0)
+        if level == BEYOND_ANY_LEVEL:
+            active.raise_not_finite()
+        if level:
+            self.damped = active.damped
+        if self.direct and value < LOOK:
+            return self._actuation.own
+        return self._actuation.delivered(active.acceleration)
 
 
 def _mean(shares: Sequence[float], parts: Sequence[Array]) -> Array:

@@ -5,9 +5,13 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.control.actuation.status import Status
+from hsp_control.control.active_stack import ActiveStack
+from hsp_control.control.actuation import Delivered, Status
 from hsp_control.law import FieldSample, TaskSample, singular_values
 from hsp_control.law.problem import Record
+
+_NOTHING = b""
+"""The memory of an output before its first step."""
 
 
 class ControlOutput:
@@ -56,6 +60,27 @@ class ControlOutput:
     _memory: Array | bytes
     _rows: int
     _views: Record | None  # of the memory, once they were asked for
+
+    def __init__(self) -> None:
+        """Allocate nothing yet: see `overwrite`."""
+        self._memory = _NOTHING
+
+    def overwrite(self, delivered: Delivered, stack: ActiveStack, damped: str) -> None:
+        """Make this the output of a step."""
+        tau, a, forces, self.status, self.relaxation = delivered
+        own, memory = self._memory, stack.memory
+        if own is _NOTHING:
+            self.tau, self._memory, self._views = tau.copy(), memory.tobytes(), None
+        else:
+            self.tau[:] = tau
+            if isinstance(own, bytes) or len(own) != len(memory):
+                self._memory, self._views = memory.copy(), None
+            else:
+                own[:] = memory
+        self._rows, self._bounds = stack.row_count, stack.bounds
+        self._acceleration = None if a is stack.acceleration else a.tobytes()
+        self.forces = forces.copy() if stack.has_forces else forces
+        self.damped = damped
 
     @property
     def acceleration(self) -> Array:
@@ -106,14 +131,6 @@ class ControlOutput:
         if self._acceleration is not None:
             own.acceleration[:] = np.frombuffer(self._acceleration)
         return own
-
-    def _keep(self, memory: Array) -> None:
-        """Copy the record of a step, into the memory of the last one if it fits."""
-        own = self._memory
-        if isinstance(own, bytes) or own.shape != memory.shape:
-            self._memory, self._views = memory.copy(), None
-        else:
-            own[:] = memory
 
     @property
     def _record(self) -> Record:

@@ -2,4 +2,4 @@
 
 from .actuation import Actuation as Actuation
 from .actuation import Delivered as Delivered
-from .status import Status as Status
+from .limited_step import Status as Status

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.identity_cache import IdentityCache
 from hsp_control.common.kernels import kernel
 from hsp_control.common.linalg import (
     cholesky,
@@ -37,9 +36,17 @@ class Support:
     """Forces f at the points of contacts, in the axes (tangents, normal) of each."""
 
     def __init__(
-        self, contacts: Sequence[PlannedContact], robot: Robot, weight: float
+        self,
+        contacts: Sequence[PlannedContact],
+        state: RobotState,
+        base: Sequence[int] = (),
     ) -> None:
-        nv = robot.nv
+        robot, nv = state.robot, state.robot.nv
+        self._state = state
+        # degrees of freedom without a motor
+        self.base: Indices = np.array(base, dtype=np.int64)
+        # robot's weight [N]
+        self.weight = 9.81 * sum(inertia.mass for inertia in robot.model.inertias)
         self.contacts = tuple(each.contact for each in contacts)
         counts = [len(contact.points) for contact in self.contacts]
         points = sum(counts)
@@ -55,7 +62,6 @@ class Support:
         self.lower[2::3] = 0.0
         # e, shape (size,): the closed form minimises Σ (f - f_ref)²/e
         self.inverse_cost = np.ones(self.size)
-        self._weight = weight
         self.supporting_dofs = _supporting_dofs(robot, self.contacts)
         ends = np.cumsum([0, *counts])
         self.points = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
@@ -82,57 +88,55 @@ class Support:
             self.inverse_cost[columns] = full
             if not planned.always:
                 self._scheduled.append((planned, columns, full))
-        self._wanted, self._tau = np.zeros(nv), np.zeros(nv)
-        # what `minimum_norm_forces` wrote last, shape (size,) [N]
-        self.forces, self._asked = np.zeros(self.size), np.zeros(self.size)
-        self._maps = IdentityCache(self._bind_maps)
-        self._solve = IdentityCache(self._bind_solve)
+        # what `minimum_norm_forces` reads, and wrote last: the remaining effort, shape
+        # (nv,), and forces, shape (size,) [N]
+        self._wanted, self.tau = np.zeros(nv), np.zeros(nv)
+        self.forces = np.zeros(self.size)
 
-    def update(self, state: RobotState, resolution: Resolution) -> None:
+    def update(self, resolution: Resolution) -> None:
         """Compute the map, the positions, the bounds of schedules, and the commands."""
-        for write in self._maps.get(state):
+        state = self._state
+        for write in self._write_maps:
             write(state.t)
         for planned, columns, full in self._scheduled:
             on = max(planned.weight(state.t), 1e-6)
-            self.upper[columns][2::3] = on * _MAX_FORCE * self._weight
+            self.upper[columns][2::3] = on * _MAX_FORCE * self.weight
             self.inverse_cost[columns] = on * full
         for planned, command, own in self._commanded:
             command.write(state, planned.weight(state.t), resolution, own)
 
-    def _bind_maps(self, state: RobotState) -> list[Callable[[float], Any]]:
-        """Return the calls that write the map and the positions at this state."""
+    @cached_property
+    def _write_maps(self) -> list[Callable[[float], Any]]:
+        """The calls that write the map and the positions."""
         calls: list[Callable[[], object]] = []
         for contact, where in zip(self.contacts, self.points, strict=True):
-            frame = state.frame(contact.frame)
+            frame = self._state.frame(contact.frame)
             points, shift = np.array(contact.points), np.array(contact.shift)
             own = points, shift, np.array(contact.axes), where.start
             write = bind(force_map, frame.motion, *own, self.positions, self.map)
             calls += [frame.compute, write]
         return in_order(calls)
 
-    def minimum_norm_forces(self, base: Indices, wanted: Array) -> tuple[Array, Array]:
-        """Return the forces of minimum Σ (f - f_ref)²/e, and the remaining effort."""
+    def minimum_norm_forces(self, wanted: Array) -> Array:
+        """Return the forces of minimum Σ (f - f_ref)²/e, and write `tau`."""
         self._wanted[:] = wanted
-        self._solve.get(base)()
-        return self.forces, self._tau
-
-    def _bind_solve(self, base: Indices) -> Callable[[], object]:
-        n, zeros = len(base), np.zeros
-        return bind(
-            minimum_norm_forces,
-            *(self.map, base, self.inverse_cost, self.reference, self._wanted),
-            *(zeros((n, self.size)), zeros((n, n)), zeros((n, n)), zeros((2, n))),
-            *(self.forces, self._tau),
-        )
-
-    def permits(self, forces: Array) -> bool:
-        """Return whether forces, shape (size,), are within cones and bounds."""
-        self._asked[:] = forces
-        return bool(self._permits())
+        self._solve()
+        return self.forces
 
     @cached_property
-    def _permits(self) -> Callable[[], float]:
-        return bind(within_cones, self.cone, self._asked, self.lower, self.upper)
+    def _solve(self) -> Callable[[], object]:
+        n, zeros = len(self.base), np.zeros
+        return bind(
+            minimum_norm_forces,
+            *(self.map, self.base, self.inverse_cost, self.reference, self._wanted),
+            *(zeros((n, self.size)), zeros((n, n)), zeros((n, n)), zeros((2, n))),
+            *(self.forces, self.tau),
+        )
+
+    @cached_property
+    def permits(self) -> Callable[[], float]:
+        """The call that says whether `forces` are within cones and bounds."""
+        return bind(within_cones, self.cone, self.forces, self.lower, self.upper)
 
     def in_world(self, forces: Array) -> Array:
         """Return the forces in world axes, shape (size/3, 3) [N]."""

@@ -19,7 +19,7 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.linalg import cholesky
 from hsp_control.control.active_stack import ActiveStack
-from hsp_control.control.actuation.status import Status
+from hsp_control.control.actuation import Status
 from hsp_control.control.compensation.compensation import Compensation
 from hsp_control.control.compensation.force_feedback import RunningForceFeedback
 from hsp_control.control.compensation.friction_feed_forward import FrictionFeedForward

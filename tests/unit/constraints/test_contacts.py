@@ -254,16 +254,19 @@ def test_forces_are_permitted_up_to_the_friction_cone() -> None:
         PlannedContact(hsp.contacts.PointContact(foot, friction=mu), PRESENT)
         for foot, mu in zip(FEET, frictions, strict=False)
     ]
-    support = Support(contacts, solo(), 20.0)
+    robot = solo()
+    rest = np.zeros(robot.nv)
+    support = Support(contacts, robot.state(0.0, robot.home(), rest))
     for k, mu in enumerate(frictions):
         for x, y in ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)):
-            forces = np.array([0.0, 0.0, 5.0, 0.0, 0.0, 5.0])
+            support.forces[:] = 0.0, 0.0, 5.0, 0.0, 0.0, 5.0
             tangential = 5.0 * mu * np.array([x, y]) / np.sqrt(2.0)
-            forces[3 * k : 3 * k + 2] = (1.0 - 1e-12) * tangential
-            assert support.permits(forces)
-            forces[3 * k : 3 * k + 2] = (1.0 + 1e-9) * tangential
-            assert not support.permits(forces)
-    assert not support.permits(np.array([0.0, 0.0, -1.0, 0.0, 0.0, 5.0]))  # it pulls
+            support.forces[3 * k : 3 * k + 2] = (1.0 - 1e-12) * tangential
+            assert support.permits()
+            support.forces[3 * k : 3 * k + 2] = (1.0 + 1e-9) * tangential
+            assert not support.permits()
+    support.forces[:] = 0.0, 0.0, -1.0, 0.0, 0.0, 5.0  # it pulls
+    assert not support.permits()
 
 
 def test_the_log_says_how_much_friction_is_used() -> None:

@@ -13,8 +13,7 @@ from places import THOROUGH
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.control.actuation import actuation
-from hsp_control.control.actuation.status import Status
+from hsp_control.control.actuation import Status, actuation
 from hsp_control.control.compensation import Command, Compensation, FrictionFeedForward
 from hsp_control.control.planned import Switched
 from hsp_control.trajectories import HoldOrientation, Schedule
@@ -370,7 +369,8 @@ def test_a_mixture_keeps_the_limits(name: str, seed: int) -> None:
     for t in START + RAMP * case.rng.uniform(0.0, 1.0, 5):
         out = controller.compute(t, case.q, case.v)
         assume(out.status == Status.LIMITED)
-        limits, bounds = controller.limits, controller._actuation._bounds
+        limits = controller.limits
+        bounds = controller._limits.sets[-1][0].bounds
         assert limits is not None
         assert (np.abs(out.tau) <= limits.effort).all()
         assert (out.acceleration >= bounds.a_lower - 1e-6).all()

@@ -15,7 +15,7 @@ import hsp_control as hsp
 from hsp_control.common.arrays import Array
 from hsp_control.common.kernels import PLAIN
 from hsp_control.constraints.limits import Scaled
-from hsp_control.control.actuation import Delivered, Status
+from hsp_control.control.actuation import Actuation, Delivered, Status
 from hsp_control.control.actuation.limited_step import Barriers
 
 seeds = st.integers(0, 2**32 - 1)
@@ -69,17 +69,21 @@ def drawn(name: str, seed: int, spread: float) -> hsp.Controller:
     return made
 
 
+def actuation_of(made: hsp.Controller) -> Actuation:
+    """Return what delivered the controller's last step."""
+    ((limits, _),) = made._limits.sets
+    return made._mixture.actuation(made.active_stack, limits)
+
+
 def repeated(made: hsp.Controller, barriers: Barriers | None = None) -> Delivered:
     """Return the nearest step at the controller's state, with rows of barriers."""
-    stack, state, actuation = made.active_stack, made.state, made._actuation
-    a = stack.resolution.acceleration
-    wanted = state.inverse_dynamics(a)
+    stack, state, actuation = made.active_stack, made.state, actuation_of(made)
+    a, wanted = stack.resolution.acceleration, actuation._wanted
+    wanted.acceleration[:], wanted.effort[:] = a, state.inverse_dynamics(a)
     if stack.support.size:
-        stack.support.update(state, stack.resolution)
-        stack.support.minimum_norm_forces(actuation.base, wanted)
-    return actuation._limit(
-        *(state, wanted, a, False, stack.resolution, stack.support, barriers or {})
-    )
+        stack.support.update(stack.resolution)
+        stack.support.minimum_norm_forces(wanted.effort)
+    return actuation._nearest(a, False, barriers or {})
 
 
 @pytest.mark.parametrize(
@@ -101,9 +105,9 @@ def test_it_is_the_optimum(name: str, spread: float, seed: int) -> None:
     _, a, forces, status, _ = repeated(made)
     if status != Status.LIMITED:
         return
-    stack, state, actuation = made.active_stack, made.state, made._actuation
-    wanted = stack.resolution.acceleration
-    bounds = actuation._bounds
+    stack, state = made.active_stack, made.state
+    wanted, weight = stack.resolution.acceleration, stack.support.weight
+    bounds = actuation_of(made)._limits.bounds
     qp = limit_oracle.limited_step(
         state.mass_matrix,
         wanted,
@@ -112,11 +116,11 @@ def test_it_is_the_optimum(name: str, spread: float, seed: int) -> None:
         (bounds.a_lower, bounds.a_upper),
         stack.resolution,
         stack.support,
-        actuation.base,
-        actuation._weight,
+        stack.support.base,
+        weight,
         made.robot.size,
     )
-    x = np.concatenate([a - wanted, forces / actuation._weight])
+    x = np.concatenate([a - wanted, forces / weight])
     scale = np.linalg.norm(qp.rows.A, axis=1) * (1.0 + np.abs(x).max())
     value = qp.rows.A @ x
     beyond = np.maximum(qp.rows.lower - value, value - qp.rows.upper) / scale
@@ -147,7 +151,7 @@ def test_least_violation_is_the_least(seed: int) -> None:
     if out.status != Status.RELAXED:
         return
     assert (np.abs(out.tau) <= 2.0).all()
-    M, bounds = made.state.mass_matrix, made._actuation._bounds
+    M, bounds = made.state.mass_matrix, actuation_of(made)._limits.bounds
     a = made.active_stack.resolution.acceleration
     tau = made.state.inverse_dynamics(a)
     H = np.diag(np.concatenate([np.full(7, 1e-9), np.ones(7)]))
@@ -166,8 +170,8 @@ def test_distances_are_relaxed_less_than_motion_and_motion_less_than_holding() -
     """The violations of a quadratic cost are in inverse proportion to the costs."""
     made = arm()
     made.compute(0.0, panda().home(), np.zeros(7))
-    bounds, first = made._actuation._bounds, np.eye(7)[5]
-    made._actuation._tau_lower[:], made._actuation._tau_upper[:] = -np.inf, np.inf
+    bounds, first = actuation_of(made)._limits.bounds, np.eye(7)[5]
+    bounds.tau_lower[:], bounds.tau_upper[:] = -np.inf, np.inf
     for kind, cost in (("distances", 30.0), ("holding", 0.1)):
         bounds.a_upper[5], bounds.a_lower[5] = 1.0, -np.inf
         _, a, _, status, relaxation = repeated(made, {kind: row(first, 5.0)})
@@ -207,7 +211,7 @@ def test_one_native_call_is_the_same_as_its_parts(strength: float) -> None:
         q = panda().home() + 0.3 * rng.standard_normal(7)
         v = 0.3 * rng.standard_normal(7)
         parts = made.compute(0.3, q, v, modifier=lambda _, __, a: (a, None))
-        assert made._whole is not None
+        assert made.settled is not None
         once = made.compute(0.3, q, v)
         seen.add(once.status)
         assert once.status is parts.status

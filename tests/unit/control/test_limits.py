@@ -14,7 +14,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.constraints.limits import ObstacleDistance, RobotLimits
 from hsp_control.constraints.limits.acceleration_bounds import acceleration_bounds
 from hsp_control.control.actuation import Status
-from hsp_control.control.actuation.held_effort import HeldEffort, observe
+from hsp_control.control.actuation.sent_effort import SentEffort, observe
 from hsp_control.geometry import Scene
 from hsp_control.geometry.start import Start
 from hsp_control.simulation.plants import Push, RigidBodyPlant
@@ -229,24 +229,29 @@ def test_a_load_that_the_model_lacks_drives_no_joint_beyond_its_limit(
 
 
 def test_the_error_of_the_acceleration_is_what_is_observed() -> None:
-    effort, v, a = HeldEffort(2), np.array([0.1, 0.2]), np.array([1.0, -1.0])
+    robot = hsp.Robot.load("planar3r")
+    state, q = robot.state(0.0, robot.home(), np.zeros(3)), robot.home()
+    v, a = np.array([0.1, 0.2, 0.0]), np.array([1.0, -1.0, 0.0])
+    effort, tau = SentEffort(state), np.zeros(3)
     held = effort.held
     for k in range(100):
-        effort.sent(0.001 * k, v, a, 0.001)
-        v = v + 0.001 * (a + np.array([3.0, 0.0]))
+        state.update(0.001 * k, q, v)
+        effort.record(tau, a, 0.001)
+        v = v + 0.001 * (a + np.array([3.0, 0.0, 0.0]))
         observe(9.0 * v, held, 0.001 * k + 0.0005)  # not the end of the period
         observe(v, held, 0.001 * (k + 1))
-    np.testing.assert_allclose(held.error, [3.0, 0.0], rtol=1e-3, atol=1e-9)
+    np.testing.assert_allclose(held.error, [3.0, 0.0, 0.0], rtol=1e-3, atol=1e-9)
     # The mean over 0.1 s, of an error that has lasted as long.
-    mean = [3.0 * (1.0 - np.exp(-1.0)), 0.0]
+    mean = [3.0 * (1.0 - np.exp(-1.0)), 0.0, 0.0]
     np.testing.assert_allclose(held.drift, mean, rtol=1e-9, atol=1e-9)
     np.testing.assert_array_equal(held.steady, held.drift)
-    effort.sent(0.1, v, a, 0.02)  # a longer period counts alone
+    state.update(0.1, q, v)
+    effort.record(tau, a, 0.02)  # a longer period counts alone
     observe(v + 0.02 * (a - 8.0), held, 0.12)
-    np.testing.assert_allclose(held.error, [8.0, 8.0], rtol=1e-9)
+    np.testing.assert_allclose(held.error, [8.0, 8.0, 8.0], rtol=1e-9)
     # The first one's mean still has the old sign: nothing of it is there any more.
     assert held.drift[0] > 0.0
-    np.testing.assert_array_equal(held.steady, [0.0, held.drift[1]])
+    np.testing.assert_array_equal(held.steady, [0.0, *held.drift[1:]])
     memory, drift, steady = effort.memory(), held.drift.copy(), held.steady.copy()
     effort.forget()
     assert not held.error.any()
@@ -255,7 +260,7 @@ def test_the_error_of_the_acceleration_is_what_is_observed() -> None:
     effort.remember(memory)
     np.testing.assert_array_equal(held.drift, drift)
     np.testing.assert_array_equal(held.steady, steady)
-    np.testing.assert_allclose(held.error, [8.0, 8.0], rtol=1e-9)
+    np.testing.assert_allclose(held.error, [8.0, 8.0, 8.0], rtol=1e-9)
 
 
 def test_contradiction_is_relaxed_and_told() -> None:

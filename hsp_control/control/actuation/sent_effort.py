@@ -1,4 +1,4 @@
-"""What holding an effort for a period adds to the acceleration, as it is observed."""
+"""What is remembered of the efforts sent: their rate, and what holding them does."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -6,9 +6,10 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.identity_cache import IdentityCache
 from hsp_control.common.kernels import kernel
+from hsp_control.common.linalg import copy
 from hsp_control.common.native import bind
+from hsp_control.robot import RobotState
 
 _WINDOW = 0.01
 """The acceleration is observed over this time, or over one period if that is longer
@@ -19,11 +20,11 @@ _MEMORY = 0.1
 
 
 class Held(NamedTuple):
-    """The memory of a `HeldEffort`, as kernels read it, shape (nv,) each."""
+    """What was seen of the efforts that were held, as kernels read it."""
 
     # when the period ends, NaN once that was looked at, and its length [s]
     timing: Array
-    expected: Array  # velocity that is expected then [rad/s or m/s]
+    expected: Array  # velocity that is expected then, shape (nv,) [rad/s or m/s]
     stray: Array  # differences from it, summed over about `_WINDOW`
     error: Array  # largest error of late [rad/s² or m/s²]
     drift: Array  # mean error of late
@@ -33,8 +34,8 @@ class Held(NamedTuple):
     disturbance: Array  # acceleration that something else than the effort causes
 
 
-class HeldEffort:
-    """The error of the acceleration while an effort is held for a period.
+class SentEffort:
+    """The last effort, and the error of the acceleration while efforts are held.
 
     The law's acceleration is that of the beginning of a period; while the effort is
     held the robot moves on, and the acceleration changes. The barriers of `Limits` look
@@ -45,39 +46,60 @@ class HeldEffort:
     by an error only while it lasts: by its mean over the bandwidth's square.
     """
 
-    def __init__(self, nv: int) -> None:
-        self.held = Held(np.full(2, np.nan), *(np.zeros(nv) for _ in range(6)))
-        self._expect = IdentityCache(self.expect)
+    def __init__(self, state: RobotState) -> None:
+        nv = state.robot.nv
+        self._state = state
+        self.period = 0.0  # of the last effort [s]; 0: there was none in this run
+        # the last effort, and how long it is held [s], inf: not known; shape (nv + 1,)
+        self.last = np.zeros(nv + 1)
+        self.held = Held(np.zeros(2), *(np.zeros(nv) for _ in range(6)))
+        self._acceleration = np.zeros(nv)
+        self._expect = self.expecting(self._acceleration)
+        self.forget()
 
-    def sent(self, t: float, v: Array, a: Array, period: float) -> None:
-        """Record that the effort of an acceleration is held from now on."""
+    def record(self, tau: Array, acceleration: Array, period: float) -> None:
+        """Record an effort, the acceleration it is to give, and how long it is held."""
+        self.last[:-1], self.last[-1] = tau, period
+        self.record_acceleration(acceleration, period)
+
+    def record_acceleration(self, acceleration: Array, period: float) -> None:
+        """Record the acceleration that an effort is to give, and not the effort."""
+        self._acceleration[:] = acceleration
         self.held.timing[1] = period
-        self._expect.get(v, a)(t)
+        self._expect(self._state.t)
 
-    def expect(self, v: Array, a: Array) -> Callable[[float], float]:
-        """Return `sent` of what these arrays then hold, as a call of the time."""
-        # The period is that of the last `sent`.
+    def expecting(self, acceleration: Array) -> Callable[[float], float]:
+        """Return `record_acceleration` of what an array then holds, at a time.
+
+        The period is that of the last one.
+        """
         held = self.held
-        arrays = v, a, held.disturbance, held.timing, held.expected
-        return bind(_expect, *arrays, timed=True)
+        arrays = acceleration, held.disturbance, held.timing, held.expected
+        return bind(_expect, self._state.v, *arrays, timed=True)
 
-    def prepare(self, v: Array, a: Array) -> None:
-        """Compile what `sent` calls, for these arrays."""
-        self._expect.get(v, a)
+    def recording(self) -> Callable[[], float]:
+        """Return a call that makes `RobotState.effort` the last effort."""
+        return bind(copy, self._state.effort, self.last[:-1])
+
+    def forget_rate(self) -> None:
+        """Forget the last effort: the rate of the next one has no limit."""
+        self.last[-1] = np.inf
 
     def forget(self) -> None:
         """Begin anew."""
+        self.period = 0.0
         for each in self.held:
             each[:] = 0.0
         self.held.timing[:] = np.nan
+        self.forget_rate()
 
     def memory(self) -> tuple[Array, ...]:
         """Return a copy of what it remembers."""
-        return tuple(each.copy() for each in self.held)
+        return tuple(each.copy() for each in (self.last, *self.held))
 
     def remember(self, memory: tuple[Array, ...]) -> None:
         """Set what `memory` returned."""
-        for each, value in zip(self.held, memory, strict=True):
+        for each, value in zip((self.last, *self.held), memory, strict=True):
             each[:] = value
 
 
@@ -112,12 +134,12 @@ def observe(v: Array, held: Held, t: float) -> None:
 
 @kernel
 def effort_window(
-    sent: Array, effort: Array, rate: Array, lower: Array, upper: Array
+    last: Array, effort: Array, rate: Array, lower: Array, upper: Array
 ) -> None:
-    """Write the range of the next effort, where the effort's rate is limited."""
-    # Shapes: sent (nv + 1,), see `Actuation`, the others (nv,).
-    period = sent[effort.shape[0]]
+    """Write the range of the next effort, which limits on it and its rate leave."""
+    # Shapes: last (nv + 1,), see `SentEffort`, the others (nv,).
+    period = last[effort.shape[0]]
     for i in range(effort.shape[0]):
         # The last effort may lie outside the limits: then move towards them.
-        lower[i] = min(max(sent[i] - rate[i] * period, -effort[i]), effort[i])
-        upper[i] = max(min(sent[i] + rate[i] * period, effort[i]), -effort[i])
+        lower[i] = min(max(last[i] - rate[i] * period, -effort[i]), effort[i])
+        upper[i] = max(min(last[i] + rate[i] * period, effort[i]), -effort[i])

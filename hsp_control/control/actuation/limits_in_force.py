@@ -1,0 +1,167 @@
+"""The limits in force: the numbers that every step reads, as changes make them."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.native import bind
+from hsp_control.common.step_plan import in_order
+from hsp_control.constraints.limits import RobotLimits
+from hsp_control.constraints.limits.acceleration_bounds import Bounds, MotionLimits
+from hsp_control.control.actuation.sent_effort import SentEffort, effort_window
+from hsp_control.control.evolution import Evolution
+from hsp_control.control.planned import PlannedLimits
+from hsp_control.robot import Robot, RobotState
+
+
+class LimitSet:
+    """One set of limits, as kernels read it; None: nothing is limited."""
+
+    def __init__(self, limits: RobotLimits | None, nv: int, sent: SentEffort) -> None:
+        self.limits, self.sent = limits, sent
+        # bounds of the next step; those on the effort are always up to date
+        self.bounds = Bounds(
+            np.full(nv, -np.inf),
+            np.full(nv, np.inf),
+            np.full(nv, -np.inf),
+            np.full(nv, np.inf),
+        )
+        # whether there are but bounds on accelerations and efforts
+        self.box = limits is None or not (limits.distances or limits.static_effort)
+        self.rate = False  # whether the effort's rate is limited
+        if limits is None:
+            return
+        self.rate = bool(np.isfinite(limits.effort_rate).any())
+        numbers = (np.array(each) for each in limits.motion)
+        self.motion = MotionLimits(*numbers)
+        # Writes the bounds on the next effort.
+        self.update: Callable[[], object] = bind(
+            effort_window,
+            *(sent.last, np.array(limits.effort), np.array(limits.effort_rate)),
+            *(self.bounds.tau_lower, self.bounds.tau_upper),
+        )
+        self.update()
+
+
+class LimitsInForce:
+    """The sets of limits that count now, and what is remembered of the efforts sent.
+
+    Its only memory is of the last efforts, used where the effort's rate or the speed is
+    limited.
+    """
+
+    def __init__(self, state: RobotState, planned: PlannedLimits) -> None:
+        self._state = state
+        self.sent = SentEffort(state)
+        self._rate = False
+        self._all: list[tuple[LimitSet, Evolution[float]]] = []
+        self.plan(planned, -np.inf)
+
+    def plan(self, planned: PlannedLimits, t: float) -> None:
+        """Follow other limits from now on; t is the present time [s]."""
+        if not self._rate:
+            self.sent.forget_rate()
+        nv, known = self._state.robot.nv, {id(each.limits): each for each in self.all}
+        self._all = [
+            (known.get(id(limits)) or LimitSet(limits, nv, self.sent), share)
+            for limits, share in planned.sets
+        ]
+        self._rate = any(each.rate for each, _ in self._all)
+        self.write(t, always=True)
+
+    def write(self, t: float, *, always: bool = False) -> None:
+        """Find the sets that count at a time [s]."""
+        if always or len(self._all) > 1:
+            shares = [(each, share.at(t)) for each, share in self._all]
+            # each set that counts, and its share in (0, 1]
+            self.sets = [pair for pair in shares if pair[1] > 0.0]
+
+    @property
+    def all(self) -> list[LimitSet]:
+        """The sets that count now, or will."""
+        return [each for each, _ in self._all]
+
+    @property
+    def limits(self) -> RobotLimits | None:
+        """The limits in force, if any; of several sets their mean."""
+        sets = [(each.limits, share) for each, share in self.sets]
+        return _mean(sets, self._state.robot)
+
+    def applied(self, tau: Array, acceleration: Array, period: float) -> None:
+        """Record the effort that is sent now: its rate and the speed are limited."""
+        self.sent.period = period
+        if not self._limit_anything:
+            return
+        if self._rate:
+            self.sent.record(tau, acceleration, period)
+            self.update()
+        else:
+            self.sent.record_acceleration(acceleration, period)
+
+    def applying(self, acceleration: Array) -> list[Callable[[float], Any]]:
+        """Return calls of the time that do what `applied` does of the effort M a + N.
+
+        The period is that of the last `applied`.
+        """
+        if not self._limit_anything:
+            return []
+        calls = [self.sent.expecting(acceleration)]
+        if self._rate:
+            windows = [each.update for each in self.all if each.rate]
+            calls += in_order([self.sent.recording(), *windows])
+        return calls
+
+    def update(self) -> None:
+        """Find what the last effort leaves for the next one."""
+        for each, _ in self._all:
+            if each.rate:
+                each.update()
+
+    @property
+    def _limit_anything(self) -> bool:
+        return any(each.limits is not None for each, _ in self.sets)
+
+    def forget(self) -> None:
+        """Forget the last efforts."""
+        self.sent.forget()
+        self.update()
+
+    def remember(self, memory: tuple[Array, ...]) -> None:
+        """Go on from what `SentEffort.memory` returned."""
+        self.sent.remember(memory)
+        self.update()
+
+
+def _mean(
+    sets: Sequence[tuple[RobotLimits | None, float]], robot: Robot
+) -> RobotLimits | None:
+    """Return the limits that a mixture keeps: the weighted mean of the numbers."""
+    # The bounds on efforts and accelerations are linear in them. Where one of them is
+    # inf, so is the mean. Distances are those of all sets.
+    if len(sets) == 1:
+        return sets[0][0]
+    numbers = np.sum([w * _numbers(each, robot.nv) for each, w in sets], axis=0)
+    numbers.flags.writeable = False
+    effort, rate, velocity, lower, upper, *motion = numbers[:-1].reshape(-1, robot.nv)
+    return RobotLimits(
+        robot=robot,
+        effort=effort,
+        effort_rate=rate,
+        velocity=velocity,
+        lower=lower,
+        upper=upper,
+        motion=MotionLimits._make((*motion, numbers[-1:])),
+        distances=tuple(one for each, _ in sets if each for one in each.distances),
+    )
+
+
+def _numbers(limits: RobotLimits | None, nv: int) -> Array:
+    """Return all numbers of limits in a row; None has numbers that bound nothing."""
+    if limits is None:
+        signs = 1.0, 1.0, 1.0, -1.0, 1.0, -1.0, 1.0, 1.0, 1.0, 1.0
+        return np.append(np.repeat(np.inf * np.array(signs), nv), 10.0)
+    x = limits
+    rows = x.effort, x.effort_rate, x.velocity, x.lower, x.upper, *x.motion
+    return np.asarray(np.concatenate(rows))
