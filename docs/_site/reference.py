@@ -1,8 +1,9 @@
-"""The reference's pages, written from what there is: names, YAML keys, commands."""
+"""The reference's pages, written from the code: names, YAML keys, commands, files."""
 
 import json
 from pathlib import Path
 
+from bundled import configurations_page, franka_errors_page, robots_page
 from commands import commands_page
 from names import names_page, namespace_pages
 from sphinx.application import Sphinx
@@ -20,6 +21,9 @@ def write(app: Sphinx) -> None:
     pages = {
         "names": names_page(),
         "commands": commands_page(command_line()),
+        "configurations": configurations_page(),
+        "robots": robots_page(),
+        "franka_errors": franka_errors_page(),
         "yaml": yaml_page(json.loads((Path(app.srcdir) / SCHEMA).read_text())),
         **{f"hsp.{name}": page for name, page in namespace_pages()},
     }
