@@ -140,8 +140,8 @@ def test_the_compensators_of_the_document_are_a_configuration() -> None:
     experiment = load_experiment(
         yaml.safe_load(configuration), "simulation.duration=0.02"
     )
-    told = re.findall(r"^\| `(\w+)` \|", text, re.MULTILINE)
-    assert tuple(told) == experiment.compensation.names
+    named = re.findall(r"^- `(\w+)`:", text, re.MULTILINE)
+    assert tuple(named) == experiment.compensation.names
     assert experiment.run().status == "completed"
 
 
