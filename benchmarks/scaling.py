@@ -328,7 +328,7 @@ One `Controller.compute(t, q, v)` [µs], medians over {rounds} interleaved round
 Near a singularity a step takes more (Jacobi's method), up to the levels *in conflict*.
 Ratios are valid for other machines, microseconds are not.
 
-![Time of a step against joints, tasks, fields, obstacles, levels](figures/scaling.png)
+![Time of a step against joints, tasks and more](../../docs/figures/scaling.png)
 
 """
 ABOUT = {
