@@ -66,7 +66,10 @@ def test_the_page_of_compliance_is_true() -> None:
     )
 
 
-PAGES_WITH_PYTHON = ["companions/sweeps", "latency", "robustness", "streams"]
+PAGES_WITH_PYTHON = [
+    *("companions/sweeps", "development/kernels", "latency", "play", "robustness"),
+    "streams",
+]
 
 
 GUIDES = sorted(
@@ -76,7 +79,7 @@ GUIDES = sorted(
 )
 
 
-@pytest.mark.parametrize("page", [*PAGES_WITH_PYTHON, *GUIDES])
+@pytest.mark.parametrize("page", [*PAGES_WITH_PYTHON, *GUIDES, "whole_body"])
 def test_what_pages_show_can_be_followed(
     page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
