@@ -176,7 +176,8 @@ class ActiveStack:
 
     def field_value(self) -> float:
         """Return the field's value at the state."""
-        return self._field.value(self._state)
+        # The state that users and logs have: calls are bound for it once, not in turns.
+        return self._field.value(self._state.seen)
 
     def flow(self) -> Array:
         """Return J# x_d' + P g, shape (nv,), where it was resolved, at rest."""

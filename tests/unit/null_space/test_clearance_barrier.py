@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from oracles import slope
 
-from hsp_control import Cost, Obstacle
+from hsp_control import Cost, Obstacle, load_experiment
+from hsp_control.geometry.closed_form import ClosedFormDistances
 from hsp_control.geometry.shapes import Sphere
 from hsp_control.null_space.fields import FieldSample, ObstacleClearance
 from hsp_control.null_space.fields.barrier import CORE
@@ -144,3 +145,21 @@ def test_distances_are_measured_once_per_state(calls: list[int]) -> None:
     del calls[:]
     evaluate(ObstacleClearance([ball], influence=1.0), state)
     assert not calls
+
+
+def test_rows_of_a_log_bind_nothing_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The value of the field and those of its terms are taken of one state."""
+    bound: list[int] = []
+    make = ClosedFormDistances._plan
+
+    def counting(self: ClosedFormDistances, *arguments: Any) -> Any:
+        bound.append(1)
+        return make(self, *arguments)
+
+    monkeypatch.setattr(ClosedFormDistances, "_plan", counting)
+    counts = []
+    for duration in (0.02, 0.2):
+        bound.clear()
+        load_experiment("panda_obstacle", f"simulation.duration={duration}").run()
+        counts.append(len(bound))
+    assert counts[0] == counts[1]
