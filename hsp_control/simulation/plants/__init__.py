@@ -12,7 +12,6 @@ from .drives import EffortNoise as EffortNoise
 from .drives import Jitter as Jitter
 from .drives import Saturation as Saturation
 from .imperfect_plant import ImperfectPlant as ImperfectPlant
-from .integrated_plant import IntegratedPlant as IntegratedPlant
 from .model_changes import Inertias as Inertias
 from .model_changes import Payload as Payload
 from .mujoco import ContactShape as ContactShape
@@ -22,6 +21,7 @@ from .mujoco import MujocoScene as MujocoScene
 from .mujoco import MujocoScenePlant as MujocoScenePlant
 from .mujoco import Solid as Solid
 from .plant import ContinuousPlant as ContinuousPlant
+from .plant import IntegratedPlant as IntegratedPlant
 from .plant import Plant as Plant
 from .plant import SampledPlant as SampledPlant
 from .plant import check_plant as check_plant
