@@ -16,8 +16,13 @@ from hsp_control.common.arrays import Array
 from hsp_control.constraints.contacts import SurfaceContact
 from hsp_control.geometry.shapes import Box
 from hsp_control.robot.integrators import Rk4
-from hsp_control.simulation.plants import ContactPlant, RigidContact
-from hsp_control.simulation.plants.mujoco import ContactShape, Ground, MujocoPlant
+from hsp_control.simulation.plants import (
+    ContactPlant,
+    ContactShape,
+    Ground,
+    RigidContact,
+)
+from hsp_control.simulation.plants.mujoco_plant import MujocoPlant
 from hsp_control.trajectories import Blend, HoldOrientation
 
 COM, HAND, TRUNK = "center_of_mass", "hand", "trunk"
