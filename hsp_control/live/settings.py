@@ -19,6 +19,7 @@ from hsp_control.declaration.quantities import (
     PositiveCount,
 )
 from hsp_control.robot import Robot
+from hsp_control.robot.model import inf_for_no_limit
 
 
 class StopSettings(Part, error=LiveError):
@@ -114,9 +115,7 @@ class LiveSettings(Part, error=LiveError):
             with within("effort"):
                 own = by_dof(self.effort, robot.nv, error=LiveError)
         else:
-            own = np.array(robot.model.effortLimit, dtype=float)
-            # URDFs contain 0, or the largest float, where there is no limit.
-            own[(own <= 0.0) | (own >= np.finfo(np.float32).max)] = np.inf
+            own = inf_for_no_limit(robot.model.effortLimit)
         own[list(robot.unactuated)] = 0.0  # no motor is there
         return own
 

@@ -12,6 +12,7 @@ from hsp_control.common.exceptions import HspControlError, LimitError
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import ArrayField, Number, Positive, plain
 from hsp_control.robot import Robot
+from hsp_control.robot.model import inf_for_no_limit
 
 T = TypeVar("T")
 
@@ -165,10 +166,8 @@ def maximum(value: Maximum, own: Array, robot: Robot) -> Array:
 
 
 def _own_limit(own: Array, robot: Robot) -> Array:
-    limit = np.array(own, dtype=float)
+    limit = inf_for_no_limit(own)
     limit[list(robot.unactuated)] = np.inf
-    # URDFs have 0 or the largest float where there is no limit.
-    limit[(limit <= 0.0) | (limit >= np.finfo(np.float32).max)] = np.inf
     return limit
 
 
