@@ -128,20 +128,12 @@ def simulate(
     if isinstance(plant, ContinuousPlant) and periods:
         plant = IntegratedPlant(plant, integrator)
     if compensation is not None and compensation.names and not periods:
-        raise SimulationError(
-            f"compensation ({', '.join(compensation.names)}) is computed once a "
-            "period: it needs a control_period [s], for example 0.001"
-        )
+        names = ", ".join(compensation.names)
+        raise _no_period(f"compensation ({names}) is computed once a period: it needs")
     if plan is not None and not periods:
-        raise SimulationError(
-            "a plan decides once a period: it needs a control_period [s], for example "
-            "0.001"
-        )
+        raise _no_period("a plan decides once a period: it needs")
     if estimators and not periods:
-        raise SimulationError(
-            "estimators estimate once a period: they need a control_period [s], for "
-            "example 0.001"
-        )
+        raise _no_period("estimators estimate once a period: they need")
     running: RunningPlan | None = None
     if isinstance(plant, ContinuousPlant):
         loop = continuous_loop(controller, plant, integrator, times, q, v)
@@ -160,10 +152,8 @@ def simulate(
         running = chain.plan
         loop = sampled_loop(chain, plant, periods, times, q, v)
     else:
-        raise SimulationError(
-            f"{type(plant).__name__} holds the effort during a period: it needs a "
-            "control_period [s], for example 0.001"
-        )
+        name = type(plant).__name__
+        raise _no_period(f"{name} holds the effort during a period: it needs")
     description = {**plant.describe(), **differing_bodies(plant, robot)}
     writer = LogWriter(
         controller,
@@ -202,6 +192,10 @@ def simulate(
         with suppress(LogError):  # all rows are in memory, too
             writer.end(status, message)
     return writer.rollout(status, message)
+
+
+def _no_period(who_needs: str) -> SimulationError:
+    return SimulationError(f"{who_needs} a control_period [s], for example 0.001")
 
 
 def _count_rows(
