@@ -2,9 +2,6 @@
 
 from hsp_control.robot.friction import Friction as Friction
 
-from .declared import AnyPlant as AnyPlant
-from .declared import FrictionalPart as FrictionalPart
-from .declared import PlantPart as PlantPart
 from .drives import Drive as Drive
 from .drives import DroppedPeriods as DroppedPeriods
 from .drives import EffortDelay as EffortDelay
@@ -26,6 +23,9 @@ from .plant import Plant as Plant
 from .plant import SampledPlant as SampledPlant
 from .plant import check_plant as check_plant
 from .plant import differing_bodies as differing_bodies
+from .plant_part import AnyPlant as AnyPlant
+from .plant_part import FrictionalPart as FrictionalPart
+from .plant_part import PlantPart as PlantPart
 from .push import Push as Push
 from .rigid_body import RigidBody as RigidBody
 from .rigid_body import RigidBodyPlant as RigidBodyPlant

@@ -20,7 +20,6 @@ from hsp_control.robot.integrators import Integrator
 from hsp_control.robot.motion import number_of_steps
 from hsp_control.robot.mujoco import scene
 from hsp_control.robot.mujoco_coordinates import MujocoCoordinates, joints_of
-from hsp_control.simulation.plants.declared import FrictionalPart
 from hsp_control.simulation.plants.mjcf import (
     ContactShape,
     ContactShapes,
@@ -36,6 +35,7 @@ from hsp_control.simulation.plants.plant import (
     contact_channels,
     to_json_data,
 )
+from hsp_control.simulation.plants.plant_part import FrictionalPart
 from hsp_control.simulation.plants.push import Push, Pushes
 
 MujocoIntegrator = Literal["Euler", "RK4", "implicit", "implicitfast"]

@@ -24,9 +24,9 @@ from hsp_control.robot import MujocoCoordinates, Robot
 from hsp_control.robot.integrators import Integrator
 from hsp_control.robot.mujoco.loading import compile_mjcf
 from hsp_control.robot.mujoco.scene import Motor, Names, joint_actuators, motor
-from hsp_control.simulation.plants.declared import PlantPart
 from hsp_control.simulation.plants.mujoco_plant import MujocoEngine, import_mujoco
 from hsp_control.simulation.plants.plant import contact_channels
+from hsp_control.simulation.plants.plant_part import PlantPart
 from hsp_control.simulation.plants.push import Push
 
 _DEEP = 1e-3

@@ -3,16 +3,19 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
-from typing import Any
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.control.measurement import NO_WRENCHES, Inertial, LogChannel
+from hsp_control.declaration import Part
 from hsp_control.robot import Robot
 from hsp_control.robot.integrators import Advance, Integrator, Steps
 from hsp_control.robot.motion import Acceleration
+
+Kind = TypeVar("Kind", bound="Imperfection")
 
 
 class Plant:
@@ -202,6 +205,35 @@ class IntegratedPlant(SampledPlant):
     def describe(self) -> dict[str, Any]:
         """Return the continuous plant's description."""
         return self.plant.describe()
+
+
+class Imperfection(Part, ABC, error=SimulationError):
+    """What a sensor and a drive have in common: its place in a chain of them.
+
+    A subclass declares its parameters as fields (see `Part`) and implements ``begin``.
+    It knows no robot and has no memory: ``begin`` makes what runs. A plant applies
+    those of a chain in the order of their stages, however they are given.
+
+    Attributes:
+        stage: The place in the chain; by default behind all of this package.
+    """
+
+    stage: ClassVar[float] = 100.0
+
+    @property
+    def active(self) -> bool:
+        """Whether it changes anything; a plant leaves out one that does not."""
+        return True
+
+    @property
+    def periods(self) -> int:
+        """By how many control periods it delays, for the rate check."""
+        return 0
+
+
+def in_order(chain: tuple[Kind, ...]) -> tuple[Kind, ...]:
+    """Return a chain in the order of its stages."""
+    return tuple(sorted(chain, key=lambda each: each.stage))
 
 
 def differing_bodies(plant: Plant, robot: Robot) -> dict[str, Any]:
