@@ -54,9 +54,7 @@ class BearingFeet:
     def feel(self, measured: Measurement) -> None:
         """Find which contacts bear: those that are pressed."""
         if self._base:
-            self.contacts = tuple(
-                each for each in self._all if _bears(each, measured)
-            )  # fmt: skip
+            self.contacts = tuple(c for c in self._all if _bears(c, measured))
 
     def lose(self) -> None:
         """Let no contact bear any more."""

@@ -224,10 +224,10 @@ def posture_search(
             "fixed base only: give joints, and ground"
         )
     obstacles = () if scene is None else tuple(scene.values())
-    return PostureSearch(robot, tracked_rows(tasks, robot), obstacles)
+    return PostureSearch(robot, _tracked_rows(tasks, robot), obstacles)
 
 
-def tracked_rows(tasks: Iterable[Task], robot: Robot) -> list[Rows]:
+def _tracked_rows(tasks: Iterable[Task], robot: Robot) -> list[Rows]:
     """Return what those tasks of the highest priority track that track frames."""
     tasks = list(tasks)
     first = min((task.priority or 1 for task in tasks), default=1)
