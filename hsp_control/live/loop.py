@@ -135,7 +135,7 @@ def run_loop(
             controller.compute(start_time, first.q, first.v)  # begins
             loop_log.begin()
             safe_stop.begin()
-            loop = OneRun(
+            loop = LiveRun(
                 chain,
                 hardware,
                 reader,
@@ -220,7 +220,7 @@ def _fall_detector(controller: Controller, state: RobotState) -> FallDetector | 
 
 
 @dataclass(eq=False)
-class OneRun:
+class LiveRun:
     """One run of a loop whose parts are ready: `run`, then `finish`; none raises."""
 
     chain: ControlChain[EffortSource]
