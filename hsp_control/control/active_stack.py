@@ -175,8 +175,7 @@ class ActiveStack:
         return steps(plans, law)
 
     def field_value(self) -> float:
-        """Return the field's value at the state."""
-        # The state that users and logs have: calls are bound for it once, not in turns.
+        """Return the field's value at the state that logs have: bound only for it."""
         return self._field.value(self._state.seen)
 
     def flow(self) -> Array:

@@ -9,7 +9,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LiveError
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import RobotLimits
-from hsp_control.constraints.limits.joint_numbers import Positives, by_dof
+from hsp_control.constraints.limits.joint_numbers import Positives, by_dof, own_maximum
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import (
     Count,
@@ -19,7 +19,6 @@ from hsp_control.declaration.quantities import (
     PositiveCount,
 )
 from hsp_control.robot import Robot
-from hsp_control.robot.model import inf_for_no_limit
 
 
 class StopSettings(Part, error=LiveError):
@@ -115,7 +114,7 @@ class LiveSettings(Part, error=LiveError):
             with within("effort"):
                 own = by_dof(self.effort, robot.nv, error=LiveError)
         else:
-            own = inf_for_no_limit(robot.model.effortLimit)
+            own = own_maximum(robot.model.effortLimit, robot)
         own[list(robot.unactuated)] = 0.0  # no motor is there
         return own
 

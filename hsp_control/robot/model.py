@@ -402,7 +402,8 @@ class RobotModel:
 
     def _largest_effort(self) -> Array:
         """Return the largest effort of each motor, shape (nv,); inf for none."""
-        effort = inf_for_no_limit(self.model.effortLimit)
+        effort = np.array(self.model.effortLimit)
+        effort[(effort <= 0.0) | (effort >= np.finfo(np.float32).max)] = np.inf
         effort[list(self.unactuated)] = np.inf
         return effort
 
@@ -470,13 +471,6 @@ class RobotModel:
             raise ModelError(
                 f"{self.name}: the mass matrix is singular at this configuration"
             ) from None
-
-
-def inf_for_no_limit(maxima: ArrayLike) -> Array:
-    """Return maxima of a URDF, inf where it has none: 0, or the largest float."""
-    found = np.array(maxima, dtype=float)
-    found[(found <= 0.0) | (found >= np.finfo(np.float32).max)] = np.inf
-    return found
 
 
 def _floats(joint: Any) -> bool:
