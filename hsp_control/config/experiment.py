@@ -49,8 +49,7 @@ from hsp_control.simulation import Rollout, simulate
 from hsp_control.simulation.initial_state import InitialState
 from hsp_control.simulation.log_writer import LogWriter
 from hsp_control.simulation.plants import Plant, PlantPart, SampledPlant
-from hsp_control.simulation.settings import SimulationSettings
-from hsp_control.simulation.simulate import check_steps
+from hsp_control.simulation.simulate import SimulationSettings, check_steps
 from hsp_control.tasks import Task
 from hsp_control.trajectories.streams.stream import Streamed
 

@@ -13,8 +13,7 @@ from hsp_control.null_space.fields.weight import sample_weight
 from hsp_control.play.live_loop import Mirror
 from hsp_control.play.session import Session
 from hsp_control.simulation import Rollout
-from hsp_control.simulation.log_series import distance_label
-from hsp_control.simulation.unreached import unreached
+from hsp_control.simulation.log_series import distance_label, unreached
 from hsp_control.visualization.palette import SERIES
 from hsp_control.visualization.viewer import Viewer
 from hsp_control.visualization.viewer.clearances import capsules, distances, influence

@@ -167,16 +167,9 @@ class Rollout:
                 f"{path}: its format is {meta.get('format')!r}; this version reads "
                 f"{FORMAT!r}"
             )
-        if "status" not in meta or "dofs" not in meta.get("robot", {}):
-            raise LogError(
-                f"{path}: a log of another version: its entry 'meta' lacks the "
-                "status, or the robot's dofs"
-            )
         for name in (*_REQUIRED, *meta.get("columns", ())):
             if name not in columns:
                 raise LogError(f"{path}: the log lacks the column {name!r}")
-        if {column.shape[:1] for column in columns.values()} != {columns["t"].shape}:
-            raise LogError(f"{path}: the log's columns differ in length")
         return cls(columns, meta)
 
 

@@ -12,7 +12,7 @@ from hsp_control.null_space.fields import Clearance, NullSpaceField, SelfClearan
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.limit_excess import POSITION, VELOCITY
 from hsp_control.simulation.log_columns import logged_terms
-from hsp_control.simulation.unreached import FAR, OUT, Unreached, unreached
+from hsp_control.simulation.log_series import FAR, OUT, Unreached, unreached
 from hsp_control.visualization import palette
 from hsp_control.visualization.viewer.analysis import from_the_start
 from hsp_control.visualization.viewer.commands import (

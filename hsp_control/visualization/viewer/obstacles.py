@@ -15,7 +15,7 @@ from hsp_control.geometry.enclosing import hull_corners
 from hsp_control.geometry.scene import Scene
 from hsp_control.geometry.shapes import Shape, shape_from_log
 from hsp_control.simulation import Rollout
-from hsp_control.simulation.plants.mujoco.mjcf import Solid
+from hsp_control.simulation.plants.mjcf import Solid
 from hsp_control.visualization.palette import OBSTACLE, SOLID
 from hsp_control.visualization.viewer import threejs
 from hsp_control.visualization.viewer.commands import (
