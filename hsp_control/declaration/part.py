@@ -23,6 +23,7 @@ from hsp_control.common.exceptions import HspControlError, ImmutableError
 from hsp_control.declaration.any_of import AnyOf
 from hsp_control.declaration.equality import same
 from hsp_control.declaration.families import Declared, Family, value_fields
+from hsp_control.declaration.in_python import with_parts_made
 from hsp_control.declaration.mistakes import Carrier, argument_error
 from hsp_control.declaration.plain_data import plain_data
 
@@ -220,7 +221,8 @@ def _with_one_error(init: Callable[..., None]) -> Callable[..., None]:
     @wraps(init)
     def checked(self: Part, *args: Any, **kwargs: Any) -> None:
         try:
-            init(self, *args, **kwargs)
+            given, named = with_parts_made(type(self), args, kwargs)
+            init(self, *given, **named)
         except ValidationError as error:
             raise argument_error(type(self), error) from None
 

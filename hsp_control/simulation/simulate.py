@@ -21,6 +21,7 @@ from hsp_control.control.estimator import Estimator
 from hsp_control.control.first_state import warn_of_jump, warn_of_slow_efforts
 from hsp_control.control.plan import Plan, RunningPlan
 from hsp_control.declaration import within
+from hsp_control.declaration.in_python import check_kind
 from hsp_control.geometry.scene import Scene
 from hsp_control.robot.integrators import Dop853, Integrator
 from hsp_control.simulation.control_chain import ControlChain
@@ -112,8 +113,12 @@ def simulate(
         HspControlError: If q0 or v0 is not a valid state of the robot, or the plant
             does not fit it.
     """
+    check_kind("controller is", controller, Controller, SimulationError)
     robot = controller.robot
     integrator = Dop853() if integrator is None else integrator
+    check_kind("integrator is", integrator, Integrator, SimulationError)
+    if isinstance(plant, str | type):
+        check_kind("plant is", plant, PlantPart, SimulationError)
     if plant is None:
         plant = RigidBodyPlant(robot)
     elif isinstance(plant, PlantPart):

@@ -295,9 +295,9 @@ def test_a_plugin_that_does_not_work_is_named(plug: Callable[..., Any]) -> None:
 # --- messages -------------------------------------------------------------------------
 
 MESSAGES: dict[str, Callable[[], Any]] = {
-    "Ball: missing key 'radius'; required here: radius": lambda: Ball(),  # type: ignore
-    "Ball: radus: unknown key 'radus'; did you mean 'radius'? (allowed: label, radius, "
-    "center)": lambda: Ball(radus=1),  # type: ignore
+    "Ball: missing argument 'radius'; required here: radius": lambda: Ball(),  # type: ignore
+    "Ball: radus: unknown argument 'radus'; did you mean 'radius'? (allowed: label, "
+    "radius, center)": lambda: Ball(radus=1),  # type: ignore
     "Ball: takes 2 positional arguments (radius, center); the others are given by "
     "name": (
         lambda: Ball(1, [1, 2, 3], "red")  # type: ignore
@@ -309,7 +309,7 @@ MESSAGES: dict[str, Callable[[], Any]] = {
     "Ball: center: nothing given; expected a list of 3 numbers": (
      lambda: Ball(1, None)),
     "Rod: a mass of 11.0 is too much for this size": lambda: Rod(1.0, 11.0),
-    "Bag: first: 3 is an integer; expected a mapping": lambda: Bag(3),  # type: ignore
+    "Bag: first: 3, of type int; needs a Gadget, one of hsp.gadgets": lambda: Bag(3),  # type: ignore
     "Bag: first: a Hammer is not one of the gadgets": lambda: Bag(Hammer(1)),  # type: ignore
     "Bag: first: missing key 'type'; type is one of: bag, ball, rod": (
         lambda: Bag({"radius": 1})  # type: ignore
