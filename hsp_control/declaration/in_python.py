@@ -41,8 +41,8 @@ def misfit(value: object, kinds: Sequence[type[Any]]) -> str:
     if families:
         places = dict.fromkeys(map(_namespace, families))
         hint = f", one of {joined([*places])}"
-    for family in families if isinstance(value, str) else ():
-        if (near := nearest(value, family.members)) is not None:
+    for family in families:
+        if isinstance(value, str) and (near := nearest(value, family.members)):
             name = f"{_namespace(family)}.{family.members[near].__name__}"
             hint = f"; did you mean {name}(...)?"
     return f"{given}, of type {type(value).__name__}; needs {needed}{hint}"
@@ -57,7 +57,7 @@ def _namespace(family: Family) -> str:
 
 
 def with_parts_made(
-    cls: type[Declared], args: Sequence[Any], kwargs: Mapping[str, Any]
+    cls: Any, args: Sequence[Any], kwargs: Mapping[str, Any]
 ) -> tuple[Sequence[Any], Mapping[str, Any]]:
     """Return arguments in which bare values are the parts that they mean.
 
@@ -90,23 +90,23 @@ def _made(value: Any, bases: Sequence[type[Declared]]) -> Any:
 
 
 @cache
-def _held(cls: type[Declared]) -> dict[str, tuple[type[Declared], ...]]:
+def _held(cls: Any) -> dict[str, tuple[type[Declared], ...]]:
     """Return the families of the fields that hold one part, by the field's name."""
     fields: Mapping[str, Any] = getattr(cls, "__pydantic_fields__", {})
-    found = {}
-    for name, field in fields.items():
-        annotation = Annotated[field.annotation, *field.metadata, None]
-        if bases := tuple(dict.fromkeys(_bases(annotation))):
-            found[name] = bases
-    return found
+    found = {
+        name: _bases(each.annotation, each.metadata) for name, each in fields.items()
+    }
+    return {name: tuple(bases) for name, bases in found.items() if bases}
 
 
-def _bases(annotation: Any) -> list[type[Declared]]:
+def _bases(annotation: Any, metadata: Sequence[Any] = ()) -> list[type[Declared]]:
     """Return the bases of the families that an annotation names outside containers."""
+    for each in metadata:
+        if isinstance(each, AnyOf):
+            return [*each.bases]
     if get_origin(annotation) is Annotated:
         inner, *more = get_args(annotation)
-        several = [each for each in more if isinstance(each, AnyOf)]
-        return [*several[0].bases] if several else _bases(inner)
+        return _bases(inner, more)
     family = getattr(annotation, "family", None)
     if family is not None:
         return [annotation] if family.base is annotation else []

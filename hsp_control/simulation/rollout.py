@@ -55,7 +55,9 @@ class Rollout:
 
     def __repr__(self) -> str:
         span = f"{self.t[0]:g} to {self.t[-1]:g} s" if len(self) else "empty"
-        return f"Rollout({len(self)} rows, {span}, {self.status})"
+        about = self.meta.get("robot", {}).get("name", "?")
+        tasks = ", ".join(self.meta.get("tasks", {}))
+        return f"Rollout({about}: {tasks}; {len(self)} rows, {span}, {self.status})"
 
     @property
     def t(self) -> Array:
