@@ -2,6 +2,7 @@
 
 from .experiment import Experiment as Experiment
 from .experiment import load_experiment as load_experiment
+from .recorder import Recorder as Recorder
 from .scenario import Scenario as Scenario
 from .scenario import json_schema as json_schema
 from .view_settings import ShownItems as ShownItems

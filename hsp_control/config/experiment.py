@@ -142,7 +142,7 @@ class Experiment:
                 `load_experiment`.
         """
         terms = () if field is None else tuple(terms_of(field))
-        scene, (terms, limits, changes) = _named_obstacles(
+        scene, (terms, limits, changes) = named_obstacles(
             scene if isinstance(scene, Scene) else Scene(scene),
             (terms, limits, tuple(changes)),
         )
@@ -162,7 +162,7 @@ class Experiment:
         data = {
             "title": title,
             "description": description,
-            "robot": _description(robot),
+            "robot": robot_description(robot),
             "tasks": keyed(tasks),
             "null_space": null_space,
             "limits": limits,
@@ -382,7 +382,7 @@ def _plant(document: Document, scenario: Scenario, robot: Robot) -> Plant:
     return plant
 
 
-def _description(robot: str | Robot | RobotDescription) -> RobotDescription:
+def robot_description(robot: str | Robot | RobotDescription) -> RobotDescription:
     """Return what a configuration says about a robot."""
     if isinstance(robot, str):
         return RobotDescription(robot)
@@ -396,7 +396,7 @@ def _description(robot: str | Robot | RobotDescription) -> RobotDescription:
     return robot.description
 
 
-def _named_obstacles(scene: Scene, parts: Any) -> tuple[Scene, Any]:
+def named_obstacles(scene: Scene, parts: Any) -> tuple[Scene, Any]:
     """Return the scene with the parts' own obstacles, and parts with their names."""
     known = dict(scene)
 
