@@ -163,4 +163,4 @@ def _companions() -> list[str]:
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *__all__, *_companions()])
+    return sorted({*__all__, *_companions()})
