@@ -1,6 +1,7 @@
 """Configurations: from a YAML text to a ready experiment."""
 
 from hsp_control.common.entry_points import own_names
+from hsp_control.declaration.imported import import_file as import_file
 
 from .experiment import Experiment as Experiment
 from .experiment import load_experiment as load_experiment

@@ -69,6 +69,8 @@ def _words(annotation: Any) -> str:
         words = ["ArrayLike"] if set(args) >= _ARRAY_LIKE else []
         rest = [each for each in args if not words or each not in _ARRAY_LIKE]
         return " | ".join(dict.fromkeys([*words, *map(_words, rest)]))
+    if isinstance(annotation, list):  # the arguments of a function
+        return f"[{', '.join(map(_words, annotation))}]"
     if annotation is type(None):
         return "None"
     name = getattr(origin or annotation, "__name__", str(annotation))
