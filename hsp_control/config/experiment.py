@@ -50,7 +50,7 @@ from hsp_control.simulation.initial_state import InitialState
 from hsp_control.simulation.log_writer import LogWriter
 from hsp_control.simulation.plants import Plant, PlantPart, SampledPlant
 from hsp_control.simulation.settings import SimulationSettings
-from hsp_control.simulation.simulate import check_steps
+from hsp_control.simulation.simulate import check_steps, default_integrator
 from hsp_control.tasks import Task
 from hsp_control.trajectories.streams.stream import Streamed
 
@@ -260,7 +260,7 @@ class Experiment:
     @property
     def integrator(self) -> Integrator:
         """The integrator of the simulation."""
-        return self.scenario.simulation.integrator
+        return _integrator(self.scenario)
 
     @property
     def config(self) -> dict[str, Any] | None:
@@ -372,7 +372,8 @@ def _plant(document: Document, scenario: Scenario, robot: Robot) -> Plant:
         with document.at("simulation"):
             check_steps(settings.duration, step, "plant.timestep")
     with document.at("plant"):
-        plant = scenario.plant.build(robot, settings.integrator, access=document.access)
+        integrator = _integrator(scenario)
+        plant = scenario.plant.build(robot, integrator, access=document.access)
     if isinstance(plant, SampledPlant) and settings.control_period is None:
         raise document.error(
             ("plant",),
@@ -380,6 +381,12 @@ def _plant(document: Document, scenario: Scenario, robot: Robot) -> Plant:
             "simulation.control_period [s], for example to 0.001",
         )
     return plant
+
+
+def _integrator(scenario: Scenario) -> Integrator:
+    settings = scenario.simulation
+    own = default_integrator(scenario.plant, settings.control_period)
+    return settings.integrator or own
 
 
 def robot_description(robot: str | Robot | RobotDescription) -> RobotDescription:

@@ -3,7 +3,7 @@
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import Flag, Positive
-from hsp_control.robot.integrators import Dop853, Integrator
+from hsp_control.robot.integrators import Integrator
 from hsp_control.simulation.simulate import check_steps, count_rows
 
 
@@ -20,12 +20,14 @@ class SimulationSettings(Part, error=SimulationError):
     check_rate: Flag = True
     """Whether the loop is checked for stability at its control period: an unstable loop
     is an error, a doubtful one a warning. Without a control period nothing is done."""
-    integrator: Integrator = Dop853()
-    """The integrator of the robot's motion."""
+    integrator: Integrator | None = None
+    """The integrator of the robot's motion; by default ``rk4`` in steps of at most 1 ms
+    for the plant ``rigid_body`` under efforts that are held, and otherwise
+    ``dop853``."""
 
     def __post_init__(self) -> None:
         count_rows(self.duration, self.log_period, self.control_period)
-        if (step := self.integrator.longest_step) is None:
+        if self.integrator is None or (step := self.integrator.longest_step) is None:
             return
         period = "control_period" if self.control_period else "log_period"
         whole = self.control_period or self.log_period
