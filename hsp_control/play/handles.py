@@ -22,15 +22,16 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HspControlError, StreamError
 from hsp_control.control.changes import Changes
 from hsp_control.control.controller import Controller
+from hsp_control.control.targets import DELAY, RAMP, new_stream
 from hsp_control.declaration.nested import parts_within
 from hsp_control.geometry.scene import Obstacle
 from hsp_control.null_space.fields import TargetPosture
 from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.fields.weight import sample_weight
-from hsp_control.play.knobs import RAMP, Knob, knobs_of
+from hsp_control.play.knobs import Knob, knobs_of
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import FrameOrientation, FramePose, FramePosition, Task
-from hsp_control.trajectories import Stream, StreamOrientation, StreamPose
+from hsp_control.trajectories import Stream
 from hsp_control.trajectories.crossfade import AnyReference
 from hsp_control.trajectories.remembering import Written
 from hsp_control.trajectories.streams.stream import Streamed
@@ -38,17 +39,7 @@ from hsp_control.visualization.palette import FIELD
 
 BACK = 1.5
 """Time over which a path of its own comes back [s]: half a metre at 0.6 m/s at most."""
-_MOVING: dict[str, Any] = {"speed": 0.5, "acceleration": 3.0, "jerk": 60.0}
-"""Bounds of what is dragged [m/s, m/s², m/s³]: those that arms bear, whose limits then
-rarely bind."""
-_TURNING: dict[str, Any] = {
-    "angular_speed": 1.5,
-    "angular_acceleration": 8.0,
-    "angular_jerk": 200.0,
-}
-"""The same for turning [rad/s, rad/s², rad/s³]."""
 _FARTHEST = 1e3  # nothing is dragged farther [m]
-DELAY = 0.03  # time to a target that is dragged [s]: about two of a page's pictures
 
 
 class Grip(ABC):
@@ -134,11 +125,7 @@ class TargetGrip(Grip):
         return [float(x) for x in pose]
 
     def _new_stream(self) -> Streamed:
-        if self._kind == "position":
-            return Stream(**_MOVING, delay=DELAY)
-        if self._kind == "orientation":
-            return StreamOrientation(**_TURNING, delay=DELAY)
-        return StreamPose(**_MOVING, **_TURNING, delay=DELAY)
+        return new_stream(self._own)
 
     def _wanted(self, value: Array) -> Array:
         return _pose(value)[self._tracked]
@@ -169,7 +156,7 @@ class ObstacleGrip(Grip):
         return [float(x) for x in place.translation]
 
     def _new_stream(self) -> Streamed:
-        return Stream(**_MOVING, delay=DELAY)
+        return new_stream(self._obstacle.center)
 
     def _wanted(self, value: Array) -> Array:
         if value.shape != (3,) or not (np.abs(value) < _FARTHEST).all():
@@ -247,7 +234,8 @@ class PostureGrip(Grip):
         return [float(x) for x in pin.SE3ToXYZQUAT(self._data.oMi[self._joint])]
 
     def _new_stream(self) -> Streamed:
-        return Stream(np.zeros(self._robot.nv), **_JOINTS_MOVING, delay=DELAY)
+        here = np.zeros(self._robot.nv)
+        return Stream(here, policy="latest", delay=DELAY, **_JOINTS_MOVING)
 
     def _wanted(self, value: Array) -> Array:
         self._target = self._posture_with(self._target, _pose(value)[:3])

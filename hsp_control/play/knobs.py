@@ -20,7 +20,6 @@ from hsp_control.tasks import Gains, Impedance
 from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.task import SecondOrderTask
 
-RAMP = 0.2  # time that a change takes [s]
 _REACH = 10.0
 """A slider goes from a tenth of a setting to ten times it, within what is borne."""
 _BORNE = 0.2  # largest rate times period that a slider offers; see `rate_check.RULE`

@@ -1,5 +1,6 @@
 """Plants: the simulated robots that the controller's effort moves."""
 
+from hsp_control.common.entry_points import own_names
 from hsp_control.robot.friction import Friction as Friction
 
 from .drives import Drive as Drive
@@ -41,3 +42,5 @@ from .sensors import PositionNoise as PositionNoise
 from .sensors import Sensor as Sensor
 from .sensors import SensorDelay as SensorDelay
 from .sensors import VelocityNoise as VelocityNoise
+
+__dir__ = own_names(__name__)

@@ -143,7 +143,7 @@ MISTAKES: list[tuple[type, dict[str, Any], type[HspControlError], str]] = [
      "Manipulability: rows: unknown value 'positions'; did you mean 'position'?"),
     (InverseCondition, {"axes": "xw"}, FieldError, "axes: 'xw' must be distinct"),
     (Manipulability, {"length": 0.0}, FieldError, "length: 0.0 is too small; must be"),
-    (Transmission, UP | {"length": 1.0}, FieldError, "length: unknown key 'length'"),
+    (Transmission, UP | {"length": 1.0}, FieldError, "length: unknown argument 'len"),
     (Manipulability, {"metric": np.ones((6, 7))}, FieldError,
      "Manipulability: metric has shape (6, 7); needs (nv, nv), symmetric"),
     (Manipulability, {"metric": np.ones((7, 7))}, FieldError,
@@ -158,7 +158,7 @@ MISTAKES: list[tuple[type, dict[str, Any], type[HspControlError], str]] = [
     (Transmission, {"direction": [0, 0, 0]}, FieldError,
      "Transmission: direction [0.0, 0.0, 0.0] needs 3 numbers, one for each of the "
      "axes 'xyz', of a length that is not 0 or infinite"),
-    (Transmission, {}, FieldError, "Transmission: missing key 'direction'"),
+    (Transmission, {}, FieldError, "Transmission: missing argument 'direction'"),
     (Transmission, {"direction": [1, 0, 0], "axes": "xy"}, FieldError,
      "needs 2 numbers, one for each of the axes 'xy'"),
     (Transmission, {"direction": [1, np.nan, 0]}, FieldError,

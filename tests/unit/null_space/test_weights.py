@@ -267,7 +267,7 @@ MISTAKES: list[tuple[Callable[[], Any], str]] = [
     (lambda: Ramp(initial=-1.0, final=1.0, duration=1.0), "initial: -1.0 is negative"),
     (lambda: Ramp(final=1.0, duration=0.0),
      "Ramp: duration: 0.0 is too small; must be greater than 0"),
-    (lambda: Ramp(final=1.0), "Ramp: missing key 'duration'"),
+    (lambda: Ramp(final=1.0), "Ramp: missing argument 'duration'"),
     (lambda: Ramp(0.0, 1.0), "Ramp: takes none by position; argu"),  # type: ignore
     (lambda: StateWeight(lambda s: -0.5).sample(at(0.0)), "weight is -0.5"),
     (lambda: StateWeight(2.0), "StateWeight: function: "),  # type: ignore

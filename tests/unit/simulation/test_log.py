@@ -135,7 +135,7 @@ def test_round_trip(planar_run: Rollout, tmp_path: Path) -> None:
     assert same(loaded, planar_run)
     assert all(loaded[n].dtype == planar_run[n].dtype for n in loaded.columns)
     assert loaded.config is None
-    assert repr(loaded) == "Rollout(51 rows, 0 to 0.5 s, completed)"
+    assert repr(loaded) == "Rollout(planar3r: tip; 51 rows, 0 to 0.5 s, completed)"
 
 
 def test_a_column_that_is_not_there(planar_run: Rollout) -> None:

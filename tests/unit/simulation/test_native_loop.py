@@ -101,7 +101,8 @@ CASES = {
     ),
     "periods that are no binary fractions": (
         "panda_limits", "simulation.log_period=0.03",
-        "simulation.control_period=0.0006", "simulation.integrator.step=0.0003",
+        "simulation.control_period=0.0006",
+        "simulation.integrator={type: rk4, step: 0.0003}",
     ),
 }  # fmt: skip
 
