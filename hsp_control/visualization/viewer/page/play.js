@@ -16,8 +16,7 @@ class Play {
   constructor(viewer) {
     Object.assign(this, {viewer, sight: new Sight(viewer), mine: true, holdKey: null, taken: false});
     this.pending = new Map();    // messages of the next frame, the newest of each kind
-    this.gizmos = new Map();     // key -> Gizmo
-    this.obstacles = new Map();  // key -> {name, path, at, radius}
+    this.gizmos = new Map();     // key -> Gizmo, of a target or an obstacle
     this.held = new Map();       // key -> until when its own place is shown [ms]
     this.state = {t: 0, running: true, rate: 1, message: "", level: "info", away: ""};
     this.setup = this.selected = this.force = this.pull = null;
@@ -40,14 +39,17 @@ class Play {
     this.held.clear();
     this.force = null;
     for (const gizmo of this.gizmos.values()) gizmo.dispose();
-    this.gizmos = new Map(this.setup.targets.map((target) =>
-      [Play.targetKey(target.name), new Gizmo(target, this.viewer.scene)]));
-    this.obstacles = new Map(this.setup.obstacles.map(({position, ...rest}) =>
-      [Play.obstacleKey(rest.name), {...rest, at: new MeshCat.THREE.Vector3(...position)}]));
-    this.overlay.setThings(this.things(), (key) => this.select(key));
+    const {targets, obstacles} = this.setup;
+    const gizmos = [
+      ...targets.map((target) => new Gizmo(Play.targetKey(target.name), target, this.viewer)),
+      ...obstacles.map((obstacle) => new Obstacle(Play.obstacleKey(obstacle.name), obstacle,
+                                                  this.viewer, obstacles.length === 1)),
+    ];
+    this.gizmos = new Map(gizmos.map((gizmo) => [gizmo.key, gizmo]));
+    this.overlay.setThings(gizmos, (key) => this.select(key));
     this.panel.build(this.setup);
     this.setUpPlots(this.setup.plots);
-    if (!this.things().some(({key}) => key === this.selected)) this.selected = null;
+    if (!this.gizmos.has(this.selected)) this.selected = null;
     if (first) this.panel.setOpen(!this.panel.narrow.matches);
     this.select(this.selected);
     this.showDrive();
@@ -63,6 +65,7 @@ class Play {
     this.hand = new PlayHand(this, this.viewer);
     this.keys = new PlayKeys(this);
     this.viewer.scene.onBeforeRender = () => this.layOut();
+    legend.setOpen(false);  // what is in the picture is to be touched
     addEventListener("resize", () => this.fit());
   }
 
@@ -86,13 +89,11 @@ class Play {
   }
 
   showTargets({poses, obstacles}) {
-    for (const [name, pose] of Object.entries(poses ?? {})) {
-      const key = Play.targetKey(name);
-      if (this.follows(key)) this.gizmos.get(key)?.setPose(pose);
-    }
-    for (const [name, place] of Object.entries(obstacles ?? {})) {
-      const key = Play.obstacleKey(name);
-      if (this.follows(key)) this.obstacles.get(key)?.at.set(...place);
+    for (const [keyOf, places] of [[Play.targetKey, poses], [Play.obstacleKey, obstacles]]) {
+      for (const [name, place] of Object.entries(places ?? {})) {
+        const key = keyOf(name);
+        if (this.follows(key)) this.gizmos.get(key)?.setPose(place);
+      }
     }
   }
 
@@ -150,29 +151,22 @@ class Play {
     if (connection?.readyState === WebSocket.OPEN) connection.send(JSON.stringify(message));
   }
 
-  moveTarget(gizmo) {
-    const {name} = gizmo.target, key = Play.targetKey(name);
-    this.hold(key);
-    this.sendLater(key, {do: "move", target: name, pose: gizmo.pose()});
+  // Say where a target or an obstacle is wanted.
+  move(gizmo) {
+    this.hold(gizmo.key);
+    this.sendLater(gizmo.key, gizmo.wish());
   }
 
-  moveObstacle({name, at}, to) {
-    const key = Play.obstacleKey(name);
-    at.copy(to);
-    this.hold(key);
-    this.sendLater(key, {do: "obstacle", name, position: to.toArray()});
-  }
-
-  release(name) {
-    this.hold(Play.targetKey(name));
-    this.send({do: "release", target: name});
+  release(gizmo) {
+    this.hold(gizmo.key);
+    this.send({do: "release", ...gizmo.address()});
   }
 
   // Let a target or an obstacle return to its own path.
-  resume(key, name) {
+  resume(key) {
     this.held.delete(key);
     this.panel.showMoved(key, false);
-    this.send({do: "resume", [this.gizmos.has(key) ? "target" : "name"]: name});
+    this.send({do: "resume", ...this.gizmos.get(key).address()});
   }
 
   pullLink({path, point, local}, to) {
@@ -200,25 +194,17 @@ class Play {
 
   // --- what is shown ---
 
-  // All that can be selected, in the order of the keys 1 to 9.
-  things() {
-    return [
-      ...[...this.gizmos].map(([key, {target}]) => ({key, label: `Target ${target.name}`})),
-      ...[...this.obstacles].map(([key, {name}]) => ({key, label: `Obstacle ${name}`})),
-    ];
-  }
-
   select(key) {
     this.selected = key;
     this.panel.showSelected(key);
-    this.viewer.set_dirty();
+    this.showMarks();
   }
 
   showMarks() {
     const {grip, hover} = this.hand;
     for (const gizmo of this.gizmos.values()) {
       const active = [grip, hover].find((found) => found?.gizmo === gizmo);
-      gizmo.mark(active?.handle, Boolean(grip), !this.mine);
+      gizmo.mark(active?.handle, Boolean(grip), !this.mine, gizmo.key === this.selected);
     }
     this.viewer.set_dirty();
   }
@@ -230,7 +216,6 @@ class Play {
       gizmo.layOut(sight);
       this.overlay.placeButton(key, sight.project(gizmo.position));
     }
-    for (const [key, {at}] of this.obstacles) this.overlay.placeButton(key, sight.project(at));
     this.layOutName(sight);
     this.layOutSpring(sight);
   }
@@ -238,12 +223,11 @@ class Play {
   layOutName(sight) {
     const {grip, hover} = this.hand;
     const key = grip?.key ?? hover?.key ?? this.selected;
-    const gizmo = this.gizmos.get(key), obstacle = this.obstacles.get(key);
-    if (grip?.path || !(gizmo ?? obstacle)) return this.overlay.showThing(null);
-    const at = gizmo?.position ?? obstacle.at, {name} = gizmo?.target ?? obstacle;
-    const radius = gizmo ? 17 * gizmo.enlarged : Math.max(obstacle.radius / sight.pixel(at) + 3, 12);
-    const text = grip?.text ? `${name}   ${grip.text}` : name;
-    this.overlay.showThing(sight.project(at), radius, text, key === this.selected);
+    const gizmo = this.gizmos.get(key);
+    if (grip?.path || !gizmo) return this.overlay.showThing(null);
+    const {name} = gizmo.target, text = grip?.text ? `${name}   ${grip.text}` : name;
+    this.overlay.showThing(sight.project(gizmo.position), gizmo.ball * gizmo.enlarged + 9, text,
+                           key === this.selected);
   }
 
   // The hand's end of the spring is where the pointer is; the link's end moves with it.

@@ -103,7 +103,6 @@ class PlayHold {
 // back. While a slider is held, and a moment after each change, what the program said before does
 // not count.
 class PlayPanel {
-  static OBSTACLE = "#D55E00";  // palette.OBSTACLE
   static NARROW = "(max-width: 620px), (max-width: 860px) and (max-aspect-ratio: 6/5)";
   static CLOSE = "M6.4 5 12 10.6 17.6 5 19 6.4 13.4 12l5.6 5.6-1.4 1.4-5.6-5.6L6.4 19 5 17.6l5.6"
     + "-5.6L5 6.4z";
@@ -151,8 +150,7 @@ class PlayPanel {
     const put = (group, row) => groups.set(group, [...groups.get(group) ?? [], row]);
     for (const one of targets) put("Targets", this.thing(Play.targetKey(one.name), one));
     for (const one of obstacles) {
-      const row = this.thing(Play.obstacleKey(one.name), {...one, color: PlayPanel.OBSTACLE});
-      put("Obstacles", row);
+      put("Obstacles", this.thing(Play.obstacleKey(one.name), {...one, color: Obstacle.COLOR}));
     }
     for (const control of controls) {
       const row = control.kind === "switch" ? this.switch(control) : this.slider(control);
@@ -171,7 +169,7 @@ class PlayPanel {
     }, make("i", {style: color ? `background: ${color}` : ""}), make("span", {}, name),
     make("small", {}, kind ?? ""));
     const resume = makeButton({className: "resume", ariaLabel: `${name}: back to its own path`},
-                              () => play.resume(key, name), "Back to its path");
+                              () => play.resume(key), "Back to its path");
     this.things.set(key, make("div", {className: "play-row target"}, select, resume));
     return this.things.get(key);
   }
@@ -263,9 +261,9 @@ class PlayOverlay {
     this.buttons = new Map();
   }
 
-  // One button per thing: {key, label}; select(key) is called when one gets the focus.
-  setThings(things, select) {
-    this.buttons = new Map(things.map(({key, label}, k) => {
+  // One button per gizmo; select(key) is called when one gets the focus.
+  setThings(gizmos, select) {
+    this.buttons = new Map(gizmos.map(({key, label}, k) => {
       const number = k < 9 ? `, key ${k + 1}` : "";
       const ariaLabel = `${label}${number}: arrow keys and page up, page down move it`;
       return [key, make("button", {type: "button", ariaLabel, onfocus: () => select(key)})];

@@ -167,13 +167,11 @@ function camera(command) {
   Object.assign(lens, {fov: field_of_view, near: away / 100, far: away * 100});
   lens.up.copy(vector(up));
   lens.position.copy(center).addScaledVector(toEye, away);
-  let shift = 0;
-  if (!eye) {  // to the right, to be beside the legend if there is space; the picture is 2 wide
-    const half = (offset) => (away - offset.dot(toEye)) * wide;
-    const ends = (side) => offsets.map((o) => (o.dot(right) + side * radius) / half(o));
-    const edge = 2 * legend.reach / (clientWidth || Infinity) - 1;
-    shift = Math.max(Math.min(edge - Math.min(...ends(-1)), 1 - Math.max(...ends(1))), 0);
-  }
+  // To the right, to be beside the legend if there is space; the picture is 2 wide.
+  const half = (offset) => (away - offset.dot(toEye)) * wide;
+  const ends = (side) => offsets.map((o) => (o.dot(right) + side * radius) / half(o));
+  const edge = 2 * legend.reach / (clientWidth || Infinity) - 1;
+  const shift = Math.max(Math.min(edge - Math.min(...ends(-1)), 1 - Math.max(...ends(1))), 0);
   lens.setViewOffset(1, 1, -shift / 2, (bar - title) / 2, 1, 1);
   viewer.set_3d_pane_size();
   viewer.controls.dispose();
