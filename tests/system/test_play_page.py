@@ -61,7 +61,7 @@ PIXEL = """(point) => {
 }"""
 # A point of a handle that no other one covers: [x, y].
 HANDLE = """([name, kind, axis]) => {
-  const gizmo = play.gizmos.get(`target ${name}`) ?? play.gizmos.get(`obstacle ${name}`);
+  const gizmo = [...play.gizmos.values()].find(({target}) => target.name === name);
   const {left, top, width, height} = play.sight.update().box;
   for (let y = top; y < top + height; y += 2) {
     for (let x = left; x < left + width; x += 2) {
@@ -323,12 +323,14 @@ def test_an_obstacle_comes_to_the_robot_that_it_is_dragged_over(page: Any) -> No
     assert abs(place[2]) < 0.15  # the arm's plane; it has begun at 0.3
     # Its arrow moves it along an axis, and a line leads to the floor.
     start = np.array(page.evaluate(HANDLE, ["ball", "arrow", 2]))
-    drag(page, start, start + [0.0, -40.0])
+    drag(page, start, start + np.array([0.0, -40.0]))
     page.mouse.up()
     risen = np.array(until_sent(page, "obstacle", 2)[-1]["position"])
     np.testing.assert_allclose(risen[:2], place[:2], atol=1e-9)
     assert risen[2] > place[2] + 0.05
-    lines = "play.gizmos.get('obstacle ball').parts.find((p) => p.handle.kind === 'line')"
+    lines = (
+        "play.gizmos.get('obstacle ball').parts.find((p) => p.handle.kind === 'line')"
+    )
     assert page.evaluate(f"{lines}.meshes.every((mesh) => mesh.visible)")
 
 
