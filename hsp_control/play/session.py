@@ -84,8 +84,8 @@ class Session:
         self._step()
         self.handles = Handles(self.controller, self.period)
         law = Knob(
-            "operational", "Null space", "operational-space law instead", "", False,
-            0.0, 1.0, self._compare,
+            "operational", "Null space", "Operational-space law instead", "", False,
+            0.0, 1.0, self._compare, "Its null space follows late.",
         )  # fmt: skip
         if self.controller.field.controls:
             self.handles.add(law)

@@ -402,23 +402,26 @@ def test_a_target_and_an_obstacle_return_to_their_paths(page: Any) -> None:
     ]
 
 
-def test_a_target_out_of_reach_is_read_beside_a_message(page: Any) -> None:
+def test_a_target_out_of_reach_is_told_at_its_handle(page: Any) -> None:
     state = {"t": 2.0, "running": True, "rate": 1.0, "level": "info"}
-    words = ["hand: target out of reach, 0.31 m", "elbow: target far away"]
-    tell(page, "play_state", message="saved", away="\n".join(words), **state)
-    away, status = (
-        page.locator(f".play-status.{name}") for name in ("away", "message")
-    )
-    assert away.inner_text().split("\n") == words
-    upper, lower = away.bounding_box(), status.bounding_box()
-    assert upper["y"] + upper["height"] < lower["y"]
+    words = {"hand": "target out of reach, 0.31 m", "elbow": "target far away"}
+    tell(page, "play_state", message="saved", **state)
+    tell(page, "play_targets", away=words)
+    page.evaluate("viewer.render()")
+    away = page.locator(".play-label.away")
+    assert away.all_inner_texts() == list(words.values())
+    box, (x, y) = away.first.bounding_box(), pixel(page, HAND)
+    assert abs(box["x"] + 0.5 * box["width"] - x) < 3.0
+    assert -40.0 < box["y"] + box["height"] - y < -12.0  # at the handle
     page.keyboard.press("p")  # also while presenting, when the bar has gone
     page.wait_for_selector("body.presenting.resting", state="attached")
-    until(page, "getComputedStyle(document.querySelector('.message')).opacity === '0'")
-    assert away.is_visible()
+    status = "document.querySelector('.play-status')"
+    until(page, f"getComputedStyle({status}).opacity === '0'")
+    assert away.first.is_visible()
     page.keyboard.press("p")
-    tell(page, "play_state", message="", away="", **state)
-    assert away.is_hidden()
+    tell(page, "play_targets", away={})
+    page.evaluate("viewer.render()")
+    assert away.count() == 0
 
 
 def test_it_fits_a_phone(chromium: Any, viewer: Viewer) -> None:

@@ -18,7 +18,8 @@ class Play {
     this.pending = new Map();    // messages of the next frame, the newest of each kind
     this.gizmos = new Map();     // key -> Gizmo, of a target or an obstacle
     this.held = new Map();       // key -> until when its own place is shown [ms]
-    this.state = {t: 0, running: true, rate: 1, message: "", level: "info", away: ""};
+    this.state = {t: 0, running: true, rate: 1, message: "", level: "info"};
+    this.away = {};              // task -> what to say of a target that is not reached
     this.setup = this.selected = this.force = this.pull = null;
   }
 
@@ -88,7 +89,8 @@ class Play {
     this.plots = new LivePlots(this.panel.plots, definitions, () => this.panel.open);
   }
 
-  showTargets({poses, obstacles}) {
+  showTargets({poses, obstacles, away = {}}) {
+    this.away = away;
     for (const [keyOf, places] of [[Play.targetKey, poses], [Play.obstacleKey, obstacles]]) {
       for (const [name, place] of Object.entries(places ?? {})) {
         const key = keyOf(name);
@@ -122,7 +124,7 @@ class Play {
 
   showDrive() {
     this.bar.showDrive(this.mine, this.taken);
-    this.panel.controls.disabled = !this.mine;
+    for (const field of this.panel.fields) field.disabled = !this.mine;
     document.body.classList.toggle("watching", !this.mine);
     this.showMarks();
   }
@@ -212,22 +214,17 @@ class Play {
   // Before each picture: fit handles and labels to the camera.
   layOut() {
     const sight = this.sight.update();
+    const {grip, hover} = this.hand, active = grip ? grip.key : hover?.key ?? this.selected;
+    if (!this.gizmos.has(active)) this.overlay.hideCircle();
     for (const [key, gizmo] of this.gizmos) {
       gizmo.layOut(sight);
-      this.overlay.placeButton(key, sight.project(gizmo.position));
+      const {name} = gizmo.target, away = key === Play.targetKey(name) ? this.away[name] : "";
+      const lines = [away, key === active && (grip?.text ? `${name}   ${grip.text}` : name)];
+      const at = sight.project(gizmo.position), radius = gizmo.ball * gizmo.enlarged + 9;
+      this.overlay.place(key, at, radius, lines.filter(Boolean).join("\n"), Boolean(away));
+      if (key === active) this.overlay.showCircle(at, radius, key === this.selected);
     }
-    this.layOutName(sight);
     this.layOutSpring(sight);
-  }
-
-  layOutName(sight) {
-    const {grip, hover} = this.hand;
-    const key = grip?.key ?? hover?.key ?? this.selected;
-    const gizmo = this.gizmos.get(key);
-    if (grip?.path || !gizmo) return this.overlay.showThing(null);
-    const {name} = gizmo.target, text = grip?.text ? `${name}   ${grip.text}` : name;
-    this.overlay.showThing(sight.project(gizmo.position), gizmo.ball * gizmo.enlarged + 9, text,
-                           key === this.selected);
   }
 
   // The hand's end of the spring is where the pointer is; the link's end moves with it.
@@ -247,8 +244,8 @@ const play = new Play(viewer);
 Object.assign(commandHandlers, {
   play_setup(command) { play.setUp(command); },
   play_targets(command) { if (play.ready) play.showTargets(command); },
-  play_state({t, running, rate, message, level, away}) {
-    play.showState({t, running, rate, message, level, away});
+  play_state({t, running, rate, message, level}) {
+    play.showState({t, running, rate, message, level});
   },
   play_values({values}) { if (play.ready) play.panel.setValues(values); },
   play_force(command) { play.force = command.visible ? command : null; },
