@@ -1,5 +1,6 @@
 """A simulation that goes on and on, and whoever plays with it; without a picture."""
 
+import gc
 import logging
 from collections.abc import Iterator, Mapping
 from copy import deepcopy
@@ -89,6 +90,7 @@ class Session:
         )  # fmt: skip
         if self.controller.field.controls:
             self.handles.add(law)
+        gc.collect()  # what has been refers to itself, and would stay
 
     def rehearse(self) -> None:
         """Do everything once, and begin anew: no kernel is compiled in the play."""

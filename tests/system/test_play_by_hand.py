@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import browsers
 import numpy as np
@@ -86,7 +87,6 @@ def test_hand_ball_and_elbow(browser: Any, played: Played, tmp_path: Path) -> No
     until(page, f"play.state.t > {begin} + 3")
     page.keyboard.press("s")
     until(page, "play.state.message.startsWith('saved: ')")
-    page.close()
     assert wrong == []
     log = hsp.Rollout.load(tmp_path / "panda-play.npz")
     hand = log["task.hand.actual"][-1, :3]
@@ -99,3 +99,14 @@ def test_hand_ball_and_elbow(browser: Any, played: Played, tmp_path: Path) -> No
     assert np.linalg.norm(elbow[-1] - elbow[0]) > 0.1
     played.end()
     assert played.process.returncode == 0
+    # The page says so, and finds the next start.
+    until(page, "document.getElementById('lost').textContent.includes('has ended')")
+    assert page.evaluate("play.panel.fields.every((field) => field.disabled)")
+    assert page.evaluate("play.bar.acting.every((button) => button.disabled)")
+    port = urlsplit(played.url).port
+    again = Played("panda", "--out", str(tmp_path), "--port", str(port))
+    try:
+        until(page, READY + " && !document.body.classList.contains('lost')")
+    finally:
+        again.close()
+    page.close()

@@ -251,4 +251,8 @@ Object.assign(commandHandlers, {
   play_force(command) { play.force = command.visible ? command : null; },
   play_samples({times, values}) { if (play.ready) play.plots.add(times, values); },
   play_drive(command) { play.setDrive(command); },
+  lost() {
+    play.setDrive({mine: false, taken: false});
+    play.showState({running: false, message: ""});
+  },
 });
