@@ -50,6 +50,7 @@ class Grip(ABC):
         self.name = name
         self._controller = controller
         self._stream: Streamed | None = None
+        self._wanted_at: tuple[float, list[float]] | None = None
 
     def move(self, value: Any, t: float) -> None:
         """Lead it somewhere from time t on [s]."""
@@ -59,20 +60,29 @@ class Grip(ABC):
         if not known:
             self._follow(stream, self._controller.at(t).ramp(RAMP))
             self._stream = stream
+        self._wanted_at = t, [float(x) for x in value]
 
     def resume(self, t: float) -> None:
         """Let it return to its own path from time t on [s]."""
         if self._stream is not None:
             self._follow(None, self._controller.at(t).ramp(BACK))
-        self._stream = None
+        self._stream = self._wanted_at = None
 
     @abstractmethod
     def describe(self, state: RobotState) -> dict[str, Any]:
         """Return what a page must know of it."""
 
-    @abstractmethod
     def where(self, state: RobotState) -> list[float]:
-        """Return where it is now: x, y, z and a quaternion, or less."""
+        """Return where it is now, or is wanted while the time stands still.
+
+        That is x, y, z and a quaternion, or less.
+        """
+        if self._wanted_at is not None and self._wanted_at[0] == state.t:
+            return self._wanted_at[1]
+        return self._where(state)
+
+    @abstractmethod
+    def _where(self, state: RobotState) -> list[float]: ...
 
     @abstractmethod
     def _new_stream(self) -> Streamed: ...
@@ -115,7 +125,7 @@ class TargetGrip(Grip):
         pose = self.where(state)
         return {"name": self.name, "kind": self._kind, "axes": self._axes, "pose": pose}
 
-    def where(self, state: RobotState) -> list[float]:
+    def _where(self, state: RobotState) -> list[float]:
         """Return x, y, z and a quaternion; the frame's own where the task is free."""
         frame = state.frame(self._frame)
         pose = pin.SE3ToXYZQUAT(pin.SE3(frame.rotation, frame.position))
@@ -146,11 +156,10 @@ class ObstacleGrip(Grip):
 
     def describe(self, state: RobotState) -> dict[str, Any]:
         """Return its name, its position and its size."""
-        reach = self._obstacle.shape.bounding_radius
-        radius = reach if np.isfinite(reach) else 0.0
+        radius = self._obstacle.shape.bounding_radius
         return {"name": self.name, "position": self.where(state), "radius": radius}
 
-    def where(self, state: RobotState) -> list[float]:
+    def _where(self, state: RobotState) -> list[float]:
         """Return the position of its frame."""
         place = self._controller.scene[self.name].placement(state.t)
         return [float(x) for x in place.translation]
@@ -180,9 +189,11 @@ def targets_of(controller: Controller) -> dict[str, TargetGrip]:
 
 
 def obstacles_of(controller: Controller) -> dict[str, ObstacleGrip]:
-    """Return the grips of the obstacles that have a place, by name."""
+    """Return the grips of the bounded obstacles that have a place, by name."""
     found = {}
     for obstacle in controller.scene.values():
+        if not np.isfinite(obstacle.shape.bounding_radius):
+            continue  # such as the floor
         try:
             ObstacleGrip(obstacle, controller).where(controller.state)
         except HspControlError:
@@ -217,7 +228,7 @@ class PostureGrip(Grip):
         about = {"kind": "position", "axes": [True] * 3, "color": FIELD}
         return {"name": self.name, **about, "pose": self.where(state)}
 
-    def where(self, state: RobotState) -> list[float]:
+    def _where(self, state: RobotState) -> list[float]:
         """Return the joint's pose in the target posture, x, y, z and a quaternion."""
         terms = [
             t for t in terms_of(self._controller.field) if isinstance(t, TargetPosture)
@@ -324,7 +335,7 @@ class Handles:
         """Do what a page says; what is wrong is answered in `message`.
 
         ``move`` a target or an ``obstacle``, let it ``resume`` its own path, ``set`` a
-        knob. A target that is ``release``d stays where it is.
+        knob. What is ``release``d stays where it is.
         """
         try:
             self._do(message)
@@ -346,7 +357,7 @@ class Handles:
                 if name not in self.knobs:
                     raise ValueError(f"there is no knob {name!r}")
                 self._wanted[name] = self.knobs[name].checked(value)
-            case {"do": "release", "target": str()} | {"do": "left"}:
+            case {"do": "release" | "left"}:
                 pass
             case _:
                 raise ValueError(f"cannot do {str(dict(message))[:200]}")

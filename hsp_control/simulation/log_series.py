@@ -313,8 +313,8 @@ class Unreached(NamedTuple):
     def words(self, row: int) -> str:
         """Return what there is to say of a row; nothing if it is on the way there."""
         if self.out[row] > 0.0:
-            return f"{self.task}: {OUT}, {self.length(row)}"
-        return f"{self.task}: {FAR}" if self.far[row] else ""
+            return f"{OUT}, {self.length(row)}"
+        return FAR if self.far[row] else ""
 
 
 def unreached(
