@@ -8,7 +8,7 @@ that their projects ship for an arm like a Panda; pink and TSID are their own pa
 and are left out where they are not installed. ``--python LAW=PYTHON`` runs a law in
 another environment, which needs Pinocchio and the law's package only. ``--old`` is a
 checkout of an earlier version of this package. Writes tables into README.md and
-docs/limits.md.
+benchmarks/results/edge.md.
 """
 
 import argparse
@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from edge_cases import cases
 from edge_loop import LAWS
-from marked_sections import DOCS, replace_section
+from marked_sections import RESULTS, replace_section
 
 ROBOTS = ("panda", "ur5", "iiwa14", "xarm7")
 OUT_OF_REACH = ("position", "pose", "stream")
@@ -180,7 +180,7 @@ LONG: tuple[Column, ...] = (
         lambda runs: count(runs, lambda run: bool(run["end"] or run["unsolved"])),
     ),
 )
-"""Columns of the table in docs/limits.md."""
+"""Columns of the table in benchmarks/results/edge.md."""
 
 
 def reaching(runs: list[Run]) -> list[Run]:
@@ -271,7 +271,7 @@ def main() -> None:
     note = f"\nLeft out: {', '.join(left_out)}.\n" if left_out else ""
     if tuple(options.robots) == ROBOTS and not options.dry:
         replace_section(HERE.parent / "README.md", "edge", short + note)
-        replace_section(DOCS / "limits.md", "edge", long + note)
+        replace_section(RESULTS / "edge.md", "edge", long + note)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""A payload, a delay and elastic joints together: a table of docs/robustness.md.
+"""A payload, a delay and elastic joints together: a table of results/robustness.md.
 
     .venv/bin/python benchmarks/elastic_joints.py
 
@@ -7,7 +7,7 @@ tests/unit/control/test_elastic_joint.py compares it with simulations.
 """
 
 import numpy as np
-from marked_sections import DOCS, replace_section
+from marked_sections import RESULTS, replace_section
 
 from hsp_control.control.compensation.linear_loop import ElasticJoint, LinearLoop
 
@@ -52,7 +52,7 @@ def main() -> None:
         for stiffness in STIFFNESSES:
             cells = [f"{rate(stiffness, *each, measured):.1f}" for each in columns]
             rows.append(f"| {measured} | {stiffness:.0e} | " + " | ".join(cells) + " |")
-    replace_section(DOCS / "robustness.md", "elastic", "\n".join(rows) + "\n")
+    replace_section(RESULTS / "robustness.md", "elastic", "\n".join(rows) + "\n")
 
 
 if __name__ == "__main__":

@@ -3,14 +3,14 @@
     .venv/bin/python benchmarks/forces.py
 
 Runs configs/forces/ with other forces, speeds, masses and friction coefficients, and a
-ball without any controller. Writes the tables of docs/forces.md.
+ball without any controller. Writes the tables of benchmarks/results/forces.md.
 """
 
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from marked_sections import DOCS, replace_section
+from marked_sections import RESULTS, replace_section
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
@@ -220,7 +220,7 @@ def balls() -> str:
 
 def main() -> None:
     """Run all, and write the tables."""
-    page = DOCS / "forces.md"
+    page = RESULTS / "forces.md"
     text = balls()
     print(text)
     replace_section(page, "balls", "\n" + text + "\n")

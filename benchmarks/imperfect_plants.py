@@ -3,7 +3,7 @@
     .venv/bin/python benchmarks/imperfect_plants.py
 
 The controller without compensation, with the nominal model, at 1 kHz. Writes
-docs/plants.md.
+benchmarks/results/plants.md.
 """
 
 from pathlib import Path
@@ -14,86 +14,19 @@ from rich.progress import track
 
 from hsp_control import Rollout, load_experiment
 
-PAGE = Path(__file__).resolve().parent.parent / "docs" / "plants.md"
+PAGE = Path(__file__).resolve().parent / "results" / "plants.md"
 SETTLED = 1.5  # the transient of the start is over [s]
 
 INTRODUCTION = """\
-# Plants
+# The effect of each imperfection
 
 Written by `.venv/bin/python benchmarks/imperfect_plants.py`; do not edit.
 
-A controller computes efforts for its model; a *plant* is the simulated system that they
-move. By default it is the model itself. The key `plant` selects another engine, and the
-imperfections of the plant. The controller keeps its nominal model for every plant.
-
-| `type` | meaning |
-|---|---|
-| `rigid_body` | Pinocchio's articulated-body algorithm, under the simulation's integrator. With `friction`, joints stick and slip (stiction): each step solves for the velocity at its end |
-| `rigid_contacts` | the same, with contacts that neither slip nor break and are switched by time; their forces are in the log. For verification on floating bases |
-| `mujoco` | MuJoCo with its own integrator, friction, joint limits and contacts, built from the Pinocchio model; `pip install 'hsp_control[mujoco]'`. `plant: mujoco` is enough |
-| `mujoco_scene` | the MuJoCo scene of the robot's own MJCF, as it is, with its objects and contacts: [MuJoCo](mujoco.md) |
-
-```yaml
-robot: {name: panda}
-tasks:
-  hand:
-    type: frame_position
-    trajectory: {type: circle, origin: start, center: [0, 0, 0], radius: 0.1,
-                 angular_rate: 2, normal: [0, 0, 1]}
-plant:
-  type: mujoco
-  seed: 1                               # of all random numbers below
-  inertias: {random_mass: 0.2, random_inertia: 0.2, random_com: 0.01}
-  payload: {frame: panda_tcp, mass: 1}
-  motor_inertia: 0.05
-  friction: {coulomb: 0.3, viscous: 0.1}        # or: urdf
-  pushes: [{frame: panda_link4, force: [0, 20, 0], start: 2, duration: 0.1}]
-  sensors: {encoder_resolution: 1.2e-5, differenced_velocity: true, velocity_noise: 0.01}
-  drives: {delay: 1, jitter: 0.0002, dropped: 0.01, noise: 0.1, saturation: model}
-simulation: {duration: 5, control_period: 0.001}
-```
-
-Sensors and drives act in a fixed order, whatever their order in the file. The log contains
-the true state in `q` and `v`, the measured one in `measured.q` and `measured.v`, the
-commanded effort in `tau` and the applied one in `applied.tau`; errors are those of the
-true state. The inertias of the plant's bodies are in the log's `meta`, key `plant`.
-
-`sensors: {imu: base_link}` is an inertial measurement unit at a frame, with noise and biases that
-walk: `imu: {frame: base_link, gyroscope_noise: 1.7e-4, ...}`. It reports the mean angular velocity
-and specific force of each period, for `estimators` ([estimation](companions/estimation.md)); q and v stay as
-they are.
-
-Frames named in `contacts` touch MuJoCo's ground, with a given shape or with the link's
-own collision geometry; `plant.contact.<frame>.force` and `.moment` are logged. A mesh
-with a flat sole becomes its box, another one its capsule; `plant.clearance(q)` returns
-by how much to lower a robot so that it starts on its feet:
-
-```yaml
-robot: {name: panda}
-tasks:
-  hand: {type: frame_position, trajectory: {type: hold}}
-plant:
-  type: mujoco
-  timestep: 0.0005
-  contacts:
-    panda_link6: {}                     # its own geometry
-    panda_tcp: {shape: {type: sphere, radius: 0.02}, position: [0, 0, 0.01]}
-  ground: {height: 0, friction: 0.8}
-simulation: {duration: 1, control_period: 0.001}
-```
-
-`solids` are things that these frames may touch besides: boxes, spheres, cylinders and capsules, as
-walls, tables, slopes and stairs (`copies`, `spacing`), or loose ones with a `mass`, whose poses
-`plant.solid.<name>.position` and `.quaternion` are logged ([forces](forces.md)). The view draws
-them.
-
-## Effect of each imperfection
-
-The hand follows a circle of 10 cm radius at 2 rad/s, with ω₀ = 20 1/s and K_N = 10 1/s, at
-1 kHz, from 1.5 s to 4 s. Root mean squares of the hand's error, of ‖e_N‖ and of the
-commanded effort's rate. The two engines agree on the effect of an imperfection; on the
-exact model the difference is that of their integrators.
-"""  # noqa: E501
+The hand follows a circle of 10 cm radius at 2 rad/s, with ω₀ = 20 1/s and
+K_N = 10 1/s, at 1 kHz, from 1.5 s to 4 s. Root mean squares of the hand's error, of
+‖e_N‖ and of the commanded effort's rate. The two engines agree on the effect of an
+imperfection; on the exact model the difference is that of their integrators.
+"""
 
 CASES: dict[str, dict[str, Any]] = {
     "none": {},
@@ -174,7 +107,7 @@ def table(robot: str, hand: str) -> list[str]:
     """Return the lines of a robot's table."""
     lines = [
         "",
-        f"### {robot}",
+        f"## {robot}",
         "",
         "| imperfection | Pinocchio: error [mm] | ‖e_N‖ [rad/s] | rate [N·m/s] "
         "| MuJoCo: error [mm] | ‖e_N‖ [rad/s] | rate [N·m/s] |",

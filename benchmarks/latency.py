@@ -4,7 +4,7 @@
         [--priority LEVEL]
 
 The controller of a configuration without a plan moves its own model, in the rest of
-each period. Prints the table of docs/latency.md for this machine.
+each period. Prints the table of benchmarks/results/latency.md for this machine.
 """
 
 import argparse

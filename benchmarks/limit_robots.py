@@ -2,7 +2,7 @@
 
     .venv/bin/python benchmarks/limit_robots.py [--rollouts N] [ROBOT ...]
 
-The table is written into docs/limits.md.
+The table is written into benchmarks/results/limits.md.
 """
 
 import argparse
@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 from limit_rollouts import PERIODS, ROUNDING, STEP, beyond, run_parallel
-from marked_sections import DOCS, replace_section
+from marked_sections import RESULTS, replace_section
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
@@ -131,7 +131,7 @@ def main() -> None:
         print(line, end="")
         table += line
     if tuple(options.robots) == ROBOTS:
-        replace_section(DOCS / "limits.md", "limit_robots", table)
+        replace_section(RESULTS / "limits.md", "limit_robots", table)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
     .venv/bin/python benchmarks/limit_rollouts.py [--rollouts N] [--pushes N]
 
 All numbers are computed from the log: positions, velocities and efforts of every
-period, and the differences of efforts. The tables are written into docs/limits.md.
+period, and the differences of efforts. The tables are written into results/limits.md.
 """
 
 import argparse
@@ -13,7 +13,7 @@ from functools import cache
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
-from marked_sections import DOCS, replace_section
+from marked_sections import RESULTS, replace_section
 from rich.progress import track
 
 import hsp_control as hsp
@@ -366,7 +366,7 @@ def main() -> None:
     for name, table in tables.items():
         print(table)
         if not options.dry:
-            replace_section(DOCS / "limits.md", name, "\n" + table + "\n")
+            replace_section(RESULTS / "limits.md", name, "\n" + table + "\n")
 
 
 if __name__ == "__main__":

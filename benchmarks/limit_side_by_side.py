@@ -4,7 +4,7 @@
 
 The configurations of configs/limits on rigid bodies at 1 kHz. The cost of a step is
 also measured for two arms and for Talos on two feet, with a part of their efforts.
-Without TSID its rows are omitted. Writes tables into docs/limits.md and draws
+Without TSID its rows are omitted. Writes tables into results/limits.md and draws
 docs/figures/limits.png; ``--draw`` only draws, which needs no TSID.
 """
 
@@ -23,7 +23,7 @@ import beside_tsid
 import many_tasks
 import numpy as np
 import whole_body_side_by_side as whole_body
-from marked_sections import DOCS, replace_section
+from marked_sections import FIGURES, RESULTS, replace_section
 from matplotlib.figure import Figure
 from standing import TALOS, Standing
 
@@ -376,16 +376,15 @@ def main() -> None:
         )
         costs += costs_of_others()
         table += f"\n{costs}\n{beside_tsid.CPP}"
-        replace_section(DOCS / "step_cost.md", "make bench, limits", costs)
     print(table)
-    replace_section(DOCS / "limits.md", "limit_side_by_side", "\n" + table + "\n")
+    replace_section(RESULTS / "limits.md", "limit_side_by_side", "\n" + table + "\n")
     draw(found)
 
 
 def draw(found: dict[str, tuple[dict[str, Run], RobotLimits]]) -> None:
     """Save the figure."""
     with styled():
-        figure(found).savefig(DOCS / "figures" / "limits.png", dpi=120)
+        figure(found).savefig(FIGURES / "limits.png", dpi=120)
 
 
 if __name__ == "__main__":

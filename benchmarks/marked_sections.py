@@ -1,8 +1,9 @@
-"""Replace sections of documents between two markers."""
+"""Where tables are kept, and how a section between two markers is replaced."""
 
 from pathlib import Path
 
-DOCS = Path(__file__).resolve().parent.parent / "docs"
+RESULTS = Path(__file__).resolve().parent / "results"
+FIGURES = RESULTS.parent.parent / "docs" / "figures"
 
 
 def replace_section(page: Path, name: str, text: str) -> None:

@@ -4,7 +4,7 @@
 
 Downloads the packages, without what they depend on, into a temporary folder; or takes
 the MJCF files of a folder. Every file that MuJoCo compiles and that has a joint is made
-a robot as a whole. Writes docs/mujoco_models.csv and a section of docs/mujoco.md.
+a robot as a whole. Writes results/mujoco_models.csv and a section of results/mujoco.md.
 """
 
 import argparse
@@ -20,12 +20,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 import mujoco
-from marked_sections import DOCS, replace_section
+from marked_sections import RESULTS, replace_section
 from rich.progress import track
 
 from hsp_control import HspControlError, Robot
 
-sys.path.insert(0, str(DOCS.parent / "tests" / "support"))
+sys.path.insert(0, str(RESULTS.parents[1] / "tests" / "support"))
 from mujoco_oracle import Differences, differences
 
 PACKAGES = (
@@ -41,7 +41,7 @@ PACKAGES = (
 )
 STATES = 3
 TOLERANCE = 1e-12
-CSV = DOCS / "mujoco_models.csv"
+CSV = RESULTS / "mujoco_models.csv"
 
 
 class Row(NamedTuple):
@@ -79,8 +79,8 @@ def main() -> None:
             counts[name] = version, len(files), len(own)
             rows += own
     write_csv(rows)
-    replace_section(DOCS / "mujoco.md", "mujoco_models", "\n" + table(rows, counts))
-    print(f"Wrote {CSV} and docs/mujoco.md")
+    replace_section(RESULTS / "mujoco.md", "mujoco_models", "\n" + table(rows, counts))
+    print(f"Wrote {CSV} and results/mujoco.md")
 
 
 def downloaded(package: str, folder: Path) -> tuple[str, Path]:

@@ -4,7 +4,7 @@
 
 A row is due every 10 ms of real time. For each configuration the same session goes on
 without a page, with a page in a browser that draws by software, and with one that takes
-a single message and no more, in turns. Writes a table into docs/play.md.
+a single message and no more, in turns. Writes a table into benchmarks/results/play.md.
 """
 
 import sys
@@ -15,7 +15,7 @@ from time import monotonic
 from typing import Any
 
 import numpy as np
-from marked_sections import DOCS, replace_section
+from marked_sections import RESULTS, replace_section
 
 from hsp_control.companions.film.chromium import headless_browser
 from hsp_control.play import Picture, Session, play
@@ -110,4 +110,4 @@ def lines() -> Iterator[str]:
 if __name__ == "__main__":
     text = "\n".join(lines())
     print(text)
-    replace_section(DOCS / "play.md", "play", f"{text}\n")
+    replace_section(RESULTS / "play.md", "play", f"{text}\n")

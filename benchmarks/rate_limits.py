@@ -4,14 +4,14 @@
 
 For each case the limit of one setting according to `check_rate` is found by bisection.
 Then the nonlinear robot starts near its target with the setting 3 % below and 3 % above
-this limit: it must converge and diverge. Writes the table of docs/robustness.md.
+this limit: it must converge and diverge. Writes the table of results/robustness.md.
 """
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from marked_sections import DOCS, replace_section
+from marked_sections import RESULTS, replace_section
 from rich.progress import track
 
 from hsp_control import Rollout, load_experiment
@@ -206,7 +206,7 @@ def growth(case: Case, x: float) -> float:
 
 
 def main() -> None:
-    """Write the table of docs/robustness.md."""
+    """Write the table of results/robustness.md."""
     lines = [
         "| loop | robot | rate | limit | 3 % below | 3 % above |",
         "|---|---|--:|--:|--:|--:|",
@@ -222,7 +222,7 @@ def main() -> None:
             f"| {case.name} | {case.robot} | {case.frequency:g} Hz | "
             f"{name} < {value:.3f} | {below:.2g} | {grown} |"
         )
-    replace_section(DOCS / "robustness.md", "rates", "\n".join(lines) + "\n")
+    replace_section(RESULTS / "robustness.md", "rates", "\n".join(lines) + "\n")
     print("\n".join(lines))
 
 

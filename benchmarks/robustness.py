@@ -2,11 +2,11 @@
 
     .venv/bin/python benchmarks/robustness.py [--fresh] [--tables]
 
-Runs the motion of docs/plants.md with the nominal model, on Pinocchio's plant and on
-MuJoCo's. Writes docs/robustness.csv, and from it the tables of docs/robustness.md. Runs
-that are in the CSV are not repeated, so that the script can be stopped and continued;
-``--fresh`` deletes the CSV, ``--tables`` only writes the page. Takes half an hour
-on two cores.
+Runs the motion of results/plants.md with the nominal model, on Pinocchio's plant and on
+MuJoCo's. Writes results/robustness.csv, and from it the tables of
+results/robustness.md. Runs that are in the CSV are not repeated, so that the script can
+be stopped and continued; ``--fresh`` deletes the CSV, ``--tables`` only
+writes the page. Takes half an hour on two cores.
 """
 
 import csv
@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from iiwa_inertias import write_urdf
 from imperfect_plants import SETTLED, configuration
-from marked_sections import DOCS, replace_section
+from marked_sections import RESULTS, replace_section
 from rich.progress import track
 
 from hsp_control import load_experiment
@@ -33,7 +33,7 @@ from hsp_control.simulation.plants import (
 )
 
 PROCESSES = 3
-CSV = DOCS / "robustness.csv"
+CSV = RESULTS / "robustness.csv"
 HANDS = {"panda": "panda_tcp", "iiwa14": "iiwa_link_ee"}
 ENGINES = {"rigid_body": "Pinocchio", "mujoco": "MuJoCo"}
 MEASURES = {"error": "task error [mm]", "e_N": "‖e_N‖ [rad/s]", "rate": "rate [N·m/s]"}
@@ -344,9 +344,9 @@ def main() -> None:
         CSV.unlink(missing_ok=True)
     if "--tables" not in sys.argv:
         run_all()
-    replace_section(DOCS / "robustness.md", "tables", tables())
+    replace_section(RESULTS / "robustness.md", "tables", tables())
     print("Run benchmarks/robustness_figure.py to draw the figure again")
-    print(f"Wrote {CSV} and docs/robustness.md")
+    print(f"Wrote {CSV} and results/robustness.md")
 
 
 if __name__ == "__main__":

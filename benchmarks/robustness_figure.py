@@ -1,10 +1,10 @@
-"""Draw the figure of docs/robustness.md: every plant with every compensator.
+"""Draw the figure of docs/measurements.md: every plant with every compensator.
 
 .venv/bin/python benchmarks/robustness_figure.py
 """
 
 import numpy as np
-from marked_sections import DOCS
+from marked_sections import FIGURES
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.image import AxesImage
@@ -13,7 +13,7 @@ from robustness import COLUMNS, ROWS, means
 from hsp_control.visualization.palette import INK
 from hsp_control.visualization.plots import new_figure, styled
 
-FILE = DOCS / "figures" / "robustness.png"
+FILE = FIGURES / "robustness.png"
 SHOWN = {"error": "task error [mm]", "e_N": "‖e_N‖ [rad/s]"}
 RANGES = {"error": (3e-3, 30.0), "e_N": (1e-3, 3.0)}
 ROBOTS = {"panda": "Panda", "iiwa14": "iiwa 14"}

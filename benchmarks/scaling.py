@@ -3,9 +3,9 @@
     make bench          or          .venv-peers/bin/python benchmarks/scaling.py
 
 Each point is a median over interleaved rounds over many robot states; TSID is timed
-where it is comparable. t = a + b n^p is fitted to each series. Writes docs/speed.md and
-its figure. To add a series, write a function that yields (n, robot, controllers) and
-add it to SERIES.
+where it is comparable. t = a + b n^p is fitted to each series. Writes
+results/speed.md and its figure. To add a series, write a function that yields
+(n, robot, controllers) and add it to SERIES.
 """
 
 import argparse
@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from marked_sections import FIGURES, RESULTS
 from matplotlib.ticker import MaxNLocator
 from scipy.optimize import curve_fit
 from timing import Compute, State, step_times
@@ -37,8 +38,7 @@ from hsp_control.trajectories import ComposedPose, HoldOrientation, TrajectorySa
 from hsp_control.visualization.palette import SERIES as SERIES_COLORS
 from hsp_control.visualization.plots import new_figure, styled
 
-ROOT = Path(__file__).resolve().parent.parent
-DOCUMENT, FIGURE = ROOT / "docs" / "speed.md", ROOT / "docs" / "figures" / "scaling.png"
+DOCUMENT, FIGURE = RESULTS / "speed.md", FIGURES / "scaling.png"
 GAINS = hsp.Gains(natural_frequency=10.0)
 HAND = "panda_tcp"
 
@@ -328,7 +328,7 @@ One `Controller.compute(t, q, v)` [µs], medians over {rounds} interleaved round
 Near a singularity a step takes more (Jacobi's method), up to the levels *in conflict*.
 Ratios are valid for other machines, microseconds are not.
 
-![Time of a step against joints, tasks, fields, obstacles, levels](figures/scaling.png)
+![Time of a step against joints, tasks and more](../../docs/figures/scaling.png)
 
 """
 ABOUT = {

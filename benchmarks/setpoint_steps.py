@@ -5,7 +5,7 @@
 A Panda's hand is asked to be elsewhere at once; rigid bodies, efforts held for 1 ms.
 This law within the robot's limits, also with a limit on the effort's rate; this law and
 the operational space with efforts that are clipped; TSID with bounds on efforts,
-positions and speeds. Writes a table into docs/limits.md. Without TSID its rows are
+positions and speeds. Writes a table into results/limits.md. Without TSID its rows are
 omitted.
 """
 
@@ -23,7 +23,7 @@ from limit_side_by_side import (
     this_law,
     tsid_of,
 )
-from marked_sections import DOCS, replace_section
+from marked_sections import RESULTS, replace_section
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
@@ -152,7 +152,7 @@ def main() -> None:
                 line = row(f"{what}, ω₀ = {frequency:g}", name, run, limits)
                 print(line, end="", flush=True)
                 table += line
-    replace_section(DOCS / "limits.md", "setpoint_steps", "\n" + table + "\n")
+    replace_section(RESULTS / "limits.md", "setpoint_steps", "\n" + table + "\n")
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@
 
 First every controller runs the case in closed loop with the same simulator. Those that
 track are then timed, in one process, interleaved. Prints the tables and writes them to
-docs/side_by_side.md. A peer that is not installed gets a row with the reason.
+results/side_by_side.md. A peer that is not installed gets a row with the reason.
 """
 
 import argparse
@@ -27,7 +27,7 @@ import pinocchio as pin
 from cases import FRAME, Case
 from controllers import operational_space, this_law
 from many_tasks import humanoid, two_arms
-from marked_sections import replace_section
+from marked_sections import RESULTS
 from timing import Compute, State, ratios, spread, step_times
 from tsid_in_cpp import CppSteps
 
@@ -307,12 +307,11 @@ def placo_row(
     return f"| {name} (pin {result['pin']}) | " + " | ".join(cells) + " |\n"
 
 
-def larger_robots(rounds: int, block: int, say: Callable[[str], None]) -> list[str]:
-    """Time this law and TSID on larger robots; return the rows of docs/step_cost.md."""
+def larger_robots(rounds: int, block: int, say: Callable[[str], None]) -> None:
+    """Time this law and TSID on larger robots."""
     say("## Larger robots, several poses at once\n\n")
     say("| problem | this law, rms [mm] | TSID, rms [mm] | this law / TSID | µs |\n")
     say("|---|--:|--:|--:|--:|\n")
-    summary = []
     for make in (two_arms, humanoid):
         problem = make()
         compute = {"law": problem.law(), "TSID": problem.tsid()}
@@ -325,47 +324,10 @@ def larger_robots(rounds: int, block: int, say: Callable[[str], None]) -> list[s
             say(f"{line} | not timed: does not track | |\n")
             continue
         states = runs["law"][1]
-        compared = {**compute, CPP: CppSteps(compute["TSID"], states)}
-        times = step_times(compared, states, rounds, block)
+        times = step_times(compute, states, rounds, block)
         quartiles = ratios(times, "law", "TSID")
         say(f"{line} | {spread(quartiles)} | {1e6 * np.median(times['law']):.0f} |\n")
-        cells = f"{spread(quartiles)} | {spread(ratios(times, 'law', CPP))}"
-        summary.append(f"| {problem.name} | {cells} | |\n")
     say("\nA pose for each frame, and a posture; settings as for the Panda.\n\n")
-    return summary
-
-
-def summarise(times: dict[int, dict[str, Array]], larger: list[str]) -> None:
-    """Write the table of docs/step_cost.md, between its two markers."""
-    if "TSID" not in times[6]:
-        return
-    lines = (
-        "| one control step, this law | TSID through Python = 1 | TSID in C++ = 1 | "
-        "pink + RNEA = 1 |\n|---|--:|--:|--:|\n"
-    )
-    for rows, what in ((6, "Panda, pose"), (3, "Panda, position")):
-        for name, field_name in SUMMARY_ROWS.items():
-            cells = [
-                spread(ratios(times[rows], name, r)) if r in times[rows] else ""
-                for r in REFERENCES
-            ]
-            lines += f"| {what}, {field_name} | " + " | ".join(cells) + " |\n"
-    page = ROOT / "docs" / "step_cost.md"
-    text = page.read_text()
-    head, rest = text.split(MARKERS[0] + "\n", 1)
-    _, tail = rest.split(MARKERS[1], 1)
-    page.write_text(
-        head + MARKERS[0] + "\n" + lines + "".join(larger) + MARKERS[1] + tail
-    )
-
-
-MARKERS = ("<!-- make bench: begin -->", "<!-- make bench: end -->")
-SUMMARY_ROWS = {
-    "this law": "joint centering",
-    "this law, and `diagnose`": "joint centering, `diagnose` included",
-    "this law, and its singular values": "joint centering, `diagnose`, singular values",
-    "this law, manipulability": "manipulability",
-}
 
 
 # ----------------------------------------------------------------------------- main
@@ -393,7 +355,7 @@ def main() -> None:
     parser.add_argument("--block", type=int, default=200, help="steps in a round")
     parser.add_argument("--duration", type=float, default=8.0, help="of a run [s]")
     parser.add_argument("--only", help="run controllers whose name contains this")
-    parser.add_argument("--out", type=Path, default=ROOT / "docs" / "side_by_side.md")
+    parser.add_argument("--out", type=Path, default=RESULTS / "side_by_side.md")
     options = parser.parse_args()
 
     compared, timed, missing = peers()
@@ -450,20 +412,14 @@ def main() -> None:
             "runs in its own environment; its ratio is the product of its ratio to the "
             "operational space there and of that controller's ratio here.\n\n"
         )
-    larger: list[str] = []
     if "tsid" not in missing and not options.only:
-        larger = larger_robots(options.rounds, options.block, say)
-    if not options.only:
-        summarise(measured, larger)
-    if "tsid" not in missing and not options.only:
+        larger_robots(options.rounds, options.block, say)
         say(f"## The ball near and far\n\n{beside_tsid.HEADER}")
         rows = "".join(
             near_and_far(Case(rows=rows, obstacle=False, duration=span), say)
             for rows in (6, 3)
         )
         say(f"\n{beside_tsid.CPP}\n")
-        page = ROOT / "docs" / "step_cost.md"
-        replace_section(page, "make bench, ball", beside_tsid.HEADER + rows)
     say(
         f"Python {platform.python_version()}, {os.cpu_count()} cores, hsp_control "
         f"{hsp.__version__}, numpy {np.__version__}. Only ratios are valid for other "

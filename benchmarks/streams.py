@@ -5,7 +5,7 @@
 A Panda under the same law, efforts held for 1 ms, limits on; targets arrive late, some
 never. Beside the policies of `hsp.Stream`: a zero-order hold of the newest target, and
 linear interpolation after the same delay, both without bounds. Writes a table into
-docs/streams.md.
+benchmarks/results/streams.md.
 """
 
 from bisect import bisect_right
@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
-from marked_sections import DOCS, replace_section
+from marked_sections import RESULTS, replace_section
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
@@ -227,7 +227,7 @@ def main() -> None:
             row = followed(case, way)
             print(*row, sep="  ", flush=True)
             lines.append(f"| {' | '.join(row)} |\n")
-    replace_section(DOCS / "streams.md", "streams.py", head + "".join(lines))
+    replace_section(RESULTS / "streams.md", "streams.py", head + "".join(lines))
 
 
 if __name__ == "__main__":

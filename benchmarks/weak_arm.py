@@ -3,7 +3,7 @@
     .venv/bin/python benchmarks/weak_arm.py
 
 configs/whole_body/talos_weak_arm.yaml on MuJoCo and on ideal contacts, and without
-`static_effort`. Writes a table into docs/whole_body.md and draws
+`static_effort`. Writes a table into benchmarks/results/weak_arm.md and draws
 docs/figures/weak_arm.png; ``--draw`` only draws.
 """
 
@@ -12,7 +12,7 @@ from concurrent.futures import ProcessPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
-from marked_sections import DOCS, replace_section
+from marked_sections import FIGURES, RESULTS, replace_section
 from matplotlib.figure import Figure
 
 import hsp_control as hsp
@@ -170,9 +170,9 @@ def main() -> None:
     if not drawn_only:
         text = table(found)
         print(text)
-        replace_section(DOCS / "whole_body.md", "weak_arm", "\n" + text + "\n")
+        replace_section(RESULTS / "weak_arm.md", "weak_arm", "\n" + text + "\n")
     with styled():
-        figure(found).savefig(DOCS / "figures" / "weak_arm.png", dpi=120)
+        figure(found).savefig(FIGURES / "weak_arm.png", dpi=120)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@
 
 Runs every controller on ideal contacts and on MuJoCo, times the steps interleaved along
 the same states, and the parts of this law's step. Prints the tables and writes them to
-docs/whole_body_side_by_side.md.
+benchmarks/results/whole_body_side_by_side.md.
 """
 
 # ruff: noqa: E402
@@ -27,7 +27,7 @@ from typing import Any
 
 import beside_tsid
 import numpy as np
-from marked_sections import replace_section
+from marked_sections import RESULTS
 from standing import COM, G1, HAND, PERIOD, TALOS, TRUNK, Body, Engine, Standing
 from timing import Compute, State, ratios, spread, step_times
 
@@ -237,8 +237,6 @@ def compare(
             )
         )
         say(f"By the status of this law's step:\n\n{costs}\n{beside_tsid.CPP}\n")
-        if body is TALOS:
-            replace_section(ROOT / "docs" / "step_cost.md", "make bench, Talos", costs)
     parts = parts_table(case, path[::5])
     say(
         "Times of the parts of this law's step (*deliver* contains "
@@ -281,7 +279,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=30)
     parser.add_argument("--block", type=int, default=40)
     parser.add_argument("--only", choices=("talos", "g1"))
-    out = ROOT / "docs" / "whole_body_side_by_side.md"
+    out = RESULTS / "whole_body_side_by_side.md"
     parser.add_argument("--out", type=Path, default=out)
     options = parser.parse_args()
     text = ""

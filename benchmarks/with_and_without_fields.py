@@ -5,7 +5,7 @@
 Runs each configuration of `configs/` as it is, and once more without its first field
 (with g = 0 if there is no other), measures both the same way, times the control step
 against the Pinocchio calls that every controller needs, and prints the tables. A run of
-all configurations also writes docs/configurations.md.
+all configurations also writes benchmarks/results/configurations.md.
 """
 
 import argparse
@@ -32,11 +32,11 @@ from hsp_control.config import Experiment
 from hsp_control.null_space.fields import Clearance, ObstacleClearance, SelfClearance
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGE = ROOT / "docs" / "configurations.md"
+PAGE = ROOT / "benchmarks" / "results" / "configurations.md"
 ROUNDS, STEPS = 15, 200  # of timing
 
 INTRODUCTION = """\
-# Configurations
+# Configurations, with and without their fields
 
 Written by `.venv/bin/python benchmarks/with_and_without_fields.py`; do not edit.
 
@@ -296,7 +296,7 @@ def sections(names: list[str], progress: Progress) -> Iterator[str]:
             [
                 f"## `{name}`",
                 "",
-                f"**{scenario.title}.** {scenario.description.strip()}",
+                f"**{scenario.title}.**",
                 "",
                 HEADER,
                 *(each.row() for each in metrics),

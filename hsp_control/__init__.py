@@ -28,6 +28,7 @@ if TYPE_CHECKING:  # what a type checker reads; the names are looked up below
     from .common import exceptions as errors  # noqa: F401 (a namespace)
     from .common.exceptions import HspControlError as HspControlError
     from .config import Experiment as Experiment
+    from .config import Recorder as Recorder
     from .config import load_experiment as load_experiment
     from .constraints import contacts as contacts
     from .constraints import limits as limits
@@ -94,7 +95,7 @@ _NAMES = {
     "control": "ControlOutput Controller",
     "simulation": "Rollout simulate",
     "live": "run_loop",
-    "config": "Experiment load_experiment",
+    "config": "Experiment Recorder load_experiment",
     "visualization.viewer": "Viewer show",
     "common.exceptions": "HspControlError",
 }
@@ -162,4 +163,4 @@ def _companions() -> list[str]:
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *__all__, *_companions()])
+    return sorted({*__all__, *_companions()})

@@ -70,7 +70,7 @@ def documents() -> list[Path]:
         "*.cff",
         "pyproject.toml",
         "docs/**/*.md",
-        "benchmarks/*.md",
+        "benchmarks/**/*.md",
         "robots/*/*.md",
         "examples/**/*.md",
         "notebooks/*.ipynb",

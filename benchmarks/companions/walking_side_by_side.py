@@ -5,7 +5,7 @@
 Both stand in the same closed loop on MuJoCo: the plan gets the measurement of the
 period, writes references and switches contacts, and the controller follows. Times of a
 step are taken in one run, of all controllers in turn at each of its states. Writes a
-section of docs/companions/walking.md.
+section of benchmarks/results/walking.md.
 """
 
 # ruff: noqa: E402
@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 
 sys.path.append(str(Path(__file__).parents[1]))
-from marked_sections import DOCS, replace_section
+from marked_sections import RESULTS, replace_section
 from timing import Compute
 from walking import PUSH, WALK
 
@@ -344,7 +344,7 @@ def main() -> None:
     )
     print(table)
     if not options.dry:
-        replace_section(DOCS / "companions/walking.md", SECTION, text)
+        replace_section(RESULTS / "walking.md", SECTION, text)
 
 
 if __name__ == "__main__":

@@ -73,4 +73,4 @@ def stream(case: Case) -> hsp.StreamPose:
         t = BEGIN + k / MESSAGES
         pose = pin.SE3(case.rotation, case.desired(t).position)
         messages.append({"at": t, "value": pin.SE3ToXYZQUAT(pose).tolist()})
-    return hsp.StreamPose(messages=messages)
+    return hsp.StreamPose(messages=messages, policy="latest")

@@ -36,6 +36,9 @@ def make_plain(value: type) -> None:
     value.__signature__ = signature.replace(
         parameters=parameters, return_annotation=inspect.Signature.empty
     )  # type: ignore[attr-defined]
+    value.__doc__ = getattr(
+        value, "_docstring", value.__doc__
+    )  # each field is an attribute, with its own
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

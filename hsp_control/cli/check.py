@@ -20,8 +20,8 @@ from hsp_control.inspection.inspect import too_weak
 from hsp_control.robot import Robot
 from hsp_control.robot.description.inertias import impossible_inertias
 from hsp_control.robot.description.urdf import read_urdf
+from hsp_control.simulation.initial_state import posture_search
 from hsp_control.simulation.reach_check import out_of_reach
-from hsp_control.simulation.start_search import posture_search
 
 ROUNDING = 1e-9
 """A singular value below this share of the largest one is zero but for rounding."""

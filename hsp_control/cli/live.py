@@ -40,6 +40,7 @@ from hsp_control.live import (
 from hsp_control.live.hardware import AdaptingHardware, LocatedHardware
 from hsp_control.live.operator_requests import stop_signals
 from hsp_control.live.report import Quantiles
+from hsp_control.play.live_loop import PAGE_ENDED
 from hsp_control.simulation import Rollout
 
 _DRY_RUN = 0.5
@@ -131,7 +132,8 @@ def live(options: argparse.Namespace) -> int:
             out.print(f"The loop: {report.reason}")
             _convert(loop_log)
             fault = getattr(hardware, "fault", None)
-            if fault is None and report.ended in {"completed", "operator"}:
+            ends = {"completed", "operator"}
+            if fault is None and report.ended in ends and report.reason != PAGE_ENDED:
                 return 0
             told = fault is None or fault in report.reason
             print(f"hsp: {report.reason if told else fault}", file=sys.stderr)
@@ -150,9 +152,8 @@ def live(options: argparse.Namespace) -> int:
     _print_ends(report, robot_report)
     _convert(loop_log, link=counts, injected=link.injected)
     _convert(robot_log)
-    regular = report.ended == "completed" or (
-        report.ended == "operator" and duration == inf
-    )
+    asked = report.ended == "operator" and report.reason != PAGE_ENDED
+    regular = report.ended == "completed" or (asked and duration == inf)
     if not regular:
         print(f"hsp: {report.reason}", file=sys.stderr)
     return 0 if regular and robot_report is not None else 2

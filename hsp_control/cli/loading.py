@@ -3,10 +3,12 @@
 import argparse
 from pathlib import Path
 
+from hsp_control.common.exceptions import AccessError
 from hsp_control.config import Experiment
 from hsp_control.config.document import Document
 from hsp_control.config.experiment import build
 from hsp_control.config.source import read_document
+from hsp_control.declaration.imported import import_file
 from hsp_control.robot.description.access import ANYWHERE, Access, only_within
 from hsp_control.robot.description.sources import is_path
 
@@ -18,14 +20,22 @@ def load(options: argparse.Namespace, *overrides: str) -> Experiment:
 
 def read(options: argparse.Namespace, *overrides: str) -> Document:
     """Return a command's configuration; for the arguments see `load`."""
-    document = read_document(
-        options.config,
-        strict=options.strict or bool(options.allow),
-        allow=options.allow,
-    )
+    strict = options.strict or bool(options.allow)
+    run_imports(options)
+    document = read_document(options.config, strict=strict, allow=options.allow)
     for assignment in (*options.overrides, *overrides):
         document.override(assignment)
     return document
+
+
+def run_imports(options: argparse.Namespace) -> None:
+    """Run the files of ``--import``, which strict reading does not admit."""
+    for file in getattr(options, "imports", ()):
+        if options.strict or options.allow:
+            raise AccessError(
+                f"--import {file} runs code, which --strict and --allow do not admit"
+            )
+        import_file(file)
 
 
 def robot_access(name: str, options: argparse.Namespace) -> Access:

@@ -8,6 +8,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from types import FrameType
 
 from hsp_control.cli.consoles import out
+from hsp_control.cli.loading import run_imports
 from hsp_control.cli.pages import OpeningPage, draw_before, draw_empty, status_line
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.config import Experiment
@@ -33,6 +34,7 @@ def play(options: argparse.Namespace) -> int:
             status_line(server),
         )
         with page.compiling():
+            run_imports(options)
             document = playable_document(
                 options.config,
                 *options.overrides,

@@ -8,7 +8,7 @@ from rich.table import Table
 
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.limit_excess import POSITION, VELOCITY
-from hsp_control.simulation.unreached import FAR, OUT, unreached
+from hsp_control.simulation.log_series import FAR, OUT, unreached
 
 
 def summary(rollout: Rollout) -> Table:

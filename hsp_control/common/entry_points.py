@@ -47,3 +47,26 @@ def at_first_use(
         return getattr(import_module(f"{package}.{homes[name]}"), name)
 
     return attribute, lambda: sorted(homes)
+
+
+def own_names(module: str) -> Callable[[], list[str]]:
+    """Return a public module's ``__dir__``: its classes and functions, no imports.
+
+    ``__dir__ = own_names(__name__)``. What a package imports from its modules is its
+    own; in a file, what it defines, or what ``__all__`` lists.
+    """
+
+    def own(value: object, package: bool) -> bool:
+        home = str(getattr(value, "__module__", ""))
+        return home.startswith(f"{_PACKAGE.name}.") if package else home == module
+
+    def names() -> list[str]:
+        there = vars(import_module(module))
+        package = "__path__" in there
+        public = {
+            k: each for k, each in there.items() if callable(each) and k[0] != "_"
+        }
+        mine = [k for k, each in public.items() if own(each, package)]
+        return sorted({*there.get("__all__", mine)} - {own_names.__name__})
+
+    return names

@@ -49,8 +49,11 @@ from hsp_control.simulation import Rollout, simulate
 from hsp_control.simulation.initial_state import InitialState
 from hsp_control.simulation.log_writer import LogWriter
 from hsp_control.simulation.plants import Plant, PlantPart, SampledPlant
-from hsp_control.simulation.settings import SimulationSettings
-from hsp_control.simulation.simulate import check_steps
+from hsp_control.simulation.simulate import (
+    SimulationSettings,
+    check_steps,
+    default_integrator,
+)
 from hsp_control.tasks import Task
 from hsp_control.trajectories.streams.stream import Streamed
 
@@ -142,7 +145,7 @@ class Experiment:
                 `load_experiment`.
         """
         terms = () if field is None else tuple(terms_of(field))
-        scene, (terms, limits, changes) = _named_obstacles(
+        scene, (terms, limits, changes) = named_obstacles(
             scene if isinstance(scene, Scene) else Scene(scene),
             (terms, limits, tuple(changes)),
         )
@@ -162,7 +165,7 @@ class Experiment:
         data = {
             "title": title,
             "description": description,
-            "robot": _description(robot),
+            "robot": robot_description(robot),
             "tasks": keyed(tasks),
             "null_space": null_space,
             "limits": limits,
@@ -260,7 +263,7 @@ class Experiment:
     @property
     def integrator(self) -> Integrator:
         """The integrator of the simulation."""
-        return self.scenario.simulation.integrator
+        return _integrator(self.scenario)
 
     @property
     def config(self) -> dict[str, Any] | None:
@@ -372,7 +375,8 @@ def _plant(document: Document, scenario: Scenario, robot: Robot) -> Plant:
         with document.at("simulation"):
             check_steps(settings.duration, step, "plant.timestep")
     with document.at("plant"):
-        plant = scenario.plant.build(robot, settings.integrator, access=document.access)
+        integrator = _integrator(scenario)
+        plant = scenario.plant.build(robot, integrator, access=document.access)
     if isinstance(plant, SampledPlant) and settings.control_period is None:
         raise document.error(
             ("plant",),
@@ -382,7 +386,13 @@ def _plant(document: Document, scenario: Scenario, robot: Robot) -> Plant:
     return plant
 
 
-def _description(robot: str | Robot | RobotDescription) -> RobotDescription:
+def _integrator(scenario: Scenario) -> Integrator:
+    settings = scenario.simulation
+    own = default_integrator(scenario.plant, settings.control_period)
+    return settings.integrator or own
+
+
+def robot_description(robot: str | Robot | RobotDescription) -> RobotDescription:
     """Return what a configuration says about a robot."""
     if isinstance(robot, str):
         return RobotDescription(robot)
@@ -396,7 +406,7 @@ def _description(robot: str | Robot | RobotDescription) -> RobotDescription:
     return robot.description
 
 
-def _named_obstacles(scene: Scene, parts: Any) -> tuple[Scene, Any]:
+def named_obstacles(scene: Scene, parts: Any) -> tuple[Scene, Any]:
     """Return the scene with the parts' own obstacles, and parts with their names."""
     known = dict(scene)
 

@@ -29,7 +29,7 @@ from hsp_control.null_space.settings import NullSpaceSettings
 from hsp_control.robot.description.robot_description import RobotDescription
 from hsp_control.simulation.initial_state import InitialState, StartOrAuto
 from hsp_control.simulation.plants import AnyPlant, RigidBody
-from hsp_control.simulation.settings import SimulationSettings
+from hsp_control.simulation.simulate import SimulationSettings
 from hsp_control.tasks import Task
 
 

@@ -42,6 +42,7 @@ def _read(source: str | PathLike[str] | dict[str, Any]) -> Document:
         if run.config is None:
             raise ConfigError(
                 f"{path}: this log was made from Python and contains no configuration"
+                + (f": {lost}" if (lost := run.meta.get("config_lost")) else "")
             )
         if lost := run.meta.get("changes_lost"):
             raise ConfigError(

@@ -178,8 +178,8 @@ class ActiveStack:
         return steps(plans, law)
 
     def field_value(self) -> float:
-        """Return the field's value at the state."""
-        return self._field.value(self._state)
+        """Return the field's value at the state that logs have: bound only for it."""
+        return self._field.value(self._state.seen)
 
     def flow(self) -> Array:
         """Return J# x_d' + P g, shape (nv,), where it was resolved, at rest."""

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from itertools import takewhile
 from typing import Self
 
+from hsp_control.common.entry_points import own_names
 from hsp_control.constraints.contacts import CommandedForce
 from hsp_control.constraints.limits import Limits
 from hsp_control.control.change import (
@@ -173,3 +174,6 @@ def _applied(changes: Iterable[Change], setup: Setup) -> Setup:
     for change in changes:
         setup = change.apply(setup)
     return setup
+
+
+__dir__ = own_names(__name__)

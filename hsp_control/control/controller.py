@@ -7,6 +7,7 @@ from math import isfinite
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
@@ -28,6 +29,7 @@ from hsp_control.control.guards import StepLock
 from hsp_control.control.mixture import AccelerationModifier, BoundStep, Mixture
 from hsp_control.control.output import ControlOutput, Diagnostics
 from hsp_control.control.setup import Base, Declared
+from hsp_control.control.targets import RAMP, followed_stream, new_stream, target_of
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.start import Start
 from hsp_control.law import TaskSample
@@ -38,6 +40,7 @@ from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.impedance import parts_of
 from hsp_control.tasks.task import Feedback
+from hsp_control.trajectories.streams.stream import Streamed
 
 if TYPE_CHECKING:
     from hsp_control.control.free_step import FreeStep
@@ -427,6 +430,41 @@ class Controller:
         """
         return Changes(self.change, t)
 
+    def set_target(self, task: str, target: ArrayLike | pin.SE3) -> Streamed:
+        """Let a task go to a target from now on, smoothly, until the next one is set.
+
+        ``controller.set_target("hand", pose)``, at any time and as often as needed. A
+        stream takes over from the task's trajectory, with a crossfade, and goes there
+        as fast as it may: at 0.5 m/s and 3 m/s², 1.5 rad/s and 8 rad/s². A task that
+        was given a stream, with bounds of its own, goes on with that.
+        ``controller.at(t).reference(task, trajectory)`` ends it.
+
+        Args:
+            task: Name of the task.
+            target: For a pose a pin.SE3, x, y, z and a quaternion (x, y, z, w), or a
+                matrix; for an orientation a quaternion or a matrix; else the numbers of
+                the task's trajectory [m, or the task's unit].
+
+        Returns:
+            The stream, which counts what it has taken.
+
+        Raises:
+            ControllerError: If there is no such task, it follows no trajectory, or the
+                target is of another kind.
+            StreamError: If the target is not valid.
+        """
+        present = self._setup.task(task).task
+        value = target_of(present, target)
+        stream = followed_stream(present, self._time_line.made)
+        if stream is not None:
+            stream.send(value)
+            return stream
+        stream = new_stream(present.followed)
+        stream.send(value)
+        reference: Any = stream
+        self.at(self._state.t).ramp(RAMP).reference(task, reference)
+        return stream
+
     def change(self, change: Change) -> None:
         """Make a change; `at` is the shorter way.
 
@@ -600,6 +638,16 @@ class Controller:
             ControllerError: If there is no such contact.
         """
         return self._setup.contact(contact).force_offset
+
+    def __repr__(self) -> str:
+        gain = self.null_space_gain
+        same = np.array_equal(gain, gain[0, 0] * np.eye(len(gain)))
+        tasks = (f"{each.name!r} ({type(each).__name__})" for each in self.tasks)
+        return (
+            f"Controller of {self.robot.name}: {', '.join(tasks)}; field "
+            f"{self.field.name}, K_N = {f'{gain[0, 0]:g}' if same else 'a matrix'}, "
+            f"{type(self.metric).__name__}; {'' if self.limits else 'no '}limits"
+        )
 
     # -- what explains it -------------------------------------------------------------
 

@@ -7,6 +7,7 @@ from typing import Annotated, ClassVar
 from pydantic import AfterValidator
 
 from hsp_control.common.arrays import Array
+from hsp_control.common.entry_points import own_names
 from hsp_control.common.exceptions import EstimationError
 from hsp_control.control.controller import Controller
 from hsp_control.control.measurement import Inertial, LogChannel, Measurement
@@ -84,3 +85,6 @@ Estimators = Annotated[
     Sequence[Estimator], ByType(Estimator), AfterValidator(_in_order)
 ]
 """A chain: a sequence in Python, a mapping by type in YAML; stored by stage."""
+
+
+__dir__ = own_names(__name__)

@@ -1,10 +1,12 @@
 """What a controller returns: an effort, and everything that explains it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import ControllerError
+from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation import Delivered, Status
 from hsp_control.law import FieldSample, TaskSample, singular_values
@@ -38,6 +40,7 @@ class ControlOutput:
         "_acceleration",
         "_bounds",
         "_memory",
+        "_places",
         "_rows",
         "_views",
         "damped",
@@ -58,6 +61,7 @@ class ControlOutput:
         tuple[str, slice, Callable[[Array], float]]
     ]  # see `ActiveStack.bounds`
     _memory: Array | bytes
+    _places: Mapping[str, slice]  # the rows of each task, by name
     _rows: int
     _views: Record | None  # of the memory, once they were asked for
 
@@ -78,6 +82,7 @@ class ControlOutput:
             else:
                 own[:] = memory
         self._rows, self._bounds = stack.row_count, stack.bounds
+        self._places = stack.task_rows
         self._acceleration = None if a is stack.acceleration else a.tobytes()
         self.forces = forces.copy() if stack.has_forces else forces
         self.damped = damped
@@ -103,6 +108,27 @@ class ControlOutput:
                 found[task] = away
         return found
 
+    def error(self, task: str) -> Array:
+        """Return the error e of a task, as its class says, shape (m,) [m or rad].
+
+        Raises:
+            ControllerError: If no such task counts at this time.
+        """
+        return self._record.task.error[self._rows_of(task)].copy()
+
+    def error_rate(self, task: str) -> Array:
+        """Return e' of a task, shape (m,) [m/s or rad/s]; see `error`."""
+        return self._record.task.error_rate[self._rows_of(task)].copy()
+
+    def _rows_of(self, task: str) -> slice:
+        places = self._places
+        if task not in places:
+            near = did_you_mean(task, places)
+            raise ControllerError(
+                f"no task {task!r} counts now{near} (there are {listing(places)})"
+            )
+        return places[task]
+
     @property
     def task(self) -> TaskSample:
         """All tasks stacked: J, J', e, e', a_x."""
@@ -117,6 +143,19 @@ class ControlOutput:
     def null_space_error(self) -> Array:
         """e_N = (I - J#J)(g - v), shape (nv,)."""
         return self._record.null_space_error
+
+    def __repr__(self) -> str:
+        if self._memory is _NOTHING:
+            return "ControlOutput(not computed yet)"
+        sizes = {f"e of {name}": self.error(name) for name in self._places}
+        sizes["e_N"] = self.null_space_error
+        notes = [
+            f"|{name}| = {np.linalg.norm(each):.3g}" for name, each in sizes.items()
+        ]
+        if self.damped:
+            notes.append(f"damped: {self.damped}")
+        tau = np.round(self.tau, 3).tolist()
+        return f"ControlOutput(tau={tau}, {self.status.name}; {', '.join(notes)})"
 
     def explanation(self, own: Record | None) -> Record:
         """Return a copy of tasks, field, null-space error and `acceleration`.

@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+from hsp_control.common.entry_points import own_names
 from hsp_control.common.exceptions import PlanError
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits
@@ -116,3 +117,6 @@ class RunningPlan(ABC):
     @abstractmethod
     def log_channels(self) -> Mapping[str, LogChannel]:
         """Return what to log of the last update, by name: ``plan.<...>``."""
+
+
+__dir__ = own_names(__name__)

@@ -2,9 +2,11 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, Literal, Self, TypeVar
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
@@ -19,8 +21,10 @@ from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits, RobotLimits
 from hsp_control.control.evolution import ABSENT, PRESENT, Evolution, EvolvingWeight
 from hsp_control.control.planned import PlannedContact, PlannedLimits
-from hsp_control.declaration import within
+from hsp_control.declaration import Part, within
+from hsp_control.declaration.in_python import check_kind
 from hsp_control.declaration.nested import parts_within, with_parts_replaced
+from hsp_control.declaration.plain import shortened
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.start import Start
 from hsp_control.law import VARYING, MetricSample
@@ -38,15 +42,20 @@ Base = Literal["flying", "driven"]
 """What else than contacts acts on a free-flyer root: nothing, or an outside device."""
 
 
-def check_kind(what: str, value: object, kind: type) -> None:
-    """Check that an argument is of the right kind."""
-    if isinstance(value, kind):
-        return
-    if kind is Task and isinstance(value, list | tuple):
+def _check_parts(what: str, parts: object, kind: type[Part]) -> None:
+    """Check that an argument is several parts of a kind."""
+    if isinstance(parts, kind) or not isinstance(parts, Iterable):
         raise ControllerError(
-            "tasks contains lists; write the level as priority=1, 2, ... of each task"
+            f"{what} is {shortened(repr(parts))}; needs several, such as "
+            f"[{kind.__name__.lower()}]"
         )
-    raise ControllerError(f"{what} {value!r}, which is not a {kind.__name__}")
+    for part in parts:
+        if isinstance(part, list | tuple):
+            raise ControllerError(
+                f"{what} contains lists; write the level as priority=1, 2, ... of each "
+                "task"
+            )
+        check_kind(f"{what} contains", part, kind, ControllerError)
 
 
 def check_tasks(tasks: Sequence[Task], robot: Robot) -> None:
@@ -368,23 +377,30 @@ class Declared:
         start: ArrayLike | None,
     ) -> Self:
         """Check each part by itself; see `Controller` for what they mean."""
+        if isinstance(robot, str | Path):
+            raise ControllerError(f"robot is {robot!r}; needs Robot.load({robot!r})")
+        if isinstance(robot, pin.Model):
+            raise ControllerError(
+                "robot is a pinocchio.Model; needs Robot.from_pinocchio(model)"
+            )
+        check_kind("robot is", robot, Robot, ControllerError)
         if not 0.0 < singularity_threshold < np.inf:
             raise ControllerError(
                 f"singularity_threshold is {singularity_threshold}; must be positive"
             )
         field = Rest() if field is None else field
-        for task in tasks:
-            check_kind("tasks contains", task, Task)
+        _check_parts("tasks", tasks, Task)
         if metric is None:
             yields = any(impedance_of(task) is not None for task in tasks)
             own = MassMatrixMetric(inertia="robot")
             metric = own if yields else IdentityMetric()
-        for contact in contacts:
-            check_kind("contacts contains", contact, Contact)
-        check_kind("field is", field, NullSpaceField)
-        check_kind("metric is", metric, Metric)
+        _check_parts("contacts", contacts, Contact)
+        check_kind("field is", field, NullSpaceField, ControllerError)
+        check_kind("metric is", metric, Metric, ControllerError)
         if limits is not None:
-            check_kind("limits is", limits, Limits)
+            if limits == "none":
+                raise ControllerError("limits is 'none'; in Python it is None")
+            check_kind("limits is", limits, Limits, ControllerError)
         scene = scene if isinstance(scene, Scene) else Scene(scene)
         known = None if start is None else robot.check_configuration(start).copy()
         check_support(robot, contacts, base)

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import MISSING, Field
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 from pydantic_core import CoreSchema, PydanticCustomError
 
@@ -32,6 +32,14 @@ class Declared:
     yaml_key: ClassVar[str | None] = None
     documentation: ClassVar[Mapping[str, str]] = {}
     __pydantic_core_schema__: ClassVar[CoreSchema]
+
+    @classmethod
+    def of_value(cls, value: object) -> Self | None:
+        """Return the part that a bare value means in Python; None: it means none.
+
+        Numbers mean a point that is held, for example.
+        """
+        return None
 
     def all_fields(self) -> dict[str, Any]:
         """Return all fields, by name."""

@@ -19,6 +19,7 @@ from pydantic_core import ErrorDetails
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.common.suggestions import did_you_mean, listing, nearest
 from hsp_control.declaration.families import Declared
+from hsp_control.declaration.in_python import misfit
 from hsp_control.declaration.keys import KeyPath, written
 from hsp_control.declaration.plain import joined, kind, shown
 from hsp_control.declaration.schema import (
@@ -205,22 +206,25 @@ _ENTRIES = ("entry", "entries")
 _LONG_LIST = 40
 
 
-def explained(finding: Finding) -> str:
-    """Return the message for a finding, without its location."""
+def explained(finding: Finding, key: str = "key") -> str:
+    """Return the message for a finding, without its location.
+
+    What is missing or unknown is called ``key``.
+    """
     value, expected = finding.value, finding.expected
     match finding.kind:
         case "mismatch" if words := joined(_words(expected)):
             return _mismatch(value, words, literals(expected.options))
         case "extra_forbidden":
-            return f"unknown key {_unknown(value, keys(expected))}"
+            return f"unknown {key} {_unknown(value, keys(expected))}"
         case "missing":
-            return _missing(value, keys(expected, required=True))
-        case "union_tag_invalid" if key := expected.discriminator:
-            return f"unknown {key} {_unknown(value, tagged(expected.options, key))}"
-        case "union_tag_not_found" if key := expected.discriminator:
-            return f"missing key {key!r}; {_tags(expected, key)}"
-        case "misspelt_tag" if key := expected.discriminator:
-            hint = f"did you mean {key!r}? ({_tags(expected, key)})"
+            return _missing(key, value, keys(expected, required=True))
+        case "union_tag_invalid" if tag := expected.discriminator:
+            return f"unknown {tag} {_unknown(value, tagged(expected.options, tag))}"
+        case "union_tag_not_found" if tag := expected.discriminator:
+            return f"missing key {tag!r}; {_tags(expected, tag)}"
+        case "misspelt_tag" if tag := expected.discriminator:
+            hint = f"did you mean {tag!r}? ({_tags(expected, tag)})"
             return f"unknown key {value!r}; {hint}"
         case "literal_error" | "enum" if choices := literals(expected.options):
             return f"unknown value {_unknown(value, choices)}"
@@ -244,10 +248,10 @@ def _unknown(value: Any, options: Iterable[Any]) -> str:
     return f"{shown(value)}{near}{among}"
 
 
-def _missing(names: list[str], required: list[str]) -> str:
+def _missing(key: str, names: list[str], required: list[str]) -> str:
     plural = "s" if len(names) > 1 else ""
     among = f"; required here: {listing(required, _LONG_LIST)}" if required else ""
-    return f"missing key{plural} {listing(map(repr, names), _LONG_LIST)}{among}"
+    return f"missing {key}{plural} {listing(map(repr, names), _LONG_LIST)}{among}"
 
 
 def _tags(expected: Shape, key: str) -> str:
@@ -364,7 +368,21 @@ def as_error(finding: Finding, cls: type[Declared]) -> HspControlError:
     where = ": ".join(part for part in (cls.__name__, written(finding.path)) if part)
     own = domain_error(finding.error)
     kind = cls.error if own is None else type(own)
-    return kind(f"{where}: {explained(finding)}")
+    own_argument = finding.kind == "missing" and not finding.path
+    if own_argument or (finding.kind == "extra_forbidden" and len(finding.path) == 1):
+        return kind(f"{where}: {explained(finding, 'argument')}")
+    return kind(f"{where}: {_in_python(finding) or explained(finding)}")
+
+
+def _in_python(finding: Finding) -> str:
+    """Return the message where Python gave something that is no part; or nothing."""
+    options = finding.expected.options
+    wanted = all(isinstance(o, type) and issubclass(o, Declared) for o in options)
+    known = finding.kind in ("mismatch", "union_tag_not_found")
+    if not (wanted and known and options) or isinstance(finding.value, Mapping):
+        return ""
+    bases = [each.family.base if each.family else each for each in options]
+    return misfit(finding.value, [*dict.fromkeys(bases)])
 
 
 class Carrier(ValueError):

@@ -6,7 +6,8 @@ import inspect
 import sys
 from collections.abc import Callable, Iterator
 from functools import cache, wraps
-from typing import Any, NoReturn, dataclass_transform
+from inspect import cleandoc
+from typing import Any, ClassVar, NoReturn, dataclass_transform
 
 import numpy as np
 from pydantic import (
@@ -23,8 +24,10 @@ from hsp_control.common.exceptions import HspControlError, ImmutableError
 from hsp_control.declaration.any_of import AnyOf
 from hsp_control.declaration.equality import same
 from hsp_control.declaration.families import Declared, Family, value_fields
+from hsp_control.declaration.in_python import with_parts_made
 from hsp_control.declaration.mistakes import Carrier, argument_error
 from hsp_control.declaration.plain_data import plain_data
+from hsp_control.declaration.signature import PlainSignature, with_fields
 
 
 def attribute_docstrings(cls: type) -> dict[str, str]:
@@ -93,6 +96,9 @@ class Part(Declared):
     together. A field may stand for a property that a base class asks for.
     """
 
+    _docstring: ClassVar[str]  # without the fields' own
+    __signature__: ClassVar[PlainSignature]
+
     def __init_subclass__(
         cls,
         *,
@@ -119,8 +125,11 @@ class Part(Declared):
         cls.documentation = inherited | attribute_docstrings(cls)
         if "__post_init__" in vars(cls):
             cls.__post_init__ = _completed(cls.__post_init__)  # type: ignore[assignment,method-assign]
+        cls._docstring = cleandoc(vars(cls)["__doc__"] or "")
         hidden = _hide_properties(cls)
         dataclass(cls, frozen=True, eq=False, repr=False, config=_CONFIG)
+        cls.__doc__ = with_fields(cls, cls._docstring)
+        cls.__signature__ = PlainSignature()
         for name in hidden:
             setattr(cls, name, _field_property(name))
         cls.__init__ = _with_one_error(cls.__init__)  # type: ignore[method-assign]
@@ -151,6 +160,8 @@ class Part(Declared):
     @classmethod
     def describe(cls, schema: JsonSchemaValue) -> None:
         """Add the docstrings of the fields to a JSON schema of the part, in place."""
+        if "description" in schema:
+            schema["description"] = cls._docstring
         if cls.yaml_key is not None:
             schema.get("properties", {}).pop(cls.yaml_key, None)
             if cls.yaml_key in schema.get("required", []):
@@ -217,10 +228,11 @@ class Part(Declared):
 def _with_one_error(init: Callable[..., None]) -> Callable[..., None]:
     """Return a constructor that raises the part's own error instead of pydantic's."""
 
-    @wraps(init)
     def checked(self: Part, *args: Any, **kwargs: Any) -> None:
+        """Make the part, and check it; see the class for the arguments."""
         try:
-            init(self, *args, **kwargs)
+            given, named = with_parts_made(type(self), args, kwargs)
+            init(self, *given, **named)
         except ValidationError as error:
             raise argument_error(type(self), error) from None
 

@@ -13,6 +13,7 @@ from hsp_control.declaration import schema
 from hsp_control.declaration.by_type import ByType, as_entry
 from hsp_control.declaration.equality import same
 from hsp_control.declaration.families import Declared
+from hsp_control.declaration.imported import name_of
 from hsp_control.declaration.located import within
 
 _SIMPLE = bool, int, float, str, type(None)
@@ -34,6 +35,8 @@ def plain_data(value: Any, *, defaults: bool = False) -> Any:
         return {key: _entry(key, each, defaults) for key, each in value.items()}
     if isinstance(value, list | tuple):
         return [_inside(k, each, defaults) for k, each in enumerate(value)]
+    if (name := name_of(value)) is not None:
+        return name
     what = getattr(value, "__qualname__", None) or f"a {type(value).__name__}"
     raise ConfigError(f"YAML cannot say {what}: it is Python, not data")
 

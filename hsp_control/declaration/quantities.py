@@ -135,6 +135,20 @@ class OrInstance(ArrayField):
         )
 
 
+def numbers(value: object) -> Array | None:
+    """Return an array of numbers that a list, a tuple or an array is; None: it is not.
+
+    A part that a bare value means begins with it; see `Declared.of_value`.
+    """
+    if not isinstance(value, list | tuple | np.ndarray):
+        return None
+    try:
+        array = np.asarray(value)
+    except ValueError:  # rows of different lengths
+        return None
+    return array.astype(float) if array.dtype.kind in "fiu" else None
+
+
 def read_only(value: Any) -> Array:
     """Return a read-only copy, as doubles."""
     if isinstance(value, list):

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
-from pydantic import WithJsonSchema
+from pydantic import BeforeValidator, WithJsonSchema
 
 from hsp_control.common.arrays import Array
 from hsp_control.declaration.quantities import ArrayField, Number, read_only
@@ -44,6 +44,11 @@ def matrix_of(rotation: ArrayLike, name: str = "rotation") -> Array:
     return given.copy()
 
 
+def _coefficients(value: Any) -> Any:
+    """Return a quaternion of Pinocchio as numbers (x, y, z, w), others as they are."""
+    return value.coeffs() if isinstance(value, pin.Quaternion) else value
+
+
 def _checked(value: object) -> Array:
     array = read_only(value)
     matrix_of(array)
@@ -70,6 +75,7 @@ Rotation = Annotated[
     ArrayLike,
     ArrayField(list[Number] | list[list[Number]], _checked),
     WithJsonSchema(_SCHEMA),
+    BeforeValidator(_coefficients),
 ]
 """Roll, pitch and yaw [rad], shape (3,); a quaternion (x, y, z, w) [-], shape (4,); or
 a matrix, body to world [-], shape (3, 3)."""

@@ -24,7 +24,7 @@ from hsp_control.robot import Robot
 from hsp_control.robot.description import mesh_files
 from hsp_control.robot.description.access import XmlError, read_xml
 from hsp_control.robot.description.loading import RobotPart
-from hsp_control.robot.description.sources import BodyShape, RobotSource
+from hsp_control.robot.description.sources import PINOCCHIO, BodyShape, RobotSource
 from hsp_control.robot.description.urdf import parser_text, read_urdf
 
 Proxy = Literal["capsules", "spheres", "hulls", "meshes"]
@@ -113,13 +113,13 @@ def _collision_shapes(robot: Robot, part: RobotPart) -> list[LinkShape]:
             name = part.prefix + shape.body
             frame = robot.model.frames[robot.frame_id(name)]
             place = frame.placement * pin.SE3(shape.pose)
-            geometry = _body_geometry(shape)
+            geometry = _body_geometry(shape, as_is=part.source.origin == PINOCCHIO)
             shapes.append(LinkShape(name, frame.parentJoint, place, geometry))
     return shapes
 
 
-def _body_geometry(shape: BodyShape) -> Any:
-    """Return Coal's geometry; of a mesh its convex hull, or a flat mesh as it is."""
+def _body_geometry(shape: BodyShape, *, as_is: bool) -> Any:
+    """Return Coal's geometry; of a mesh its convex hull, unless it is flat or as is."""
     match shape.kind:
         case "box":
             return coal.Box(*shape.size)
@@ -138,7 +138,7 @@ def _body_geometry(shape: BodyShape) -> Any:
     for triangle in vertices[triangles]:
         mesh.addTriangle(*triangle)
     mesh.endModel()
-    return convex_hull(mesh) or mesh
+    return mesh if as_is else convex_hull(mesh) or mesh
 
 
 def _shapes_of_urdf(robot: Robot, part: RobotPart) -> list[LinkShape]:

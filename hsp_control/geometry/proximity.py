@@ -171,6 +171,9 @@ class Proximity:
         ]
         self._measured: RobotState | None = None
         self._stamp = -1, -1
+        # For `gradient`, always the same arrays: a kernel is bound to them once.
+        self._slopes, self._curvatures = np.zeros((2, len(pairs)))
+        self._gradient, self._rate = np.zeros((2, robot.nv))
 
     def measure(self, state: RobotState) -> Array:
         """Return all distances at a state, shape (k,) [m]; computed once per state."""
@@ -197,13 +200,14 @@ class Proximity:
     def gradient(self, state: RobotState, slopes: Array) -> Array:
         """Return Σ slopes_k ∇d_k, shape (nv,); pairs with slope 0 are skipped."""
         self.measure(state)
-        result, rate = np.zeros(self.robot.nv), np.zeros(self.robot.nv)
+        self._slopes[:], self._gradient[:], self._rate[:] = slopes, 0.0, 0.0
         if self.closed_form is not None:
-            curvatures = np.zeros(len(slopes))
-            self.closed_form.differentiate(state, slopes, curvatures, result, rate)
+            self.closed_form.differentiate(
+                state, self._slopes, self._curvatures, self._gradient, self._rate
+            )
         if self.coal is not None:
-            self.coal.add_gradient(state, slopes, result)
-        return result
+            self.coal.add_gradient(state, slopes, self._gradient)
+        return self._gradient.copy()
 
     def nearest(self, state: RobotState) -> tuple[float, str]:
         """Return the minimum distance [m] and the names of its pair, ``a to b``."""

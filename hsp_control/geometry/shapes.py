@@ -16,6 +16,7 @@ import coal
 import numpy as np
 
 from hsp_control.common.arrays import Array
+from hsp_control.common.entry_points import own_names
 from hsp_control.common.exceptions import SceneError
 from hsp_control.declaration import Part
 from hsp_control.declaration.families import value_fields
@@ -288,3 +289,6 @@ def shape_from_log(kind: str, parameters: Mapping[str, Any]) -> Shape | None:
     shape = shape_class(**parameters)
     assert isinstance(shape, Shape)
     return shape
+
+
+__dir__ = own_names(__name__)

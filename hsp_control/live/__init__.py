@@ -1,5 +1,6 @@
 """Real-time control: run a controller on a robot each period, ending in a safe stop."""
 
+from hsp_control.common.entry_points import own_names
 from hsp_control.simulation.control_chain import EffortSource as EffortSource
 
 from .hardware import Hardware as Hardware
@@ -21,3 +22,5 @@ from .simulated_robot import SimulatedRobot as SimulatedRobot
 from .udp import SensorLayout as SensorLayout
 from .udp import UdpHardware as UdpHardware
 from .udp import serve as serve
+
+__dir__ = own_names(__name__)

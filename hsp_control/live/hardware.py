@@ -90,24 +90,11 @@ class AdaptingHardware(LocatedHardware, Protocol):
         """Return the settings with what is fixed on this robot."""
 
 
-class Connect(Protocol):
-    """Connects to a robot: an entry point of the group ``hsp_control.hardware``."""
-
-    def __call__(self, address: str, robot: Robot, period: float) -> Hardware:
-        """Return the connected robot.
-
-        Args:
-            address: What stands behind ``name://``.
-            robot: The controller's model.
-            period: The control period [s].
-
-        Raises:
-            HardwareError: If the robot cannot be reached.
-        """
-
-
 def connect(url: str, robot: Robot, period: float) -> Hardware:
     """Return the robot at ``name://address``; an installed package provides the name.
+
+    Its entry point of the group ``hsp_control.hardware`` is a function of the address,
+    the model and the period, which returns the connected robot.
 
     Args:
         url: Name and address.
@@ -119,7 +106,7 @@ def connect(url: str, robot: Robot, period: float) -> Hardware:
         HardwareError: If the robot cannot be reached.
     """
     address, known = _known("--robot", url, "hardware")
-    make: Connect = known.load()
+    make: Callable[[str, Robot, float], Hardware] = known.load()
     return make(address, robot, period)
 
 

@@ -10,26 +10,28 @@ from time import monotonic
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FallError, HspControlError, LiveError
 from hsp_control.control.compensation import Command
 from hsp_control.control.controller import Controller
 from hsp_control.control.estimator import Estimator
+from hsp_control.control.falling import FallDetector
 from hsp_control.control.first_state import warn_of_slow_efforts
 from hsp_control.control.plan import Plan
 from hsp_control.declaration.nested import parts_within
 from hsp_control.geometry.scene import Scene
-from hsp_control.live.bearing_feet import Balance, BearingFeet, balance_of
 from hsp_control.live.effort_limiter import EffortLimiter
 from hsp_control.live.hardware import Hardware, described
 from hsp_control.live.live_log import LoopLog
 from hsp_control.live.operator_requests import OperatorRequests, stop_signals
 from hsp_control.live.real_time import no_garbage_collection, real_time_priority
 from hsp_control.live.report import Ended, LoopReport
-from hsp_control.live.safe_stop import Phase, SafeStop
+from hsp_control.live.safe_stop import BearingFeet, Phase, SafeStop
 from hsp_control.live.settings import LiveSettings, check_held
 from hsp_control.live.state_reader import StateReader
+from hsp_control.robot import RobotState
 from hsp_control.simulation.control_chain import ControlChain, EffortSource
 from hsp_control.trajectories.schedule import Schedule
 
@@ -133,8 +135,7 @@ def run_loop(
             controller.compute(start_time, first.q, first.v)  # begins
             loop_log.begin()
             safe_stop.begin()
-            balance = balance_of(robot, controller.contacts, reader.state)
-            loop = OneRun(
+            loop = LiveRun(
                 chain,
                 hardware,
                 reader,
@@ -144,7 +145,7 @@ def run_loop(
                 requests,
                 settings,
                 end,
-                balance,
+                _fall_detector(controller, reader.state),
             )
             with real_time_priority(priority), no_garbage_collection():
                 loop.run(on_period)
@@ -200,8 +201,26 @@ def _instants(controller: Controller) -> Iterator[float]:
         yield change.end
 
 
+_ROOT = 1
+"""Index of the joint that a floating base is."""
+
+
+def _fall_detector(controller: Controller, state: RobotState) -> FallDetector | None:
+    """Return what finds a fall; None if the robot's base is fixed."""
+    robot = controller.robot
+    if not robot.unactuated:
+        return None
+    base = next(
+        str(frame.name)
+        for frame in robot.model.frames
+        if frame.parentJoint == _ROOT and frame.type == pin.FrameType.BODY
+    )
+    feet = tuple(contact.frame for contact in controller.contacts)
+    return FallDetector(base, feet, state)
+
+
 @dataclass(eq=False)
-class OneRun:
+class LiveRun:
     """One run of a loop whose parts are ready: `run`, then `finish`; none raises."""
 
     chain: ControlChain[EffortSource]
@@ -213,7 +232,7 @@ class OneRun:
     requests: OperatorRequests
     settings: LiveSettings
     end: float  # when the duration is over [s]
-    balance: Balance | None = None
+    detector: FallDetector | None  # until the robot has fallen; None: it cannot fall
     phase: Phase = Phase.RUNNING  # running, damping or holding
     ended: Ended = "completed"
     reason: str = ""
@@ -277,18 +296,17 @@ class OneRun:
     def feel_ground(self) -> None:
         """Find which feet bear, and stop if the robot falls."""
         measurement, state = self.reader.measurement, self.reader.state
-        if self.balance is None or measurement is None:
+        if self.detector is None or measurement is None:
             return
-        if not self.balance.lost:
-            self.safe_stop.feet.feel(measurement._replace(t=state.t))
-            fallen = self.balance.fault(state)
-            if fallen is not None:
-                self.fall(fallen)
+        self.safe_stop.feet.feel(measurement._replace(t=state.t))
+        try:
+            self.detector.check(state)
+        except FallError as error:
+            self.fall(str(error))
 
     def fall(self, reason: str, error: Exception | None = None) -> None:
         """Stop a robot that falls: its feet hold it no more."""
-        if self.balance is not None:
-            self.balance.lost = True
+        self.detector = None
         self.safe_stop.feet.lose()
         self.stop("fault", reason, error)
 

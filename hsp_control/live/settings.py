@@ -9,7 +9,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LiveError
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import RobotLimits
-from hsp_control.constraints.limits.joint_numbers import Positives, by_dof
+from hsp_control.constraints.limits.joint_numbers import Positives, by_dof, own_maximum
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import (
     Count,
@@ -114,9 +114,7 @@ class LiveSettings(Part, error=LiveError):
             with within("effort"):
                 own = by_dof(self.effort, robot.nv, error=LiveError)
         else:
-            own = np.array(robot.model.effortLimit, dtype=float)
-            # URDFs contain 0, or the largest float, where there is no limit.
-            own[(own <= 0.0) | (own >= np.finfo(np.float32).max)] = np.inf
+            own = own_maximum(robot.model.effortLimit, robot)
         own[list(robot.unactuated)] = 0.0  # no motor is there
         return own
 

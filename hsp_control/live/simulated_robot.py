@@ -8,10 +8,9 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HspControlError, LiveError
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import RobotLimits, own_limits
-from hsp_control.live.bearing_feet import BearingFeet
 from hsp_control.live.effort_limiter import EffortLimiter
 from hsp_control.live.hardware import Measurement
-from hsp_control.live.safe_stop import Phase, SafeStop
+from hsp_control.live.safe_stop import BearingFeet, Phase, SafeStop
 from hsp_control.live.settings import LiveSettings
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.integrators import Integrator, Rk4

@@ -22,15 +22,16 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HspControlError, StreamError
 from hsp_control.control.changes import Changes
 from hsp_control.control.controller import Controller
+from hsp_control.control.targets import DELAY, RAMP, new_stream
 from hsp_control.declaration.nested import parts_within
 from hsp_control.geometry.scene import Obstacle
 from hsp_control.null_space.fields import TargetPosture
 from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.fields.weight import sample_weight
-from hsp_control.play.knobs import RAMP, Knob, knobs_of
+from hsp_control.play.knobs import Knob, knobs_of
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import FrameOrientation, FramePose, FramePosition, Task
-from hsp_control.trajectories import Stream, StreamOrientation, StreamPose
+from hsp_control.trajectories import Stream
 from hsp_control.trajectories.crossfade import AnyReference
 from hsp_control.trajectories.remembering import Written
 from hsp_control.trajectories.streams.stream import Streamed
@@ -38,17 +39,7 @@ from hsp_control.visualization.palette import FIELD
 
 BACK = 1.5
 """Time over which a path of its own comes back [s]: half a metre at 0.6 m/s at most."""
-_MOVING: dict[str, Any] = {"speed": 0.5, "acceleration": 3.0, "jerk": 60.0}
-"""Bounds of what is dragged [m/s, m/s², m/s³]: those that arms bear, whose limits then
-rarely bind."""
-_TURNING: dict[str, Any] = {
-    "angular_speed": 1.5,
-    "angular_acceleration": 8.0,
-    "angular_jerk": 200.0,
-}
-"""The same for turning [rad/s, rad/s², rad/s³]."""
 _FARTHEST = 1e3  # nothing is dragged farther [m]
-DELAY = 0.03  # time to a target that is dragged [s]: about two of a page's pictures
 
 
 class Grip(ABC):
@@ -59,6 +50,7 @@ class Grip(ABC):
         self.name = name
         self._controller = controller
         self._stream: Streamed | None = None
+        self._wanted_at: tuple[float, list[float]] | None = None
 
     def move(self, value: Any, t: float) -> None:
         """Lead it somewhere from time t on [s]."""
@@ -68,20 +60,29 @@ class Grip(ABC):
         if not known:
             self._follow(stream, self._controller.at(t).ramp(RAMP))
             self._stream = stream
+        self._wanted_at = t, [float(x) for x in value]
 
     def resume(self, t: float) -> None:
         """Let it return to its own path from time t on [s]."""
         if self._stream is not None:
             self._follow(None, self._controller.at(t).ramp(BACK))
-        self._stream = None
+        self._stream = self._wanted_at = None
 
     @abstractmethod
     def describe(self, state: RobotState) -> dict[str, Any]:
         """Return what a page must know of it."""
 
-    @abstractmethod
     def where(self, state: RobotState) -> list[float]:
-        """Return where it is now: x, y, z and a quaternion, or less."""
+        """Return where it is now, or is wanted while the time stands still.
+
+        That is x, y, z and a quaternion, or less.
+        """
+        if self._wanted_at is not None and self._wanted_at[0] == state.t:
+            return self._wanted_at[1]
+        return self._where(state)
+
+    @abstractmethod
+    def _where(self, state: RobotState) -> list[float]: ...
 
     @abstractmethod
     def _new_stream(self) -> Streamed: ...
@@ -124,7 +125,7 @@ class TargetGrip(Grip):
         pose = self.where(state)
         return {"name": self.name, "kind": self._kind, "axes": self._axes, "pose": pose}
 
-    def where(self, state: RobotState) -> list[float]:
+    def _where(self, state: RobotState) -> list[float]:
         """Return x, y, z and a quaternion; the frame's own where the task is free."""
         frame = state.frame(self._frame)
         pose = pin.SE3ToXYZQUAT(pin.SE3(frame.rotation, frame.position))
@@ -134,11 +135,7 @@ class TargetGrip(Grip):
         return [float(x) for x in pose]
 
     def _new_stream(self) -> Streamed:
-        if self._kind == "position":
-            return Stream(**_MOVING, delay=DELAY)
-        if self._kind == "orientation":
-            return StreamOrientation(**_TURNING, delay=DELAY)
-        return StreamPose(**_MOVING, **_TURNING, delay=DELAY)
+        return new_stream(self._own)
 
     def _wanted(self, value: Array) -> Array:
         return _pose(value)[self._tracked]
@@ -159,17 +156,16 @@ class ObstacleGrip(Grip):
 
     def describe(self, state: RobotState) -> dict[str, Any]:
         """Return its name, its position and its size."""
-        reach = self._obstacle.shape.bounding_radius
-        radius = reach if np.isfinite(reach) else 0.0
+        radius = self._obstacle.shape.bounding_radius
         return {"name": self.name, "position": self.where(state), "radius": radius}
 
-    def where(self, state: RobotState) -> list[float]:
+    def _where(self, state: RobotState) -> list[float]:
         """Return the position of its frame."""
         place = self._controller.scene[self.name].placement(state.t)
         return [float(x) for x in place.translation]
 
     def _new_stream(self) -> Streamed:
-        return Stream(**_MOVING, delay=DELAY)
+        return new_stream(self._obstacle.center)
 
     def _wanted(self, value: Array) -> Array:
         if value.shape != (3,) or not (np.abs(value) < _FARTHEST).all():
@@ -193,9 +189,11 @@ def targets_of(controller: Controller) -> dict[str, TargetGrip]:
 
 
 def obstacles_of(controller: Controller) -> dict[str, ObstacleGrip]:
-    """Return the grips of the obstacles that have a place, by name."""
+    """Return the grips of the bounded obstacles that have a place, by name."""
     found = {}
     for obstacle in controller.scene.values():
+        if not np.isfinite(obstacle.shape.bounding_radius):
+            continue  # such as the floor
         try:
             ObstacleGrip(obstacle, controller).where(controller.state)
         except HspControlError:
@@ -230,7 +228,7 @@ class PostureGrip(Grip):
         about = {"kind": "position", "axes": [True] * 3, "color": FIELD}
         return {"name": self.name, **about, "pose": self.where(state)}
 
-    def where(self, state: RobotState) -> list[float]:
+    def _where(self, state: RobotState) -> list[float]:
         """Return the joint's pose in the target posture, x, y, z and a quaternion."""
         terms = [
             t for t in terms_of(self._controller.field) if isinstance(t, TargetPosture)
@@ -247,7 +245,8 @@ class PostureGrip(Grip):
         return [float(x) for x in pin.SE3ToXYZQUAT(self._data.oMi[self._joint])]
 
     def _new_stream(self) -> Streamed:
-        return Stream(np.zeros(self._robot.nv), **_JOINTS_MOVING, delay=DELAY)
+        here = np.zeros(self._robot.nv)
+        return Stream(here, policy="latest", delay=DELAY, **_JOINTS_MOVING)
 
     def _wanted(self, value: Array) -> Array:
         self._target = self._posture_with(self._target, _pose(value)[:3])
@@ -336,7 +335,7 @@ class Handles:
         """Do what a page says; what is wrong is answered in `message`.
 
         ``move`` a target or an ``obstacle``, let it ``resume`` its own path, ``set`` a
-        knob. A target that is ``release``d stays where it is.
+        knob. What is ``release``d stays where it is.
         """
         try:
             self._do(message)
@@ -358,7 +357,7 @@ class Handles:
                 if name not in self.knobs:
                     raise ValueError(f"there is no knob {name!r}")
                 self._wanted[name] = self.knobs[name].checked(value)
-            case {"do": "release", "target": str()} | {"do": "left"}:
+            case {"do": "release" | "left"}:
                 pass
             case _:
                 raise ValueError(f"cannot do {str(dict(message))[:200]}")

@@ -20,7 +20,6 @@ from hsp_control.tasks import Gains, Impedance
 from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.task import SecondOrderTask
 
-RAMP = 0.2  # time that a change takes [s]
 _REACH = 10.0
 """A slider goes from a tenth of a setting to ten times it, within what is borne."""
 _BORNE = 0.2  # largest rate times period that a slider offers; see `rate_check.RULE`
@@ -37,6 +36,7 @@ class Knob(NamedTuple):
     low: float
     high: float
     turn: Callable[[Changes, Any], object]
+    note: str = ""  # what it does
 
     def describe(self) -> dict[str, Any]:
         """Return what a page must know of it."""
@@ -45,6 +45,7 @@ class Knob(NamedTuple):
             "id": self.id,
             "group": self.group,
             "label": self.label,
+            "note": self.note,
             "unit": self.unit,
             "kind": "switch" if on_off else "slider",
             "value": self.value,
@@ -78,17 +79,23 @@ def _null_space(controller: Controller, period: float) -> Iterator[Knob]:
         return
     switch = _FieldSwitch(field)
     if switch.whole:
-        yield Knob("field", group, "field", "", True, 0.0, 1.0, switch.turn)
+        note = "Off: nothing tells the free joints where to go."
+        yield Knob("field", group, "Field", "", True, 0.0, 1.0, switch.turn, note)
     K = controller.null_space_gain
     gain = float(np.diag(K).mean())
     if np.allclose(K, gain * np.eye(len(K))):
         low, high = _span(gain, period)
-        yield Knob("null_space_gain", group, "K_N", "1/s", gain, low, high, _set_gain)
+        note = "How fast the free joints take up the field's motion."
+        id_, label = "null_space_gain", "Null-space gain K_N"
+        yield Knob(id_, group, label, "1/s", gain, low, high, _set_gain, note)
     for name, weight in switch.weights.items():
         if weight:
-            turn, label = partial(switch.weigh, name), f"{name}, weight"
-            most = 5.0 * weight
-            yield Knob(f"weight.{name}", group, label, "", weight, 0.0, most, turn)
+            turn, most = partial(switch.weigh, name), 5.0 * weight
+            label = f"Weight of {name.replace('_', ' ')}"
+            note = "How much this term counts beside the others."
+            yield Knob(
+                f"weight.{name}", group, label, "", weight, 0.0, most, turn, note
+            )
 
 
 class _FieldSwitch:
@@ -127,16 +134,17 @@ def _tasks(controller: Controller, period: float) -> Iterator[Knob]:
         name, impedance = task.name, impedance_of(task)
         if impedance is not None:
             low, high, turn = 1.0 / _REACH, _REACH, partial(_stiffen, name, impedance)
-            id_ = f"stiffness.{name}"
-            yield Knob(id_, name, "stiffness", "×", 1.0, low, high, turn)
+            id_, note = f"stiffness.{name}", "How hard it resists a push."
+            yield Knob(id_, name, "Stiffness", "×", 1.0, low, high, turn, note)
             continue
         Kp, Kv = task.gains.matrices(task.rows)
         frequency = float(np.sqrt(np.diag(Kp).mean()))
         if np.allclose(Kp, frequency**2 * np.eye(len(Kp))):
             ratio = float(np.diag(Kv).mean() / (2.0 * frequency))
             (low, high), turn = _span(frequency, period), partial(_tune, name, ratio)
-            id_, label = f"frequency.{name}", "natural frequency"
-            yield Knob(id_, name, label, "rad/s", frequency, low, high, turn)
+            id_, label = f"frequency.{name}", "Natural frequency"
+            note = "How fast its error decays."
+            yield Knob(id_, name, label, "rad/s", frequency, low, high, turn, note)
 
 
 def _span(rate: float, period: float) -> tuple[float, float]:

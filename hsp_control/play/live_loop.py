@@ -12,9 +12,9 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.config import Experiment
 from hsp_control.control.controller import Controller
+from hsp_control.control.targets import RAMP
 from hsp_control.live import OperatorRequests
 from hsp_control.play.handles import Handles
-from hsp_control.play.knobs import RAMP
 from hsp_control.simulation.journal import JournalReader
 from hsp_control.simulation.log_writer import LogWriter
 
@@ -90,6 +90,8 @@ class DeadMansKey:
         return self._clock() < self._until
 
 
+PAGE_ENDED = "the process of the page has ended"
+"""Why a loop stops that nobody can steer."""
 TOLD = 1.0 / 30.0  # time between two words to the page [s]
 _MESSAGES = 4  # messages that are taken in one period at most
 
@@ -136,8 +138,8 @@ class SteeredLoop:
                     self._requests.stop("stopped from the page")
                 case _ if self._requests.reason is None:
                     self.handles.receive(message)
-        if self.key is not None and self._channel.lost:  # nobody can hold it any more
-            self._requests.stop("the process of the page has ended")
+        if self._channel.lost:  # nobody can steer it any more
+            self._requests.stop(PAGE_ENDED)
 
     def tell(self) -> None:
         """Say where everything is, and what the knobs are set to."""

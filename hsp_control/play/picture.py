@@ -13,8 +13,7 @@ from hsp_control.null_space.fields.weight import sample_weight
 from hsp_control.play.live_loop import Mirror
 from hsp_control.play.session import Session
 from hsp_control.simulation import Rollout
-from hsp_control.simulation.log_series import distance_label
-from hsp_control.simulation.unreached import unreached
+from hsp_control.simulation.log_series import distance_label, joint_names, unreached
 from hsp_control.visualization.palette import SERIES
 from hsp_control.visualization.viewer import Viewer
 from hsp_control.visualization.viewer.clearances import capsules, distances, influence
@@ -52,6 +51,7 @@ class Plot(NamedTuple):
     """One plot."""
 
     title: str
+    note: str  # what it tells
     unit: str
     log: bool  # whether its scale is logarithmic
     curves: list[Curve]
@@ -74,7 +74,7 @@ class Picture:
         session, viewer = self._session, self._viewer
         self._sent = 0
         self._moved: dict[str, float] = {}
-        self._away = ""
+        self._away: dict[str, str] = {}
         self._meta = session.meta
         self._field, self._acting = session.controller.field, self._acting_terms()
         motion = self._motion()
@@ -124,11 +124,14 @@ class Picture:
         return [
             *changed,
             play_command("pose", "pose", tracks=tracks),
-            play_command("play_targets", "targets", poses=poses, obstacles=places),
+            play_command(
+                "play_targets", "targets", poses=poses, obstacles=places,
+                away=self._away,
+            ),
             play_command(
                 "play_state", "state", t=session.t, running=running, rate=rate,
                 message=text, level="warning" if handles.warning or session.over
-                else "info", away=self._away,
+                else "info",
             ),
             play_command("play_values", "values", values=handles.settings),
             self._force(),
@@ -182,6 +185,7 @@ class Picture:
                 {
                     "id": f"plot{k}",
                     "title": plot.title,
+                    "note": plot.note,
                     "unit": plot.unit,
                     "log": plot.log,
                     "series": series,
@@ -221,7 +225,7 @@ class Picture:
             return
         rows, self._sent = recorder.rows(self._sent), recorder.count
         away = unreached(rows, self._meta["tasks"], self._moved)
-        self._away = "\n".join(filter(None, (task.words(-1) for task in away)))
+        self._away = {task.task: words for task in away if (words := task.words(-1))}
         times = rows["t"]
         self._batch += 1
         values = np.column_stack(
@@ -249,37 +253,38 @@ def _values(rows: dict[str, Array], curve: Curve) -> Array:
 
 
 def _plots(session: Played) -> Iterator[Plot]:
-    """Yield the plots of a session."""
+    """Yield the plots of a session, what tells most first."""
     controller = session.controller
+    rows, meta = session.recorder.rows(0), session.meta
+    dofs = joint_names(Rollout(rows, meta))
+    if controller.field.controls:
+        norm = Curve("‖e_N‖", "null_space_norm", slice(0, 1))
+        unit = ", ".join(f"{unit}/s" for unit in dict.fromkeys(controller.robot.units))
+        note = "Of the free joints' motion; K_N makes it decay."
+        yield Plot("Null-space error ‖e_N‖", note, unit, True, [norm])
+    names = [name for name in rows if name.startswith("distance.")]
+    if names:
+        labels = [distance_label(meta, n.removeprefix("distance.")) for n in names]
+        curves = [
+            Curve(label, name, slice(0, 1))
+            for label, name in zip(labels, names, strict=True)
+        ]
+        note = "To obstacles; below 0 is a collision."
+        yield Plot("Clearance", note, "m", False, curves)
+    curves = [Curve("‖τ‖", "tau", slice(0, len(dofs)))]
+    if len(dofs) <= _JOINTS:
+        curves = [Curve(n, "tau", slice(k, k + 1)) for k, n in enumerate(dofs)]
+    yield Plot("Efforts τ", "Of the motors.", "N·m", False, curves)
     errors: dict[str, list[Curve]] = {}
     for task in controller.tasks:
         first = 0
         for part in task.error_parts:
             one = len(task.error_parts) == 1
             name = task.name if one else f"{task.name}, {part.name}"
-            rows = slice(first, first + part.size)
-            curve = Curve(name, f"task.{task.name}.error", rows)
+            own = slice(first, first + part.size)
+            curve = Curve(name, f"task.{task.name}.error", own)
             errors.setdefault(part.unit, []).append(curve)
             first += part.size
     for unit, curves in errors.items():
-        yield Plot("Task error", unit, True, curves)
-    if controller.field.controls:
-        norm = Curve("‖e_N‖", "null_space_norm", slice(0, 1))
-        units = dict.fromkeys(controller.robot.units)
-        unit = ", ".join(f"{unit}/s" for unit in units)
-        yield Plot("Null-space error", unit, True, [norm])
-    names = [name for name in session.recorder.rows(0) if name.startswith("distance.")]
-    if names:
-        meta = session.meta
-        labels = [distance_label(meta, n.removeprefix("distance.")) for n in names]
-        curves = [
-            Curve(label, name, slice(0, 1))
-            for label, name in zip(labels, names, strict=True)
-        ]
-        yield Plot("Smallest distance", "m", False, curves)
-    dofs = controller.robot.dof_names
-    if len(dofs) <= _JOINTS:
-        curves = [Curve(n, "tau", slice(k, k + 1)) for k, n in enumerate(dofs)]
-    else:
-        curves = [Curve("‖τ‖", "tau", slice(0, len(dofs)))]
-    yield Plot("Effort", "N·m", False, curves)
+        note = "From each target."
+        yield Plot("Task error", note, unit, True, curves)

@@ -13,6 +13,7 @@ from hsp_control.config import Experiment
 from hsp_control.config.document import Document
 from hsp_control.config.experiment import build
 from hsp_control.config.source import read_document
+from hsp_control.geometry.links import link_shapes
 from hsp_control.play.session import ROW
 from hsp_control.robot import Robot
 from hsp_control.robot.description.sources import is_robot
@@ -69,45 +70,77 @@ def _for_robot(name: str) -> dict[str, Any]:
             f"{name} has a free-flyer root, which needs contacts: give a "
             f"configuration{listed}"
         )
-    center, radius = _beside_the_elbow(robot)
+    size, elbow, forward, across = _build_of(robot)
+    radius = _rounded(0.13 * size)
+    eye = elbow + size * (3.4 * forward + 1.9 * across + [0.0, 0.0, 1.2])
+    floor = {"shape": {"type": "plane"}, "center": {"type": "hold", "point": [0, 0, 0]}}
+    ball = {
+        "shape": {"type": "sphere", "radius": radius},
+        "center": {"type": "hold", "point": _listed(elbow + 6.0 * radius * across)},
+    }
+    clear = _above_the_floor(robot, 0.05 * size)
+    below = {"type": "obstacles", "obstacles": ["floor"], "links": clear}
     pose = robot.nv >= 6
     has_home = bool(np.any(robot.home() != robot.neutral()))
     return {
-        "title": f"{name}: take its hand, move the ball, pull at a link",
+        "title": f"{name}: take its hand, push the ball against its elbow",
         "robot": {"name": name},
         **({} if has_home else {"start": "auto"}),
-        "scene": {
-            "obstacles": {
-                "ball": {
-                    "shape": {"type": "sphere", "radius": radius},
-                    "center": {"type": "hold", "point": center},
-                }
-            }
-        },
+        "scene": {"obstacles": {"ball": ball, **({"floor": floor} if clear else {})}},
         "tasks": {"hand": {"type": "frame_pose" if pose else "frame_position"}},
+        "limits": {"distances": [*([below] if clear else []), {"type": "self"}]},
         "null_space": {
             "gain": 10,
             "fields": [
                 {"type": "obstacle_clearance", "obstacles": ["ball"],
-                 "influence": 3.0 * radius},
+                 "influence": _rounded(2.5 * radius)},
                 {"type": "target_posture", "target": "start"},
             ],
+        },
+        "view": {
+            "camera": _listed(eye),
+            "target": _listed(elbow * [1, 1, 0.75] + 0.4 * size * forward),
         },
     }  # fmt: skip
 
 
-def _beside_the_elbow(robot: Robot) -> tuple[list[float], float]:
-    """Return the centre and the radius of a ball beside the robot's elbow [m]."""
+def _build_of(robot: Robot) -> tuple[float, Array, Array, Array]:
+    """Return a robot's size [m], its elbow [m], and horizontal unit vectors at home.
+
+    The first points to the hand, the second to the left of it.
+    """
     state = robot.state(0.0, robot.home(), np.zeros(robot.nv))
-    points = np.array([place.translation for place in state.data.oMi][1:])
     hand = state.position(robot.end_effector)
-    reach = float(np.linalg.norm(hand - points[0]).max())
-    size = max(reach, float(np.ptp(points, axis=0).max()), 1e-3)
-    elbow: Array = points[np.argmin(np.abs(np.linalg.norm(points - hand, axis=1)
-                                           - 0.5 * size))]  # fmt: skip
-    across = np.cross(hand - points[0], [0.0, 0.0, 1.0])
-    if np.linalg.norm(across) < 1e-3 * size:
-        across = np.array([0.0, 1.0, 0.0])
-    away = across / np.linalg.norm(across)
-    radius = 0.1 * size
-    return [float(x) for x in elbow + 5.0 * radius * away], float(f"{radius:.3g}")
+    points = np.array([*(place.translation for place in state.data.oMi[1:]), hand])
+    along = hand - points[0]
+    size = max(float(np.linalg.norm(along)), float(np.ptp(points, axis=0).max()), 1e-3)
+    away = np.linalg.norm(np.cross(points - points[0], along), axis=1)
+    elbow = points[int(np.argmax(away))]
+    if away.max() < 0.1 * size**2:  # a straight arm
+        elbow = points[
+            np.argmin(np.abs(np.linalg.norm(points - hand, axis=1) - size / 2))
+        ]
+    forward = along * [1.0, 1.0, 0.0]
+    length = float(np.linalg.norm(forward))
+    forward = forward / length if length > 1e-3 * size else np.array([1.0, 0.0, 0.0])
+    return size, elbow, forward, np.cross([0.0, 0.0, 1.0], forward)
+
+
+def _above_the_floor(robot: Robot, height: float) -> list[str]:
+    """Return the moving links that are at least this high at home [m]."""
+    state = robot.state(0.0, robot.home(), np.zeros(robot.nv))
+    lowest: dict[str, float] = {}
+    for shape in link_shapes(robot, "spheres"):
+        center = state.data.oMi[shape.joint].act(shape.placement.translation)
+        bottom = float(center[2] - shape.geometry.radius)
+        if shape.joint > 0:
+            lowest[shape.link] = min(lowest.get(shape.link, np.inf), bottom)
+    return [link for link, bottom in lowest.items() if bottom > height]
+
+
+def _listed(point: Array) -> list[float]:
+    return [_rounded(x) for x in point]
+
+
+def _rounded(x: float) -> float:
+    return float(f"{x:.3g}")

@@ -1,5 +1,6 @@
 """A simulation that goes on and on, and whoever plays with it; without a picture."""
 
+import gc
 import logging
 from collections.abc import Iterator, Mapping
 from copy import deepcopy
@@ -84,11 +85,12 @@ class Session:
         self._step()
         self.handles = Handles(self.controller, self.period)
         law = Knob(
-            "operational", "Null space", "operational-space law instead", "", False,
-            0.0, 1.0, self._compare,
+            "operational", "Null space", "Operational-space law instead", "", False,
+            0.0, 1.0, self._compare, "Its null space follows late.",
         )  # fmt: skip
         if self.controller.field.controls:
             self.handles.add(law)
+        gc.collect()  # what has been refers to itself, and would stay
 
     def rehearse(self) -> None:
         """Do everything once, and begin anew: no kernel is compiled in the play."""

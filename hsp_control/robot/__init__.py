@@ -1,5 +1,7 @@
 """The robot: its model, its state, and the kinematic and dynamic terms there."""
 
+from hsp_control.common.entry_points import own_names
+
 from .description.robot_description import PlacedRobot as PlacedRobot
 from .description.robot_description import RobotDescription as RobotDescription
 from .description.robot_description import ToolFrame as ToolFrame
@@ -11,3 +13,5 @@ from .integrators import SemiImplicitEuler as SemiImplicitEuler
 from .mujoco_coordinates import MujocoCoordinates as MujocoCoordinates
 from .robot import Robot as Robot
 from .robot import RobotState as RobotState
+
+__dir__ = own_names(__name__)

@@ -12,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
+from hsp_control.common.entry_points import own_names
 from hsp_control.common.exceptions import HspControlError, SimulationError
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import NativeCall, are_native, bind
@@ -412,3 +413,6 @@ class _Trial:
             except (HspControlError, ArithmeticError, np.linalg.LinAlgError) as failure:
                 self.failure = failure
         return np.full(y.shape, np.nan)
+
+
+__dir__ = own_names(__name__)

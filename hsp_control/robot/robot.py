@@ -26,6 +26,7 @@ from hsp_control.common.native import NativeCall, once
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Vector
 from hsp_control.robot.description.access import ANYWHERE, Access
+from hsp_control.robot.description.from_pinocchio import take_model
 from hsp_control.robot.description.loading import (
     RobotPart,
     combine,
@@ -190,6 +191,45 @@ class Robot(RobotModel):
         """
         selection = select(model, root, joints, qpos, keyframe, locked)
         return cls(*load_selection(selection, tool_frames or {}))
+
+    @classmethod
+    def from_pinocchio(
+        cls,
+        model: pin.Model,
+        collision: pin.GeometryModel | None = None,
+        visual: pin.GeometryModel | None = None,
+        *,
+        home: ArrayLike | None = None,
+        end_effector: str | None = None,
+        tool_frames: Mapping[str, ToolFrame] | None = None,
+    ) -> Self:
+        """Return the robot of a Pinocchio model, of which it keeps a copy.
+
+        ``hsp.Robot.from_pinocchio(*pin.buildModelsFromUrdf(urdf, folders))`` is the
+        robot with its shapes. Without ``collision``, distances see capsules between its
+        joints; without ``visual``, the viewer draws its joints and links. YAML can only
+        name a robot that `Robot.load` reads.
+
+        Args:
+            model: The model; gravity, friction and limits are its own. Lock joints with
+                ``pin.buildReducedModel``.
+            collision: What distances see. If it has collision pairs, only their links
+                can collide with one another.
+            visual: What is drawn.
+            home: The home posture, a configuration of shape (nq,); None: see `home`.
+            end_effector: The frame of the hand; None: see `end_effector`.
+            tool_frames: Frames to add, by name.
+
+        Raises:
+            ModelError: If an argument is of another type, a geometry model is of
+                another model, or the mass matrix is singular.
+            FrameNotFoundError: If the hand, or a tool frame's parent, does not exist.
+        """
+        given = collision, visual, home, end_effector, tool_frames or {}
+        robot = cls(*take_model(model, *given))
+        if end_effector is not None:
+            robot.frame_id(end_effector)
+        return robot
 
     @classmethod
     def _described(cls, description: RobotDescription, access: Access) -> Self:

@@ -19,7 +19,7 @@ from hsp_control.simulation.limit_excess import LimitExcess
 from hsp_control.simulation.plants import ContinuousPlant, IntegratedPlant, SampledPlant
 
 if TYPE_CHECKING:
-    from hsp_control.simulation.stretch import Stretch
+    from hsp_control.simulation.native_loop import NativeLoop
 
 RUNAWAY_SPEED = 1e4
 """Joint speed [rad/s or m/s] above which a simulation has diverged."""
@@ -72,7 +72,7 @@ def sampled_loop(
     command, excess = chain.command, LimitExcess(plant.robot)
     controller = command.controller
     period = (times[1] - times[0]) / periods
-    stretch = _stretch(chain, plant, excess)
+    native = _native_loop(chain, plant, excess)
     tau, count = np.zeros(plant.robot.nv), 0
     for start, end in zip(times, (*times[1:], times[-1]), strict=True):
         if end > start:
@@ -100,7 +100,7 @@ def sampled_loop(
                 yield Instant(state, output, tau, channels)
             if end == start:  # the last row
                 return
-            made = stretch and stretch.advance(start, end, periods, k, tau)
+            made = native and native.advance(start, end, periods, k, tau)
             if made:
                 q, v, after = made
             else:
@@ -111,9 +111,9 @@ def sampled_loop(
         _check_divergence(end, q, v)
 
 
-def _stretch(
+def _native_loop(
     chain: ControlChain[Command], plant: SampledPlant, excess: LimitExcess
-) -> "Stretch | None":
+) -> "NativeLoop | None":
     """Return what moves on many periods at once; None where each must be made alone."""
     command = chain.command
     bare = chain.is_bare and type(command) is Command and not command.compensation.names
@@ -122,9 +122,9 @@ def _stretch(
     steps = plant.native_steps()
     if steps is None:
         return None
-    from hsp_control.simulation.stretch import Stretch  # here: it imports Numba
+    from hsp_control.simulation.native_loop import NativeLoop  # here: it imports Numba
 
-    return Stretch(command.controller, plant, steps, excess)
+    return NativeLoop(command.controller, plant, steps, excess)
 
 
 def _check_divergence(t: float, q: Array, v: Array) -> None:

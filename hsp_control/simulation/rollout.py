@@ -5,6 +5,7 @@ import zipfile
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
 from typing import Any, Self
 
@@ -55,7 +56,9 @@ class Rollout:
 
     def __repr__(self) -> str:
         span = f"{self.t[0]:g} to {self.t[-1]:g} s" if len(self) else "empty"
-        return f"Rollout({len(self)} rows, {span}, {self.status})"
+        about = self.meta.get("robot", {}).get("name", "?")
+        tasks = ", ".join(self.meta.get("tasks", {}))
+        return f"Rollout({about}: {tasks}; {len(self)} rows, {span}, {self.status})"
 
     @property
     def t(self) -> Array:
@@ -104,6 +107,25 @@ class Rollout:
         rows = zip(self.t.tolist(), self.q, self.v, strict=True)
         # Each update overwrites the state's arrays, so np.array must copy.
         return np.array([np.array(function(state.update(*row))) for row in rows])
+
+    def plot(self, *, paper: bool = False) -> Any:
+        """Return a figure of the run, which Jupyter shows inline.
+
+        It compares the run with what the law predicts: errors, field and efforts. What
+        ``hsp plot`` saves is this and the paper's figure.
+
+        Args:
+            paper: Whether it is the paper's five panels instead.
+
+        Returns:
+            The ``matplotlib.figure.Figure``.
+
+        Raises:
+            PlotError: If the log has no rows.
+        """
+        # Here: what draws is a room above, and takes long to import.
+        plots = import_module("hsp_control.visualization.plots")
+        return plots.paper_figure(self) if paper else plots.diagnostics_figure(self)
 
     def save(self, path: str | Path) -> Path:
         """Write one ``.npz`` without pickles, which NumPy can read by itself.
@@ -167,16 +189,9 @@ class Rollout:
                 f"{path}: its format is {meta.get('format')!r}; this version reads "
                 f"{FORMAT!r}"
             )
-        if "status" not in meta or "dofs" not in meta.get("robot", {}):
-            raise LogError(
-                f"{path}: a log of another version: its entry 'meta' lacks the "
-                "status, or the robot's dofs"
-            )
         for name in (*_REQUIRED, *meta.get("columns", ())):
             if name not in columns:
                 raise LogError(f"{path}: the log lacks the column {name!r}")
-        if {column.shape[:1] for column in columns.values()} != {columns["t"].shape}:
-            raise LogError(f"{path}: the log's columns differ in length")
         return cls(columns, meta)
 
 

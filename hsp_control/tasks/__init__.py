@@ -1,5 +1,6 @@
 """Tasks: the motions that the robot tracks, each with its linear error equation."""
 
+from hsp_control.common.entry_points import own_names
 from hsp_control.law import TaskSample as TaskSample
 
 from .centroidal import AngularMomentum as AngularMomentum
@@ -13,3 +14,5 @@ from .joint_posture import JointPosture as JointPosture
 from .pointing import Pointing as Pointing
 from .relative_pose import RelativePose as RelativePose
 from .task import Task as Task
+
+__dir__ = own_names(__name__)

@@ -209,6 +209,9 @@ class FramePose(FrameTask, TrackingTask, CompliantTask, type="frame_pose"):
     The two errors are decoupled and exactly linear, and the origin returns on a
     straight line. With the logarithm on SE(3) it would return on a screw
     (docs/law.md).
+
+    Python may give what is held as it is: ``FramePose("hand", pin.SE3(...))``, or x, y,
+    z and a quaternion (x, y, z, w), or x, y, z.
     """
 
     drawn: ClassVar[tuple[Drawn, ...]] = ("position", "orientation")

@@ -38,7 +38,7 @@ class Gains(Part, error=GainError):
                 "give either kp and kv, or natural_frequency and damping_ratio"
             )
         if stiff and (self.kp is None or self.kv is None):
-            raise GainError("give both kp and kv; one of them is missing")
+            raise GainError("give both kp and kv, or natural_frequency; one is missing")
         if not stiff and self.natural_frequency is None:
             raise GainError("give either kp and kv, or natural_frequency")
         self._pair()

@@ -1,5 +1,7 @@
 """Reference motions in Rⁿ, SO(3) and SE(3), with their first two derivatives."""
 
+from hsp_control.common.entry_points import own_names
+
 from .blend import Blend as Blend
 from .blend import BlendOrientation as BlendOrientation
 from .callables import CallableOrientation as CallableOrientation
@@ -32,3 +34,5 @@ from .streams.stream import StreamOrientation as StreamOrientation
 from .streams.stream import StreamPose as StreamPose
 from .trajectory import Trajectory as Trajectory
 from .trajectory import TrajectorySample as TrajectorySample
+
+__dir__ = own_names(__name__)

@@ -1,12 +1,13 @@
 """A constant point, and a constant orientation."""
 
 from functools import cached_property
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
+import pinocchio as pin
 
 from hsp_control.common.arrays import Array
-from hsp_control.declaration.quantities import Vector
+from hsp_control.declaration.quantities import Vector, numbers
 from hsp_control.declaration.rotation import Rotation, matrix_of
 from hsp_control.trajectories.orientation import (
     OrientationSample,
@@ -23,6 +24,12 @@ class Hold(Trajectory, type="hold"):
 
     point: Vector | None = None
     """x0, shape (n,) [m, or the task's unit]; where the robot starts by default."""
+
+    @classmethod
+    def of_value(cls, value: object) -> Self | None:
+        """Return the point of n numbers; see `Declared.of_value`."""
+        point = numbers(value)
+        return None if point is None or point.ndim != 1 else cls(point)
 
     @property
     def dimension(self) -> int:
@@ -46,6 +53,14 @@ class HoldOrientation(OrientationTrajectory, type="hold"):
     rotation: Rotation | None = None
     """R0, body to world: roll, pitch and yaw [rad], a quaternion or a matrix [-]; the
     orientation in which the robot starts by default."""
+
+    @classmethod
+    def of_value(cls, value: object) -> Self | None:
+        """Return what a quaternion, a matrix, or roll, pitch and yaw mean."""
+        if isinstance(value, pin.Quaternion):
+            return cls(value)
+        given = numbers(value)
+        return None if given is None else cls(given)
 
     def sample(
         self, t: float, out: OrientationSample | None = None

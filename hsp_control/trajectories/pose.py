@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from dataclasses import KW_ONLY, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import pinocchio as pin
@@ -13,7 +13,7 @@ from hsp_control.common.exceptions import TrajectoryError
 from hsp_control.common.kernels import kernel
 from hsp_control.common.rotations import compose_back, jlog3, log3, stumpff, turn
 from hsp_control.declaration import Part
-from hsp_control.declaration.quantities import Number, Positive, Vector3
+from hsp_control.declaration.quantities import Number, Positive, Vector3, numbers
 from hsp_control.declaration.rotation import Rotation, matrix_of
 from hsp_control.trajectories.following import Follower, follow_all, follow_by
 from hsp_control.trajectories.hold import Hold, HoldOrientation
@@ -149,6 +149,18 @@ class HoldPose(PoseTrajectory, type="hold_pose"):
     rotation: Rotation | None = None
     """The orientation, body to world: roll, pitch and yaw [rad], a quaternion or a
     matrix [-]; that in which the robot starts by default."""
+
+    @classmethod
+    def of_value(cls, value: object) -> Self | None:
+        """Return the pose of a pin.SE3, of x, y, z and a quaternion, or of a matrix."""
+        if isinstance(value, pin.SE3):
+            return cls(value.translation, value.rotation)
+        given = numbers(value)
+        if given is not None and given.shape == (7,):
+            return cls(given[:3], given[3:])
+        if given is not None and given.shape == (4, 4):
+            return cls(given[:3, 3], given[:3, :3])
+        return None
 
     @property
     def relative(self) -> bool:

@@ -19,6 +19,9 @@ FIELD = "#CC79A7"
 WARNING = "#882255"
 """Damped intervals near a singularity; a run that ended early (wine)."""
 
+COLLISION = "#D00020"
+"""A link inside an obstacle or another link (red)."""
+
 LINK = "#8C969F"
 """A robot's links (grey)."""
 JOINT = "#2F363D"
@@ -72,6 +75,11 @@ def series(index: int) -> str:
 def task(index: int) -> str:
     """Return the colour of task ``index``; the colours repeat."""
     return TASKS[index % len(TASKS)]
+
+
+def fractions(color: str) -> list[float]:
+    """Return red, green and blue of a colour, from 0 to 1."""
+    return [channel / 255 for channel in _channels(color)]
 
 
 def _channels(color: str) -> tuple[int, int, int]:

@@ -1,7 +1,7 @@
 """Run campaigns in full: ``python -m campaigns [NAME ...]`` in ``tests``, or make fuzz.
 
 Counts are kept in out/fuzz after every batch: what was interrupted is told as far as it
-went. docs/fuzz.md tells them.
+went. benchmarks/results/fuzz.md has them.
 """
 
 import argparse

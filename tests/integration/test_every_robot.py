@@ -5,7 +5,6 @@ of its own, while a posture and the middle of its range draw on the null space. 
 are taken from the logged motion by plain Pinocchio.
 """
 
-import runpy
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Any
@@ -14,7 +13,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from numpy.typing import NDArray
-from places import ROOT
 
 from hsp_control import (
     Controller,
@@ -275,10 +273,3 @@ def test_every_robot_is_driven_or_listed_with_its_reason() -> None:
     # What does not load as it is says what it is to be loaded with.
     for name in LOAD_OPTIONS:
         assert "load it with `" in rows[name].note
-
-
-def test_the_document_holds_the_table() -> None:
-    """After a change: python tools/robots_page.py."""
-    pytest.importorskip("example_robot_data")
-    tool = runpy.run_path(str(ROOT / "tools" / "robots_page.py"))
-    assert tool["page"]() == tool["PAGE"].read_text(encoding="utf-8")

@@ -119,16 +119,13 @@ def test_the_page_about_forces_is_true() -> None:
     assert isinstance(controller, hsp.Controller)
     out = controller.compute(0.0, controller.robot.home(), [0.0] * 7)
     assert out.forces[2] == 20.0
-    first, box, stairs = re.findall(
-        r"^```yaml\n(.*?)^```", text, re.MULTILINE | re.DOTALL
-    )
+    first, box = re.findall(r"^```yaml\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     talos = yaml.safe_load(
         (ROOT / "configs" / "forces" / "talos_wall.yaml").read_text(encoding="utf-8")
     )
     talos["contacts"] |= yaml.safe_load(first)["contacts"]
     talos["changes"] = yaml.safe_load(first)["changes"]
     talos["plant"]["solids"] = yaml.safe_load(first)["plant"]["solids"]
-    talos["plant"]["solids"] |= yaml.safe_load(stairs)["plant"]["solids"]
     load_experiment(talos)
     pandas = yaml.safe_load(
         (ROOT / "configs" / "forces" / "pandas_box.yaml").read_text(encoding="utf-8")

@@ -7,7 +7,6 @@ columns that the controller wrote about itself.
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -40,7 +39,7 @@ from hsp_control.null_space.metrics import (
     MassMatrixMetric,
     Metric,
 )
-from hsp_control.robot.integrators import Dop853, Rk4
+from hsp_control.robot.integrators import Dop853
 from hsp_control.trajectories import (
     Circle,
     ComposedPose,
@@ -306,32 +305,6 @@ def test_proposition_1_the_error_is_critically_damped(which: str) -> None:
     assert controller.robot.name == TASKS[which].robot
 
 
-@every_task
-def test_proposition_1_the_logged_acceleration(which: str) -> None:
-    """J a + J'v = a_x, J and J' by plain Pinocchio, at every row; M a + N = tau."""
-    controller, rollout = tracked(which)
-    robot, case = controller.robot, TASKS[which]
-    for i in range(0, len(rollout), 10):
-        t, q, v, a = (rollout[name][i] for name in ("t", "q", "v", "acceleration"))
-        state = robot.state(t, q, v)
-        J, J_dot = plain(case.robot).jacobians(q, v, FRAMES[case.robot])
-        answer = J @ a + J_dot @ v
-        for task in controller.tasks:
-            wanted = task.evaluate(state).acceleration
-            if isinstance(task, Pointing):
-                R = plain(case.robot).placement(q, task.frame).rotation
-                # Rows turn with the frame: (Cᵀ w)' = Cᵀ w' for rows fixed in the body.
-                C = task.evaluate(state).jacobian @ np.linalg.pinv(J[3:])
-                np.testing.assert_allclose(C @ R[:, 2], 0.0, rtol=0, atol=1e-13)
-                found = C @ answer[3:]
-            else:
-                found = answer[: task.rows]
-            np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-11)
-        model, data = robot.model, robot.model.createData()
-        answered = pin.aba(model, data, q, v, rollout.tau[i])
-        np.testing.assert_allclose(answered, a, rtol=0, atol=1e-11)
-
-
 # --- the null space ------------------------------------------------------------------
 
 
@@ -449,65 +422,6 @@ def test_proposition_2_the_null_space_error_decays_as_it_must(run: Run) -> None:
     found = differences(V, LOG_PERIOD)
     np.testing.assert_allclose(found, power[4:-4], rtol=0, atol=1e-9 * V[0])
     assert (np.diff(V) < 0.0).all()
-
-
-@pytest.mark.parametrize("run", [r for r in RUNS if r.gain == "scalar"], ids=str)
-def test_proposition_2_there_was_something_to_prove(run: Run) -> None:
-    """The field and the null space move by far more than what is left of e_N."""
-    rollout = self_motion(run)
-    g = rollout["field.g"]
-    assert np.abs(g - g[0]).max() > 0.1
-    e_N, _ = null_space_errors(run, rollout)
-    moved = e_N[-1] - np.exp(-6.0 * DURATION) * e_N[0]  # a null space that did not turn
-    if run.robot != "planar3r" or run.metric == "mass matrix":
-        assert np.abs(moved).max() > 1e-4 * np.abs(e_N[0]).max()
-
-
-@pytest.mark.parametrize("metric", METRICS)
-def test_the_law_integrates_in_fourth_order(metric: str) -> None:
-    """Rk4's error falls with the fourth power of its step: the law is smooth in t.
-
-    A null-space law that forgets a term in J' or g' would still be smooth; a state
-    left over from another stage would not.
-    """
-    run = Run("panda", metric, "scalar")
-    robot, q0 = load("panda"), home("panda")
-    start = plain("panda").placement(q0, "panda_tcp")
-    task = FramePosition(
-        "panda_tcp",
-        circle_about(start.translation, OFF),
-        gains=Gains(natural_frequency=7),
-    )
-    field = moving(robot, "panda")
-    controller = Controller(
-        robot,
-        [task],
-        field,
-        null_space_gain=6.0,
-        metric=METRICS[metric][0](7),
-        limits=None,
-    )
-    v0 = self_motion(run).v[0]
-    # The mass matrix makes light wrists fast: -M⁻¹∇f has rates of up to 1e3 1/s.
-    longest = 0.001 if metric == "mass matrix" else 0.02
-    steps = longest / np.array([1.0, 2.0, 4.0, 8.0])
-    duration = 5.0 * longest
-
-    def end(integrator: Any) -> Array:
-        out = simulate(
-            controller,
-            q0,
-            v0,
-            duration=duration,
-            log_period=duration,
-            integrator=integrator,
-        )
-        return np.concatenate([out.q[-1], out.v[-1]])
-
-    exact = end(Dop853(rtol=1e-13, atol=1e-13))
-    errors = [np.abs(end(Rk4(step)) - exact).max() for step in steps]
-    order = np.polyfit(np.log(steps), np.log(errors), 1)[0]
-    assert order == pytest.approx(4.0, abs=0.2)
 
 
 # --- the minimum ---------------------------------------------------------------------

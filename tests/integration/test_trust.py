@@ -283,7 +283,7 @@ def test_files_are_bounded(
 @pytest.mark.parametrize(("overrides", "message"), [
     (["duration=1e9", "log_period=0.01"], r"simulation: .* 1e.11 rows; at most 1e.07"),
     (["duration=10", "control_period=1e-9"], r"1e.10 steps; at most 1e.09"),
-    (["integrator.step=1e-12"], r"simulation.integrator.step: .* steps; at most"),
+    (["integrator={type: rk4, step: 1e-12}"], r"integrator.step: .* steps; at most"),
 ])  # fmt: skip
 def test_runs_that_would_not_end_are_refused(
     overrides: list[str], message: str, home: Path

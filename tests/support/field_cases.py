@@ -164,8 +164,8 @@ MEMBERS: dict[str, Member] = {
         lambda n: distance_oracle(n, 0.4),
     ),
     "limit_barrier": of_cost(
-        lambda n: hsp.fields.LimitBarrier(zone=0.9),
-        lambda n: barrier_oracle(n, 0.9),
+        lambda n: hsp.fields.LimitBarrier(zone=0.9, weights=weights_of(n)),
+        lambda n: barrier_oracle(n, 0.9, weights_of(n)),
         LIMITED,
     ),
     "manipulability": of_spectrum(

@@ -375,8 +375,8 @@ def coupling(name: str) -> Array:
     return A.T @ A
 
 
-def barrier_oracle(name: str, zone: float) -> CostOracle:
-    """Return Σ -(1 - s)² ln s of the distances to both limits, in units of the zone."""
+def barrier_oracle(name: str, zone: float, weights: Array) -> CostOracle:
+    """Return Σ -w (1 - s)² ln s of distances to both limits, in units of the zone."""
     model = load(name).model
 
     def f(t: float, q: Array) -> float:
@@ -388,7 +388,8 @@ def barrier_oracle(name: str, zone: float) -> CostOracle:
                 for away in (q[joint.idx_q] - low, high - q[joint.idx_q]):
                     s = away / (0.5 * zone * (high - low))
                     assert s > 0.02  # the core, which has its own test
-                    total += -((1.0 - s) ** 2) * np.log(s) if s < 1.0 else 0.0
+                    if s < 1.0:
+                        total -= weights[joint.idx_v] * (1.0 - s) ** 2 * np.log(s)
         return total
 
     return f

@@ -13,7 +13,6 @@ References:
     of Robotic Systems 6(2), 133-148, 1989.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
@@ -140,12 +139,7 @@ def circle(t: float) -> tuple[Array, Array, Array]:
     return x_d, w * np.array([-s, c]), -(w**2) * np.array([c, s])
 
 
-# --- the costs f, their gradients and the gradients' total rates ---------------------
-
-
-def equal_angles(theta: Array) -> float:
-    """Return f = 5 (r3 - r2)²."""
-    return float(5.0 * (SPREAD @ theta) ** 2)
+# --- the gradients of the costs f, and their total rates -----------------------------
 
 
 def equal_angles_gradient(theta: Array) -> Array:
@@ -169,11 +163,6 @@ def disk_distances(t: float, theta: Array) -> Array:
     """Return d2, d3: from joints two and three to the disk's centre, shape (2,)."""
     r = joint_positions(theta)[:2] - disk_center(t)[0]
     return np.sqrt((r**2).sum(axis=1))
-
-
-def disk_cost(t: float, theta: Array) -> float:
-    """Return f = 1/d2² + 1/d3²."""
-    return float((disk_distances(t, theta) ** -2).sum())
 
 
 def disk_cost_gradient(t: float, theta: Array) -> Array:
@@ -205,15 +194,6 @@ def disk_cost_gradient_rate(t: float, theta: Array, theta_dot: Array) -> Array:
     return (turning + receding).sum(axis=0)
 
 
-def cost(number: int, t: float, theta: Array) -> float:
-    """Return the cost f of simulation (1) to (4); zero in the first two."""
-    if number <= 2:
-        return 0.0
-    if number == 3:
-        return equal_angles(theta)
-    return equal_angles(theta) + disk_cost(t, theta)
-
-
 def cost_gradient(number: int, t: float, theta: Array) -> Array:
     """Return ∇f, the partial derivative at fixed t."""
     if number <= 2:
@@ -242,7 +222,6 @@ class PaperLaw(NamedTuple):
     Attributes:
         tau: Torques on the absolute angles, shape (3,).
         acceleration: The bracket of eq. (7), the commanded θ'', shape (3,).
-        null_space_acceleration: φ_N, shape (3,).
         task_error: e = x_d - x, shape (2,).
         task_error_rate: e', shape (2,).
         null_space_error: e_N, shape (3,).
@@ -251,7 +230,6 @@ class PaperLaw(NamedTuple):
 
     tau: Array
     acceleration: Array
-    null_space_acceleration: Array
     task_error: Array
     task_error_rate: Array
     null_space_error: Array
@@ -307,7 +285,6 @@ def law(
     return PaperLaw(
         tau=mass_matrix(theta) @ acceleration + nonlinear_effects(theta, v),
         acceleration=acceleration,
-        null_space_acceleration=phi_N,
         task_error=e,
         task_error_rate=e_dot,
         null_space_error=e_N,
@@ -346,8 +323,6 @@ class PlanarSimulation:
         gram_determinant: det(JJᵀ), shape (n,).
         task_error: e, shape (n, 2) [m].
         null_space_error: e_N, shape (n, 3) [rad/s]; in (1) that of g = 0.
-        disk_distance: From the nearer of joints two and three to the disk's centre,
-            shape (n,) [m]; the disk takes part in (4) only.
     """
 
     number: int
@@ -359,7 +334,6 @@ class PlanarSimulation:
     gram_determinant: Array
     task_error: Array
     null_space_error: Array
-    disk_distance: Array
 
     @property
     def sigma_min(self) -> Array:
@@ -374,12 +348,8 @@ class PlanarSimulation:
         return np.sqrt(2.0 * det / (3.0 + root))
 
 
-def simulate_paper(
-    number: int,
-    duration: float = 10.0,
-    grid: float = 0.01,
-    start: Sequence[float] | None = None,
-) -> PlanarSimulation:
+@lru_cache(maxsize=32)
+def simulate_paper(number: int, duration: float = 10.0) -> PlanarSimulation:
     """Return simulation (1) to (4) of the paper, from rest; equal calls are cached.
 
     The law is evaluated inside the integrator's stages. Against runs whose steps end
@@ -390,22 +360,13 @@ def simulate_paper(
 
     Args:
         number: Which of the four.
-        duration: Length [s], a multiple of grid.
-        grid: Distance of the rows [s]; it does not change the integrator's steps.
-        start: Absolute angles at t = 0 [rad]; None for the paper's.
+        duration: Length [s], a multiple of 0.01 s, the distance of the rows.
 
     Returns:
         The motion and what the law says along it.
     """
-    if start is None:
-        start = MIRRORED_START if number == 4 else START
-    return _simulate(number, float(duration), float(grid), tuple(map(float, start)))
+    start = MIRRORED_START if number == 4 else START
 
-
-@lru_cache(maxsize=32)
-def _simulate(
-    number: int, duration: float, grid: float, start: tuple[float, ...]
-) -> PlanarSimulation:
     def closed_loop(t: float, y: Array) -> Array:
         theta, theta_dot = y[:3], y[3:]
         tau = paper_law(number, t, theta, theta_dot).tau
@@ -416,7 +377,7 @@ def _simulate(
         (0.0, duration),
         np.concatenate([start, np.zeros(3)]),
         method="DOP853",
-        t_eval=np.linspace(0.0, duration, round(duration / grid) + 1),
+        t_eval=np.linspace(0.0, duration, round(duration / 0.01) + 1),
         rtol=1e-13,
         atol=1e-13,
     )
@@ -442,9 +403,6 @@ def _simulate(
         gram_determinant=np.array([row.gram_determinant for row in laws]),
         task_error=np.array([row.task_error for row in laws]),
         null_space_error=np.array([row.null_space_error for row in laws]),
-        disk_distance=np.array(
-            [disk_distances(s, theta_row).min() for s, theta_row, _ in states]
-        ),
     )
     # One cached result serves many tests: none may change it for the others.
     for value in vars(simulation).values():

@@ -1,4 +1,4 @@
-"""Small samples of the campaigns; ``make fuzz`` runs them in full (docs/fuzz.md)."""
+"""Small samples of the campaigns, which ``make fuzz`` runs in full."""
 
 import tempfile
 from collections.abc import Callable

@@ -61,7 +61,7 @@ PIXEL = """(point) => {
 }"""
 # A point of a handle that no other one covers: [x, y].
 HANDLE = """([name, kind, axis]) => {
-  const gizmo = play.gizmos.get(`target ${name}`);
+  const gizmo = [...play.gizmos.values()].find(({target}) => target.name === name);
   const {left, top, width, height} = play.sight.update().box;
   for (let y = top; y < top + height; y += 2) {
     for (let x = left; x < left + width; x += 2) {
@@ -171,7 +171,7 @@ def test_the_ball_stays_under_the_pointer(page: Any) -> None:
     # While it is held, the program's word on it is not shown; on the others it is.
     elsewhere = {"hand": [0, 0, 0, 0, 0, 0, 1], "elbow": [0.3, *ELBOW[1:]]}
     tell(page, "play_targets", poses=elsewhere)
-    held, free = page.evaluate("[...play.gizmos.values()].map((one) => one.pose())")
+    held, free, _ = page.evaluate("[...play.gizmos.values()].map((one) => one.pose())")
     assert lies_under(page, held, end)
     assert free == pytest.approx(elsewhere["elbow"])
     page.mouse.up()
@@ -312,7 +312,26 @@ def test_an_obstacle_is_dragged(page: Any) -> None:
     moved = until_sent(page, "obstacle")[-1]
     assert moved["name"] == "ball"
     assert lies_under(page, moved["position"], end)
-    assert {message["do"] for message in sent(page)} == {"obstacle"}
+    assert sent(page)[-1] == {"do": "release", "name": "ball"}
+
+
+def test_an_obstacle_comes_to_the_robot_that_it_is_dragged_over(page: Any) -> None:
+    link = np.array(page.evaluate(LINK))
+    drag(page, pixel(page, BALL), link)
+    page.mouse.up()
+    place = np.array(until_sent(page, "obstacle")[-1]["position"])
+    assert abs(place[2]) < 0.15  # the arm's plane; it has begun at 0.3
+    # Its arrow moves it along an axis, and a line leads to the floor.
+    start = np.array(page.evaluate(HANDLE, ["ball", "arrow", 2]))
+    drag(page, start, start + np.array([0.0, -40.0]))
+    page.mouse.up()
+    risen = np.array(until_sent(page, "obstacle", 2)[-1]["position"])
+    np.testing.assert_allclose(risen[:2], place[:2], atol=1e-9)
+    assert risen[2] > place[2] + 0.05
+    lines = (
+        "play.gizmos.get('obstacle ball').parts.find((p) => p.handle.kind === 'line')"
+    )
+    assert page.evaluate(f"{lines}.meshes.every((mesh) => mesh.visible)")
 
 
 def test_a_link_is_pulled(page: Any) -> None:
@@ -383,23 +402,26 @@ def test_a_target_and_an_obstacle_return_to_their_paths(page: Any) -> None:
     ]
 
 
-def test_a_target_out_of_reach_is_read_beside_a_message(page: Any) -> None:
+def test_a_target_out_of_reach_is_told_at_its_handle(page: Any) -> None:
     state = {"t": 2.0, "running": True, "rate": 1.0, "level": "info"}
-    words = ["hand: target out of reach, 0.31 m", "elbow: target far away"]
-    tell(page, "play_state", message="saved", away="\n".join(words), **state)
-    away, status = (
-        page.locator(f".play-status.{name}") for name in ("away", "message")
-    )
-    assert away.inner_text().split("\n") == words
-    upper, lower = away.bounding_box(), status.bounding_box()
-    assert upper["y"] + upper["height"] < lower["y"]
+    words = {"hand": "target out of reach, 0.31 m", "elbow": "target far away"}
+    tell(page, "play_state", message="saved", **state)
+    tell(page, "play_targets", away=words)
+    page.evaluate("viewer.render()")
+    away = page.locator(".play-label.away")
+    assert away.all_inner_texts() == list(words.values())
+    box, (x, y) = away.first.bounding_box(), pixel(page, HAND)
+    assert abs(box["x"] + 0.5 * box["width"] - x) < 3.0
+    assert -40.0 < box["y"] + box["height"] - y < -12.0  # at the handle
     page.keyboard.press("p")  # also while presenting, when the bar has gone
     page.wait_for_selector("body.presenting.resting", state="attached")
-    until(page, "getComputedStyle(document.querySelector('.message')).opacity === '0'")
-    assert away.is_visible()
+    status = "document.querySelector('.play-status')"
+    until(page, f"getComputedStyle({status}).opacity === '0'")
+    assert away.first.is_visible()
     page.keyboard.press("p")
-    tell(page, "play_state", message="", away="", **state)
-    assert away.is_hidden()
+    tell(page, "play_targets", away={})
+    page.evaluate("viewer.render()")
+    assert away.count() == 0
 
 
 def test_it_fits_a_phone(chromium: Any, viewer: Viewer) -> None:

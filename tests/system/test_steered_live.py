@@ -1,6 +1,8 @@
 """`hsp live --steer` as processes: the loop, the robot, and a page that steers both."""
 
+import os
 import re
+import signal
 import subprocess
 import sys
 import threading
@@ -105,6 +107,19 @@ def test_a_robot_moves_while_the_key_is_held(
     assert live.process.returncode == 0, text
     assert "The loop: the dead-man's key was released" in text
     assert (tmp_path / "panda_obstacle-live.npz").is_file()
+
+
+def test_it_fails_if_its_page_dies(arguments: list[str]) -> None:
+    live = SteeredLive("--steer", *arguments)
+    page = Steering(live.url)
+    wait_until(lambda: moving(page), 120.0)
+    pid = live.process.pid
+    for child in map(int, Path(f"/proc/{pid}/task/{pid}/children").read_text().split()):
+        if "hsp_control.cli.steering" in Path(f"/proc/{child}/cmdline").read_text():
+            os.kill(child, signal.SIGKILL)
+    text = live.text()
+    assert live.process.returncode == 2, text
+    assert "the process of the page has ended" in text
 
 
 @pytest.mark.parametrize(("arguments", "message"), [

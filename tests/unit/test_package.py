@@ -82,6 +82,13 @@ def test_each_namespace_has_names_of_its_own(namespace: str) -> None:
     module = getattr(hsp_control, namespace)
     assert module is import_module(f"hsp_control.{hsp_control._NAMESPACES[namespace]}")
     assert [name for name in vars(module) if name[0].isupper()]
+    names = [name for name in dir(module) if not name.startswith("_")]
+    homes = {name: getattr(module, name).__module__ for name in names}
+    assert all(home.startswith("hsp_control.") for home in homes.values()), homes
+    assert len(names) <= 40
+    if namespace == "changes":  # it imports this name, and another is its own
+        assert "Trajectory" not in names
+        assert "ChangeGains" in names
 
 
 @pytest.mark.process

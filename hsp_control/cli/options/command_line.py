@@ -10,6 +10,7 @@ from hsp_control.cli.options.companions import added_commands, export_formats
 from hsp_control.cli.options.shared import (
     add_configuration,
     add_host,
+    add_import,
     add_page,
     add_strict,
     complete,
@@ -70,6 +71,7 @@ def command_line() -> argparse.ArgumentParser:
 
     run = _command(commands, "run", "simulate a configuration and write its log")
     add_configuration(run)
+    add_import(run)
     run.add_argument(
         "--out", type=Path, default=Path("out"), metavar="DIR", help="default: out"
     )
@@ -84,10 +86,12 @@ def command_line() -> argparse.ArgumentParser:
 
     check = _command(commands, "check", "check a configuration without running it")
     add_configuration(check)
+    add_import(check)
     check.add_argument("--json", action="store_true", help="print the summary as JSON")
 
     play = _command(commands, "play", "touch a simulated robot in a browser")
     add_configuration(play, "a robot's name, or ")
+    add_import(play)
     play.add_argument(
         "--out", type=Path, default=Path("out"), metavar="DIR", help="default: out"
     )
@@ -220,6 +224,7 @@ def add_inspect(inspect: argparse.ArgumentParser) -> None:
 def add_live(live: argparse.ArgumentParser) -> None:
     """Add all options of `hsp live`."""
     add_configuration(live)
+    add_import(live)
     live.add_argument(
         "--robot",
         metavar="NAME://ADDRESS",

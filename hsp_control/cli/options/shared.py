@@ -55,6 +55,20 @@ def add_strict(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_import(parser: argparse.ArgumentParser) -> None:
+    """Add which Python files are run first."""
+    parser.add_argument(
+        "--import",
+        action="append",
+        default=[],
+        type=Path,
+        dest="imports",
+        metavar="FILE.py",
+        help="run this Python file first, whose functions and types the configuration "
+        "may name: it may do anything, so none with --strict; may be repeated",
+    )
+
+
 def add_host(parser: argparse.ArgumentParser) -> None:
     """Add the address at which a page is opened."""
     parser.add_argument(

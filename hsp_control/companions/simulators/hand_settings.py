@@ -24,7 +24,7 @@ _POSTURE_RATE = 10.0**0.5
 space: what robosuite's OSC_POSE asks for there [1/s]."""
 
 _UNHURRIED = StreamPose(
-    delay=0.05,
+    delay=0.11,  # two actions at 20 Hz, and a little
     speed=0.5,
     acceleration=2.0,
     jerk=40.0,

@@ -1,5 +1,7 @@
 """Limits of motors, joints and distances."""
 
+from hsp_control.common.entry_points import own_names
+
 from .joint_numbers import ByJoint as ByJoint
 from .joint_numbers import PositionRange as PositionRange
 from .joint_numbers import PositionsByJoint as PositionsByJoint
@@ -12,3 +14,5 @@ from .limits import RobotLimits as RobotLimits
 from .limits import SelfDistance as SelfDistance
 from .limits import StaticEffort as StaticEffort
 from .limits import own_limits as own_limits
+
+__dir__ = own_names(__name__)

@@ -156,18 +156,18 @@ joints, or numbers for all."""
 def maximum(value: Maximum, own: Array, robot: Robot) -> Array:
     """Return a maximum effort or speed (nv,), of the robot's own; inf for none."""
     if isinstance(value, Scaled | ByJoint):
-        return value.of(_own_limit(own, robot), robot)
+        return value.of(own_maximum(own, robot), robot)
     if isinstance(value, str):
         if value == "none":
             return np.full(robot.nv, np.inf)
-        return _own_limit(own, robot)
+        return own_maximum(own, robot)
     return by_dof(value, robot.nv)
 
 
-def _own_limit(own: Array, robot: Robot) -> Array:
+def own_maximum(own: Array, robot: Robot) -> Array:
+    """Return a URDF's maxima (nv,), inf where it has none: 0, or the largest float."""
     limit = np.array(own, dtype=float)
     limit[list(robot.unactuated)] = np.inf
-    # URDFs have 0 or the largest float where there is no limit.
     limit[(limit <= 0.0) | (limit >= np.finfo(np.float32).max)] = np.inf
     return limit
 

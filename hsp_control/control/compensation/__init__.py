@@ -1,5 +1,7 @@
 """Compensation: compensators for the differences between the robot and its model."""
 
+from hsp_control.common.entry_points import own_names
+
 from .command import Command as Command
 from .compensation import Compensation as Compensation
 from .force_feedback import ForceFeedback as ForceFeedback
@@ -12,3 +14,5 @@ from .rate_check import check_rate as check_rate
 from .rate_check import rate_findings as rate_findings
 from .start_up_ramp import StartUpRamp as StartUpRamp
 from .velocity_filter import VelocityFilter as VelocityFilter
+
+__dir__ = own_names(__name__)

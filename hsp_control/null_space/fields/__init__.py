@@ -1,5 +1,6 @@
 """Null-space fields and costs: the goals of self-motion."""
 
+from hsp_control.common.entry_points import own_names
 from hsp_control.law import FieldSample as FieldSample
 
 from .clearance import Clearance as Clearance
@@ -27,3 +28,5 @@ from .weight import ConstantWeight as ConstantWeight
 from .weight import Ramp as Ramp
 from .weight import StateWeight as StateWeight
 from .weight import Weight as Weight
+
+__dir__ = own_names(__name__)

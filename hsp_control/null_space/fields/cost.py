@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import KW_ONLY
 from functools import partial
-from typing import NoReturn
+from typing import Annotated, NoReturn
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from hsp_control.common.exceptions import FieldError
 from hsp_control.common.kernels import KernelCall, kernel
 from hsp_control.common.native import bind
 from hsp_control.common.step_plan import StepPlan, planned, says
+from hsp_control.declaration.imported import AS_TEXT, NAMED
 from hsp_control.law import VARYING, FieldSample, MetricSample, raise_covector
 from hsp_control.null_space.differences import gradient, rate_along_flow
 from hsp_control.null_space.fields.field import NullSpaceField
@@ -171,20 +172,25 @@ class Cost(NullSpaceField):
         return array
 
 
-class FunctionCost(Cost):
+class FunctionCost(Cost, type="function_cost"):
     """f = function(state): a cost given as a Python function.
 
-    YAML cannot say it: declare a subclass of `Cost` for that.
+    YAML gives the function's name, and ``hsp run --import FILE.py`` runs the file that
+    has it. A subclass of `Cost` has parameters of its own.
     """
 
-    function: Callable[[RobotState], float]
+    function: Annotated[Callable[[RobotState], float], NAMED, AS_TEXT]
     """f of a state, one number [rad²/s, m²/s]; it may use q, t and frames, but not
     v."""
     _: KW_ONLY
-    gradient_function: Callable[[RobotState], Array] | None = None
+    gradient_function: (
+        Annotated[Callable[[RobotState], Array], NAMED, AS_TEXT] | None
+    ) = None
     """∇f of a state in the tangent space, shape (nv,) [rad/s, m/s]; by differences by
     default."""
-    rate_function: Callable[[RobotState], Array] | None = None
+    rate_function: Annotated[Callable[[RobotState], Array], NAMED, AS_TEXT] | None = (
+        None
+    )
     """(∇f)' = ∇²f v + ∂∇f/∂t of a state, shape (nv,) [rad/s², m/s²]; by differences by
     default."""
 

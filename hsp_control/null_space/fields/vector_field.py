@@ -3,12 +3,13 @@
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import KW_ONLY
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
+from hsp_control.declaration.imported import AS_TEXT, NAMED
 from hsp_control.law import FieldSample, MetricSample
 from hsp_control.null_space.differences import rate_along_flow
 from hsp_control.null_space.fields.field import NullSpaceField
@@ -61,16 +62,18 @@ class VectorField(NullSpaceField):
         return float(np.linalg.norm(self.vector(state)))
 
 
-class FunctionField(VectorField):
+class FunctionField(VectorField, type="function_field"):
     """g = function(state): a vector field given as a Python function.
 
-    YAML cannot say it: declare a subclass of `VectorField` for that.
+    YAML gives the function's name; see `FunctionCost`.
     """
 
-    function: Callable[[RobotState], Array]
+    function: Annotated[Callable[[RobotState], Array], NAMED, AS_TEXT]
     """g of a state, shape (nv,) [rad/s, m/s]; it may use q, t and frames, but not v."""
     _: KW_ONLY
-    rate_function: Callable[[RobotState], Array] | None = None
+    rate_function: Annotated[Callable[[RobotState], Array], NAMED, AS_TEXT] | None = (
+        None
+    )
     """g' = ∂g/∂q·v + ∂g/∂t of a state, shape (nv,) [rad/s², m/s²]; by differences by
     default."""
 

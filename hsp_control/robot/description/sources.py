@@ -43,6 +43,8 @@ _END_EFFECTORS = {
 }
 
 
+PINOCCHIO = "pinocchio"
+"""The origin of a robot that was made of a Pinocchio model: it has no URDF."""
 ShapeKind = Literal["box", "sphere", "capsule", "cylinder", "ellipsoid", "mesh"]
 
 
@@ -71,15 +73,15 @@ class RobotSource:
     """Where a robot comes from, and the settings that its folder gives."""
 
     name: str  # name of a known robot, or the URDF file's name without ``.urdf``
-    # the URDF file. Of a robot in a MuJoCo model, whose `shapes` are given: the MJCF
-    # file, or the model's name if it was compiled in Python
+    # the URDF file. Of a robot whose `shapes` are given: the MJCF file, or the name of
+    # the MuJoCo or Pinocchio model
     urdf: Path
     # the SRDF file (reference postures, disabled collision pairs), if any
     srdf: Path | None = None
     root: Root = "fixed"  # the default root: ``fixed``, ``planar`` or ``free_flyer``
     package_dirs: tuple[Path, ...] = ()  # folders in which ``package://`` is looked up
-    # ``bundled``, ``example-robot-data``, ``robot_descriptions``, ``file``, ``mujoco``
-    # or ``combined``
+    # ``bundled``, ``example-robot-data``, ``robot_descriptions``, ``file``, ``mujoco``,
+    # ``pinocchio`` or ``combined``
     origin: str = "file"
     # joints that are locked by default, name to value [rad or m]
     locked: Mapping[str, float] = field(default_factory=dict)

@@ -16,7 +16,7 @@ from hsp_control.common.exceptions import ModelError, RobotNotFoundError
 from hsp_control.common.suggestions import listing
 from hsp_control.robot.description.access import XmlError, parse_xml, read_xml
 from hsp_control.robot.description.inertias import ENTRIES, project_inertias
-from hsp_control.robot.description.sources import RobotSource
+from hsp_control.robot.description.sources import PINOCCHIO, RobotSource
 
 MAX_LINKS = 1000
 """Maximum number of links: the depth of recursions grows with it."""
@@ -75,6 +75,11 @@ def read_urdf(source: RobotSource) -> Element:
 def parse_urdf(source: RobotSource) -> Element:
     """Return the top element of a URDF whose elements are not yet checked."""
     urdf = source.urdf
+    if source.origin == PINOCCHIO:
+        raise ModelError(
+            f"{source.name} was made of a pinocchio.Model, and its URDF is needed: "
+            "load it with Robot.load"
+        )
     try:
         if source.expanded is None:
             robot = read_xml(urdf)

@@ -1,10 +1,8 @@
 """Plants: the simulated robots that the controller's effort moves."""
 
+from hsp_control.common.entry_points import own_names
 from hsp_control.robot.friction import Friction as Friction
 
-from .declared import AnyPlant as AnyPlant
-from .declared import FrictionalPart as FrictionalPart
-from .declared import PlantPart as PlantPart
 from .drives import Drive as Drive
 from .drives import DroppedPeriods as DroppedPeriods
 from .drives import EffortDelay as EffortDelay
@@ -12,20 +10,23 @@ from .drives import EffortNoise as EffortNoise
 from .drives import Jitter as Jitter
 from .drives import Saturation as Saturation
 from .imperfect_plant import ImperfectPlant as ImperfectPlant
-from .integrated_plant import IntegratedPlant as IntegratedPlant
+from .mjcf import ContactShape as ContactShape
+from .mjcf import Ground as Ground
+from .mjcf import Solid as Solid
 from .model_changes import Inertias as Inertias
 from .model_changes import Payload as Payload
-from .mujoco import ContactShape as ContactShape
-from .mujoco import Ground as Ground
-from .mujoco import Mujoco as Mujoco
-from .mujoco import MujocoScene as MujocoScene
-from .mujoco import MujocoScenePlant as MujocoScenePlant
-from .mujoco import Solid as Solid
+from .mujoco_plant import Mujoco as Mujoco
+from .mujoco_scene import MujocoScene as MujocoScene
+from .mujoco_scene import MujocoScenePlant as MujocoScenePlant
 from .plant import ContinuousPlant as ContinuousPlant
+from .plant import IntegratedPlant as IntegratedPlant
 from .plant import Plant as Plant
 from .plant import SampledPlant as SampledPlant
 from .plant import check_plant as check_plant
 from .plant import differing_bodies as differing_bodies
+from .plant_part import AnyPlant as AnyPlant
+from .plant_part import FrictionalPart as FrictionalPart
+from .plant_part import PlantPart as PlantPart
 from .push import Push as Push
 from .rigid_body import RigidBody as RigidBody
 from .rigid_body import RigidBodyPlant as RigidBodyPlant
@@ -41,3 +42,5 @@ from .sensors import PositionNoise as PositionNoise
 from .sensors import Sensor as Sensor
 from .sensors import SensorDelay as SensorDelay
 from .sensors import VelocityNoise as VelocityNoise
+
+__dir__ = own_names(__name__)

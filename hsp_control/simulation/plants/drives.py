@@ -1,6 +1,6 @@
 """Drives: they turn the commanded effort into the applied one."""
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Annotated, ClassVar, Literal, TypeAlias
@@ -10,42 +10,24 @@ from pydantic import AfterValidator
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
-from hsp_control.declaration import Part, within
+from hsp_control.declaration import within
 from hsp_control.declaration.by_type import ByType
 from hsp_control.declaration.quantities import NonNegative, Periods, Share, Weights
 from hsp_control.robot import Robot
+from hsp_control.simulation.plants.plant import Imperfection, in_order
 
 Driving: TypeAlias = Callable[[Array], tuple[Array, float]]
 """Effort from the drive before, shape (nv,) ↦ the effort that acts, and how long after
 the start of the period it begins to [s]; called once per period."""
 
 
-class Drive(Part, ABC, family="drives", error=SimulationError):
+class Drive(Imperfection, family="drives", error=SimulationError):
     """One imperfection of the actuation; several make a chain.
 
     A subclass declares its parameters as fields (see `Part`) and implements `begin`.
-    A drive knows no robot and has no memory: `begin` makes what runs.
-
-    A plant applies its drives in the order of their stages, whatever the order in which
-    they are given: `DroppedPeriods` 10, `EffortDelay` 20, `Jitter` 30, `EffortNoise`
-    40, `Saturation` 50. A new drive chooses a number between its neighbours; the
-    default is behind all of these.
-
-    Attributes:
-        stage: The place in the chain.
+    Stages: `DroppedPeriods` 10, `EffortDelay` 20, `Jitter` 30, `EffortNoise` 40,
+    `Saturation` 50; see `Imperfection`.
     """
-
-    stage: ClassVar[float] = 100.0
-
-    @property
-    def active(self) -> bool:
-        """Whether it changes anything; a plant leaves out a drive that does not."""
-        return True
-
-    @property
-    def periods(self) -> int:
-        """By how many control periods it delays the effort, for the rate check."""
-        return 0
 
     @abstractmethod
     def begin(self, robot: Robot, random: np.random.Generator) -> Driving:
@@ -60,11 +42,7 @@ class Drive(Part, ABC, family="drives", error=SimulationError):
         """
 
 
-def _in_order(drives: tuple[Drive, ...]) -> tuple[Drive, ...]:
-    return tuple(sorted(drives, key=lambda drive: drive.stage))
-
-
-Drives = Annotated[Sequence[Drive], ByType(Drive), AfterValidator(_in_order)]
+Drives = Annotated[Sequence[Drive], ByType(Drive), AfterValidator(in_order)]
 """A chain: a sequence in Python, a mapping by type in YAML; stored by stage."""
 
 

@@ -13,13 +13,13 @@ from hsp_control.robot import Robot
 from hsp_control.robot.friction import JointFriction
 from hsp_control.robot.integrators import Integrator
 from hsp_control.robot.motion import Acceleration, number_of_steps
-from hsp_control.simulation.plants.declared import FrictionalPart
 from hsp_control.simulation.plants.plant import (
     ContinuousPlant,
     Plant,
     SampledPlant,
     to_json_data,
 )
+from hsp_control.simulation.plants.plant_part import FrictionalPart
 from hsp_control.simulation.plants.push import Push, Pushes
 
 

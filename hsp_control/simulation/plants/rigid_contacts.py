@@ -16,13 +16,13 @@ from hsp_control.declaration.named import BY_FRAME, stored_by_frame
 from hsp_control.declaration.quantities import ArrayField, NonNegative
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.integrators import Integrator
-from hsp_control.simulation.plants.declared import PlantPart
 from hsp_control.simulation.plants.plant import (
     ContinuousPlant,
     FloatingRoots,
     contact_channels,
     to_json_data,
 )
+from hsp_control.simulation.plants.plant_part import PlantPart
 from hsp_control.simulation.plants.push import Push, Pushes
 from hsp_control.trajectories.schedule import Intervals, Schedule
 

@@ -1,6 +1,6 @@
 """Sensors: they turn the true state into the measured one."""
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY
@@ -14,41 +14,23 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.common.rotations import log3
 from hsp_control.control.measurement import Inertial
-from hsp_control.declaration import Part, within
+from hsp_control.declaration import within
 from hsp_control.declaration.by_type import ByType
 from hsp_control.declaration.quantities import NonNegative, Periods, Weights
 from hsp_control.robot import Robot
+from hsp_control.simulation.plants.plant import Imperfection, in_order
 
 Sensing: TypeAlias = Callable[[float, Array, Array], tuple[Array, Array]]
 """(t, q, v) from the sensor before ↦ (q, v) as measured; called once per period."""
 
 
-class Sensor(Part, ABC, family="sensors", error=SimulationError):
+class Sensor(Imperfection, family="sensors", error=SimulationError):
     """One imperfection of the measurements; several make a chain.
 
     A subclass declares its parameters as fields (see `Part`) and implements `begin`.
-    A sensor knows no robot and has no memory: `begin` makes what runs.
-
-    A plant applies its sensors in the order of their stages, whatever the order in
-    which they are given: `SensorDelay` 10, `Imu` 15, `PositionNoise` 20, `Encoder` 30,
-    `DifferencedVelocity` 40, `VelocityNoise` 50. A new sensor chooses a number between
-    its neighbours; the default is behind all of these.
-
-    Attributes:
-        stage: The place in the chain.
+    Stages: `SensorDelay` 10, `Imu` 15, `PositionNoise` 20, `Encoder` 30,
+    `DifferencedVelocity` 40, `VelocityNoise` 50; see `Imperfection`.
     """
-
-    stage: ClassVar[float] = 100.0
-
-    @property
-    def active(self) -> bool:
-        """Whether it changes anything; a plant leaves out a sensor that does not."""
-        return True
-
-    @property
-    def periods(self) -> int:
-        """By how many control periods it delays the state, for the rate check."""
-        return 0
 
     @abstractmethod
     def begin(
@@ -67,11 +49,7 @@ class Sensor(Part, ABC, family="sensors", error=SimulationError):
         """
 
 
-def _in_order(sensors: tuple[Sensor, ...]) -> tuple[Sensor, ...]:
-    return tuple(sorted(sensors, key=lambda sensor: sensor.stage))
-
-
-Sensors = Annotated[Sequence[Sensor], ByType(Sensor), AfterValidator(_in_order)]
+Sensors = Annotated[Sequence[Sensor], ByType(Sensor), AfterValidator(in_order)]
 """A chain: a sequence in Python, a mapping by type in YAML; stored by stage."""
 
 

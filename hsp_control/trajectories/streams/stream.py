@@ -53,11 +53,12 @@ class Streamed(Remembering, error=TrajectoryError):
     bounds permit. On its way it follows quintics where they keep the bounds, and
     otherwise Ruckig's fastest motion.
 
-    * ``latest``: only the newest message counts; the reference comes to rest at its
-      last waypoint.
     * ``interpolate``: the reference passes through all waypoints, with the velocities
       and accelerations that they show. If no more follow, it brakes at the last one,
-      and comes to rest there.
+      and comes to rest there, as it does at a single target.
+    * ``latest``: only the newest message counts; the reference comes to rest at its
+      last waypoint. For single targets that replace each other, such as a hand that
+      is dragged.
     * ``extrapolate``: it goes on from the last one at the velocity that the waypoints
       show, for a time, and then comes to rest.
 
@@ -75,7 +76,7 @@ class Streamed(Remembering, error=TrajectoryError):
     )
     """A recording, instead of a source: messages with the times ``at`` [s] at which
     they are taken; a log contains those of its run."""
-    policy: Literal["latest", "interpolate", "extrapolate"] = "latest"
+    policy: Literal["interpolate", "latest", "extrapolate"] = "interpolate"
     """How waypoints are followed."""
     delay: NonNegative = 0.1
     """Time from a waypoint's own time to when the reference is there [s]. For

@@ -1,5 +1,6 @@
 """Show a robot in a browser: during a run, or from a log."""
 
+from hsp_control.common.entry_points import own_names
 from hsp_control.config.view_settings import ShownItems as ShownItems
 from hsp_control.config.view_settings import ViewSettings as ViewSettings
 
@@ -12,3 +13,5 @@ from .replay import show as show
 from .replay import view_logs as view_logs
 from .transport import SceneRecorder as SceneRecorder
 from .viewer import Viewer as Viewer
+
+__dir__ = own_names(__name__)

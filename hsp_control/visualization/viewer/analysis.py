@@ -22,6 +22,11 @@ def terms_of_type(field: NullSpaceField, kind: type[_Term]) -> Iterator[_Term]:
     yield from (term for term in terms_of(field) if isinstance(term, kind))
 
 
+def acts(term: NullSpaceField) -> bool:
+    """Return whether a term of a field may act: not with a constant weight of 0."""
+    return not (isinstance(term.weight, int | float) and term.weight == 0.0)
+
+
 def from_the_start(controller: Controller) -> Controller:
     """Return the controller as it is before a run; its changes are all ahead."""
     if not controller.changes and not any(t.remembers for t in controller.tasks):

@@ -18,9 +18,9 @@ from hsp_control.null_space.fields import (
     PointDistance,
 )
 from hsp_control.robot import RobotState
-from hsp_control.visualization.palette import OBSTACLE, SERIES
+from hsp_control.visualization.palette import COLLISION, OBSTACLE, SERIES, fractions
 from hsp_control.visualization.viewer import threejs
-from hsp_control.visualization.viewer.analysis import terms_of_type
+from hsp_control.visualization.viewer.analysis import acts, terms_of_type
 from hsp_control.visualization.viewer.arrows import bar_tracks, unit_bar
 from hsp_control.visualization.viewer.commands import (
     Json,
@@ -129,6 +129,7 @@ class ClosestPoints(NamedTuple):
     start: Array  # on the robot [m], (3,)
     end: Array  # on the obstacle, or on another link [m], (3,)
     active: bool  # whether their distance is below the field's influence distance
+    deep: bool  # whether they overlap: then the distance is a depth
 
 
 class _Distance(NamedTuple):
@@ -137,17 +138,20 @@ class _Distance(NamedTuple):
     kind: str  # its name in the legend
     path: str
     closest: Callable[[RobotState], ClosestPoints]
+    obstacle: str = ""  # the obstacle's name, if there is one
 
 
 def distances(controller: Controller, root: str, color: str) -> Layer:
     """Draw a bar per obstacle, from the closest link, while the field is active there.
 
     Bars are seen through all else: meshes lie inside the capsules that are measured.
+    They and the obstacle are red while a link is inside it.
     """
     found = list(_distances(controller, root))
+    obstacles = root.removesuffix("/distances") + "/obstacles"
 
     def draw(size: float) -> Iterator[PageCommand]:
-        for _, path, _ in found:
+        for _, path, *_ in found:
             surface = always_visible(unlit_material(color))
             yield set_object(f"{path}/bar", unit_bar(surface, _BAR_RADIUS * size))
             for end in ("start", "end"):
@@ -158,14 +162,21 @@ def distances(controller: Controller, root: str, color: str) -> Layer:
 
     def tracks(motion: RunMotion) -> Iterator[Track]:
         rows = [[each.closest(state) for each in found] for state in motion.states()]
-        for (_, path, _), points in zip(found, zip(*rows, strict=True), strict=True):
-            start, end, active = map(np.array, zip(*points, strict=True))
+        for each, points in zip(found, zip(*rows, strict=True), strict=True):
+            start, end, active, deep = map(np.array, zip(*points, strict=True))
             shown, times = np.asarray(active, float)[:, None], motion.times
+            path, red = each.path, fractions(COLLISION)
             yield from bar_tracks(f"{path}/bar", times, start, end)
             yield Track(f"{path}/start", "position", times, start)
             yield Track(f"{path}/end", "position", times, end)
+            tint = np.where(deep[:, None], red, fractions(color))
             for part in ("bar", "start", "end"):
                 yield Track(f"{path}/{part}", "visible", times, shown)
+                yield Track(f"{path}/{part}", "color", times, tint)
+            if each.obstacle:
+                tint = np.where(deep[:, None], red, fractions(OBSTACLE))
+                thing = f"{obstacles}/{path_element(each.obstacle)}"
+                yield Track(thing, "color", times, tint)
 
     def legend() -> list[LegendEntry]:
         paths = {
@@ -183,7 +194,8 @@ def _distances(controller: Controller, root: str) -> Iterator[_Distance]:
     for clearance in terms_of_type(field, Clearance):  # type: ignore[type-abstract]
         for name, pairs in _pairs_by_obstacle(clearance, controller.state).items():
             path = f"{root}/{path_element(f'{clearance.name} {name}')}"
-            yield _Distance(_SURFACES, path, partial(_between_pairs, clearance, pairs))
+            closest = partial(_between_pairs, clearance, pairs)
+            yield _Distance(_SURFACES, path, closest, "" if name == _SELF else name)
     for term in terms_of_type(field, PointDistance):
         if isinstance(term.obstacle, Obstacle):  # in a placed field it is
             path = f"{root}/{path_element(f'{term.name} {term.obstacle.name}')}"
@@ -212,7 +224,8 @@ def _between_pairs(
     start, end, _ = proximity.witness(int(pairs[k]))
     # Coal overwrites its points at the next state: copy them.
     active = bool(measured[k] < clearance.influence)
-    return ClosestPoints(np.array(start), np.array(end), active)
+    deep = bool(measured[k] < 0.0)
+    return ClosestPoints(np.array(start), np.array(end), active, deep)
 
 
 def _to_center(
@@ -222,7 +235,7 @@ def _to_center(
     center = obstacle.center.sample(state.t).position.copy()
     positions = [np.array(state.position(frame)) for frame in cost.frames]
     lengths = [np.linalg.norm(position - center) for position in positions]
-    return ClosestPoints(positions[int(np.argmin(lengths))], center, True)
+    return ClosestPoints(positions[int(np.argmin(lengths))], center, True, False)
 
 
 # -- zones of influence ---------------------------------------------------------------
@@ -234,7 +247,7 @@ _SWATCH_OPACITY = 0.35  # in the legend: as pale as the zone it would be invisib
 def influence(field: NullSpaceField, shown: dict[str, Shape], root: str) -> Layer:
     """Draw the zone of each shown obstacle in which a clearance field reacts to it."""
     zones: dict[str, tuple[Shape, float]] = {}
-    for term in terms_of_type(field, ObstacleClearance):
+    for term in filter(acts, terms_of_type(field, ObstacleClearance)):
         for obstacle in term.obstacles or ():
             if isinstance(obstacle, Obstacle) and obstacle.name in shown:
                 known = zones.get(obstacle.name, (obstacle.shape, 0.0))[1]

@@ -12,9 +12,9 @@ from hsp_control.null_space.fields import Clearance, NullSpaceField, SelfClearan
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.limit_excess import POSITION, VELOCITY
 from hsp_control.simulation.log_columns import logged_terms
-from hsp_control.simulation.unreached import FAR, OUT, Unreached, unreached
+from hsp_control.simulation.log_series import FAR, OUT, Unreached, unreached
 from hsp_control.visualization import palette
-from hsp_control.visualization.viewer.analysis import from_the_start
+from hsp_control.visualization.viewer.analysis import acts, from_the_start
 from hsp_control.visualization.viewer.commands import (
     Json,
     PageCommand,
@@ -38,6 +38,7 @@ class Band(NamedTuple):
     caption: str  # what is shown while the time is inside: ``a limit is active``
     color: str  # its colour, ``#RRGGBB``
     spans: list[tuple[float, float]]  # its intervals [s], ascending and apart
+    run: str = ""  # in a comparison, the name of its run
 
 
 def bands_of(
@@ -91,13 +92,18 @@ def _activities(
         singular = Band(words, f"the law is {words}", palette.WARNING, [])
         yield singular, rollout["damped"] > 0.0
     obstacle = itself = np.zeros(len(rollout), bool)
+    deepest = np.full(len(rollout), np.inf)
     for name, field in _fields_of(controller).items():
         if isinstance(field, Clearance) and f"distance.{name}" in rollout:
-            near = rollout[f"distance.{name}"] < field.influence
+            distance = rollout[f"distance.{name}"]
+            deepest = np.minimum(deepest, distance)
+            near = (distance < field.influence) & acts(field)
             if isinstance(field, SelfClearance):
                 itself = itself | near
             else:
                 obstacle = obstacle | near
+    depth = f"collision, up to {-100.0 * deepest.min():.1f} cm deep"
+    yield Band("collision", depth, palette.COLLISION, []), deepest < 0.0
     words = "inside an influence zone"
     yield Band(words, f"a link is {words}", palette.OBSTACLE, []), obstacle
     words = "links near each other"

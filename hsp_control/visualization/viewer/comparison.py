@@ -125,7 +125,10 @@ class Comparison:
         return np.concatenate([run.obstacle_points() + offset for run, offset in runs])
 
     def title(self) -> str:
-        """Return the runs' names."""
+        """Return the title that all runs have, or else their names."""
+        titles = {str(run.motion.rows.meta.get("title") or "") for run in self._runs}
+        if len(titles) == 1 and (title := titles.pop()):
+            return title
         return (" | " if self._beside is not None else " and ").join(self._names)
 
     def legend(self) -> list[LegendEntry]:
@@ -186,13 +189,9 @@ def run_parts(names: Sequence[str]) -> list[list[str]]:
 
 
 def _bands_named(run: ComparedRun) -> list[Band]:
-    """Return a run's bands, which begin with its name."""
-    return [
-        band._replace(
-            name=f"{run.name}: {band.name}", caption=f"{run.name}: {band.caption}"
-        )
-        for band in bands_of(run.rollout, run.controller)
-    ]
+    """Return a run's bands, with its name."""
+    bands = bands_of(run.rollout, run.controller)
+    return [band._replace(run=run.name) for band in bands]
 
 
 def ghost_color(number: int) -> str:

@@ -105,8 +105,9 @@ def page_of(runs: Sequence[ComparedRun], view: dict[str, Any]) -> str:
             "colors": [ghost_color(number) for number in range(len(runs))],
             "opacity": GHOST_OPACITY,
         }
-    title = " and ".join(names) if len(runs) > 1 else ""
-    title = title or str(first.rollout.meta.get("title") or first.robot.name)
+    titles = {str(run.rollout.meta.get("title") or "") for run in runs}
+    title = titles.pop() if len(titles) == 1 else " and ".join(names)
+    title = title or first.robot.name
     return assemble(title, {**content, "arrays": arrays.entries})
 
 

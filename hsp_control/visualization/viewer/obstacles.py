@@ -15,8 +15,8 @@ from hsp_control.geometry.enclosing import hull_corners
 from hsp_control.geometry.scene import Scene
 from hsp_control.geometry.shapes import Shape, shape_from_log
 from hsp_control.simulation import Rollout
-from hsp_control.simulation.plants.mujoco.mjcf import Solid
-from hsp_control.visualization.palette import OBSTACLE, SOLID
+from hsp_control.simulation.plants.mjcf import Solid
+from hsp_control.visualization.palette import MUTED, OBSTACLE, SOLID
 from hsp_control.visualization.viewer import threejs
 from hsp_control.visualization.viewer.commands import (
     Json,
@@ -31,7 +31,7 @@ from hsp_control.visualization.viewer.robot_drawing import robot_entry
 from hsp_control.visualization.viewer.threejs import material, pose_at
 
 ROOT = "/obstacles"
-_OPACITY = 0.75
+_OPACITY, _PALE = 0.75, 0.1
 _EXTENT = 4.0  # edge of the square that stands for a half-space, over the scene's size
 _TOLD = 3  # number of obstacles that the legend names
 
@@ -50,8 +50,8 @@ def obstacle(shape: Shape, size: float, color: str = OBSTACLE) -> Json:
     """Return a shape as a three.js object, in a scene of a size [m]."""
     surface = material(color, opacity=_OPACITY, glow=0.3)
     solid, pose = surface_of(shape, size)
-    if isinstance(shape, shapes.HalfSpace):
-        surface |= {"opacity": 0.3 * _OPACITY, "side": 2}
+    if isinstance(shape, shapes.HalfSpace):  # a floor or a wall: it must not glare
+        surface = material(MUTED, opacity=_PALE, glow=0.3) | {"side": 2}
     elif solid["type"] == "BufferGeometry" and not isinstance(shape, shapes.PointCloud):
         surface |= {"side": 2}
     thing = threejs.mesh(solid, surface, pose)

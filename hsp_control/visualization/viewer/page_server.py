@@ -6,8 +6,8 @@ because the parent ended or was killed, the server ends too. It imports neither
 Pinocchio nor modules that do.
 
 Pages and their connections must name the server's own host, against DNS rebinding, and
-connections must come from one of its own pages. With a key, pages and connections need
-it in their address, and one page at a time may steer the program; see `Steering`.
+connections must come from one of its own pages. Pages and connections need a key in
+their address; one page at a time may steer the program, see `Steering`.
 """
 
 import asyncio
@@ -18,7 +18,7 @@ import select
 import socket
 import struct
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
@@ -35,6 +35,7 @@ from hsp_control.visualization.viewer.pipe import (
     LatestCommands,
     PipeRecord,
     key_of,
+    newest,
 )
 
 _MAX_SIZE = 1_000_000  # bytes; the commands that move a robot are far smaller
@@ -69,7 +70,7 @@ class Steering:
         """Begin without a page."""
         self.page: object | None = None
         self._parent = parent
-        self._waiting: dict[tuple[str, str], str] = {}
+        self._waiting: list[Mapping[str, Any]] = []
 
     def enter(self, page: object) -> bool:
         """Let a page that was opened steer, if no other one does; return whether."""
@@ -107,25 +108,20 @@ class Steering:
         poll = select.poll()
         poll.register(self._parent, select.POLLOUT)
         while self._waiting and poll.poll(0):
-            key = next(iter(self._waiting))
-            self._write(self._waiting.pop(key))
+            line = json.dumps({"message": self._waiting.pop(0)})
+            with open(self._parent, "w", closefd=False) as pipe:
+                pipe.write(line + "\n")
         return not self._waiting
 
     def _put(self, message: dict[str, Any]) -> None:
-        parts = [message.get(name, "") for name in ("target", "name", "id")]
-        key = message["do"], json.dumps(parts)
-        self._waiting.pop(key, None)  # the newest comes last
-        self._waiting[key] = json.dumps({"message": message})
-
-    def _write(self, line: str) -> None:
-        with open(self._parent, "w", closefd=False) as pipe:
-            pipe.write(line + "\n")
+        self._waiting = list(newest([*self._waiting, message]).values())
 
 
 def _refuse(word: str) -> Callable[[], None]:
     raise ValueError(f"{word} is no number")
 
 
+KEY = "HSP_PAGE_KEY"  # variable with the key: others can read a command line
 PORTS = (*range(7000, 7100), 0)  # 0: any free port
 TAKEN = "taken"  # a page's acknowledgement of a message
 
@@ -144,9 +140,9 @@ class Door(NamedTuple):
     """Who is let in."""
 
     host: str  # the address that the server listens on
-    key: str  # what an address must contain; empty: nothing, and no page may steer
+    key: str  # what an address must contain
 
-    def check(self, handler: RequestHandler, *, needs_key: bool) -> None:
+    def check(self, handler: RequestHandler, *, needs_key: bool = True) -> None:
         """Check a request."""
         names = _LOOPBACK_NAMES if self.host in _LOOPBACK_NAMES else {self.host}
         if handler.request.host_name not in names:
@@ -235,7 +231,7 @@ class Page(WebSocketHandler):
         Tornado compares the origin with the host, but lets in what names no origin:
         programs, and not browsers.
         """
-        self._door.check(self, needs_key=bool(self._door.key))
+        self._door.check(self)
         if "Origin" not in self.request.headers:
             raise HTTPError(403, reason="The connection names no origin")
 
@@ -312,8 +308,7 @@ class FileHandler(RequestHandler):
 
     def prepare(self) -> None:
         """Check the host, and for the page itself the key."""
-        page = self.request.path == "/" and bool(self._door.key)
-        self._door.check(self, needs_key=page)
+        self._door.check(self, needs_key=self.request.path == "/")
 
     def get(self, name: str) -> None:
         """Send the file."""
@@ -326,13 +321,16 @@ class FileHandler(RequestHandler):
         self.finish(content)
 
 
-def main(meshcat: str, port: int, parent: int, host: str, key: str) -> NoReturn:
+def main(meshcat: str, port: int, parent: int, host: str, steerable: bool) -> NoReturn:
     """Serve until the parent has ended."""
-    asyncio.run(_serve(Path(meshcat), port, parent, Door(host, key)))
+    door = Door(host, os.environ[KEY])
+    asyncio.run(_serve(Path(meshcat), port, parent, door, steerable))
     os._exit(0)
 
 
-async def _serve(meshcat: Path, port: int, parent: int, door: Door) -> None:
+async def _serve(
+    meshcat: Path, port: int, parent: int, door: Door, steerable: bool
+) -> None:
     files = {
         file.name: (_TYPES[file.suffix], file.read_bytes())
         for file in (
@@ -341,7 +339,7 @@ async def _serve(meshcat: Path, port: int, parent: int, door: Door) -> None:
         )
     }
     files[""] = files.pop("index.html")
-    hub = Hub(Steering(sys.stdout.fileno()) if door.key else None)
+    hub = Hub(Steering(sys.stdout.fileno()) if steerable else None)
     routes: list[Any] = [
         (r"/scene", Page, {"hub": hub, "door": door}),
         (r"/(.*)", FileHandler, {"files": files, "door": door}),
@@ -354,7 +352,7 @@ async def _serve(meshcat: Path, port: int, parent: int, door: Door) -> None:
     os.set_blocking(0, False)
     asyncio.get_running_loop().add_reader(0, _read, hub)
     address = f"http://{door.host}:{sockets[0].getsockname()[1]}/"
-    _tell_parent(url=address + (f"?key={door.key}" if door.key else ""))
+    _tell_parent(url=f"{address}?key={door.key}")
     # Other children of the parent may hold our standard input open after its death.
     while os.getppid() == parent:
         await asyncio.sleep(_PARENT_CHECK_PERIOD)

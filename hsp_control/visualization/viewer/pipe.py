@@ -3,9 +3,10 @@
 The server's process imports this module too: it needs only the standard library.
 """
 
+import json
 import struct
-from collections.abc import Iterator
-from typing import NamedTuple
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, NamedTuple
 
 _SEPARATOR = "\0"
 _STAGE = {"Background", "camera", "caption", "floor", "lights"}
@@ -14,6 +15,17 @@ _STAGE = {"Background", "camera", "caption", "floor", "lights"}
 def key_of(path: str, name: str) -> str:
     """Return the key of a command that sets a property of a node."""
     return f"{path}{_SEPARATOR}{name}"
+
+
+def newest(messages: Iterable[Mapping[str, Any]]) -> dict[str, Mapping[str, Any]]:
+    """Return messages of a page, of each kind and object the newest, in their order."""
+    found: dict[str, Mapping[str, Any]] = {}
+    for message in messages:
+        about = [message.get(name, "") for name in ("do", "target", "name", "id")]
+        key = json.dumps(about)
+        found.pop(key, None)  # the newest comes last
+        found[key] = message
+    return found
 
 
 class LatestCommands:

@@ -31,6 +31,7 @@ from hsp_control.visualization.viewer.pipe import (
     PipeRecord,
     encode,
     key_of,
+    newest,
 )
 
 
@@ -124,13 +125,13 @@ _POLL = 0.05  # s
 # The process imports a few modules of this package, without the package's __init__.
 _LAUNCH = """
 import json, sys, types
-viewer, meshcat, port, parent, host, key = sys.argv[1:]
+viewer, meshcat, port, parent, host, steerable = sys.argv[1:]
 for name in ("hsp_control", "hsp_control.visualization.viewer"):
     sys.modules[name] = types.ModuleType(name)
     sys.modules[name].__path__ = [viewer]
 try:
     from hsp_control.visualization.viewer.page_server import main
-    main(meshcat, int(port), int(parent), host, key)
+    main(meshcat, int(port), int(parent), host, bool(steerable))
 except Exception as error:
     print(json.dumps({"error": str(error) or repr(error)}), flush=True)
 """
@@ -156,11 +157,11 @@ class PageServer(SceneRecorder):
         self._answers = b""
         self._asked = 0
         self._messages: deque[dict[str, Any]] = deque()
-        key = secrets.token_urlsafe(16) if steerable else ""
-        folder = Path(__file__).parent
-        arguments = [folder, meshcat_page(), port or 0, os.getpid(), host, key]
+        folder, steers = Path(__file__).parent, "yes" if steerable else ""
+        arguments = [folder, meshcat_page(), port or 0, os.getpid(), host, steers]
         self.process = subprocess.Popen(
             [sys.executable, "-P", "-c", _LAUNCH, *map(str, arguments)],
+            env={**os.environ, "HSP_PAGE_KEY": page_key(host)},
             bufsize=0,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
@@ -190,7 +191,10 @@ class PageServer(SceneRecorder):
             super().send(commands)
 
     def messages(self) -> list[dict[str, Any]]:
-        """Return the steering page's messages since the last call; never waits."""
+        """Return the steering page's messages since the last call; never waits.
+
+        Of each kind and object it is the newest: no page holds the program up.
+        """
         with self._lock:
             if self.process.stdout is None or self.process.stdout.closed:
                 raise ViewerError("the viewer is closed")
@@ -199,9 +203,9 @@ class PageServer(SceneRecorder):
                 self._read(descriptor)
             *lines, self._answers = self._answers.split(b"\n")
             self._messages.extend(json.loads(line)["message"] for line in lines)
-            found = list(self._messages)
+            found = newest(self._messages)
             self._messages.clear()
-        return found
+        return [dict(message) for message in found.values()]
 
     def wait_for_page(self, timeout: float) -> bool:
         """Wait until a page shows all that was sent; return whether one does."""
@@ -289,6 +293,30 @@ class PageServer(SceneRecorder):
         self.process.kill()
         self.close()
         raise ViewerError(f"the viewer's server {reason}; open a new viewer")
+
+
+def page_key(host: str) -> str:
+    """Return what a page's address must contain.
+
+    On this computer it is the user's, in a file that nobody else can read, so that an
+    open page finds the next start. In a network it is new at each start.
+    """
+    fresh = secrets.token_urlsafe(16)
+    if host != LOOPBACK:
+        return fresh
+    try:
+        cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+        file = Path(cache) / "hsp_control" / "page-key"
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with suppress(FileExistsError):
+            opened = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+            os.write(opened, fresh.encode())
+            os.close(opened)
+        about, kept = file.stat(), file.read_text()
+    except (OSError, RuntimeError, UnicodeDecodeError):  # no place for it
+        return fresh
+    private = about.st_uid == os.getuid() and not about.st_mode & 0o077
+    return kept if private and len(kept) == len(fresh) else fresh
 
 
 def _wait(descriptor: int, event: int, timeout: float) -> bool:

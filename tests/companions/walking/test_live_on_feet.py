@@ -29,7 +29,7 @@ from hsp_control.live import (
     Phase,
     run_loop,
 )
-from hsp_control.live.bearing_feet import BearingFeet
+from hsp_control.live.safe_stop import BearingFeet
 from hsp_control.live.state_reader import valid_measurement
 from hsp_control.live.udp import SensorLayout
 

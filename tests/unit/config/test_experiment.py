@@ -168,7 +168,7 @@ MISTAKES = [
      "tasks.pen.frame: no frame 'pan'; did you mean 'pen'?"),
     ("tasks.pen.wieght", 1, "ConfigError", "unknown key 'wieght'"),
     ("tasks.pen.gains", {"kp": 1}, "GainError",
-     "tasks.pen.gains: give both kp and kv; one of them is missing"),
+     "tasks.pen.gains: give both kp and kv, or natural_frequency; one is missing"),
     ("tasks.pen.gains", {"kp": [1, 2], "kv": 1}, "GainError",
      "tasks.pen.gains: kp has shape (2,); needs a number, 6 numbers"),
     ("tasks.pen.trajectory.position.center", [0, 0], "TrajectoryError",

@@ -21,7 +21,7 @@ from hsp_control.common.exceptions import (
 )
 from hsp_control.robot import RobotDescription
 from hsp_control.robot.description.access import only_within
-from hsp_control.simulation.plants.mujoco import MujocoScenePlant
+from hsp_control.simulation.plants import MujocoScenePlant
 
 pytest.importorskip("mujoco")
 

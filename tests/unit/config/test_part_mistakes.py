@@ -167,7 +167,7 @@ WRONG: dict[str, Any] = {
     "lists": [[[]]],
     "mapping": {"nonsense": 1},
 }
-FOREIGN = ("instance", "should be", "Input", "Sequence", "dataclass", "function")
+FOREIGN = ("instance", "should be", "Input", "Sequence", "dataclass", "function-")
 """Words of pydantic."""
 
 

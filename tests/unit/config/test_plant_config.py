@@ -15,7 +15,7 @@ from hsp_control.simulation.plants import (
     ImperfectPlant,
     StickingPlant,
 )
-from hsp_control.simulation.plants.mujoco import MujocoPlant
+from hsp_control.simulation.plants.mujoco_plant import MujocoPlant
 
 EVERYTHING: dict[str, Any] = {
     "type": "rigid_body",

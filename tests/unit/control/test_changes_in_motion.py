@@ -271,15 +271,3 @@ def test_the_error_equation_of_other_tasks_holds_while_one_comes_and_goes(
     rate = log["task.turned.error_rate"][first]
     expected = np.exp(-w * s) * (e[first] + (rate + w * e[first]) * s)
     np.testing.assert_allclose(e[alone], expected, rtol=0, atol=1e-8)
-
-
-# --- efforts -------------------------------------------------------------------------
-
-
-def efforts(law: hsp.Controller, times: Array) -> Array:
-    """Return efforts at one state while time goes on."""
-    q, v = panda().home(), np.full(7, 0.1)
-    return np.array([law.compute(t, q, v).tau for t in times])
-
-
-# --- what is on the time line --------------------------------------------------------

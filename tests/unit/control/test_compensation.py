@@ -30,12 +30,10 @@ from hsp_control.null_space.fields import TargetPosture
 from hsp_control.robot.friction import JointFriction
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants.drives import EffortDelay
-from hsp_control.simulation.plants.model_changes import Inertias, Payload, changed
+from hsp_control.simulation.plants.model_changes import Inertias, changed
 from hsp_control.simulation.plants.sensors import SensorDelay, VelocityNoise
 from hsp_control.tasks import RelativePose
 from hsp_control.trajectories import HoldOrientation, HoldPose
-
-EYE = np.eye(7)
 
 
 def run(
@@ -278,48 +276,6 @@ def test_with_an_integral_the_error_is_that_of_the_third_order() -> None:
         expected = [(expm(A * t) @ [0.0, e, rate])[1] for t in log.t]
         size = np.abs(expected).max()
         assert_allclose(log["task.hand.error"][:, row], expected, atol=0.01 * size)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("mass", "tolerance"), [(0.5, 0.01), (2.0, 0.07)])
-@pytest.mark.parametrize("rate", [2.0, 5.0])
-def test_a_payload_s_error_dies_as_the_linear_equation_says(
-    mass: float, tolerance: float, rate: float
-) -> None:
-    """e'' + B (Kv e' + Kp e + Ki ∫e) + D e = d, with B = M̃⁻¹M, M̃ the loaded arm's.
-
-    d is what the payload's weight accelerates, D e what that changes with the posture.
-    All joints are led, so that no self-motion is left; the rest is of second order.
-    """
-    loaded = changed(PANDA, [Payload("panda_tcp", mass)])
-    task = hsp.JointPosture(Q0, gains=hsp.Gains(natural_frequency=20.0), name="hand")
-
-    def dynamics(robot: hsp.Robot, q: Array) -> tuple[Array, Array]:
-        state = robot.state(0.0, q, np.zeros(7))
-        upper = np.triu(state.mass_matrix)
-        return upper + np.triu(upper, 1).T, state.nonlinear_effects.copy()
-
-    def weight(q: Array) -> Array:
-        M, N = dynamics(loaded, q)
-        return np.linalg.solve(M, N - dynamics(PANDA, q)[1])
-
-    B = np.linalg.solve(dynamics(loaded, Q0)[0], dynamics(PANDA, Q0)[0])
-    D = np.transpose([(weight(Q0 + s) - weight(Q0 - s)) / 2e-5 for s in 1e-5 * EYE])
-    A = np.zeros((22, 22))
-    A[:7, 7:14] = A[14:21, :7] = EYE
-    A[7:14] = np.hstack(
-        [-400.0 * B - D, -40.0 * B, -400.0 * rate * B, weight(Q0)[:, None]]
-    )
-    log = run(
-        hsp.Controller(PANDA, [task], limits=None),
-        Compensation(integral_action=IntegralAction(rate)),
-        plant=hsp.plants.RigidBodyPlant(loaded), duration=2.0, log_period=0.02,
-    )  # fmt: skip
-    expected = np.array([expm(A * t)[:7, 21] for t in log.t])
-    error, size = log["task.hand.error"], np.abs(expected).max()
-    assert size > 0.01 * mass  # [rad]
-    assert_allclose(error, expected, rtol=0, atol=tolerance * size)
-    assert np.abs(error[-1]).max() < (0.05 if rate == 2.0 else 1e-3) * size
 
 
 def test_an_integral_only_unwinds_while_the_law_is_not_delivered() -> None:

@@ -95,28 +95,3 @@ def test_a_simulated_joint_obeys_the_loop_s_polynomial(
     loop = LinearLoop(Kp, Kv, Ki, h, *delays, parts, joint=joint)
     other = LinearLoop(1.1 * Kp, Kv, Ki, h, *delays, parts, joint=joint)
     check_that_it_is_the_loop(x, loop, other, rounding=1e-11)
-
-
-@pytest.mark.parametrize("delay", [0, 2])
-def test_where_it_is_measured_decides(delay: int) -> None:
-    """Without damping in the joint, small gains brake or drive the joint's own mode.
-
-    To first order in Kv, its rate is -Kv φ_m φ/2: φ is the mode's shape, of the motor
-    and of what is measured, with λ φ_l² + μ φ_m² = 1. Motor and link move against each
-    other, so that a measured link drives the mode.
-    """
-    stiffness = 5e3
-    link, motor = 2.0 / 3.0, 1.0 / 3.0
-    shape = np.array([motor, -link]) / np.sqrt(link * motor)  # of link and motor
-    for measured, own in (("link", shape[0]), ("motor", shape[1])):
-        joint = ElasticJoint(link, motor, stiffness, 0.0, measured)  # type: ignore[arg-type]
-        gentle = np.eye(1)
-        loop = LinearLoop(0.01 * gentle, 0.2 * gentle, 0.0 * gentle, H, 0, delay,
-                          joint=joint)  # fmt: skip
-        modes = np.linalg.eigvals(loop.transition())
-        frequency = np.sqrt(stiffness / (link * motor))
-        found = modes[np.abs(np.abs(np.angle(modes)) - frequency * H).argmin()]
-        # The held effort is half a period late besides.
-        late = np.cos(frequency * H * (delay + 0.5))
-        expected = -0.5 * 0.2 * own * shape[1] * late
-        assert np.log(np.abs(found)) / H == pytest.approx(expected, rel=0.02)

@@ -1,13 +1,16 @@
-"""Check what is said of angles in degrees, and of a step that calls its controller."""
+"""Check what one tries first: degrees, targets, errors, and steps that call others."""
 
+import pickle
 import re
 import threading
 import time
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from controller_cases import assert_same, contents, panda, states, track
 from hypothesis import given
@@ -54,6 +57,87 @@ def test_degrees_are_asked_about_at_the_first_state_and_after_a_restart() -> Non
     with pytest.raises(ConfigurationError, match="degrees"):
         law.compute(0.0, degrees, REST)
     assert_same(contents(law.compute(0.0, home, REST)), before)
+
+
+# --- a target that one sets ---------------------------------------------------------
+
+
+def pose_of(frame: Any) -> pin.SE3:
+    return pin.SE3(frame.rotation, frame.position)
+
+
+@pytest.mark.parametrize(
+    ("task", "frame_value"),
+    [
+        (hsp.FramePose(), pose_of),
+        (hsp.FramePosition(axes="xz"), lambda frame: frame.position[[0, 2]]),
+        (hsp.FrameOrientation(), lambda frame: frame.rotation),
+        (hsp.FramePose(trajectory=hsp.StreamPose(delay=0.02)), pose_of),
+    ],
+)
+def test_a_target_is_set_at_any_time(task: hsp.Task, frame_value: Any) -> None:
+    """Before the first step and after it, and again in a copy; nothing jumps."""
+    robot = panda()
+    q, v = robot.home(), REST
+    near = robot.state(0.0, robot.home() + 0.1, REST).frame("panda_tcp")
+    target = frame_value(near)
+    law = hsp.Controller(robot, [replace(task, name="hand")], limits=None)
+    law.set_target("hand", frame_value(robot.state(0.0, q, v).frame("panda_tcp")))
+    before = law.compute(0.0, q, v).tau
+    for k in range(1, 1500):
+        if k == 100:
+            stream = law.set_target("hand", target)
+        if k == 200:
+            law = pickle.loads(pickle.dumps(law))
+            assert type(law.set_target("hand", target)) is type(stream)
+            assert len(law.changes) == (not isinstance(task.followed, hsp.StreamPose))
+        out = law.compute(1e-3 * k, q, v)
+        assert np.abs(out.tau - before).max() < 2.0
+        before = out.tau
+        v = v + 1e-3 * robot.forward_dynamics(q, v, out.tau)
+        q = robot.integrate(q, 1e-3 * v)
+    assert np.linalg.norm(out.error("hand")) < 1e-3
+    reference, actual = law.tasks[0].measure(law.state)
+    np.testing.assert_allclose(actual, reference, atol=1e-3)
+    here = frame_value(robot.state(0.0, q, v).frame("panda_tcp"))
+    np.testing.assert_allclose(np.array(here), np.array(target), atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("hnd", REST, "there is no task 'hnd'; did you mean 'hand'"),
+        ("hand", [1, 2, 3], "'hand' is a pin.SE3, x, y, z and a quaternion .* got"),
+        ("point", [1, 2], r"target of task 'point' is 3 numbers; got \[1, 2\]"),
+        ("turned", "up", "is a quaternion .*, or roll, pitch and yaw; got 'up'"),
+    ],
+)
+def test_a_target_of_another_kind_is_refused(
+    name: str, value: Any, message: str
+) -> None:
+    tasks = [
+        hsp.FramePose(name="hand", priority=1),
+        hsp.FramePosition(name="point", priority=2),
+        hsp.FrameOrientation(name="turned", priority=3),
+    ]
+    with pytest.raises(ControllerError, match=message):
+        hsp.Controller(panda(), tasks).set_target(name, value)
+
+
+def test_errors_by_name_and_what_is_printed() -> None:
+    law, out = holding(null_space_gain=8.0), hsp.ControlOutput()
+    assert repr(out) == "ControlOutput(not computed yet)"
+    assert repr(law) == (
+        "Controller of panda: 'panda_tcp' (FramePosition); field rest, K_N = 8, "
+        "IdentityMetric; no limits"
+    )
+    law.compute(0.0, panda().home(), REST, out=out)
+    np.testing.assert_array_equal(out.error("panda_tcp"), out.task.error)
+    np.testing.assert_array_equal(out.error_rate("panda_tcp"), out.task.error_rate)
+    length = np.linalg.norm(out.task.error)
+    assert f", EXACT; |e of panda_tcp| = {length:.3g}, |e_N| = " in repr(out)
+    with pytest.raises(ControllerError, match="no task 'tcp' counts now; did you mean"):
+        out.error("tcp")
 
 
 # --- the first effort ---------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 import copy
 import dataclasses
+import inspect
 import math
 import pickle
 from abc import ABC, abstractmethod
@@ -37,7 +38,7 @@ from hsp_control.declaration.quantities import (
     Vector3,
     Weights,
 )
-from hsp_control.trajectories import Circle, Trajectory
+from hsp_control.trajectories import Circle, StreamPose, Trajectory
 from hsp_control.trajectories.orientation import OrientationTrajectory
 from hsp_control.trajectories.pose import PoseTrajectory
 
@@ -295,9 +296,9 @@ def test_a_plugin_that_does_not_work_is_named(plug: Callable[..., Any]) -> None:
 # --- messages -------------------------------------------------------------------------
 
 MESSAGES: dict[str, Callable[[], Any]] = {
-    "Ball: missing key 'radius'; required here: radius": lambda: Ball(),  # type: ignore
-    "Ball: radus: unknown key 'radus'; did you mean 'radius'? (allowed: label, radius, "
-    "center)": lambda: Ball(radus=1),  # type: ignore
+    "Ball: missing argument 'radius'; required here: radius": lambda: Ball(),  # type: ignore
+    "Ball: radus: unknown argument 'radus'; did you mean 'radius'? (allowed: label, "
+    "radius, center)": lambda: Ball(radus=1),  # type: ignore
     "Ball: takes 2 positional arguments (radius, center); the others are given by "
     "name": (
         lambda: Ball(1, [1, 2, 3], "red")  # type: ignore
@@ -309,7 +310,7 @@ MESSAGES: dict[str, Callable[[], Any]] = {
     "Ball: center: nothing given; expected a list of 3 numbers": (
      lambda: Ball(1, None)),
     "Rod: a mass of 11.0 is too much for this size": lambda: Rod(1.0, 11.0),
-    "Bag: first: 3 is an integer; expected a mapping": lambda: Bag(3),  # type: ignore
+    "Bag: first: 3, of type int; needs a Gadget, one of hsp.gadgets": lambda: Bag(3),  # type: ignore
     "Bag: first: a Hammer is not one of the gadgets": lambda: Bag(Hammer(1)),  # type: ignore
     "Bag: first: missing key 'type'; type is one of: bag, ball, rod": (
         lambda: Bag({"radius": 1})  # type: ignore
@@ -409,6 +410,24 @@ def test_every_property_has_a_description(base: type[Part]) -> None:
         for name, about in each["properties"].items():
             assert about.get("description"), (each, name)
             assert "default" not in about or "oneOf" not in about
+
+
+def test_what_python_shows_of_a_part() -> None:
+    """A signature without pydantic's words, and the docstrings of the fields."""
+    assert str(inspect.signature(Ball)) == (
+        "(radius: float, center: ArrayLike = (0.0, 0.0, 0.0), *, label: str = 'gadget')"
+    )
+    assert str(inspect.signature(Bag)) == (
+        "(first: Gadget, spare: Gadget | None = None, grid: ArrayLike = ((1.0, 0.0), "
+        "(0.0, 1.0)), counts: dict[str, ArrayLike] = {}, *, label: str = 'gadget')"
+    )
+    assert Ball.__doc__ == (
+        "A round one.\n\nArgs:\n    radius: Radius [m].\n    center: Center [m].\n"
+        "    label: What it is called, on one line [-]."
+    )
+    assert TypeAdapter(Ball).json_schema()["description"] == "A round one."
+    assert len(str(inspect.signature(StreamPose))) < 600
+    assert "policy: How waypoints are followed." in str(StreamPose.__doc__)
 
 
 def test_docstrings_of_fields_are_inherited() -> None:

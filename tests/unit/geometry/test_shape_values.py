@@ -78,7 +78,7 @@ WRONG: list[tuple[type[Part], str, Any]] = [
     (Obstacle, "name", 3),
     (Obstacle, "shape", 0.1),
     (Obstacle, "shape", {"type": "sphere", "radius": -0.1}),
-    (Obstacle, "center", [0.0, 0.0, 0.0]),
+    (Obstacle, "center", [0.0, 0.0]),
     (Obstacle, "center", Hold([0.0, 0.0])),
     (Obstacle, "center", Hold()),
     (Obstacle, "center", Hold([0.0, 0.0, 0.0], origin="start")),

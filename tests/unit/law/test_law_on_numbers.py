@@ -5,11 +5,10 @@ import oracles
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from law_numbers import Numbers, numbers, orthogonal, resolve
+from law_numbers import Numbers, numbers, resolve
 
 from hsp_control.common.arrays import Array
 from hsp_control.law import CONSTANT, IDENTITY, VARYING, Resolution, singular_values
-from hsp_control.null_space.metrics import CoordinatesMetric, MetricSample
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -55,30 +54,6 @@ def test_task_is_met_whatever_the_field_asks(form: int, seed: int, m: int) -> No
 
 @pytest.mark.slow
 @forms
-@given(seeds, st.integers(2, 6))
-def test_law_does_not_depend_on_the_rows(form: int, seed: int, m: int) -> None:
-    """J and B(t)J, each with its own rate, are one task: the same a, e_N and φ_N."""
-    x = numbers(seed, m, 7, form)
-    rng = np.random.default_rng(seed)
-    B = orthogonal(seed, m, m) * np.linspace(1.0, 3.0, m)
-    B_dot = rng.standard_normal((m, m))
-    # (BJv)' = B a_x + B'Jv.
-    y = x._replace(
-        J=B @ x.J, J_dot=B_dot @ x.J + B @ x.J_dot, a_x=B @ x.a_x + B_dot @ x.J @ x.v
-    )
-    for first, second in (
-        (resolve(x, form)[0], resolve(y, form)[0]),
-        (resolve(x, form)[1], resolve(y, form)[1]),
-        (phi_N(x, form), phi_N(y, form)),
-    ):
-        np.testing.assert_allclose(first, second, rtol=1e-10, atol=1e-10)
-    # With another's rate the law differs.
-    wrong = phi_N(y._replace(J_dot=x.J_dot), form)
-    assert np.abs(wrong - phi_N(x, form)).max() > 1e-3
-
-
-@pytest.mark.slow
-@forms
 @given(seeds, st.integers(1, 5), st.data())
 def test_redundant_rows_change_nothing(
     form: int, seed: int, m: int, data: st.DataObject
@@ -98,37 +73,6 @@ def test_redundant_rows_change_nothing(
     # Zeros that rounding lifts to 1e-16 act with 2/threshold² = 2e4, twice at most.
     np.testing.assert_allclose(e_N, expected_e_N, rtol=0, atol=1e-9)
     np.testing.assert_allclose(a, expected, rtol=1e-9, atol=1e-8)
-
-
-@given(seeds, rows)
-def test_constant_metric_is_the_papers_law_in_other_coordinates(
-    seed: int, m: int
-) -> None:
-    """W = AᵀA: a = A⁻¹ a_θ with the law of W = I for θ = A q."""
-    x = numbers(seed, m, 7, IDENTITY)
-    A = (
-        orthogonal(seed + 5, 7, 7)
-        * np.linspace(1.0, 3.0, 7)
-        @ orthogonal(seed + 6, 7, 7)
-    )
-    A_inverse = np.linalg.inv(A)
-    theta = x._replace(
-        J=x.J @ A_inverse,
-        J_dot=x.J_dot @ A_inverse,
-        v=A @ x.v,
-        g=A @ x.g,
-        g_dot=A @ x.g_dot,
-        K_N=A @ x.K_N @ A_inverse,
-    )
-    a_theta, e_theta, _ = resolve(theta, IDENTITY)
-    metric = CoordinatesMetric(A)
-    sample = metric.evaluate(None, MetricSample.allocate(7))  # type: ignore[arg-type]
-    np.testing.assert_allclose(sample.W, A.T @ A, rtol=0, atol=1e-14)
-    a, e_N, _ = resolve(x._replace(W=sample.W), CONSTANT)
-    np.testing.assert_allclose(a, A_inverse @ a_theta, rtol=1e-10, atol=1e-10)
-    np.testing.assert_allclose(e_N, A_inverse @ e_theta, rtol=1e-11, atol=1e-11)
-    # It is another law than that of W = I.
-    assert np.abs(a - resolve(x, IDENTITY)[0]).max() > 1e-6
 
 
 @forms

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import oracles
 import pytest
-from law_cases import load, pseudo_inverse
+from law_cases import load
 from law_numbers import positive
 from numpy.testing import assert_allclose
 from oracles import slope
@@ -252,30 +252,6 @@ def test_coordinates_metric_is_equation_13_in_those_coordinates(name: str) -> No
     state = robot.state(0.3, robot.integrate(c.q, 0.3 * c.v), c.v)
     g = cost.evaluate(state, sample, metric.form, FieldSample.allocate(nv)).g
     assert_allclose(A @ g, -A_inverse.T @ cost.gradient(state), rtol=0, atol=1e-13)
-
-
-@pytest.mark.parametrize("name", CASES)
-@pytest.mark.parametrize("kind", METRICS)
-def test_projector_and_error_in_the_metric(name: str, kind: str) -> None:
-    """W P = PᵀW, P² = P, P W⁻¹Jᵀ = 0; e_N = P(g - v) and ‖x‖² = ‖e_N‖² + ‖x - e_N‖²."""
-    c = case(name)
-    metric = METRICS[kind](c.robot.nv)
-    state = c.robot.state(0.3, c.q, c.v)
-    x = terms(c, state, metric)
-    ours = controller(c, metric, 7.0)
-    out = ours.compute(state)
-    J_sharp, _ = pseudo_inverse(x.J, x.W, threshold=1e-4)
-    P = np.eye(c.robot.nv) - J_sharp @ x.J
-    atol = 1e-11 * np.linalg.norm(x.W, 2)
-    assert_allclose(x.W @ P, P.T @ x.W, rtol=0, atol=atol)
-    assert_allclose(P @ P, P, rtol=0, atol=1e-10)
-    assert_allclose(P @ np.linalg.solve(x.W, x.J.T), 0.0, rtol=0, atol=1e-8)
-    e_N, asked = out.null_space_error, x.g - c.v
-    assert_allclose(e_N, P @ asked, rtol=0, atol=1e-11)
-    assert_allclose(x.J @ e_N, 0.0, rtol=0, atol=1e-11)
-    rest = asked - e_N
-    whole = asked @ x.W @ asked
-    assert_allclose(e_N @ x.W @ e_N + rest @ x.W @ rest, whole, rtol=1e-10)
 
 
 @pytest.mark.slow

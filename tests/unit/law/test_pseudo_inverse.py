@@ -2,7 +2,6 @@
 
 import numpy as np
 import oracles
-import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from law_cases import pseudo_inverse
@@ -98,68 +97,3 @@ def test_bounded_pseudo_inverse_is_the_function_of_the_spectrum(
         assert damped
     if values.min() > threshold * (1 + 1e-9):
         assert not damped
-
-
-@given(
-    seeds,
-    st.integers(1, 6),
-    st.lists(st.floats(0.0, 2.0), min_size=6, max_size=6),
-    st.floats(-14.0, -1.0).map(lambda k: 10.0**k),
-)
-def test_bounded_pseudo_inverse_is_continuous(
-    seed: int, m: int, factors: list[float], distance: float
-) -> None:
-    """‖J1# - J2#‖_F ≤ (2/threshold²) ‖J1 - J2‖_F, in any direction, at any rank.
-
-    2/threshold² is the steepest slope of s q(s²), at s = 0, and a function of a
-    symmetric matrix (here of [[0, J], [Jᵀ, 0]]) keeps its Lipschitz constant in the
-    Frobenius norm. A jump at the threshold, or at a change of rank, would break it.
-    """
-    n, threshold = 7, 0.1
-    values = threshold * np.array(factors[:m])
-    J = jacobian(seed, m, n, values, np.eye(n))
-    step = np.random.default_rng(seed).standard_normal((m, n))
-    other = J + distance * step / np.linalg.norm(step)
-    first, _ = pseudo_inverse(J, None, threshold)
-    second, _ = pseudo_inverse(other, None, threshold)
-    moved = np.linalg.norm(other - J)
-    change = np.linalg.norm(second - first)
-    assert change <= 2.0 / threshold**2 * moved + 1e-11
-
-
-@pytest.mark.parametrize("weighted", [False, True])
-def test_smooth_across_the_threshold(weighted: bool) -> None:
-    """One singular value crosses it: neither J# nor its slope jumps."""
-    n, threshold = 7, 0.05
-    W = positive(3, n) if weighted else np.eye(n)
-
-    def at(value: float) -> Array:
-        J = jacobian(4, 3, n, [0.7, 0.3, value], W)
-        return pseudo_inverse(J, W if weighted else None, threshold)[0]
-
-    h = 1e-5
-    below, at_it, above = (at(threshold + k * h) for k in (-1, 0, 1))
-    # The jump of the slope, 1/s² against (2 - 3s²/θ²)/θ², is 4h/θ³ at most plus
-    # rounding 1e-14/h; a formula that were only continuous would jump by 400.
-    jump = (above - at_it) / h - (at_it - below) / h
-    assert np.abs(jump).max() < 8 * 10.0 * h / threshold**3
-    assert np.abs(above - below).max() > 1e-4  # something does move
-
-
-@given(seeds, st.lists(st.floats(0.0, 1.5), min_size=3, max_size=3))
-def test_freed_directions_pass_to_the_null_space(
-    seed: int, factors: list[float]
-) -> None:
-    """P = I - J#J has the eigenvalues (1 - s²/threshold²)², 0 above it, and ones."""
-    n, threshold = 7, 0.1
-    W = positive(seed, n)
-    values = threshold * np.array(factors)
-    J = jacobian(seed + 2, 3, n, values, W)
-    J_sharp, _ = pseudo_inverse(J, W, threshold)
-    L = np.linalg.cholesky(W)
-    P = L.T @ (np.eye(n) - J_sharp @ J) @ np.linalg.inv(L).T  # symmetric
-    freed = np.maximum(1.0 - np.array(factors) ** 2, 0.0) ** 2
-    expected = np.sort(np.concatenate([freed, np.ones(n - 3)]))
-    actual = np.linalg.eigvalsh(0.5 * (P + P.T))
-    np.testing.assert_allclose(actual, expected, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(P, P.T, rtol=0, atol=1e-12)

@@ -10,7 +10,6 @@ from task_cases import FRAMES, load, unit
 
 from hsp_control import Controller, FramePosition, Gains, Hold, Robot
 from hsp_control.common.arrays import Array
-from hsp_control.law import threshold
 from hsp_control.law.threshold import (
     MODEST,
     NOT,
@@ -137,16 +136,3 @@ def drawn(name: str, seed: int) -> Slopes:
 def test_the_law_is_nowhere_steep(name: str, seed: int) -> None:
     found, bound = drawn(name, seed)
     assert found <= bound * (1.0 + 1e-5)
-
-
-def test_it_would_be_steep_if_the_threshold_did_not_follow(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """And the bound is near: stretched, it is met to a sixth."""
-    robot = load("planar3r")
-    q = robot.integrate(robot.neutral(), np.array([0.3, 1e-4, 1e-4]))
-    target = 1e3 * np.array([np.cos(0.3), np.sin(0.3)])
-    found, bound = slopes(robot, q, target)
-    assert found > 0.1 * bound
-    monkeypatch.setattr(threshold, "STIFFNESS", np.inf)
-    assert slopes(robot, q, target).found > 5.0 * bound

@@ -8,12 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from live_rigs import (
     PERIOD,
     Rig,
-    Trick,
     always,
     law,
     missing,
@@ -194,60 +191,6 @@ def test_a_disk_that_is_full_stops_it(
     assert (
         len(Rollout.load(tmp_path / "run.journal")) == 18
     )  # 20 less magic and heading
-
-
-EVENTS = st.lists(
-    st.tuples(
-        st.integers(25, 400),
-        st.sampled_from(
-            [
-                missing,
-                nan_velocity,
-                lambda m: m._replace(q=m.q + np.inf),
-                lambda m: m._replace(q=m.q + 3.0),
-                lambda m: m._replace(v=m.v + 2.5),
-                lambda m: m._replace(q=m.q[:5]),
-                lambda m: m._replace(sequence=m.sequence - 3),
-                lambda m: m._replace(t=m.t - 0.1),
-                lambda m: m._replace(t=-np.inf),
-                lambda m: m._replace(age=0.5),
-                lambda m: m._replace(halted=True),
-                interrupt,
-            ]
-        ),
-        st.integers(1, 60),
-    ),
-    max_size=6,
-)
-
-
-@pytest.mark.slow
-@settings(max_examples=12)
-@given(events=EVENTS, compensates=st.booleans())
-def test_whatever_comes_it_ends_and_no_effort_is_beyond_limits(
-    events: list[tuple[int, Trick, int]], compensates: bool
-) -> None:
-    tricks: dict[int, Trick] = {}
-    for begin, trick, count in events:
-        tricks |= always(trick, begin, 1 if trick is interrupt else count)
-    most, rate = 80.0, 1000.0
-    settings = LiveSettings(
-        compensates_gravity=compensates, effort_rate=rate, effort=most
-    )
-    rig = Rig(watched(settings), tricks)
-    report = run_loop(law(), rig, duration=0.3, settings=settings)
-    sent = np.array(rig.sent)
-    assert np.isfinite(sent).all()
-    at_rest = np.zeros(7) if compensates else gravity(start())
-    steps = np.abs(np.diff(np.vstack([at_rest, sent]), axis=0))
-    # Rounding: sums of numbers as large as the efforts.
-    assert steps.max() <= rate * PERIOD + 1e-9
-    if not compensates:
-        assert np.abs(sent).max() <= most + 1e-9
-    assert report.reason
-    assert rig.robot.phase is Phase.HOLDING
-    assert np.abs(rig.robot.v).max() < AT_REST
-    assert rig.closed
 
 
 # --- changes while it runs -----------------------------------------------------------

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from oracles import slope
 
-from hsp_control import Cost, Obstacle
+from hsp_control import Cost, Obstacle, load_experiment
+from hsp_control.geometry.closed_form import ClosedFormDistances
 from hsp_control.geometry.shapes import Sphere
 from hsp_control.null_space.fields import FieldSample, ObstacleClearance
 from hsp_control.null_space.fields.barrier import CORE
@@ -26,8 +27,8 @@ def test_barrier_is_its_formula_and_its_own_derivatives(
 ) -> None:
     """-(1 - s)² ln s above the core, a parabola with the same tangent below.
 
-    Differences of sixth order over a hundredth of the distance to where the formula
-    changes; at the change itself the next test looks.
+     Differences of sixth order over a hundredth of the distance to where the formula
+    .
     """
     value, first, second = barrier_at(s * influence, influence)
     s = s * influence / influence
@@ -49,21 +50,6 @@ def test_barrier_is_its_formula_and_its_own_derivatives(
         bend = slope(lambda x: barrier_at((s + x) * influence, influence)[1], step)
         assert rise / influence == pytest.approx(first, rel=1e-7, abs=1e-7 / influence)
         assert bend / influence == pytest.approx(second, rel=1e-7, abs=1e-6 / influence)
-
-
-@pytest.mark.parametrize("edge", [1.0, CORE])
-@pytest.mark.parametrize("influence", [0.05, 1.0, 3.0])
-def test_barrier_is_twice_continuously_differentiable(
-    edge: float, influence: float
-) -> None:
-    """Across an edge, b, b' and b'' change by no more than their own slopes allow."""
-    tiny = 1e-7
-    below = np.array(barrier_at((edge - tiny) * influence, influence))
-    above = np.array(barrier_at((edge + tiny) * influence, influence))
-    units = influence ** np.array([0.0, 1.0, 2.0])
-    # b''' is at most 6 at the influence, and 2/s³ + 4/s² + ... = 2.6e5 at the core.
-    steepest = np.array([60.0, 3e3, 3e5]) if edge < 1.0 else np.array([1e-6, 1e-6, 7.0])
-    assert (np.abs(above - below) * units <= steepest * 2.0 * tiny).all()
 
 
 # --- far away, and once per state ----------------------------------------------------
@@ -144,3 +130,21 @@ def test_distances_are_measured_once_per_state(calls: list[int]) -> None:
     del calls[:]
     evaluate(ObstacleClearance([ball], influence=1.0), state)
     assert not calls
+
+
+def test_rows_of_a_log_bind_nothing_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The value of the field and those of its terms are taken of one state."""
+    bound: list[int] = []
+    make = ClosedFormDistances._plan
+
+    def counting(self: ClosedFormDistances, *arguments: Any) -> Any:
+        bound.append(1)
+        return make(self, *arguments)
+
+    monkeypatch.setattr(ClosedFormDistances, "_plan", counting)
+    counts = []
+    for duration in (0.02, 0.2):
+        bound.clear()
+        load_experiment("panda_obstacle", f"simulation.duration={duration}").run()
+        counts.append(len(bound))
+    assert counts[0] == counts[1]

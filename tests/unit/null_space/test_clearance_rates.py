@@ -9,18 +9,15 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-import coal
 import numpy as np
-import pinocchio as pin
 import pytest
 from clearance_cases import AIR, agree, barrier_at, flowing, load, turned
 from numpy.typing import NDArray
 from odd_robots import FACES, OCTAHEDRON, write_stl
-from oracles import gradient, slope
+from oracles import gradient
 
 from hsp_control import Controller, Cost, FramePosition, Gains, Obstacle, simulate
-from hsp_control.declaration.quantities import Vector
-from hsp_control.geometry import LinkShape, Proximity, link_shapes
+from hsp_control.geometry import Proximity, link_shapes
 from hsp_control.geometry.shapes import (
     Box,
     Capsule,
@@ -34,7 +31,7 @@ from hsp_control.geometry.shapes import (
 from hsp_control.null_space.fields import ObstacleClearance
 from hsp_control.robot import Dop853
 from hsp_control.robot.integrators import Integrator
-from hsp_control.trajectories import Hold, HoldOrientation, Lissajous, Spin, Trajectory
+from hsp_control.trajectories import Hold, HoldOrientation, Lissajous, Spin
 
 Array = NDArray[np.float64]
 
@@ -136,83 +133,6 @@ def test_gradient_by_hulls_is_as_good_as_gjk() -> None:
         np.testing.assert_allclose(
             field.gradient(state), expected, rtol=0, atol=2e-4 * scale
         )
-
-
-def rate_at_one_time(field: Cost, state: Any) -> Array:
-    """Return the gradient's rate with the obstacles frozen where they are."""
-    return slope(lambda s: field.gradient(state.displaced(0.0, s * state.v)), 5e-4)
-
-
-def test_a_frozen_obstacle_or_witness_point_is_measurably_wrong() -> None:
-    """The rate needs ∂∇f/∂t and the sliding of the nearest point along the link.
-
-    The latter is frozen by hanging a point on the link, and one on the obstacle, where
-    the nearest points are now: distance and gradient are equal, the rate is not.
-    """
-    robot = load("panda")
-    obstacle = Obstacle("ball", Sphere(0.1), AIR)
-    field = ObstacleClearance([obstacle], influence=0.4)
-    rng = np.random.default_rng(12)
-    in_time, in_place = [], []
-    while len(in_time) < 12:
-        q, v = robot.random_configuration(rng), 0.5 * rng.normal(size=7)
-        state = robot.state(0.7, q, v)
-        if not 0.05 < field.minimum_distance(state) < 0.25:
-            continue
-        true = field.gradient_rate(state)
-        frozen = rate_at_one_time(field, state)
-        in_time.append(float(np.abs(true - frozen).max() / np.abs(true).max()))
-
-        field.value(state)
-        proximity = field.proximity(state)
-        k = int(np.argmin(proximity.distances))
-        link = proximity.links[proximity.pairs[k][0]]
-        alone = ObstacleClearance([obstacle], influence=0.4, links=[link.link])
-        place = state.data.oMi[link.joint]
-        hung = LinkShape(
-            link.link,
-            link.joint,
-            pin.SE3(np.eye(3), place.actInv(proximity.witness(k)[0])),
-            coal.Sphere(0.0),
-        )
-        offset = proximity.witness(k)[1] - obstacle.placement(0.7).translation
-        moving = Obstacle("point", Sphere(0.0), Shifted(AIR, offset))
-        points = Proximity(robot, [hung], [moving], [(0, 1)])
-        if len(alone.proximity(state).pairs) > 1:
-            continue  # a link of two capsules
-        one = np.array([barrier_at(float(proximity.distances[k]), 0.4)[1]])
-        np.testing.assert_allclose(
-            points.gradient(state, one), alone.gradient(state), rtol=0, atol=1e-9
-        )
-
-        def rate(p: Proximity, state: Any = state, q: Array = q, v: Array = v) -> Array:
-            def along(s: float) -> Array:
-                here = robot.state(0.7 + s, robot.integrate(q, s * v), v)
-                (d,) = p.measure(here)
-                return p.gradient(here, np.array([barrier_at(float(d), 0.4)[1]]))
-
-            return slope(along, 5e-4)
-
-        sliding = alone.gradient_rate(state)
-        stuck = rate(points)
-        in_place.append(float(np.abs(sliding - stuck).max() / np.abs(sliding).max()))
-    assert np.median(in_time) > 0.2, in_time
-    assert max(in_place) > 0.2, in_place
-
-
-class Shifted(Trajectory):
-    """A trajectory moved by a constant."""
-
-    base: Trajectory
-    offset: Vector
-
-    @property
-    def dimension(self) -> int:
-        return self.base.dimension
-
-    def sample(self, t: float, out: Any = None) -> Any:
-        sample = self.base.sample(t)
-        return sample._replace(position=sample.position + self.offset)
 
 
 def test_a_floor_has_no_edge_where_links_lie_level() -> None:

@@ -13,7 +13,6 @@ from field_oracles import (
     swirl_field,
     target,
 )
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from hsp_control import (
@@ -84,12 +83,6 @@ def test_target_posture_is_smooth_all_the_way_round() -> None:
     # It winds: a whole turn further all is the same again.
     turn = round(2.0 * np.pi / step)
     np.testing.assert_allclose(slopes[turn], slopes[0], atol=3 * step)
-
-
-# --- sums ----------------------------------------------------------------------------
-
-
-weights = st.floats(0.0, 1e3)
 
 
 # --- placing -------------------------------------------------------------------------

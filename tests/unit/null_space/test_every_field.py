@@ -4,15 +4,10 @@ import numpy as np
 import pytest
 from field_cases import MEMBERS, draw, evaluate, every_field, metrics
 from field_oracles import (
-    ROBOTS,
     TIME,
     derivative,
-    frames_of,
     load,
     plain,
-    reach_gradient,
-    reach_rate,
-    reach_value,
 )
 from numpy.typing import NDArray
 
@@ -80,43 +75,6 @@ def test_field_and_its_rate(name: str, which: str, metric_name: str) -> None:
 
 
 # --- differences ---------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", ROBOTS)
-def test_accuracy_of_differences(name: str) -> None:
-    """gradient: 1e-12 of f's scale; rate_along_flow: 3e-11 at 2 rad/s.
-
-    Truncation is h⁴/30 f⁽⁵⁾ = 3e-14 f⁽⁵⁾, rounding 1.5e-16 f/h = 2e-13 f.
-    """
-    robot, frame = load(name), frames_of(name)[2]
-    for seed in range(5):
-        state = robot.state(TIME, *draw(name, 10 + seed))
-        exact = reach_gradient(frame)(state)
-        found = differences.gradient(reach_value(frame), state)
-        scale = 1.0 + np.abs(exact).max() + abs(reach_value(frame)(state))
-        np.testing.assert_allclose(found, exact, rtol=0, atol=1e-12 * scale)
-        exact = reach_rate(frame)(state)
-        found = differences.rate_along_flow(reach_gradient(frame), state)
-        scale = 1.0 + np.abs(exact).max()
-        np.testing.assert_allclose(found, exact, rtol=0, atol=3e-11 * scale)
-
-
-def test_differences_are_of_fourth_order(monkeypatch: pytest.MonkeyPatch) -> None:
-    robot, frame = load("panda"), "panda_tcp"
-    state = robot.state(TIME, *draw("panda", 20))
-    steps = np.array([0.2, 0.1, 0.05, 0.025])
-    exact = reach_gradient(frame)(state), reach_rate(frame)(state)
-    errors = []
-    for step in steps:
-        monkeypatch.setattr(differences, "GRADIENT_STEP", step)
-        monkeypatch.setattr(differences, "RATE_STEP", step)
-        found = (
-            differences.gradient(reach_value(frame), state),
-            differences.rate_along_flow(reach_gradient(frame), state),
-        )
-        errors.append([np.abs(a - b).max() for a, b in zip(found, exact, strict=True)])
-    orders = np.polyfit(np.log(steps), np.log(errors), 1)[0]
-    np.testing.assert_allclose(orders, 4.0, atol=0.15)
 
 
 def test_rate_along_flow_of_anything() -> None:

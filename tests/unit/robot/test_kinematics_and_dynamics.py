@@ -7,14 +7,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from numpy.typing import NDArray
-from oracles import gradient, slope
+from oracles import slope
 from robot_cases import BUNDLED, ROBOTS, draw
 
-from hsp_control import Robot, RobotState
+from hsp_control import Robot
 
 Array = NDArray[np.float64]
 LWA = pin.LOCAL_WORLD_ALIGNED
-FLAT = ("planar3r", "panda", "panda_fingers", "iiwa14", "ur5", "tiago_pro")
 
 
 def frames(robot: Robot, rng: np.random.Generator) -> list[str]:
@@ -67,27 +66,6 @@ def test_frames_equal_pinocchios(case: str) -> None:
 
 
 @pytest.mark.parametrize("case", ROBOTS)
-def test_frame_jacobian_is_the_derivative_of_the_placement(case: str) -> None:
-    """J e_i by differences of position and rotation along q ⊕ s e_i."""
-    robot, q, v, rng = draw(case, seed=2)
-    state = robot.state(0.0, q, v)
-    for name in frames(robot, rng):
-        frame = state.frame(name)
-        R, J = frame.rotation.copy(), frame.jacobian.copy()
-
-        def moved(s: float, unit: Array, name: str = name, R: Array = R) -> Array:
-            there = state.displaced(0.0, s * unit).frame(name)
-            turned = pin.log3(there.rotation @ R.T)  # in world axes
-            return np.concatenate([there.position, turned])
-
-        columns = [
-            slope(lambda s, u=unit: moved(s, u), 0.01) for unit in np.eye(robot.nv)
-        ]
-        # Rounding of the differences: 2e-16 of 5 m over 0.01 rad.
-        np.testing.assert_allclose(J, np.array(columns).T, rtol=0, atol=1e-12)
-
-
-@pytest.mark.parametrize("case", ROBOTS)
 def test_frame_rates_are_derivatives_along_the_flow(case: str) -> None:
     """J', velocity and drift by differences along q ⊕ s v."""
     robot, q, v, rng = draw(case, seed=3)
@@ -125,35 +103,6 @@ def test_mass_matrix_rate_is_the_derivative_along_the_flow(case: str) -> None:
     atol = 1e-12 * np.abs(state.mass_matrix).max() * np.abs(v).sum()
     np.testing.assert_allclose(state.mass_matrix_rate, expected, rtol=0, atol=atol)
     assert np.abs(expected).max() > 1e3 * atol  # there is something to see
-
-
-def potential_energy(state: RobotState) -> float:
-    """Return -Σ m gᵀc, from the frames' placements."""
-    model, total = state.robot.model, 0.0
-    for name, inertia in zip(model.names, model.inertias, strict=True):
-        frame = state.frame(name)
-        center = frame.position + frame.rotation @ inertia.lever
-        total -= inertia.mass * model.gravity.linear @ center
-    return total
-
-
-@pytest.mark.parametrize("case", FLAT)
-def test_nonlinear_effects_are_lagranges(case: str) -> None:
-    """N = M'v - ½ ∇(vᵀMv) + ∇U, all by differences of M and U (flat spaces only)."""
-    robot, q, v, _ = draw(case, seed=8)
-    state = robot.state(0.0, q, v)
-
-    def lagrangian(displacement: Array) -> float:
-        there = state.displaced(0.0, displacement)
-        return float(0.5 * v @ there.mass_matrix @ v) - potential_energy(there)
-
-    M_dot = slope(lambda s: state.ahead(s).mass_matrix, step_of(v))
-    expected = M_dot @ v - gradient(lagrangian, robot.nv, 0.01)
-    # Rounding of the differences: 2e-16 of U (up to 400 J) over 0.01 rad, and M'.
-    scale = max(400.0, np.abs(state.mass_matrix).max() * np.abs(v).sum() ** 2)
-    np.testing.assert_allclose(
-        state.nonlinear_effects, expected, rtol=0, atol=1e-12 * scale
-    )
 
 
 @pytest.mark.parametrize("case", ROBOTS)

@@ -1,5 +1,6 @@
-"""Check mimic and locked joints, tool frames, gravity and the likely hand."""
+"""Check options of loading, the likely hand, and robots of Pinocchio's own models."""
 
+import re
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
@@ -7,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+from robot_cases import by_pickle
 from robot_texts import (
     BUNDLED,
     assert_same_placements,
@@ -17,10 +19,13 @@ from robot_texts import (
     robot_xml,
 )
 
+import hsp_control as hsp
 from hsp_control import Robot
 from hsp_control.common.exceptions import ModelError
+from hsp_control.geometry.links import link_shapes
 from hsp_control.robot import ToolFrame
 from hsp_control.robot.description.loading import end_effector_frame
+from hsp_control.robot.description.urdf import read_urdf
 
 
 def full_configuration(model: pin.Model, values: dict[str, float]) -> np.ndarray:
@@ -198,3 +203,52 @@ def test_end_effector_frame(
 ) -> None:
     path = write(robot_xml(link("base", ""), *parts))
     assert end_effector_frame(Robot.load(path).model) == expected
+
+
+# --- Pinocchio's own models ----------------------------------------------------------
+
+
+def of_panda() -> tuple[Robot, list[object]]:
+    """Return the bundled Panda, and what Pinocchio makes of its files."""
+    robot = Robot.load("panda", locked={}, mimic=False)
+    source = robot.source
+    folders = [str(folder) for folder in source.package_dirs]
+    model, collision, visual = pin.buildModelsFromUrdf(str(source.urdf), folders)
+    collision.addAllCollisionPairs()
+    pin.removeCollisionPairs(model, collision, str(source.srdf))
+    return robot, [model, collision, visual]
+
+
+def test_a_robot_of_a_pinocchio_model_is_that_of_its_urdf() -> None:
+    loaded, models = of_panda()
+    robot = by_pickle(Robot.from_pinocchio(*models, home=loaded.home()))
+    assert robot.end_effector == loaded.end_effector
+    for proxy in ("capsules", "hulls", "meshes"):
+        for ours, theirs in zip(
+            link_shapes(robot, proxy), link_shapes(loaded, proxy), strict=True
+        ):
+            assert (ours.link, ours.joint) == (theirs.link, theirs.joint)
+            assert type(ours.geometry) is type(theirs.geometry)
+            assert ours.placement.isApprox(theirs.placement, 1e-9)
+    tau = [
+        hsp.Controller(each, [hsp.FramePose()], hsp.SelfClearance())
+        .compute(0.0, each.home(), np.full(each.nv, 0.1))
+        .tau
+        for each in (loaded, robot)
+    ]
+    np.testing.assert_allclose(tau[1], tau[0], atol=1e-9)
+
+
+def test_what_is_no_pinocchio_model_is_refused() -> None:
+    _, (model, collision, visual) = of_panda()
+    less = pin.buildReducedModel(model, [8, 9], pin.neutral(model))
+    for arguments, message in (
+        (("panda.urdf",), "model is of type str; needs a pinocchio.Model"),
+        ((pin.RobotWrapper(model),), "give robot.model, robot.collision_model and"),
+        ((model, model), "collision is of type Model; needs a pinocchio.GeometryM"),
+        ((less, collision, visual), "if joints were locked, give all that pin.build"),
+    ):
+        with pytest.raises(ModelError, match=re.escape(message)):
+            Robot.from_pinocchio(*arguments)
+    with pytest.raises(ModelError, match="its URDF is needed: load it with"):
+        read_urdf(Robot.from_pinocchio(model).source)

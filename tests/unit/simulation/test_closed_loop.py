@@ -3,32 +3,26 @@
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 import pytest
 from closed_loops import (
     EXACT,
-    distance,
-    load,
     order,
     panda_controller,
     planar_controller,
     planar_start,
-    start,
 )
 from numpy.typing import NDArray
 
 from hsp_control import (
     Controller,
-    FramePose,
     FramePosition,
     Gains,
     Robot,
-    TargetPosture,
     simulate,
 )
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants import RigidBodyPlant
-from hsp_control.trajectories import ComposedPose, Lissajous, Spin
+from hsp_control.trajectories import Lissajous
 
 Array = NDArray[np.float64]
 
@@ -125,51 +119,3 @@ def test_the_plant_may_be_another_robot() -> None:
     ends = [np.abs(run["task.tool0.error"][-1]).max() for run in runs]
     assert ends[0] < 1e-3
     assert ends[1] > 3e-3
-
-
-LEFT = np.array([1.0, -0.5, 1.0])
-
-
-def test_a_floating_robot_follows_the_law() -> None:
-    """Order 4 on the manifold with a pose task, and the error's own exponential.
-
-    The hand is led through 2.4 rad in 0.6 s, at a root that turns with it.
-    """
-    robot = load("floating talos_arm", gravity=False)
-    frame = "gripper_left_base_link"
-    q0, v0 = start(robot, 8, speed=0.3)
-    here = robot.state(0.0, q0, v0).frame(frame)
-    axis = np.array([1.0, -2.0, 2.0]) / 3.0
-    path = ComposedPose(
-        Lissajous([0.2, 0.1, 0.2], [3.0, 4.0, 5.0], center=here.position + 0.1 * LEFT),
-        Spin(axis, 4.0, rotation=pin.exp3(np.array([0.5, 0.8, -0.3])) @ here.rotation),
-    )
-    task = FramePose(frame, path, gains=Gains(natural_frequency=6.0))
-    controller = Controller(
-        robot,
-        [task],
-        TargetPosture(robot.home()),
-        null_space_gain=6.0,
-        base="driven" if robot.unactuated else None,
-    )
-    options: Any = {"duration": 0.6, "log_period": 0.1}
-    exact = simulate(controller, q0, v0, integrator=EXACT, **options)
-    e, e_dot = exact[f"task.{task.name}.error"], exact[f"task.{task.name}.error_rate"]
-    t = exact.t[:, None]
-    expected = (e[0] + (e_dot[0] + 6.0 * e[0]) * t) * np.exp(-6.0 * t)
-    assert np.linalg.norm(e[0, 3:]) > 0.9
-    np.testing.assert_allclose(e, expected, rtol=0, atol=1e-9)
-    assert (
-        np.linalg.norm(robot.difference(q0, exact.q[-1])[3:6]) > 0.5
-    )  # the root turned
-    norm = exact["null_space_norm"]
-    np.testing.assert_allclose(norm, norm[0] * np.exp(-6.0 * exact.t), rtol=1e-8)
-
-    steps = np.array([0.02, 0.01, 0.005])
-    errors = []
-    for step in steps:
-        run = simulate(controller, q0, v0, integrator=Rk4(step), **options)
-        errors.append(
-            distance(robot, (run.q[-1], run.v[-1]), (exact.q[-1], exact.v[-1]))
-        )
-    assert order(steps, errors) == pytest.approx(4.0, abs=0.3)

@@ -360,7 +360,7 @@ def test_a_push_gives_its_impulse_whatever_the_plant(kind: str) -> None:
         plant = StickingPlant(robot, JointFriction.of(robot), pushes=[push])
     else:
         pytest.importorskip("mujoco")
-        from hsp_control.simulation.plants.mujoco import MujocoPlant
+        from hsp_control.simulation.plants.mujoco_plant import MujocoPlant
 
         plant = MujocoPlant(robot, pushes=[push])
     # In the stages of RK4 an edge may count for a third of a step more or less.

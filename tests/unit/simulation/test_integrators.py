@@ -17,11 +17,14 @@ from closed_loops import (
 )
 from numpy.typing import NDArray
 
+import hsp_control as hsp
 from hsp_control import Robot
 from hsp_control.common.exceptions import LogError, SimulationError
 from hsp_control.common.kernels import PLAIN
 from hsp_control.robot import integrators
 from hsp_control.robot.integrators import Dop853, Rk4, SemiImplicitEuler
+from hsp_control.simulation.plants import Mujoco, RigidBody, RigidBodyPlant
+from hsp_control.simulation.simulate import default_integrator
 
 Array = NDArray[np.float64]
 
@@ -228,6 +231,24 @@ def test_dynamics_that_fail_for_good_say_why() -> None:
         run(ZeroDivisionError("by nothing"))
     with pytest.raises(KeyError, match=r"yours"):  # no business of the integrator's
         run(KeyError("yours"))
+
+
+def test_held_efforts_move_rigid_bodies_by_rk4_unless_it_is_said() -> None:
+    """It differs from a tight DOP853 by less than any figure shows."""
+    robot = load("panda")
+    for plant in (None, RigidBody(), RigidBodyPlant(robot)):
+        assert default_integrator(plant, 0.01) == Rk4(1e-3)
+        assert default_integrator(plant, None) == Dop853()
+    assert default_integrator(Mujoco(), 0.001) == Dop853()
+    task = hsp.FramePose(trajectory=hsp.Circle(0.1, 3.0), blend=0.5, name="hand")
+    parts: Any = robot, [task], hsp.JointCentering()
+    how: Any = {"duration": 1.0, "control_period": 0.01}
+    own, exact = (
+        hsp.simulate(hsp.Controller(*parts), robot.home(), **how, integrator=each)
+        for each in (None, Dop853(1e-12, 1e-12))
+    )
+    for name in ("q", "v", "task.hand.error", "null_space_norm"):
+        np.testing.assert_allclose(own[name], exact[name], atol=1e-8)
 
 
 def test_dop853_gives_up_at_a_pole() -> None:

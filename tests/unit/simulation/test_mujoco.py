@@ -22,8 +22,8 @@ from hsp_control.geometry.shapes import Box, Capsule, Cylinder, HalfSpace, Spher
 from hsp_control.robot.description.loading import load_model
 from hsp_control.robot.description.sources import find_robot
 from hsp_control.robot.friction import JointFriction
-from hsp_control.simulation.plants import Push
-from hsp_control.simulation.plants.mujoco import ContactShape, Ground, MujocoPlant
+from hsp_control.simulation.plants import ContactShape, Ground, Push
+from hsp_control.simulation.plants.mujoco_plant import MujocoPlant
 
 mujoco = pytest.importorskip("mujoco")
 from mujoco_oracle import mass_matrix  # noqa: E402

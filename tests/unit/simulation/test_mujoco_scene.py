@@ -18,7 +18,7 @@ from hsp_control.simulation.plants import (
     MujocoScenePlant,
     Push,
 )
-from hsp_control.simulation.plants.mujoco import MujocoPlant
+from hsp_control.simulation.plants.mujoco_plant import MujocoPlant
 from hsp_control.trajectories import Circle
 
 mujoco = pytest.importorskip("mujoco")
@@ -221,19 +221,6 @@ def test_a_robot_that_overlaps_itself_is_told_once(
         found = [each.getMessage() for each in caplog.records]
         assert len(found) == len(told)
         assert all(pair in line for pair, line in zip(told, found, strict=True))
-
-
-def test_a_floating_root_has_no_motor() -> None:
-    text = CELL.replace(
-        '<body name="base" pos="0 0 .1">', '<body name="base"><freejoint/>'
-    )
-    text = re.sub(r"<keyframe>.*</keyframe>", "", text, flags=re.DOTALL)
-    model = mujoco.MjModel.from_xml_string(text)
-    robot = Robot.from_mujoco(model, "base", locked={"f": 0.0})
-    plant = MujocoScenePlant(robot, model, mujoco.MjData(model))
-    at_home(robot, plant)
-    with pytest.raises(SimulationError, match=r"pushes the floating root"):
-        plant.advance(0.0, 0.001, np.ones(robot.nv))
 
 
 def test_mistakes() -> None:

@@ -116,7 +116,7 @@ def test_ctrl_c_before_the_first_row() -> None:
     run = simulate_until_interrupted(controller, planar_start(), duration=0.5)
     assert run.status == "interrupted"
     assert len(run) == 0
-    assert repr(run) == "Rollout(0 rows, empty, interrupted)"
+    assert repr(run) == "Rollout(planar3r: tip; 0 rows, empty, interrupted)"
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from hsp_control import Robot
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.geometry.shapes import Box, HalfSpace, Sphere
 from hsp_control.simulation.plants import ContactShape, Solid
-from hsp_control.simulation.plants.mujoco import MujocoPlant
+from hsp_control.simulation.plants.mujoco_plant import MujocoPlant
 
 mujoco = pytest.importorskip("mujoco")
 TIP = "panda_tcp"

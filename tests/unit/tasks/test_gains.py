@@ -48,7 +48,7 @@ GAIN_ERRORS: dict[str, tuple[Callable[[], Any], str]] = {
     "empty": (lambda: Gains([], 1.0), r"^Gains: kp is empty; needs numbers$"),
     "ragged": (lambda: Gains([[1.0], [1.0, 2.0]], 1.0),
      r"^Gains: kp: rows have different lengths \[1, 2\]; need the same$"),
-    "none": (lambda: Gains(None, 1.0), r"^Gains: give both kp and kv; one of them is"),
+    "none": (lambda: Gains(None, 1.0), r"^Gains: give both kp and kv, or natural_f"),
     "nothing": (lambda: Gains(), r"^Gains: give either kp and kv, or natural_freq"),
     "twice": (lambda: Gains(1.0, 1.0, natural_frequency=1.0),
      r"^Gains: give either kp and kv, or natural_frequency and damping_ratio$"),

@@ -40,11 +40,8 @@ from hsp_control.control.compensation import (
     IntegralAction,
     MomentumObserver,
 )
-from hsp_control.geometry import Scene
-from hsp_control.geometry.start import Start
 from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric, Metric
-from hsp_control.tasks import Impedance, TaskSample
-from hsp_control.tasks.impedance_gains import Rotating, Scratch, impedance_gains
+from hsp_control.tasks import Impedance
 
 Array = NDArray[np.float64]
 
@@ -229,23 +226,6 @@ def test_through_a_singularity() -> None:
     np.testing.assert_allclose(  # at the singularity only the damping is left
         Kv, 2.0 * np.real(sqrtm_psd(Kp / 100.0)) * 10.0, rtol=1e-6, atol=1e-6
     )
-
-
-def test_a_singular_mass_matrix_is_not_a_number() -> None:
-    """As for the metric M: the step then says that it is not finite."""
-    task = JointPosture("home", impedance=Impedance(100.0))
-    robot = hsp.Robot.load("planar3r")
-    state = robot.state(0.0, bent(robot, 0.3), np.ones(3))
-    task = task.placed(Start(state, Scene()))
-    in_force, sample = task.in_force(), TaskSample.allocate(3, 3)
-    flat, none = np.zeros((3, 3)), Rotating(3, np.eye(3), np.zeros(3))
-    numbers, scratch = in_force.numbers, Scratch.allocate(3, 3)
-    mobility, feedback = in_force.mobility, in_force.feedback
-    impedance_gains(
-        flat, flat, none, numbers, task.part_ends(), sample, scratch, mobility, feedback
-    )
-    assert np.isnan(in_force.feedback.Kp[0, 0])
-    assert np.isnan(in_force.feedback.Kv[0, 0])
 
 
 def bent(robot: hsp.Robot, bend: float) -> Array:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pinocchio import SE3, Quaternion, SE3ToXYZQUAT
 from task_cases import panda, placed
 from values import assert_is_a_value
 
@@ -25,8 +26,10 @@ from hsp_control import (
     Hold,
     JointPosture,
     Line,
+    Obstacle,
     Pointing,
     Robot,
+    Sphere,
     Task,
 )
 from hsp_control.declaration import Part
@@ -132,18 +135,43 @@ def test_tasks_and_gains_are_values(part: Part) -> None:
     assert_is_a_value(part, NAMES)
 
 
+# --- bare values that mean a trajectory ----------------------------------------------
+
+TURNED = Quaternion(np.array([0.6, 0.0, 0.0, 0.8]))
+THERE = SE3(TURNED, np.array([0.4, 0.1, 0.5]))
+
+
+@pytest.mark.parametrize(
+    "value",
+    [THERE, SE3ToXYZQUAT(THERE), THERE.homogeneous, SE3ToXYZQUAT(THERE).tolist()],
+)
+def test_a_pose_is_held(value: Any) -> None:
+    for task in (FramePose("hand", value), FramePose(trajectory=value)):
+        held = task.pose.sample(0.0)
+        np.testing.assert_allclose(held.position.position, THERE.translation)
+        np.testing.assert_allclose(held.orientation.rotation, THERE.rotation)
+
+
+def test_a_point_and_an_orientation_are_held() -> None:
+    assert FramePose("hand", (0.4, 0, 0.5)).trajectory == Hold([0.4, 0.0, 0.5])
+    assert Obstacle("ball", Sphere(0.1), np.zeros(3)).center == Hold([0.0, 0.0, 0.0])
+    for value in (TURNED, TURNED.coeffs(), TURNED.matrix(), [0.6, 0.0, 0.0, 0.8]):
+        held = FrameOrientation("hand", value).trajectory.sample(0.0)
+        np.testing.assert_allclose(held.rotation, TURNED.matrix())
+
+
 # --- what is refused -----------------------------------------------------------------
 
 Wrong = dict[str, list[tuple[Any, str]]]
 _WRONG_TASK: Wrong = {
     "priority": [(0, "priority: 0 is too small; must be at least 1"),
      (1.5, "priority: 1.5 is a decimal number; expected an integer")],
-    "schedule": [([(0, 1)], "schedule: .* is a list; expected a mapping"),
+    "schedule": [([(0, 1)], "schedule: .* of type list; needs a Schedule"),
      ({"intervals": [[0, 1]], "rmap": 1}, "schedule.rmap: unknown key 'rmap'; did")],
     "name": [(3, "name: 3 "), ("a b", "task name 'a b'")],
 }  # fmt: skip
 _WRONG_GAINS: Wrong = {
-    "gains": [(3.0, "gains: 3.0 is a decimal number; expected a mapping"),
+    "gains": [(3.0, "gains: 3.0, of type float; needs a Gains"),
      ({"kp": -1, "kv": 1}, "gains.kp: -1 is negative; must be greater than 0"),
      ({"Kp": 1}, "gains.Kp: unknown key 'Kp'; did you mean 'kp'")],
     "largest_error": [(0, "largest_error: 0 is too small; must be greater than 0"),
@@ -158,21 +186,21 @@ _WRONG_TRACKING: Wrong = {
 }
 _WRONG_SPRING: Wrong = {
     "impedance": [
-        (100.0, "impedance: 100.0 is a decimal number; expected a mapping"),
+        (100.0, "impedance: 100.0, of type float; needs an Imp"),
         ({"damping": 3}, "impedance: missing key 'stiffness'"),
         ({"stiffness": -1}, "impedance.stiffness: -1 is negative; must be greater"),
     ]
 }
 _WRONG_FRAME: Wrong = {"frame": [(7, "frame: 7 is an integer; expected text")]}
 _WRONG_POINT: list[tuple[Any, str]] = [
-    ([0, 0, 1], "trajectory: .* expected a mapping"),
+    (SE3.Identity(), "trajectory: SE3.*; needs a Trajectory, one of hsp.trajectories"),
     ({"type": "hodl"}, "trajectory.type: unknown type 'hodl'; did you mean 'hold'"),
     ({"type": "circle", "radius": 1}, "trajectory: missing key 'angular_rate'"),
     (HoldPose([0, 0, 0], np.eye(3)), "trajectory: a HoldPose is not one of the traj"),
 ]
 _WRONG_TURN: list[tuple[Any, str]] = [
     (Hold([0, 0, 0]), "trajectory: a Hold is not one of the orientations"),
-    (np.eye(3), "trajectory: .* expected a mapping"),
+    ("hold", r"'hold', of type str; .* did you mean hsp.trajectories.HoldOrientation"),
 ]
 _WRONG_POSE: list[tuple[Any, str]] = [
     (HoldOrientation(), "trajectory: a HoldOrientation is not one of the poses or tr"),

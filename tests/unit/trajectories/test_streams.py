@@ -3,6 +3,7 @@
 import copy
 import json
 import socket
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -459,8 +460,6 @@ def free_port() -> int:
 
 def wait_until(done: Callable[[], bool]) -> None:
     """Wait until something has happened in another thread."""
-    import time
-
     for _ in range(6000):
         if done():
             return
@@ -468,7 +467,9 @@ def wait_until(done: Callable[[], bool]) -> None:
     raise AssertionError("it did not happen")
 
 
-def test_datagrams_arrive_and_bad_ones_are_counted() -> None:
+def test_datagrams_arrive_and_bad_ones_are_counted(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     port = free_port()
     stream = Stream([0.0], source=f"udp://127.0.0.1:{port}").anchored(None)
     stream.sample(0.0)  # it listens from here on
@@ -483,11 +484,18 @@ def test_datagrams_arrive_and_bad_ones_are_counted() -> None:
         ):
             sender.sendto(text.encode(), ("127.0.0.1", port))
         sender.sendto(b'{"value": [0.1], "t": 3.5}', ("127.0.0.1", port))
-    wait_until(lambda: inbox.count == 1)
+        wait_until(lambda: inbox.count == 1)
+        assert caplog.text == ""
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as second:
+            for one in (second, sender, second):
+                one.sendto(b"0", ("127.0.0.1", port))
+                time.sleep(0.01)
+            wait_until(lambda: inbox.rejected == 8)
+        assert caplog.text.count("two senders take turns, 127.0.0.1:") == 1
     samples = columns(sampled(stream, 1.0))
     assert samples[0][-1, 0] == pytest.approx(0.1, abs=1e-9)
-    assert stream.counts()["rejected"] == 5
-    assert "is not JSON: Exceeds the limit" in stream.last_rejection
+    assert stream.counts()["rejected"] == 8
+    assert "a message is 0; needs a mapping" in stream.last_rejection
 
 
 def test_a_port_in_use_is_told_and_streams_of_one_process_share_it() -> None:

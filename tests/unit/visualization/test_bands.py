@@ -49,13 +49,21 @@ def test_bands_are_the_logs_columns(obstacle: tuple[Experiment, Rollout]) -> Non
     status[20:] = np.nan  # rows without the law's output
     near = np.full(n, influence)
     near[30:40] = influence - 1e-6
+    near[35:38] = -0.042
     (column,) = (name for name in run.columns if name.startswith("distance."))
     run = altered(run, status=status, **{column: near})
     bands = {band.name: band.spans for band in bands_of(run, experiment.controller)}
     assert bands == {
         "limit active": [pytest.approx((run.t[10], run.t[20]))],
         "inside an influence zone": [pytest.approx((run.t[30], run.t[40]))],
+        "collision": [pytest.approx((run.t[35], run.t[38]))],
     }
+    told = [band.caption for band in bands_of(run, experiment.controller)]
+    assert "collision, up to 4.2 cm deep" in told
+    without = "null_space.fields.0.weight=0", *FAST
+    weightless = load_experiment("panda_obstacle", *without).controller
+    bands = [band.name for band in bands_of(run, weightless)]
+    assert bands == ["limit active", "collision"]  # nothing reacts there
     excess = np.zeros((n, 7))
     excess[42:46, 3] = 1e-3
     beyond = altered(run, status=np.zeros(n), position_excess=excess)

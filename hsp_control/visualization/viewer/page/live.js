@@ -136,7 +136,7 @@ class LivePlot extends Plot {
   range(low, high) {
     if (low === null) return this.log ? [-3, 0] : [0, 1];
     if (this.log) {
-      const least = Math.floor(low - 0.05);
+      const least = Math.max(Math.floor(low - 0.05), -9);  // below is nothing to see
       return [least, Math.max(Math.ceil(high + 0.05), least + 1)];
     }
     const least = Math.max(1e-9, 0.02 * Math.max(Math.abs(low), Math.abs(high)));

@@ -43,6 +43,7 @@ class RunSwitch {
   constructor(viewer, side, {names, parts, colors, opacity}) {
     Object.assign(this, {viewer, side, parts, colors, opacity, solid: new Map()});
     this.choices = [...names.keys(), null];
+    this.names = names;
     this.buttons = this.choices.map((run) => {
       const text = run !== null ? names[run] : names.length === 2 ? "both" : "all";
       return makeButton({title: `${text} (w: the next)`}, () => this.select(run),
@@ -63,6 +64,7 @@ class RunSwitch {
     this.buttons.forEach((button, k) => { button.ariaPressed = this.choices[k] === run; });
     this.parts.forEach((paths, k) => this.place(paths, k, run));
     this.side.select(run);
+    this.side.player.select(this.names[run] ?? null);
     this.viewer.set_dirty();
   }
 

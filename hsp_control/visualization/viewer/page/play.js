@@ -16,10 +16,10 @@ class Play {
   constructor(viewer) {
     Object.assign(this, {viewer, sight: new Sight(viewer), mine: true, holdKey: null, taken: false});
     this.pending = new Map();    // messages of the next frame, the newest of each kind
-    this.gizmos = new Map();     // key -> Gizmo
-    this.obstacles = new Map();  // key -> {name, path, at, radius}
+    this.gizmos = new Map();     // key -> Gizmo, of a target or an obstacle
     this.held = new Map();       // key -> until when its own place is shown [ms]
-    this.state = {t: 0, running: true, rate: 1, message: "", level: "info", away: ""};
+    this.state = {t: 0, running: true, rate: 1, message: "", level: "info"};
+    this.away = {};              // task -> what to say of a target that is not reached
     this.setup = this.selected = this.force = this.pull = null;
   }
 
@@ -40,14 +40,17 @@ class Play {
     this.held.clear();
     this.force = null;
     for (const gizmo of this.gizmos.values()) gizmo.dispose();
-    this.gizmos = new Map(this.setup.targets.map((target) =>
-      [Play.targetKey(target.name), new Gizmo(target, this.viewer.scene)]));
-    this.obstacles = new Map(this.setup.obstacles.map(({position, ...rest}) =>
-      [Play.obstacleKey(rest.name), {...rest, at: new MeshCat.THREE.Vector3(...position)}]));
-    this.overlay.setThings(this.things(), (key) => this.select(key));
+    const {targets, obstacles} = this.setup;
+    const gizmos = [
+      ...targets.map((target) => new Gizmo(Play.targetKey(target.name), target, this.viewer)),
+      ...obstacles.map((obstacle) => new Obstacle(Play.obstacleKey(obstacle.name), obstacle,
+                                                  this.viewer, obstacles.length === 1)),
+    ];
+    this.gizmos = new Map(gizmos.map((gizmo) => [gizmo.key, gizmo]));
+    this.overlay.setThings(gizmos, (key) => this.select(key));
     this.panel.build(this.setup);
     this.setUpPlots(this.setup.plots);
-    if (!this.things().some(({key}) => key === this.selected)) this.selected = null;
+    if (!this.gizmos.has(this.selected)) this.selected = null;
     if (first) this.panel.setOpen(!this.panel.narrow.matches);
     this.select(this.selected);
     this.showDrive();
@@ -63,6 +66,7 @@ class Play {
     this.hand = new PlayHand(this, this.viewer);
     this.keys = new PlayKeys(this);
     this.viewer.scene.onBeforeRender = () => this.layOut();
+    legend.setOpen(false);  // what is in the picture is to be touched
     addEventListener("resize", () => this.fit());
   }
 
@@ -85,14 +89,13 @@ class Play {
     this.plots = new LivePlots(this.panel.plots, definitions, () => this.panel.open);
   }
 
-  showTargets({poses, obstacles}) {
-    for (const [name, pose] of Object.entries(poses ?? {})) {
-      const key = Play.targetKey(name);
-      if (this.follows(key)) this.gizmos.get(key)?.setPose(pose);
-    }
-    for (const [name, place] of Object.entries(obstacles ?? {})) {
-      const key = Play.obstacleKey(name);
-      if (this.follows(key)) this.obstacles.get(key)?.at.set(...place);
+  showTargets({poses, obstacles, away = {}}) {
+    this.away = away;
+    for (const [keyOf, places] of [[Play.targetKey, poses], [Play.obstacleKey, obstacles]]) {
+      for (const [name, place] of Object.entries(places ?? {})) {
+        const key = keyOf(name);
+        if (this.follows(key)) this.gizmos.get(key)?.setPose(place);
+      }
     }
   }
 
@@ -121,7 +124,7 @@ class Play {
 
   showDrive() {
     this.bar.showDrive(this.mine, this.taken);
-    this.panel.controls.disabled = !this.mine;
+    for (const field of this.panel.fields) field.disabled = !this.mine;
     document.body.classList.toggle("watching", !this.mine);
     this.showMarks();
   }
@@ -150,29 +153,22 @@ class Play {
     if (connection?.readyState === WebSocket.OPEN) connection.send(JSON.stringify(message));
   }
 
-  moveTarget(gizmo) {
-    const {name} = gizmo.target, key = Play.targetKey(name);
-    this.hold(key);
-    this.sendLater(key, {do: "move", target: name, pose: gizmo.pose()});
+  // Say where a target or an obstacle is wanted.
+  move(gizmo) {
+    this.hold(gizmo.key);
+    this.sendLater(gizmo.key, gizmo.wish());
   }
 
-  moveObstacle({name, at}, to) {
-    const key = Play.obstacleKey(name);
-    at.copy(to);
-    this.hold(key);
-    this.sendLater(key, {do: "obstacle", name, position: to.toArray()});
-  }
-
-  release(name) {
-    this.hold(Play.targetKey(name));
-    this.send({do: "release", target: name});
+  release(gizmo) {
+    this.hold(gizmo.key);
+    this.send({do: "release", ...gizmo.address()});
   }
 
   // Let a target or an obstacle return to its own path.
-  resume(key, name) {
+  resume(key) {
     this.held.delete(key);
     this.panel.showMoved(key, false);
-    this.send({do: "resume", [this.gizmos.has(key) ? "target" : "name"]: name});
+    this.send({do: "resume", ...this.gizmos.get(key).address()});
   }
 
   pullLink({path, point, local}, to) {
@@ -200,25 +196,17 @@ class Play {
 
   // --- what is shown ---
 
-  // All that can be selected, in the order of the keys 1 to 9.
-  things() {
-    return [
-      ...[...this.gizmos].map(([key, {target}]) => ({key, label: `Target ${target.name}`})),
-      ...[...this.obstacles].map(([key, {name}]) => ({key, label: `Obstacle ${name}`})),
-    ];
-  }
-
   select(key) {
     this.selected = key;
     this.panel.showSelected(key);
-    this.viewer.set_dirty();
+    this.showMarks();
   }
 
   showMarks() {
     const {grip, hover} = this.hand;
     for (const gizmo of this.gizmos.values()) {
       const active = [grip, hover].find((found) => found?.gizmo === gizmo);
-      gizmo.mark(active?.handle, Boolean(grip), !this.mine);
+      gizmo.mark(active?.handle, Boolean(grip), !this.mine, gizmo.key === this.selected);
     }
     this.viewer.set_dirty();
   }
@@ -226,24 +214,17 @@ class Play {
   // Before each picture: fit handles and labels to the camera.
   layOut() {
     const sight = this.sight.update();
+    const {grip, hover} = this.hand, active = grip ? grip.key : hover?.key ?? this.selected;
+    if (!this.gizmos.has(active)) this.overlay.hideCircle();
     for (const [key, gizmo] of this.gizmos) {
       gizmo.layOut(sight);
-      this.overlay.placeButton(key, sight.project(gizmo.position));
+      const {name} = gizmo.target, away = key === Play.targetKey(name) ? this.away[name] : "";
+      const lines = [away, key === active && (grip?.text ? `${name}   ${grip.text}` : name)];
+      const at = sight.project(gizmo.position), radius = gizmo.ball * gizmo.enlarged + 9;
+      this.overlay.place(key, at, radius, lines.filter(Boolean).join("\n"), Boolean(away));
+      if (key === active) this.overlay.showCircle(at, radius, key === this.selected);
     }
-    for (const [key, {at}] of this.obstacles) this.overlay.placeButton(key, sight.project(at));
-    this.layOutName(sight);
     this.layOutSpring(sight);
-  }
-
-  layOutName(sight) {
-    const {grip, hover} = this.hand;
-    const key = grip?.key ?? hover?.key ?? this.selected;
-    const gizmo = this.gizmos.get(key), obstacle = this.obstacles.get(key);
-    if (grip?.path || !(gizmo ?? obstacle)) return this.overlay.showThing(null);
-    const at = gizmo?.position ?? obstacle.at, {name} = gizmo?.target ?? obstacle;
-    const radius = gizmo ? 17 * gizmo.enlarged : Math.max(obstacle.radius / sight.pixel(at) + 3, 12);
-    const text = grip?.text ? `${name}   ${grip.text}` : name;
-    this.overlay.showThing(sight.project(at), radius, text, key === this.selected);
   }
 
   // The hand's end of the spring is where the pointer is; the link's end moves with it.
@@ -263,11 +244,15 @@ const play = new Play(viewer);
 Object.assign(commandHandlers, {
   play_setup(command) { play.setUp(command); },
   play_targets(command) { if (play.ready) play.showTargets(command); },
-  play_state({t, running, rate, message, level, away}) {
-    play.showState({t, running, rate, message, level, away});
+  play_state({t, running, rate, message, level}) {
+    play.showState({t, running, rate, message, level});
   },
   play_values({values}) { if (play.ready) play.panel.setValues(values); },
   play_force(command) { play.force = command.visible ? command : null; },
   play_samples({times, values}) { if (play.ready) play.plots.add(times, values); },
   play_drive(command) { play.setDrive(command); },
+  lost() {
+    play.setDrive({mine: false, taken: false});
+    play.showState({running: false, message: ""});
+  },
 });

@@ -1,5 +1,5 @@
-// The handles of the targets: a ball, arrows along the world's axes, rings about the
-// target's own axes.
+// The handles of what is moved: of a target a ball, arrows along the world's axes and rings about
+// its own; of an obstacle itself, and arrows. A line to the floor tells where they are.
 //
 // Sizes are in pixels, whatever the distance. Where the robot hides a handle it is drawn
 // through it, translucent. A pointer finds handles by its distance from them on the screen,
@@ -15,19 +15,29 @@ class Gizmo {
   static COLORS = ["#D55E00", "#009E73", "#0072B2"];  // those of the axes of targets.py
   static BALL_COLOR = "#E69F00";                      // palette.DESIRED
 
-  constructor(target, parent) {
+  constructor(key, target, viewer) {
     const {Group, Vector3, Quaternion} = MeshCat.THREE;
-    Object.assign(this, {target, position: new Vector3(), turn: new Quaternion(), parts: [],
-                         group: new Group(), rings: new Group()});
+    Object.assign(this, {key, target, viewer, position: new Vector3(), turn: new Quaternion(), parts: [],
+                         group: new Group(), rings: new Group(), shown: true, lined: false});
     this.axes = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map((axis) => new Vector3(...axis));
     this.enlarged = this.usual = matchMedia("(pointer: coarse)").matches ? 1.2 : 1;
+    this.size = 1e-3;  // m: of a pixel here, enlarged
     this.group.add(this.rings);
     this._build();
     this.setPose(target.pose);
-    parent.add(this.group);
+    viewer.scene.add(this.group);
   }
 
+  get label() { return `Target ${this.target.name}`; }
+
   get movable() { return this.target.kind !== "orientation"; }
+
+  get ball() { return Gizmo.BALL; }
+
+  // What the program is told: which thing, and where it is wanted.
+  address() { return {target: this.target.name}; }
+
+  wish() { return {do: "move", ...this.address(), pose: this.pose()}; }
 
   // Whether the program follows this coordinate of the target.
   follows(axis) { return this.movable && this.target.axes?.[axis] !== false; }
@@ -47,15 +57,32 @@ class Gizmo {
     // In a small picture, as above a phone's open sheet, the handles would hide the robot.
     const room = Math.min(sight.box.height / 450, sight.box.width / 480);
     this.enlarged = this.usual * clamp(room, 0.65, 1);
+    this.size = sight.pixel(this.position) * this.enlarged;
     this.group.position.copy(this.position);
-    this.group.scale.setScalar(sight.pixel(this.position) * this.enlarged);
+    this.group.scale.setScalar(this.size);
     this.rings.quaternion.copy(this.turn);
+    const beyond = this.ball - Gizmo.BALL;  // arrows begin at the surface
     for (const {handle, meshes} of this.parts) {
+      if (handle.kind === "line") this._layOutLine(meshes);
       if (handle.kind !== "arrow") continue;
       const shown = this._arrowEnds(handle, sight).long;
-      for (const mesh of meshes) mesh.visible = shown;
+      for (const mesh of meshes) {
+        mesh.visible = shown;
+        mesh.position.copy(this.axes[handle.axis]).multiplyScalar(beyond);
+      }
     }
     this.group.updateMatrixWorld();
+  }
+
+  _layOutLine(meshes) {
+    const floor = findNode(this.viewer, "/floor/shadow")?.object.position.z ?? 0;
+    const below = (this.position.z - floor) / this.size, length = below - this.ball;
+    meshes.forEach((mesh, k) => {
+      const foot = k > 1;
+      mesh.visible = this.lined && length > 0;
+      mesh.position.z = foot ? -below : -this.ball;
+      mesh.scale.set(...(foot ? [this.ball, 1, this.ball] : [1, Math.max(length, 1e-6), 1]));
+    });
   }
 
   // The handle under a pixel, and its distance on the screen; null if none is in reach.
@@ -64,12 +91,13 @@ class Gizmo {
     const center = sight.project(this.position);
     if (!center.ahead) return null;
     const measures = {  // distance, and thickness
-      ball: () => [Math.hypot(x - center.x, y - center.y), Gizmo.BALL * this.enlarged + 4],
+      ball: () => [Math.hypot(x - center.x, y - center.y), this.ball * this.enlarged + 4],
       arrow: (handle) => {
         const {start, tip, long} = this._arrowEnds(handle, sight);
         return [long ? Gizmo.toSegment(x, y, start, tip) : Infinity, 3];
       },
       ring: (handle) => [this._toRing(handle, sight, x, y), 2],
+      line: () => [Infinity, 0],
     };
     let best = null;
     for (const {handle} of this.parts) {
@@ -135,7 +163,8 @@ class Gizmo {
   }
 
   // Show which handle is under the pointer or dragged, and whether any may be.
-  mark(handle, dragged, disabled) {
+  mark(handle, dragged, disabled, selected) {
+    this.lined = Boolean(handle) || selected;
     const white = new MeshCat.THREE.Color("#FFFFFF");
     for (const {handle: own, meshes, color, faint} of this.parts) {
       const hot = handle === own;
@@ -145,7 +174,7 @@ class Gizmo {
         if (hot) material.color.lerp(white, dragged ? 0.15 : 0.35);
         material.opacity = strength * (material.depthTest ? 1 : hot ? 0.75 : faint);
         scale.setScalar(hot && own.kind === "ball" ? 1.15 : 1);
-        if (hot && own.kind === "arrow") scale.set(1.35, 1, 1.35);
+        if (hot && own.kind === "arrow") scale.set(1.35, 1, 1.35);  // of a line: see layOut
       }
     }
   }
@@ -179,10 +208,10 @@ class Gizmo {
 
   // The pixels of an arrow's ends; one that points at the eye is too short to be used.
   _arrowEnds({axis}, sight) {
-    const size = sight.pixel(this.position) * this.enlarged;
+    const size = sight.pixel(this.position) * this.enlarged, beyond = this.ball - Gizmo.BALL;
     const [start, tip] = Gizmo.ARROW.map((length) => sight.project(
-      this.position.clone().addScaledVector(this.axes[axis], length * size)));
-    return {start, tip, long: Math.hypot(tip.x - start.x, tip.y - start.y) > 16};
+      this.position.clone().addScaledVector(this.axes[axis], (length + beyond) * size)));
+    return {start, tip, long: this.shown && Math.hypot(tip.x - start.x, tip.y - start.y) > 16};
   }
 
   // The distance from the visible half of a ring.
@@ -204,14 +233,16 @@ class Gizmo {
   }
 
   _build() {
-    const {SphereGeometry, CylinderGeometry, TorusGeometry, BackSide, Mesh, MeshBasicMaterial} =
-      MeshCat.THREE;
-    const {BALL, ARROW: [start, tip], HEAD, RING} = Gizmo, ball = {kind: "ball"};
-    this._part(ball, [new SphereGeometry(BALL + 2.2, 32, 20)], "#FFFFFF", 1004, 0.8);
-    // Its rim is the far half of a larger ball, which never hides the ball itself.
-    for (const {material} of this.parts[0].meshes) material.side = BackSide;
+    const {SphereGeometry, CylinderGeometry, RingGeometry, TorusGeometry, DoubleSide, Mesh,
+           MeshBasicMaterial} = MeshCat.THREE;
+    const {ARROW: [start, tip], HEAD, RING} = Gizmo;
     const color = this.target.color ?? Gizmo.BALL_COLOR;
-    this._part(ball, [new SphereGeometry(BALL, 32, 20)], color, 1005, 0.9);
+    this._buildBall(color);
+    // From the surface down to the floor, and around the place there.
+    const down = new CylinderGeometry(0.8, 0.8, 1, 8).translate(0, 0.5, 0);
+    const foot = new RingGeometry(0.86, 1, 48).rotateX(Math.PI / 2);
+    this._part({kind: "line"}, [down, foot], color, 1000, 0.3, {x: -Math.PI / 2});
+    for (const {material} of this.parts.at(-1).meshes) material.side = DoubleSide;
     const along = [{z: -Math.PI / 2}, {}, {x: Math.PI / 2}];  // from y to the three axes
     for (const axis of [0, 1, 2].filter((axis) => this.follows(axis))) {
       const shaft = new CylinderGeometry(1.6, 1.6, tip - HEAD - start, 16)
@@ -232,6 +263,14 @@ class Gizmo {
     }
   }
 
+  _buildBall(color) {
+    const {SphereGeometry, BackSide} = MeshCat.THREE, {BALL} = Gizmo, ball = {kind: "ball"};
+    this._part(ball, [new SphereGeometry(BALL + 2.2, 32, 20)], "#FFFFFF", 1004, 0.8);
+    // Its rim is the far half of a larger ball, which never hides the ball itself.
+    for (const {material} of this.parts[0].meshes) material.side = BackSide;
+    this._part(ball, [new SphereGeometry(BALL, 32, 20)], color, 1005, 0.9);
+  }
+
   // A handle's shapes, each drawn twice: faint through everything, and solid where it is seen.
   _part(handle, geometries, color, order, faint, turned = {}, parent = this.group) {
     const {Mesh, MeshBasicMaterial} = MeshCat.THREE;
@@ -247,4 +286,43 @@ class Gizmo {
     }));
     this.parts.push({handle, meshes, color, faint});
   }
+}
+
+// Of an obstacle: it takes the place of the ball, and is dragged to where the robot is in the
+// picture. Of several, only what is pointed at or selected has arrows.
+class Obstacle extends Gizmo {
+  static COLOR = "#D55E00";  // palette.OBSTACLE
+
+  constructor(key, {position, ...about}, viewer, alone) {
+    super(key, {kind: "position", pose: position, color: Obstacle.COLOR, ...about}, viewer);
+    this.alone = alone;
+    this.mark(null);
+  }
+
+  get label() { return `Obstacle ${this.target.name}`; }
+
+  get ball() { return Math.max(this.target.radius / this.size, Gizmo.BALL); }
+
+  address() { return {name: this.target.name}; }
+
+  wish() { return {do: "obstacle", ...this.address(), position: this.position.toArray()}; }
+
+  // After all handles, and the nearest first.
+  find(sight, ...pointer) {
+    const found = super.find(sight, ...pointer);
+    if (found?.handle.kind === "ball") found.gap = 1e6 + sight.depth(this.position);
+    return found;
+  }
+
+  mark(handle, dragged, disabled, selected) {
+    super.mark(handle, dragged, disabled, selected);
+    this.shown = this.alone || this.lined;
+    this.lined = true;
+  }
+
+  _ballDrag(sight, from, x, y) {
+    return sight.atRobot(from, findNode(this.viewer, "/robot")?.object, x, y);
+  }
+
+  _buildBall() { this.parts.push({handle: {kind: "ball"}, meshes: []}); }
 }

@@ -1,7 +1,7 @@
 // Pointers and keys in the scene of `hsp play`: what is under them, and what they move.
 "use strict";
 
-// The hand finds, in this order: a handle of a target, an obstacle, a link of the robot; all else
+// The hand finds, in this order: a handle, an obstacle, a link of the robot; all else
 // is left to the camera, as are drags with Shift, Ctrl or Meta. A drag ends when the pointer is
 // released, but also when it is lost or the page is hidden: nothing stays grabbed.
 class PlayHand {
@@ -73,9 +73,8 @@ class PlayHand {
     this.viewer.controls.enabled = true;
     if (pane.hasPointerCapture(grip.pointer)) pane.releasePointerCapture(grip.pointer);
     if (grip.moved && !silent) {
-      if (grip.gizmo) play.release(grip.gizmo.target.name);
-      else if (grip.path) play.letGo();
-      else play.flush();
+      if (grip.gizmo) play.release(grip.gizmo);
+      else play.letGo();
     }
     play.pull = null;
     this.setHover(null);
@@ -88,31 +87,21 @@ class PlayHand {
       const drag = grip.gizmo.grab(grip.handle, sight, grip.x, grip.y);
       return (x, y) => {
         const text = drag(x, y);
-        if (text !== null) play.moveTarget(grip.gizmo);
+        if (text !== null) play.move(grip.gizmo);
         return text;
       };
     }
-    const from = (grip.point ?? grip.obstacle.at).clone();
-    const place = sight.inPlane(from, sight.back.clone(), grip.x, grip.y);
+    const place = sight.inPlane(grip.point.clone(), sight.back.clone(), grip.x, grip.y);
     return (x, y) => {
       const to = place(x, y);
-      if (!to) return null;
-      if (grip.path) play.pullLink(grip, to);
-      else play.moveObstacle(grip.obstacle, to);
-      return grip.path ? "" : Gizmo.way(from, to);
+      if (to) play.pullLink(grip, to);
+      return to && "";
     };
   }
 
   find(x, y, pointer) {
-    const {gizmos, obstacles} = this.play, sight = this.play.sight.update();
+    const {gizmos} = this.play, sight = this.play.sight.update();
     const found = [...gizmos].map(([key, gizmo]) => ({key, ...gizmo.find(sight, x, y, pointer)}));
-    for (const [key, obstacle] of obstacles) {
-      const {ahead, ...center} = sight.project(obstacle.at);
-      const radius = Math.max(obstacle.radius / sight.pixel(obstacle.at), pointer === "touch" ? 22 : 8);
-      const hit = ahead && Math.hypot(x - center.x, y - center.y) <= radius;
-      // After all handles, and the nearest first.
-      if (hit) found.push({key, obstacle, gap: 1e6 + sight.depth(obstacle.at)});
-    }
     const [best] = found.filter(({gap}) => gap >= 0).sort((one, other) => one.gap - other.gap);
     return best ?? this.findLink(x, y);
   }
@@ -206,7 +195,7 @@ class PlayKeys {
     if (inControl && (key === " " || way)) return null;
     if (key === "Escape") return () => this.escape();
     if (/^[1-9]$/.test(key)) {
-      const button = play.overlay.buttons.get(play.things()[key - 1]?.key);
+      const button = [...play.overlay.buttons.values()][key - 1];
       return button && (() => button.focus());
     }
     if (way) return play.selected && (() => this.move(key, way, shiftKey));
@@ -230,23 +219,22 @@ class PlayKeys {
     const {play} = this, {selected} = play;
     if (!play.mine || !selected || play.hand.grip) return;
     play.sight.update();
-    const gizmo = play.gizmos.get(selected), obstacle = play.obstacles.get(selected);
-    if (gizmo && !gizmo.movable) {
+    const gizmo = play.gizmos.get(selected);
+    if (!gizmo.movable) {
       this.turn(gizmo, way, (fine ? 0.1 : 1) * Math.PI / 180);
     } else {
-      const at = gizmo?.position ?? obstacle.at, {axis, sign} = this.axis(way, gizmo);
+      const at = gizmo.position, {axis, sign} = this.axis(way, gizmo);
       if (axis === null) return;
       at.setComponent(axis, at.getComponent(axis) + sign * (fine ? 0.001 : 0.01));
     }
-    if (!gizmo) return play.moveObstacle(obstacle, obstacle.at);
-    play.moveTarget(gizmo);
-    this.moving.set(key, gizmo.target.name);
+    play.move(gizmo);
+    this.moving.set(key, gizmo);
   }
 
   // The world's axis for a key: x or y by the picture, z for page up and down.
   axis([across, along, up], gizmo) {
     const {right, up: above} = this.play.sight;
-    const followed = (axis) => !gizmo || gizmo.follows(axis) ? axis : null;
+    const followed = (axis) => gizmo.follows(axis) ? axis : null;
     if (up) return {axis: followed(2), sign: up};
     const first = Math.abs(right.x) >= Math.abs(right.y) ? 0 : 1, other = 1 - first;
     const sideways = Math.sign(right.getComponent(first)) || 1;
@@ -266,15 +254,14 @@ class PlayKeys {
 
   up(key) {
     if (key === " ") this.play.holdKey?.set(false);
-    const name = this.moving.get(key);
+    const gizmo = this.moving.get(key);
     this.moving.delete(key);
-    const held = name === undefined || [...this.moving.values()].includes(name);
-    if (!held) this.play.release(name);
+    if (gizmo && ![...this.moving.values()].includes(gizmo)) this.play.release(gizmo);
   }
 
   releaseAll() {
-    const names = new Set(this.moving.values());
+    const gizmos = new Set(this.moving.values());
     this.moving.clear();
-    for (const name of names) this.play.release(name);
+    for (const gizmo of gizmos) this.play.release(gizmo);
   }
 }

@@ -2,8 +2,8 @@
 // over it in pixels.
 "use strict";
 
-// The bar: pause, step, reset, save, the time and the rate; above it which targets are out of
-// reach, the status line, and who steers the robot.
+// The bar: pause, step, reset, save, the time and the rate; above it the status line, and who
+// steers the robot.
 class PlayBar {
   static ICONS = {
     pause: "M7 5h3.6v14H7zM13.4 5H17v14h-3.6z",
@@ -30,18 +30,16 @@ class PlayBar {
     this.rate = make("output", {className: "rate", ariaLabel: "Rate"});
     this.row = make("div", {className: "play-bar", role: "toolbar", ariaLabel: "Simulation"},
                     ...this.acting, this.clock, this.rate, this.panel);
-    const line = (name) => make("div", {className: `play-status ${name}`, role: "status",
-                                        hidden: true});
-    [this.away, this.status] = [line("away"), line("message")];
+    this.status = make("div", {className: "play-status", role: "status", hidden: true});
     this.who = make("span");
     this.watching = make("div", {className: "play-watching", hidden: true}, this.who,
                          makeButton({}, () => play.takeOver(), "Take over"));
     presentation.addButton(this.row);
     parent.append(make("div", {className: "play-foot"},
-                       this.away, this.status, this.watching, this.row));
+                       this.status, this.watching, this.row));
   }
 
-  showState({t, running, rate, message, level, away}) {
+  showState({t, running, rate, message, level}) {
     this.clock.textContent = `${t.toFixed(2)} s`;
     this.rate.replaceChildren(...running
       ? [`${Number(rate).toFixed(2)} ×`, make("span", {}, " real time")]
@@ -51,10 +49,8 @@ class PlayBar {
       Object.assign(this.toggle, {ariaLabel: label, title: `${label} (space)`});
       this.toggle.replaceChildren(makeIcon(PlayBar.ICONS[label.toLowerCase()]));
     }
-    for (const [line, text = ""] of [[this.status, message], [this.away, away]]) {
-      line.hidden = !text;
-      if (line.textContent !== text) line.textContent = text;
-    }
+    this.status.hidden = !message;
+    if (this.status.textContent !== message) this.status.textContent = message;
     this.status.classList.toggle("warning", level === "warning");
   }
 
@@ -98,12 +94,11 @@ class PlayHold {
   }
 }
 
-// The panel: the targets, the controls in their groups, the live plots. A value is the program's:
+// The panel: switches, live plots, the other controls in their groups. A value is the program's:
 // a change is sent, and the value that the program then reports is shown, so a refused one goes
 // back. While a slider is held, and a moment after each change, what the program said before does
 // not count.
 class PlayPanel {
-  static OBSTACLE = "#D55E00";  // palette.OBSTACLE
   static NARROW = "(max-width: 620px), (max-width: 860px) and (max-aspect-ratio: 6/5)";
   static CLOSE = "M6.4 5 12 10.6 17.6 5 19 6.4 13.4 12l5.6 5.6-1.4 1.4-5.6-5.6L6.4 19 5 17.6l5.6"
     + "-5.6L5 6.4z";
@@ -115,13 +110,14 @@ class PlayPanel {
   constructor(play, parent) {
     Object.assign(this, {play, open: false, narrow: matchMedia(PlayPanel.NARROW)});
     this.title = make("h2");
-    this.controls = make("fieldset", {className: "play-controls"});
+    this.fields = [1, 2].map(() => make("fieldset", {className: "play-controls"}));
+    const [switches, controls] = this.fields;
     this.plots = make("div", {className: "play-plots"});
     const close = makeButton({ariaLabel: "Close the panel", title: "Close"},
                              () => this.setOpen(false), makeIcon(PlayPanel.CLOSE));
     this.box = make("aside", {className: "play-panel", ariaLabel: "Controls and plots"},
       make("header", {}, this.title, close),
-      make("div", {className: "play-content"}, this.controls, this.plots,
+      make("div", {className: "play-content"}, switches, this.plots, controls,
            make("p", {className: "play-help", innerHTML: PlayPanel.HELP})));
     // On a phone there is room for the sheet or the legend.
     legend.toggle.addEventListener("click", () => {
@@ -148,17 +144,17 @@ class PlayPanel {
     this.asked.clear();
     this.things = new Map();
     const groups = new Map();
-    const put = (group, row) => groups.set(group, [...groups.get(group) ?? [], row]);
+    const put = (group, row) => groups.set(group, [...groups.get(group) ?? [], row]), switches = [];
     for (const one of targets) put("Targets", this.thing(Play.targetKey(one.name), one));
     for (const one of obstacles) {
-      const row = this.thing(Play.obstacleKey(one.name), {...one, color: PlayPanel.OBSTACLE});
-      put("Obstacles", row);
+      put("Obstacles", this.thing(Play.obstacleKey(one.name), {...one, color: Obstacle.COLOR}));
     }
     for (const control of controls) {
-      const row = control.kind === "switch" ? this.switch(control) : this.slider(control);
-      put(control.group || "Settings", row);
+      if (control.kind === "switch") switches.push(this.switch(control));
+      else put(control.group || "Settings", this.slider(control));
     }
-    this.controls.replaceChildren(...[...groups].map(([name, rows]) =>
+    this.fields[0].replaceChildren(...switches);
+    this.fields[1].replaceChildren(...[...groups].map(([name, rows]) =>
       make("section", {}, make("h3", {}, name), ...rows)));
   }
 
@@ -171,7 +167,7 @@ class PlayPanel {
     }, make("i", {style: color ? `background: ${color}` : ""}), make("span", {}, name),
     make("small", {}, kind ?? ""));
     const resume = makeButton({className: "resume", ariaLabel: `${name}: back to its own path`},
-                              () => play.resume(key, name), "Back to its path");
+                              () => play.resume(key), "Back to its path");
     this.things.set(key, make("div", {className: "play-row target"}, select, resume));
     return this.things.get(key);
   }
@@ -183,7 +179,10 @@ class PlayPanel {
     for (const [key, row] of this.things) row.classList.toggle("selected", key === selected);
   }
 
-  slider({id, label, unit, value, low, high, log}) {
+  // The name of a control, and a line on what it does.
+  static named(label, note) { return make("span", {}, label, make("small", {}, note ?? "")); }
+
+  slider({id, label, note, unit, value, low, high, log}) {
     const input = make("input", {type: "range", min: 0, max: 1, step: 0.005, id: `play-${id}`});
     const shown = make("output");
     const place = (x) => log ? Math.log(x / low) / Math.log(high / low) : (x - low) / (high - low);
@@ -214,16 +213,16 @@ class PlayPanel {
       if (!held) show(x);
     });
     show(value);
-    const name = make("label", {htmlFor: input.id}, make("span", {}, label), shown);
+    const name = make("label", {htmlFor: input.id}, PlayPanel.named(label, note), shown);
     return make("div", {className: "play-row slider"}, name, input);
   }
 
-  switch({id, label, value}) {
+  switch({id, label, note, value}) {
     const input = make("input", {type: "checkbox", role: "switch", checked: value});
     input.onchange = () => this.set(id, input.checked);
     this.setters.set(id, (on) => { input.checked = on; });
     return make("div", {className: "play-row switch"},
-                make("label", {}, make("span", {}, label), input));
+                make("label", {}, PlayPanel.named(label, note), input));
   }
 
   // Ask for a value; what the program said before it heard of it is not shown.
@@ -255,39 +254,46 @@ class PlayOverlay {
       <svg aria-hidden="true"><circle class="focus"/>
         <g class="spring"><path class="halo"/><path class="coil"/><circle class="from" r="4"/>
         <circle class="to" r="7"/></g></svg>
-      <div class="play-label name" aria-hidden="true"></div>
       <div class="play-label force" role="status"></div>`});
-    [this.handles, this.circle, this.spring, this.name, this.force] =
-      [".play-handles", ".focus", ".spring", ".name", ".force"].map((s) => this.box.querySelector(s));
+    [this.handles, this.circle, this.spring, this.force] =
+      [".play-handles", ".focus", ".spring", ".force"].map((s) => this.box.querySelector(s));
     parent.append(this.box);
-    this.buttons = new Map();
+    this.buttons = this.labels = new Map();
   }
 
-  // One button per thing: {key, label}; select(key) is called when one gets the focus.
-  setThings(things, select) {
-    this.buttons = new Map(things.map(({key, label}, k) => {
+  // One button per gizmo; select(key) is called when one gets the focus.
+  setThings(gizmos, select) {
+    this.buttons = new Map(gizmos.map(({key, label}, k) => {
       const number = k < 9 ? `, key ${k + 1}` : "";
       const ariaLabel = `${label}${number}: arrow keys and page up, page down move it`;
       return [key, make("button", {type: "button", ariaLabel, onfocus: () => select(key)})];
     }));
+    for (const label of this.labels.values()) label.remove();
+    this.labels = new Map(gizmos.map(({key}) => [key, make("div", {className: "play-label name"})]));
+    this.box.append(...this.labels.values());
     this.handles.replaceChildren(...this.buttons.values());
   }
 
-  placeButton(key, {x, y, ahead}) {
-    const {style} = this.buttons.get(key) ?? {};
-    if (style && ahead) style.transform = `translate(${x.toFixed(0)}px, ${y.toFixed(0)}px)`;
+  // Put a gizmo's button at its place, and what there is to say above its radius [px].
+  place(key, {x, y, ahead}, radius, text, away) {
+    const label = this.labels.get(key);
+    label.hidden = !ahead || !text;
+    label.classList.toggle("away", away);
+    if (ahead) {
+      this.buttons.get(key).style.transform = `translate(${x.toFixed(0)}px, ${y.toFixed(0)}px)`;
+    }
+    if (label.hidden) return;
+    label.textContent = text;
+    PlayOverlay.put(label, x, y - radius - 12);
   }
 
-  // A circle of a radius [px] around a thing, and its name above it; null hides both.
-  showThing(at, radius, text, strong) {
-    const visible = Boolean(at?.ahead);
-    this.circle.style.display = visible ? "" : "none";
-    this.name.hidden = !visible;
-    if (!visible) return;
-    PlayOverlay.set(this.circle, {cx: at.x, cy: at.y, r: radius});
+  hideCircle() { this.circle.style.display = "none"; }
+
+  // A circle of a radius [px] around a thing.
+  showCircle({x, y, ahead}, r, strong) {
+    this.circle.style.display = ahead ? "" : "none";
+    PlayOverlay.set(this.circle, {cx: x, cy: y, r});
     this.circle.classList.toggle("strong", strong);
-    this.name.textContent = text;
-    PlayOverlay.place(this.name, at.x, at.y - radius - 12);
   }
 
   // A spring between two pixels with its force [N]; null hides it.
@@ -302,7 +308,7 @@ class PlayOverlay {
     PlayOverlay.set(end, {cx: to.x, cy: to.y});
     if (newtons === null) return;
     this.force.textContent = `${newtons < 10 ? newtons.toFixed(1) : newtons.toFixed(0)} N`;
-    PlayOverlay.place(this.force, to.x, to.y - 18);
+    PlayOverlay.put(this.force, to.x, to.y - 18);
   }
 
   // The path of a coil spring: it becomes thinner as it is stretched.
@@ -322,7 +328,7 @@ class PlayOverlay {
   }
 
   // Centre a label above a pixel, inside the window.
-  static place(label, x, y) {
+  static put(label, x, y) {
     const half = label.offsetWidth / 2 + 6;
     const inside = Math.min(Math.max(x, half), innerWidth - half);
     const below = Math.max(y, label.offsetHeight + 6);

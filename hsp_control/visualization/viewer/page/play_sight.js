@@ -6,6 +6,7 @@
 
 class Sight {
   static REACH = 20;  // m: no drag leads farther from the eye
+  static NEAR = 0.08;  // of the picture's height: what is nearer to the robot is at the robot
 
   constructor(viewer) { this.viewer = viewer; }
 
@@ -69,6 +70,43 @@ class Sight {
   inPlane(from, normal, x, y) {
     const offset = from.clone().sub(this.hit(from, normal, x, y) ?? from);
     return (x, y) => this.hit(from, normal, x, y)?.add(offset) ?? null;
+  }
+
+  // A point's places at the robot's depth where it is near the robot in the picture, and at
+  // the point's own depth elsewhere. A start that is elsewhere at the robot comes there on the way.
+  atRobot(from, robot, x, y) {
+    const start = this.project(from), own = this.depth(from), near = Sight.NEAR * this.box.height;
+    const closeness = (dx, dy) => Math.exp(-(dx * dx + dy * dy) / near ** 2);
+    const depthAt = (x, y) => {
+      let closest = 0, total = 1e-200, sum = 0;
+      for (const point of this.surface(robot)) {
+        const seen = this.project(point), share = closeness(seen.x - x, seen.y - y);
+        closest = Math.max(closest, share);
+        total += share;
+        sum += share * this.depth(point);
+      }
+      return own + closest * (sum / total - own);
+    };
+    const missing = own - depthAt(start.x, start.y);
+    return (to_x, to_y) => {
+      const [px, py] = [start.x + to_x - x, start.y + to_y - y];
+      const depth = depthAt(px, py) + missing * closeness(px - start.x, py - start.y);
+      const {origin, direction} = this.ray(px, py);
+      return origin.addScaledVector(direction, Math.max(depth, 0.1) / -direction.dot(this.back));
+    };
+  }
+
+  // Some points of the robot's surface.
+  surface(robot) {
+    const points = [];
+    robot?.traverse(({geometry, matrixWorld}) => {
+      const {position} = geometry?.attributes ?? {};
+      for (let k = 0; k < (position?.count ?? 0); k += Math.ceil(position.count / 50)) {
+        points.push(new MeshCat.THREE.Vector3().fromBufferAttribute(position, k)
+          .applyMatrix4(matrixWorld).applyMatrix4(this.toScene));
+      }
+    });
+    return points;
   }
 
   // A point's places on the line through it.

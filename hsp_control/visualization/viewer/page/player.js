@@ -17,8 +17,8 @@
 //                       `clock` is the index of its times, `values` are all rows in one
 //                       Float32Array. Before its first time and after its last one, a
 //                       track keeps its first and its last value.
-//   bands               [{name, caption, color, spans}]: what the time line marks; `spans` are
-//                       [start, end] [s], ascending. See player_bar.js.
+//   bands               [{name, caption, color, spans, run}]: what the time line marks; `spans`
+//                       are [start, end] [s], ascending. See player_bar.js.
 //
 // The properties are those of Track.PROPERTIES. All but "visible" are interpolated, quaternions
 // spherically. A path that is not in the scene is ignored.
@@ -32,8 +32,23 @@ class Player extends EventTarget {
 
   constructor(viewer) {
     super();
-    Object.assign(this, {viewer, speed: 1, loop: false});
+    Object.assign(this, {viewer, speed: 1, loop: false, run: null});  // the run that is seen alone
     this.unload();
+  }
+
+  // The bands of what is seen: of several runs each with its run's name.
+  get marks() {
+    return [...this.bands.values()].filter(({run}) => this.run === null || run === this.run)
+      .map(({name, caption, run, ...rest}) => {
+        const whose = run && this.run === null ? `${run}: ` : "";
+        return {...rest, name: whose + name, caption: whose + caption};
+      });
+  }
+
+  // Show the bands of one run; null: of all.
+  select(run) {
+    this.run = run;
+    this._emit("state");
   }
 
   // Remove the clip; the scene does not change.
@@ -167,13 +182,13 @@ class Player extends EventTarget {
 
   // Add a band; what goes on where the last interval of its name ended is one with it.
   _mark({spans, ...band}) {
-    const known = this.bands.get(band.name)?.spans ?? [];
+    const key = `${band.run}\n${band.name}`, known = this.bands.get(key)?.spans ?? [];
     for (const [from, to] of spans) {
       const last = known.at(-1);
       if (last && from <= last[1]) last[1] = Math.max(last[1], to);
       else known.push([from, to]);
     }
-    this.bands.set(band.name, {...band, spans: known});
+    this.bands.set(key, {...band, spans: known});
   }
 
   _emit(kind, detail = {}) { this.dispatchEvent(new CustomEvent(kind, {detail})); }

@@ -91,13 +91,13 @@ class PlayerBar {
   }
 
   showTime() {
-    const {time, start, end, horizon, loaded, bands} = this.player;
+    const {time, start, end, horizon, loaded, marks} = this.player;
     const share = (t) => `${horizon > start ? (t - start) / (horizon - start) : 0}`;
     this.timeline.value = time;
     this.timeline.style.setProperty("--played", share(time));
     this.timeline.style.setProperty("--available", share(end));
     this.clock.textContent = `${time.toFixed(2)} / ${horizon.toFixed(2)} s`;
-    const inside = loaded ? [...bands.values()].filter(({spans}) =>
+    const inside = loaded ? marks.filter(({spans}) =>
       spans.some(([from, to]) => from <= time && time <= to)) : [];
     const told = inside.map(({caption}) => caption).join("\n");
     if (told === this.told) return;
@@ -108,7 +108,7 @@ class PlayerBar {
 
   // Draw the bands anew if there are others; else the one with the focus would lose it.
   drawBands() {
-    const {player} = this, {start, horizon} = player, bands = [...player.bands.values()];
+    const {player} = this, {start, horizon, marks: bands} = player;
     const drawn = JSON.stringify([start, horizon, bands]);
     if (drawn === this.drawn) return;
     this.drawn = drawn;

@@ -50,7 +50,7 @@ class Plot {
     this.chart?.destroy();
     this.chart = null;  // what is told while the next one is made is not for the last one
     this.chart = new uPlot({
-      width: this.figure.clientWidth || 300, height: Plot.HEIGHT, padding: [6, 12, 0, label ? 0 : 14],
+      width: this.figure.clientWidth || 300, height: this.figure.clientHeight || Plot.HEIGHT, padding: [6, 12, 0, label ? 0 : 14],
       legend: {show: false}, scales, hooks, series: [{}, ...series.map((each) => ({points: {show: false}, pxAlign: 0, ...each}))],
       axes: [
         {...axis, size: 20, gap: 2, space: 45, grid: {show: false}, values: Plot.numbers(" s"),
@@ -67,7 +67,7 @@ class Plot {
   fit() {
     const {clientWidth} = this.figure;
     if (clientWidth && this.chart && this.chart.width !== clientWidth) {
-      this.chart.setSize({width: clientWidth, height: Plot.HEIGHT});
+      this.chart.setSize({width: clientWidth, height: this.chart.height});
     }
   }
 

@@ -94,22 +94,32 @@ function ask({number}) {
   viewer.connection.send(String(number));
 }
 
-// Connect to the server; when it ends, retry until one runs at the same address.
-function connect(again = false) {
+// Connect to the server. When it ends the page says so, and loads the next one at this address.
+function connect() {
   const address = new URL("scene" + location.search, location.href);  // with its key
   address.protocol = address.protocol.replace("http", "ws");
   const socket = new WebSocket(address);
   socket.binaryType = "arraybuffer";
   viewer.connection = socket;
-  socket.onopen = () => { if (again) location.reload(); };
   socket.onmessage = ({data}) => {
     viewer.handle_command_bytearray(new Uint8Array(data));
     socket.send("taken");  // flow control: the server sends the next message after it
   };
   socket.onclose = () => {
-    document.getElementById("lost").hidden = false;
-    setTimeout(connect, 1000, true);
+    document.body.classList.add("lost");
+    commandHandlers.lost?.();
+    lookForNext();
   };
+}
+
+async function lookForNext() {
+  const {ok, status} = await fetch(location).catch(() => ({}));
+  if (ok) return location.reload();
+  const text = "The program has ended. " + (status === 403
+    ? "Another one runs here now: open the address that it has printed."
+    : "Its next start at this address will appear here.");
+  Object.assign(document.getElementById("lost"), {hidden: false, textContent: text});
+  setTimeout(lookForNext, 1000);
 }
 
 // -- the camera --
@@ -167,13 +177,11 @@ function camera(command) {
   Object.assign(lens, {fov: field_of_view, near: away / 100, far: away * 100});
   lens.up.copy(vector(up));
   lens.position.copy(center).addScaledVector(toEye, away);
-  let shift = 0;
-  if (!eye) {  // to the right, to be beside the legend if there is space; the picture is 2 wide
-    const half = (offset) => (away - offset.dot(toEye)) * wide;
-    const ends = (side) => offsets.map((o) => (o.dot(right) + side * radius) / half(o));
-    const edge = 2 * legend.reach / (clientWidth || Infinity) - 1;
-    shift = Math.max(Math.min(edge - Math.min(...ends(-1)), 1 - Math.max(...ends(1))), 0);
-  }
+  // To the right, to be beside the legend if there is space; the picture is 2 wide.
+  const half = (offset) => (away - offset.dot(toEye)) * wide;
+  const ends = (side) => offsets.map((o) => (o.dot(right) + side * radius) / half(o));
+  const edge = 2 * legend.reach / (clientWidth || Infinity) - 1;
+  const shift = Math.max(Math.min(edge - Math.min(...ends(-1)), 1 - Math.max(...ends(1))), 0);
   lens.setViewOffset(1, 1, -shift / 2, (bar - title) / 2, 1, 1);
   viewer.set_3d_pane_size();
   viewer.controls.dispose();

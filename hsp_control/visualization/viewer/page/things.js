@@ -99,10 +99,19 @@ class LengthLabels {
     this.labels.forEach((label, k) => {
       label.hidden = k >= bars.length;
       if (label.hidden) return;
-      const text = `${bars[k].scale.z.toFixed(2)} m`;
+      const {z} = bars[k].scale, deep = this.collides(bars[k]);
+      const text = deep ? `${(100 * z).toFixed(1)} cm deep` : `${z.toFixed(2)} m`;
+      label.classList.toggle("deep", deep);
       if (label.textContent !== text) label.textContent = text;
       this.place(label, bars[k]);
     });
+  }
+
+  // Whether a bar is in the colour of a collision: palette.COLLISION.
+  collides(bar) {
+    let deep = false;
+    eachMaterial(bar, ({color}) => { deep ||= color?.getHex() === 0xD00020; });
+    return deep;
   }
 
   // The visible bars, the shortest first.

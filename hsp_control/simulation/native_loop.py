@@ -25,7 +25,7 @@ MOST = 100
 """Most periods of one call: then Ctrl-C is noticed, and other threads go on."""
 
 
-class Stretch:
+class NativeLoop:
     """Moves a plant on while its controller's steps are free, see `FreeStep`."""
 
     def __init__(
@@ -87,11 +87,11 @@ class Stretch:
         moving = table([steps.native, *self._seeing])
         own = steps.q, steps.v, self._plant.effort, step.effort, steps.interval
         calls = *moving, *step.move.args, *table(step.sending)
-        return NativeCall.of(_stretch, (*calls, *own, self._which), timed=False)
+        return NativeCall.of(_periods, (*calls, *own, self._which), timed=False)
 
 
 @kernel
-def _stretch(
+def _periods(
     moving: Indices,
     moving_when: Array,
     law: Indices,

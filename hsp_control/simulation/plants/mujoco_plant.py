@@ -1,4 +1,4 @@
-"""MuJoCo as a plant: the robot is translated to a MuJoCo model."""
+"""MuJoCo as a plant: what steps it, and the robot as a MuJoCo model."""
 
 import importlib
 from collections.abc import Mapping, Sequence
@@ -8,8 +8,9 @@ from typing import Any, Literal, get_args
 import numpy as np
 import pinocchio as pin
 
-from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import SimulationError
+from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.exceptions import ModelError, SimulationError
+from hsp_control.common.kernels import kernel
 from hsp_control.control.measurement import LogChannel
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Flag, Positive
@@ -17,14 +18,9 @@ from hsp_control.robot import Robot
 from hsp_control.robot.friction import JointFriction
 from hsp_control.robot.integrators import Integrator
 from hsp_control.robot.motion import number_of_steps
+from hsp_control.robot.mujoco import scene
 from hsp_control.robot.mujoco_coordinates import MujocoCoordinates, joints_of
-from hsp_control.simulation.plants.declared import FrictionalPart
-from hsp_control.simulation.plants.mujoco.engine import (
-    check_motion,
-    contact_wrenches,
-    import_mujoco,
-)
-from hsp_control.simulation.plants.mujoco.mjcf import (
+from hsp_control.simulation.plants.mjcf import (
     ContactShape,
     ContactShapes,
     Ground,
@@ -39,12 +35,154 @@ from hsp_control.simulation.plants.plant import (
     contact_channels,
     to_json_data,
 )
+from hsp_control.simulation.plants.plant_part import FrictionalPart
 from hsp_control.simulation.plants.push import Push, Pushes
 
 MujocoIntegrator = Literal["Euler", "RK4", "implicit", "implicitfast"]
 
 
-class MujocoPlant(SampledPlant):
+def import_mujoco() -> Any:
+    """Return the module ``mujoco``; its warnings go to our log, not to a file."""
+    try:
+        return scene.import_mujoco()
+    except ModelError as error:
+        raise SimulationError(f"the plant cannot be made: {error}") from error
+
+
+class MujocoEngine(SampledPlant):
+    """A robot that MuJoCo moves, in whatever model it stands.
+
+    Attributes:
+        model: The ``mujoco.MjModel``.
+        data: The ``mujoco.MjData``.
+        coordinates: Converts between the robot's coordinates and MuJoCo's.
+        pushes: External wrenches.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        model: Any,
+        data: Any,
+        coordinates: MujocoCoordinates,
+        pushes: Sequence[Push],
+    ) -> None:
+        super().__init__(robot)
+        self.model, self.data, self.coordinates = model, data, coordinates
+        self.pushes = Pushes(robot, pushes)
+        self._roots = FloatingRoots(robot)
+        # whose contact forces are told, by the geom
+        self._owners: dict[int, str] = {}
+
+    @property
+    def _mujoco(self) -> Any:
+        """The module mujoco; not an attribute, because a module cannot be pickled."""
+        return importlib.import_module("mujoco")
+
+    def describe(self) -> dict[str, Any]:
+        """Return its type, and what pushes it."""
+        return {
+            "type": type(self).__name__,
+            "mujoco": self._mujoco.__version__,
+            "timestep": float(self.model.opt.timestep),
+            "pushes": to_json_data(self.pushes.pushes),
+        }
+
+    def _drive(self, data: Any, t: float, q: Array, effort: Array) -> None:
+        """Write an effort, and the pushes at t, to where MuJoCo applies them."""
+        effort = effort + self.pushes.effort(t, q)
+        self.coordinates.effort_to_mujoco(q, effort, data.qfrc_applied)
+
+    def _step(
+        self, t: float, end: float, tau: Array, longest: float
+    ) -> tuple[Array, Array]:
+        """Step from t to ``end`` [s], by equal steps; return (q, v) there."""
+        data, effort = self.data, self._roots.remove_effort(t, tau)
+        steps = number_of_steps(end - t, longest)
+        h = self.model.opt.timestep = (end - t) / steps
+        pushed = self.pushes.any_active(t, end)
+        constant = self.coordinates.constant_effort and not pushed
+        at_once = steps if constant else 1
+        q, v = self.coordinates.from_mujoco(data.qpos, data.qvel)
+        for k in range(0, steps, at_once):
+            self._drive(data, t + (k + 0.5) * h, q, effort)
+            self._mujoco.mj_step(self.model, data, at_once)
+            self._check_motion(end)
+            q, v = self.coordinates.from_mujoco(data.qpos, data.qvel)
+        return q, v
+
+    def _check_motion(self, end: float) -> None:
+        """Check that the motion has not diverged."""
+        kinds = self._mujoco.mjtWarning
+        bad = (
+            kinds.mjWARN_BADQPOS,
+            kinds.mjWARN_BADQVEL,
+            kinds.mjWARN_BADQACC,
+            kinds.mjWARN_BADCTRL,  # which MuJoCo replaces by zero
+        )
+        if any(self.data.warning[kind].number for kind in bad):
+            raise SimulationError(
+                f"the motion diverged before t = {end:.6g} s: MuJoCo's state, "
+                "acceleration or control is not finite, or beyond 1e10"
+            )
+
+    def _wrenches_about(
+        self, data: Any, origins: Mapping[str, Array]
+    ) -> dict[str, Array]:
+        """Return the wrench of all contacts on each owner, shape (6,), in world axes.
+
+        ``origins`` are the points about which their moments are; contacts between two
+        of one owner cancel.
+        """
+        count, names = data.ncon, list(origins)
+        sums = np.zeros((len(names), 6))
+        if count and names:
+            index = np.full(self.model.ngeom, -1)
+            for geom, name in self._owners.items():
+                index[geom] = names.index(name)
+            contact, local = data.contact, np.zeros((count, 6))
+            touched = index[contact.geom]
+            for k in np.flatnonzero((touched >= 0).any(axis=1)).tolist():
+                self._mujoco.mj_contactForce(self.model, data, k, local[k])
+            points = np.array([origins[name] for name in names])
+            places, world = (contact.pos, contact.frame), np.zeros(6)
+            _add_wrenches(touched, *places, local, points, world, sums)
+        return dict(zip(names, sums, strict=True))
+
+
+@kernel
+def _add_wrenches(
+    touched: Indices,
+    positions: Array,
+    frames: Array,
+    local: Array,
+    origins: Array,
+    world: Array,
+    sums: Array,
+) -> None:
+    """Add the wrench of each contact to those that it touches, about their origins."""
+    for k in range(touched.shape[0]):
+        for i in range(3):
+            world[i] = world[3 + i] = 0.0
+            for j in range(3):
+                world[i] += frames[k, 3 * j + i] * local[k, j]
+                world[3 + i] += frames[k, 3 * j + i] * local[k, 3 + j]
+        for side in range(2):
+            owner = touched[k, side]
+            if owner < 0:
+                continue
+            sign = 1.0 if side == 1 else -1.0
+            x = positions[k, 0] - origins[owner, 0]
+            y = positions[k, 1] - origins[owner, 1]
+            z = positions[k, 2] - origins[owner, 2]
+            for i in range(6):
+                sums[owner, i] += sign * world[i]
+            sums[owner, 3] += sign * (y * world[2] - z * world[1])
+            sums[owner, 4] += sign * (z * world[0] - x * world[2])
+            sums[owner, 5] += sign * (x * world[1] - y * world[0])
+
+
+class MujocoPlant(MujocoEngine):
     """A robot in MuJoCo, built from the Pinocchio model.
 
     The declared contacts can touch a flat ground and the declared solids; there are no
@@ -65,7 +203,6 @@ class MujocoPlant(SampledPlant):
         pushes: Sequence[Push] = (),
     ) -> None:
         """Build the MuJoCo model."""
-        super().__init__(robot)
         mujoco = import_mujoco()
         if not 0.0 < timestep < np.inf:
             raise SimulationError(f"mujoco: timestep is {timestep}; must be positive")
@@ -85,7 +222,6 @@ class MujocoPlant(SampledPlant):
                     "that may"
                 )
         self.joint_limits, self.friction = joint_limits, friction
-        self.pushes = Pushes(robot, pushes)
         joints = joints_of(robot)
         geoms: dict[int, list[Any]] = {}
         frame_of_geom: dict[str, str] = {}
@@ -109,24 +245,21 @@ class MujocoPlant(SampledPlant):
             solids=self.solids,
         )
         try:
-            # MuJoCo's model
-            self.model: Any = mujoco.MjModel.from_xml_string(self.mjcf)
+            model = mujoco.MjModel.from_xml_string(self.mjcf)
         except ValueError as error:
             reason = str(error).strip().splitlines()[0]
             raise SimulationError(f"MuJoCo rejects {robot.name}: {reason}") from error
-        self.data: Any = mujoco.MjData(self.model)  # MuJoCo's data
         names = [name for joint in joints for name in joint.mujoco_names]
-        made = [self.model.joint(name) for name in names]
-        # converts between Pinocchio's coordinates and MuJoCo's
-        self.coordinates = MujocoCoordinates(
+        made = [model.joint(name) for name in names]
+        coordinates = MujocoCoordinates(
             robot,
             joints,
             {name: int(j.qposadr[0]) for name, j in zip(names, made, strict=True)},
             {name: int(j.dofadr[0]) for name, j in zip(names, made, strict=True)},
         )
-        self._roots = FloatingRoots(robot)
-        self._geoms = {
-            self.model.geom(name).id: frame for name, frame in frame_of_geom.items()
+        super().__init__(robot, model, mujoco.MjData(model), coordinates, pushes)
+        self._owners = {
+            model.geom(name).id: frame for name, frame in frame_of_geom.items()
         }
         self._data = robot.model.createData()
         self._origins = {c.frame: robot.frame_id(c.frame) for c in self.contacts}
@@ -139,21 +272,7 @@ class MujocoPlant(SampledPlant):
 
     def advance(self, t: float, end: float, tau: Array) -> tuple[Array, Array]:
         """Step MuJoCo from t to ``end``; see `SampledPlant.advance`."""
-        data = self.data
-        motors = self._roots.remove_effort(t, tau)
-        steps = number_of_steps(end - t, self.timestep)
-        h = self.model.opt.timestep = (end - t) / steps
-        q, v = self.coordinates.from_mujoco(data.qpos, data.qvel)
-        pushed = self.pushes.any_active(t, end)
-        constant = self.coordinates.constant_effort and not pushed
-        steps_at_once = steps if constant else 1
-        for k in range(0, steps, steps_at_once):
-            effort = motors + self.pushes.effort(t + (k + 0.5) * h, q)
-            self.coordinates.effort_to_mujoco(q, effort, data.qfrc_applied)
-            self._mujoco.mj_step(self.model, data, steps_at_once)
-            check_motion(data, end)
-            q, v = self.coordinates.from_mujoco(data.qpos, data.qvel)
-        return q, v
+        return self._step(t, end, tau, self.timestep)
 
     def log_channels(
         self, t: float, q: Array, v: Array, tau: Array
@@ -161,8 +280,7 @@ class MujocoPlant(SampledPlant):
         """Return each contact's force and moment at a true state under an effort."""
         if not self.contacts:
             return {}
-        effort = self._roots.remove_effort(t, tau) + self.pushes.effort(t, q)
-        self.coordinates.effort_to_mujoco(q, effort, self.data.qfrc_applied)
+        self._drive(self.data, t, q, self._roots.remove_effort(t, tau))
         self._mujoco.mj_forward(self.model, self.data)
         return contact_channels(self._wrenches(q)) | self._places()
 
@@ -193,14 +311,13 @@ class MujocoPlant(SampledPlant):
         distance = self._mujoco.mj_geomDistance
         return min(
             float(distance(self.model, probe, ground, geom, 1e6, None))
-            for geom in self._geoms
+            for geom in self._owners
         )
 
     def describe(self) -> dict[str, Any]:
         """Return its settings."""
         return {
-            "type": "MujocoPlant",
-            "mujoco": self._mujoco.__version__,
+            **super().describe(),
             "timestep": self.timestep,
             "integrator": self.integrator,
             "joint_limits": self.joint_limits,
@@ -208,13 +325,7 @@ class MujocoPlant(SampledPlant):
             "ground": to_json_data(self.ground),
             "solids": to_json_data(self.solids),
             "friction": to_json_data(self.friction),
-            "pushes": to_json_data(self.pushes.pushes),
         }
-
-    @property
-    def _mujoco(self) -> Any:
-        """The module mujoco; not an attribute, because a module cannot be pickled."""
-        return importlib.import_module("mujoco")
 
     def _places(self) -> dict[str, LogChannel]:
         """Return position and orientation of each loose solid."""
@@ -239,7 +350,7 @@ class MujocoPlant(SampledPlant):
             name: pin.updateFramePlacement(model, data, frame).translation
             for name, frame in self._origins.items()
         }
-        return contact_wrenches(self.model, self.data, self._geoms, origins)
+        return self._wrenches_about(self.data, origins)
 
 
 class Mujoco(FrictionalPart, type="mujoco"):

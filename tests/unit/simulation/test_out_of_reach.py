@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from hsp_control.simulation.unreached import (
+from hsp_control.simulation.log_series import (
     RESTING,
     STAYS,
     Unreached,

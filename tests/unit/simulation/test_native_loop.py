@@ -28,7 +28,7 @@ from hsp_control.simulation.limit_excess import LimitExcess
 from hsp_control.trajectories import Hold
 
 if not PLAIN:
-    from hsp_control.simulation.stretch import MOST
+    from hsp_control.simulation.native_loop import MOST
 
 pytestmark = [pytest.mark.skipif(PLAIN, reason="plain Python has no native calls")]
 
@@ -63,7 +63,7 @@ class Counted:
         """Run with each period made alone."""
         before = sum(self.many)
         with self._patch.context() as patch:
-            patch.setattr(loops, "_stretch", lambda *_: None)
+            patch.setattr(loops, "_native_loop", lambda *_: None)
             found = run()
         assert sum(self.many) == before
         return found
@@ -101,7 +101,8 @@ CASES = {
     ),
     "periods that are no binary fractions": (
         "panda_limits", "simulation.log_period=0.03",
-        "simulation.control_period=0.0006", "simulation.integrator.step=0.0003",
+        "simulation.control_period=0.0006",
+        "simulation.integrator={type: rk4, step: 0.0003}",
     ),
 }  # fmt: skip
 

@@ -21,7 +21,6 @@ from hsp_control.robot.friction import Friction, JointFriction
 from hsp_control.robot.integrators import Integrator
 from hsp_control.simulation.plants.drives import Drives
 from hsp_control.simulation.plants.imperfect_plant import ImperfectPlant
-from hsp_control.simulation.plants.integrated_plant import IntegratedPlant
 from hsp_control.simulation.plants.model_changes import (
     Inertias,
     ModelChange,
@@ -31,6 +30,7 @@ from hsp_control.simulation.plants.model_changes import (
 )
 from hsp_control.simulation.plants.plant import (
     ContinuousPlant,
+    IntegratedPlant,
     Plant,
     SampledPlant,
     check_plant,

@@ -22,22 +22,12 @@ from hsp_control.declaration.quantities import Flag
 from hsp_control.declaration.quantities import Names as NameList
 from hsp_control.robot import MujocoCoordinates, Robot
 from hsp_control.robot.integrators import Integrator
-from hsp_control.robot.motion import number_of_steps
 from hsp_control.robot.mujoco.loading import compile_mjcf
 from hsp_control.robot.mujoco.scene import Motor, Names, joint_actuators, motor
-from hsp_control.simulation.plants.declared import PlantPart
-from hsp_control.simulation.plants.mujoco.engine import (
-    check_motion,
-    contact_wrenches,
-    import_mujoco,
-)
-from hsp_control.simulation.plants.plant import (
-    FloatingRoots,
-    SampledPlant,
-    contact_channels,
-    to_json_data,
-)
-from hsp_control.simulation.plants.push import Push, Pushes
+from hsp_control.simulation.plants.mujoco_plant import MujocoEngine, import_mujoco
+from hsp_control.simulation.plants.plant import contact_channels
+from hsp_control.simulation.plants.plant_part import PlantPart
+from hsp_control.simulation.plants.push import Push
 
 _DEEP = 1e-3
 """Depth below which parts touch, and do not overlap [m]."""
@@ -77,7 +67,7 @@ _GROUPS = 31
 """Number of groups of actuators that MuJoCo can disable."""
 
 
-class MujocoScenePlant(SampledPlant):
+class MujocoScenePlant(MujocoEngine):
     """A robot in a MuJoCo scene: the user's own ``MjModel`` and ``MjData``.
 
     An effort goes through the robot's torque motors, as a control that MuJoCo limits,
@@ -89,12 +79,8 @@ class MujocoScenePlant(SampledPlant):
     robot's joints at the start of the run.
 
     Attributes:
-        model: The ``mujoco.MjModel``.
-        data: The ``mujoco.MjData``.
-        coordinates: Converts between the robot's coordinates and MuJoCo's.
         motors: The motor of each degree of freedom that has one, by its index in v.
         contacts: The bodies whose contact forces are logged.
-        pushes: External wrenches.
     """
 
     def __init__(
@@ -119,16 +105,13 @@ class MujocoScenePlant(SampledPlant):
                 they are an error, since they would work against the controller.
             pushes: External wrenches on the robot.
         """
-        super().__init__(robot)
         mujoco = import_mujoco()
-        self.model, self.data = model, data
-        self.coordinates = MujocoCoordinates.of(robot, model)
-        self.pushes = Pushes(robot, pushes)
+        coordinates = MujocoCoordinates.of(robot, model)
+        super().__init__(robot, model, data, coordinates, pushes)
         self.contacts = tuple(contacts)
-        self._roots = FloatingRoots(robot)
         names = Names(model)
         self._bodies = _bodies(names, self.contacts)
-        self._geoms = {
+        self._owners = {
             geom: name
             for name, body in self._bodies.items()
             for geom in range(model.ngeom)
@@ -159,25 +142,11 @@ class MujocoScenePlant(SampledPlant):
 
     def advance(self, t: float, end: float, tau: Array) -> tuple[Array, Array]:
         """Step MuJoCo from t to ``end``; see `SampledPlant.advance`."""
-        data, own = self.data, self.model.opt.timestep
-        effort = self._roots.remove_effort(t, tau)
-        steps = number_of_steps(end - t, own)
-        h = (end - t) / steps
-        constant = self.coordinates.constant_effort and not self.pushes.any_active(
-            t, end
-        )
-        steps_at_once = steps if constant else 1
-        q, v = self.coordinates.from_mujoco(data.qpos, data.qvel)
+        own = self.model.opt.timestep
         try:
-            self.model.opt.timestep = h
-            for k in range(0, steps, steps_at_once):
-                self._drive(data, t + (k + 0.5) * h, q, effort)
-                self._mujoco.mj_step(self.model, data, steps_at_once)
-                check_motion(data, end)
-                q, v = self.coordinates.from_mujoco(data.qpos, data.qvel)
+            return self._step(t, end, tau, own)
         finally:
             self.model.opt.timestep = own
-        return q, v
 
     def log_channels(
         self, t: float, q: Array, v: Array, tau: Array
@@ -192,26 +161,16 @@ class MujocoScenePlant(SampledPlant):
         self._drive(probe, t, q, self._roots.remove_effort(t, tau))
         mujoco.mj_forward(self.model, probe)
         origins = {name: probe.xpos[body] for name, body in self._bodies.items()}
-        return contact_channels(
-            contact_wrenches(self.model, probe, self._geoms, origins)
-        )
+        return contact_channels(self._wrenches_about(probe, origins))
 
     def describe(self) -> dict[str, Any]:
         """Return its settings, and which joints are driven through their motors."""
         names = self.robot.dof_names
         return {
-            "type": "MujocoScenePlant",
-            "mujoco": self._mujoco.__version__,
-            "timestep": float(self.model.opt.timestep),
+            **super().describe(),
             "motors": [names[i] for i in self.motors],
             "contacts": list(self.contacts),
-            "pushes": to_json_data(self.pushes.pushes),
         }
-
-    @property
-    def _mujoco(self) -> Any:
-        """The module mujoco; not an attribute, because a module cannot be pickled."""
-        return importlib.import_module("mujoco")
 
     def _tell_overlaps(self) -> None:
         """Warn once of a robot that overlaps itself where it starts."""

@@ -1,7 +1,5 @@
-"""The box's page says what is there, and its log what has happened."""
+"""The box's log has what has happened."""
 
-import inspect
-import re
 from pathlib import Path
 
 import numpy as np
@@ -14,22 +12,10 @@ from hsp_control.common.exceptions import LogError
 from hsp_control.companions.franka.layouts import (
     COMMAND,
     Controller,
-    Error,
     MotionGenerator,
 )
-from hsp_control.companions.franka_box import Box, generators, reflexes
+from hsp_control.companions.franka_box import Box
 from hsp_control.companions.franka_box.log import BoxLog
-
-PAGE = (Path(__file__).parents[3] / "docs/companions/franka_box.md").read_text("utf-8")
-
-
-def test_the_errors_of_the_page_are_those_that_the_box_has() -> None:
-    modules = [inspect.getsource(module) for module in (reflexes, generators)]
-    raised = set(re.findall(r"\bError\.([A-Z_0-9]+)", "".join(modules)))
-    _, table = PAGE.split("## Reflexes")
-    rows = [row.split("|")[1] for row in table.splitlines() if row.startswith("| `")]
-    told = [name for row in rows for name in re.findall(r"`(\w+)`", row)]
-    assert sorted(told) == sorted(Error[name].spelling for name in raised)
 
 
 def test_the_log_has_the_true_motion(tmp_path: Path) -> None:

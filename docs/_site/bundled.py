@@ -1,0 +1,59 @@
+"""The pages of what has a name: configurations, robots, errors of a Franka arm."""
+
+import yaml
+from prose import paragraphs, plain
+
+from hsp_control.cli.robot_table import number, rows, task
+from hsp_control.common.resources import bundled_configs
+from hsp_control.companions.franka.reflexes import table
+
+ROBOTS = """\
+# Robots
+
+The robots that `Robot.load` finds by name, as `hsp robots` prints them. Others are
+loaded by the path of their URDF or MJCF: [your own robot](../../own_robot.md).
+
+*Position* and *pose* are the ranks of these tasks at the end effector, and how many
+joints remain for self-motion: 3 + 4 for an arm with seven joints.
+
+| robot | root | nq | nv | end effector | joints | position | pose | note |
+|---|---|--:|--:|---|--:|---|---|---|"""
+
+
+def configurations_page() -> str:
+    """Return the page of the bundled configurations, by their titles and texts."""
+    lines = [
+        "# Configurations",
+        "",
+        "Each is a file in `configs/` and runs by name.",
+        "",
+    ]
+    for name, file in bundled_configs().items():
+        about = yaml.safe_load(file.read_text(encoding="utf-8"))
+        lines += [f"(configuration-{name.replace('/', '-')})=", f"## `{name}`", ""]
+        lines += [f"**{plain(about['title'])}**", ""]
+        lines += [paragraphs(about.get("description", "").strip()), ""]
+    return "\n".join(lines)
+
+
+def robots_page() -> str:
+    """Return the page of the robots that `Robot.load` finds by name."""
+    lines = [ROBOTS]
+    for row in rows():
+        cells = (
+            row.name + (" (bundled)" if row.origin == "bundled" else ""),
+            *(row.root.replace("_", "-"), number(row.nq), number(row.nv)),
+            f"`{row.end_effector}`" if row.end_effector else "-",
+            number(row.joints or None),
+            *(task(row, row.position, 3), task(row, row.pose, 6), row.note),
+        )
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
+
+
+def franka_errors_page() -> str:
+    """Return the page of the errors of a Franka arm, which its messages quote."""
+    return (
+        "# Errors of a Franka arm\n\nThe names that the arm gives to an abort; "
+        "`hsp live` prints the same advice.\n\n" + table() + "\n"
+    )

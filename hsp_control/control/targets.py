@@ -1,0 +1,91 @@
+"""Targets that one sets: a stream takes over from what a task follows."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import ControllerError
+from hsp_control.control.change import AddTask, Change, ChangeReference
+from hsp_control.declaration.plain import shortened
+from hsp_control.declaration.rotation import matrix_of
+from hsp_control.tasks import Task
+from hsp_control.trajectories import (
+    Hold,
+    OrientationTrajectory,
+    PoseTrajectory,
+    Stream,
+    StreamOrientation,
+    StreamPose,
+)
+from hsp_control.trajectories.hold import HoldOrientation
+from hsp_control.trajectories.pose import HoldPose
+from hsp_control.trajectories.streams.stream import Streamed
+
+RAMP = 0.2
+"""Time that a change takes which somebody makes by hand [s]."""
+DELAY = 0.03
+"""Time to a target, if the bounds permit [s]: about two of a page's pictures."""
+MOVING: dict[str, Any] = {"speed": 0.5, "acceleration": 3.0, "jerk": 60.0}
+"""Bounds on the way to a target [m/s, m/s², m/s³]: those that arms bear, whose limits
+then rarely bind."""
+TURNING: dict[str, Any] = {
+    "angular_speed": 1.5,
+    "angular_acceleration": 8.0,
+    "angular_jerk": 200.0,
+}
+"""The same for turning [rad/s, rad/s², rad/s³]."""
+
+
+def new_stream(followed: object) -> Streamed:
+    """Return a stream that can take over from a reference."""
+    how: dict[str, Any] = {"policy": "latest", "delay": DELAY}
+    if isinstance(followed, PoseTrajectory):
+        return StreamPose(**MOVING, **TURNING, **how)
+    if isinstance(followed, OrientationTrajectory):
+        return StreamOrientation(**TURNING, **how)
+    return Stream(**MOVING, **how)
+
+
+def followed_stream(task: Task, changes: Sequence[Change]) -> Streamed | None:
+    """Return the stream that a task follows after all changes, if `send` feeds it."""
+    followed: object = task.followed
+    for change in sorted(changes, key=lambda each: each.at):
+        if isinstance(change, ChangeReference) and change.task == task.name:
+            followed = change.trajectory
+        elif isinstance(change, AddTask) and change.task.name == task.name:
+            followed = task.followed
+    if not isinstance(followed, Streamed) or followed.source or followed.messages:
+        return None
+    return followed
+
+
+def target_of(task: Task, value: object) -> Array:
+    """Return a target as the streams take it: numbers, quaternions (x, y, z, w).
+
+    Raises:
+        ControllerError: If it is none of the task, or the task follows nothing.
+    """
+    followed = task.followed
+    if isinstance(followed, PoseTrajectory):
+        needed = "a pin.SE3, x, y, z and a quaternion (x, y, z, w), or a 4 × 4 matrix"
+        pose: Any = HoldPose.of_value(value)
+        if pose is not None:
+            there = pin.SE3(matrix_of(pose.rotation), pose.position)
+            return np.asarray(pin.SE3ToXYZQUAT(there))
+    elif isinstance(followed, OrientationTrajectory):
+        needed = "a quaternion (x, y, z, w), a 3 × 3 matrix, or roll, pitch and yaw"
+        turned: Any = HoldOrientation.of_value(value)
+        if turned is not None:
+            return np.array(pin.Quaternion(matrix_of(turned.rotation)).coeffs())
+    elif followed is None:
+        raise ControllerError(f"task {task.name!r} follows no trajectory")
+    else:
+        needed = f"{followed.dimension} numbers"
+        point = Hold.of_value(value)
+        if point is not None and point.dimension == followed.dimension:
+            return np.asarray(point.point)
+    given = shortened(repr(value).partition("\n")[0], 60)
+    raise ControllerError(f"a target of task {task.name!r} is {needed}; got {given}")

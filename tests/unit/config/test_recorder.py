@@ -1,0 +1,74 @@
+"""A loop of one's own is recorded in the log that all commands take."""
+
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from robot_cases import load
+
+import hsp_control as hsp
+from hsp_control.common.exceptions import ConfigError, LogError
+
+PERIOD = 1e-3
+
+
+def law(field: hsp.NullSpaceField) -> hsp.Controller:
+    hand = hsp.FramePosition(name="hand", gains=hsp.Gains(natural_frequency=20.0))
+    return hsp.Controller(load("panda"), [hand], field, null_space_gain=8.0)
+
+
+def run(controller: hsp.Controller, recorder: hsp.Recorder, steps: int) -> None:
+    """Hold each effort for a period; the hand goes elsewhere meanwhile."""
+    robot = controller.robot
+    q, v = robot.home(), np.zeros(robot.nv)
+    there = robot.state(0.0, q, v).position(robot.end_effector) + 0.03
+    for k in range(steps):
+        output = controller.compute(PERIOD * k, q, v)
+        recorder.record(output)
+        controller.applied(output.tau, PERIOD)
+        if k == 50:
+            controller.set_target("hand", there)
+            controller.at(0.05).null_space_gain(20.0)
+        v = v + PERIOD * robot.forward_dynamics(q, v, output.tau)
+        q = robot.integrate(q, PERIOD * v)
+
+
+def test_a_recorded_loop_is_plotted_and_repeated(tmp_path: Path) -> None:
+    path, controller = tmp_path / "logs" / "mine.npz", law(hsp.JointCentering())
+    with hsp.Recorder(controller, path) as recorder:
+        run(controller, recorder, 501)
+        with pytest.raises(LogError, match="still records: close it first"):
+            _ = recorder.rollout
+    assert [each.name for each in path.parent.iterdir()] == ["mine.npz"]
+    log = hsp.Rollout.load(path)
+    np.testing.assert_allclose(log.t, np.linspace(0.0, 0.5, 51), atol=1e-12)
+    assert isinstance(recorder.rollout.plot(), Figure)
+    assert isinstance(log.plot(paper=True), Figure)
+    again = hsp.load_experiment(path).run()
+    np.testing.assert_allclose(again.t, log.t)
+    # Only what integrates the robot differs.
+    for name in ("q", "task.hand.reference", "task.hand.error"):
+        np.testing.assert_allclose(again[name], log[name], atol=2e-3)
+    with pytest.raises(LogError, match="the recorder is closed"):
+        recorder.record(hsp.ControlOutput())
+
+
+def test_what_cannot_be_repeated_says_why_and_an_error_ends_the_log(
+    tmp_path: Path,
+) -> None:
+    path, controller = tmp_path / "mine.npz", law(hsp.FunctionCost(lambda s: s.q[0]))
+    recorder = hsp.Recorder(controller, path)
+    with suppress(ZeroDivisionError), recorder:
+        run(controller, recorder, 30)
+        _ = 1 / 0
+    assert recorder.rollout.status == "stopped"
+    assert recorder.rollout.meta["message"] == "ZeroDivisionError: division by zero"
+    with pytest.raises(ConfigError, match="configuration: null_space"):
+        hsp.load_experiment(path)
+    empty = hsp.Recorder(controller)
+    with pytest.raises(LogError, match="nothing was recorded"):
+        empty.close()
+    with pytest.raises(LogError, match="log_period is 0 s; must be positive"):
+        hsp.Recorder(controller, log_period=0)
