@@ -82,6 +82,7 @@ class ActiveStack:
         self.contact_rows = _places(self.contacts, 0)  # rows of each contact, by name
         self.first_task_row = held + free
         tasks = [each for level in planned for each in level]
+        below = {each.key for level in planned[1:] for each in level}
         self.task_rows = _places([each.task for each in tasks], self.first_task_row)
         # tasks with a largest error: the name, the first row, and `Feedback.largest`
         self.bounds: list[tuple[str, slice, Callable[[Array], float]]] = []
@@ -110,9 +111,11 @@ class ActiveStack:
             elif len(in_force.feedback.largest):
                 away = partial(beyond_largest, largest=in_force.feedback.largest)
                 self.bounds.append((each.task.name, here, away))
-                # Who is about to fall needs the balance whatever it costs.
-                if not each.task.keeps_balance(robot):
-                    plans.append(partial(_asked, in_force.feedback, sample, asked))
+                self.resolution.problem.bounded[here] = True
+            # Who is about to fall needs the balance whatever it costs.
+            follows = each.key in below or len(in_force.feedback.largest)
+            if follows and not (spring or each.task.keeps_balance(robot)):
+                plans.append(partial(_asked, in_force.feedback, sample, asked))
             row += each.task.rows
         self._plans = plans
         # names of each level's tasks; ``contacts`` for those at the top

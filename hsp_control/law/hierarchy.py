@@ -31,6 +31,7 @@ from hsp_control.common.linalg import (
     solve_lower_transposed,
 )
 from hsp_control.law.samples import VARYING, FieldSample, MetricSample, TaskSample
+from hsp_control.law.threshold import Following, how_held, threshold_below
 
 
 class LevelScratch(NamedTuple):
@@ -51,6 +52,9 @@ def resolve_levels(
     form: int,
     v: Array,
     K_N: Array,
+    least: float,
+    following: Following,
+    asked: Array,
     thresholds: Array,
     controls: bool,
     ends: Indices,
@@ -69,8 +73,12 @@ def resolve_levels(
         form: The metric's form.
         v: Velocity, shape (nv,).
         K_N: Null-space gain [1/s], shape (nv, nv).
+        least: ε_0.
+        following: How the thresholds of levels below a held one follow.
+        asked: What the feedback asks for at rest, shape (m,).
         thresholds: Singular value of each level's whitened Jacobian, in the null space
-            of those above, below which it is damped, shape (levels,).
+            of those above, below which it is damped, shape (levels,); raised here
+            below a held level.
         controls: False for φ_N = 0.
         ends: Where each level's rows end in the stack.
         scratch: Memory.
@@ -86,16 +94,20 @@ def resolve_levels(
     _invert(metric.L, Q)
     for i in range(n):
         a[i] = 0.0
-    start = 0
+    start, held = 0, 0.0
     for level in range(ends.shape[0]):
         end = ends[level]
         block = slice(start, end)
         G_inv, rest = G_inverse[block, block], rows[0, start:end]
-        bounded = _open_level(
-            J[block], Q, QJ[:, block], G_inv, square, thresholds[level]
-        )
-        if bounded and damped == 0:
-            damped = level + 1
+        threshold = thresholds[level]
+        if held > 0.0:
+            threshold = max(threshold, threshold_below(asked[block], held, following))
+        smallest = _open_level(J[block], Q, QJ[:, block], G_inv, square, threshold)
+        if smallest < threshold * threshold:
+            held = max(held, how_held(smallest, threshold, least))
+            if damped == 0:
+                damped = level + 1
+        thresholds[level] = threshold
         for k in range(start, end):
             total = a_x[k]
             for i in range(n):
@@ -168,8 +180,8 @@ def _open_level(
     G_inverse: Array,
     square: Array,
     threshold: float,
-) -> bool:
-    """Write Q Jᵀ and q(J Q Jᵀ), see `pseudo_inverse.py`; return whether it damped."""
+) -> float:
+    """Write Q Jᵀ and q(J Q Jᵀ), see `pseudo_inverse.py`; return the smallest x."""
     m, n = J.shape
     for k in range(m):
         multiply(Q, J[k], QJ[:, k])
@@ -183,13 +195,13 @@ def _open_level(
     # G is symmetric and not negative: its rows' lengths become its eigenvalues.
     orthogonalise_rows(G, V)
     floor = threshold * threshold
-    damped = False
+    smallest = np.inf
     for k in range(m):
         x = 0.0
         for p in range(m):
             x += G[k, p] * G[k, p]
         x = np.sqrt(x)
-        damped = damped or x < floor
+        smallest = min(smallest, x)
         G[k, 0] = 1.0 / x if x >= floor else (2.0 - x / floor) / floor
     for p in range(m):
         for k in range(m):
@@ -197,7 +209,7 @@ def _open_level(
             for r in range(m):
                 total += V[r, p] * G[r, 0] * V[r, k]
             G_inverse[p, k] = total
-    return damped
+    return smallest
 
 
 @kernel

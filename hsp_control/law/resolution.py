@@ -129,7 +129,7 @@ class Resolution:
             _resolve_at_once if alone else _resolve_levels,
             *(problem.task, problem.field, problem.metric, self.form),
             *(v, problem.gain, self.threshold, self._following, controls),
-            *(self.ends, problem.asked, self.thresholds),
+            *(self.ends, problem.asked, problem.bounded, self.thresholds),
             *(self._scratch, self.null_space_error, self.acceleration, self.code),
         )
 
@@ -181,6 +181,7 @@ def _resolve_at_once(
     controls: bool,
     ends: Indices,
     asked: Array,
+    bounded: Array,
     thresholds: Array,
     scratch: Scratch,
     e_N: Array,
@@ -195,7 +196,7 @@ def _resolve_at_once(
     n = task.jacobian.shape[1]
     (Q, X), rows = scratch.factors, scratch.rows
     u = rows[6, :n]
-    largest = write_thresholds(asked, ends, threshold, following, thresholds)
+    largest = write_thresholds(asked, bounded, ends, threshold, following, thresholds)
     damped = int(
         weighted_pseudo_inverse(
             task.jacobian, metric.L, form, largest, scratch.wide, Q, X
@@ -223,6 +224,7 @@ def _resolve_levels(
     controls: bool,
     ends: Indices,
     asked: Array,
+    bounded: Array,
     thresholds: Array,
     scratch: Scratch,
     e_N: Array,
@@ -247,6 +249,7 @@ def _resolve_levels(
             controls,
             ends,
             asked,
+            bounded,
             thresholds,
             scratch,
             e_N,
@@ -254,7 +257,7 @@ def _resolve_levels(
             code,
         )
     else:
-        write_thresholds(asked, ends, threshold, following, thresholds)
+        write_thresholds(asked, bounded, ends, threshold, following, thresholds)
     if damped > 0:
         levels = LevelScratch(
             scratch.inner, scratch.tall, scratch.square[2], scratch.square, scratch.rows
@@ -266,6 +269,9 @@ def _resolve_levels(
             form,
             v,
             K_N,
+            threshold,
+            following,
+            asked,
             thresholds,
             controls,
             ends,

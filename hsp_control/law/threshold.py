@@ -10,6 +10,11 @@ persists while a task cannot be met. With
 the acceleration that it causes changes by at most 2 (L + f_0/ε_0²) for each unit of s,
 whatever the target. A task that is tracked has f = 0 nearly, at any speed: for it the
 law is exact down to ε_0. ``docs/law.md``, The edge, has the proposition.
+
+A level that is held at its edge leaves to those below the very directions in which it
+is drawn there: along them its spring must outweigh what they ask for. So a level below
+follows with an L that is a fiftieth: it is as steep as it is strong, and the nearer to
+the edge the level above is held, the less it gets there.
 """
 
 from typing import NamedTuple, Self
@@ -23,6 +28,9 @@ STIFFNESS = 200.0
 """L times the robot's size [1/s²]. A stretched elbow is then drawn to its singular
 posture by a spring of at most 2 L |∂s/∂q| ≤ 400 1/s² of its own inertia, 20 rad/s: slow
 beside periods of up to 10 ms, and damped by a null-space gain of 10 1/s."""
+BELOW = 4.0
+"""L times the robot's size below a held level [1/s²]. Its feedback then accelerates a
+joint by at most 2 L s, 1/50 of the spring of the level above."""
 MODEST, MODEST_ON_LEGS = 1.0, 10.0
 """f_0 over the robot's size [1/s²]: what a position 1 % of the size away asks for at
 10 rad/s; and with a floating base, whose feet ask for more where they land."""
@@ -34,40 +42,78 @@ class Following(NamedTuple):
     # L [rad/s² for each unit of a singular value]; inf: it does not follow
     steepest: float
     modest: float  # f_0 [m/s² or rad/s²]
+    below: float  # L of a level below a held one
 
     @classmethod
     def of(cls, size: float, *, on_legs: bool) -> Self:
         """Return it for a robot of a size [m]."""
         if size == 0.0:
-            return cls(np.inf, 0.0)
-        return cls(STIFFNESS / size, size * (MODEST_ON_LEGS if on_legs else MODEST))
+            return NOT
+        modest = MODEST_ON_LEGS if on_legs else MODEST
+        return cls(STIFFNESS / size, size * modest, BELOW / size)
 
 
-NOT = Following(np.inf, 0.0)
+NOT = Following(np.inf, 0.0, np.inf)
 """The threshold does not follow."""
 
 
 @kernel
 def write_thresholds(
-    asked: Array, ends: Indices, least: float, following: Following, thresholds: Array
+    asked: Array,
+    bounded: Array,
+    ends: Indices,
+    least: float,
+    following: Following,
+    thresholds: Array,
 ) -> float:
     """Write ε of each level, and return the largest.
 
     Args:
         asked: f, what the feedback asks for at rest, level after level, shape (m,).
+        bounded: Whether a row counts, shape (m,).
         ends: Where each level's rows end in the stack, shape (levels,).
         least: ε_0.
         following: L and f_0.
         thresholds: ε of each level, shape (levels,).
     """
-    steepest, modest = following
     largest, start = least, 0
     for level in range(ends.shape[0]):
         square = 0.0
         for k in range(start, ends[level]):
-            square += asked[k] * asked[k]
-        beyond = max(np.sqrt(square) - modest, 0.0)
-        thresholds[level] = max(least, np.sqrt(beyond / steepest))
+            if bounded[k]:
+                square += asked[k] * asked[k]
+        beyond = max(np.sqrt(square) - following.modest, 0.0)
+        thresholds[level] = max(least, np.sqrt(beyond / following.steepest))
         largest = max(largest, thresholds[level])
         start = ends[level]
     return float(largest)
+
+
+@kernel
+def threshold_below(asked: Array, held: float, following: Following) -> float:
+    """Return the ε that a level below a held one has at least.
+
+    Args:
+        asked: f of the level, shape (m,).
+        held: How much a level above is held, see `how_held`.
+        following: f_0 and L.
+    """
+    square = 0.0
+    for k in range(asked.shape[0]):
+        square += asked[k] * asked[k]
+    beyond = max(np.sqrt(square) - following.modest, 0.0)
+    return float(np.sqrt(held * beyond / following.below))
+
+
+@kernel
+def how_held(smallest: float, threshold: float, least: float) -> float:
+    """Return how much a level is held at the edge, from 0 (exact) to nearly 1.
+
+    Args:
+        smallest: The smallest x = s² of the level, below ε².
+        threshold: ε, which follows what the level asks for: a level that asks for
+            little is not held, whatever its posture.
+        least: ε_0.
+    """
+    z = smallest / (threshold * threshold)
+    return float((1.0 - z * z * z) * (1.0 - (least / threshold) ** 2))

@@ -15,6 +15,8 @@ from hsp_control.law.threshold import (
     NOT,
     STIFFNESS,
     Following,
+    how_held,
+    threshold_below,
     write_thresholds,
 )
 from hsp_control.null_space.fields import Rest
@@ -29,11 +31,13 @@ def test_it_bounds_what_the_feedback_asks_for_over_its_square(
 ) -> None:
     """‖f‖/ε² ≤ L + f_0/ε_0² for each level, and ε = ε_0 for all that is modest."""
     rng, L, least = np.random.default_rng(seed), 150.0, 0.03
+    everywhere, nowhere = np.ones(9, dtype=bool), np.zeros(9, dtype=bool)
     modest = 1.3
     sizes = [3, 0, 2, 4]
     ends, thresholds = np.cumsum(sizes), np.zeros(4)
     asked = 10.0**size * rng.standard_normal(9)
-    largest = write_thresholds(asked, ends, least, Following(L, modest), thresholds)
+    following = Following(L, modest, L / 50.0)
+    largest = write_thresholds(asked, everywhere, ends, least, following, thresholds)
     assert largest == thresholds.max()
     for f, epsilon in zip(np.split(asked, ends[:-1]), thresholds, strict=True):
         norm = np.linalg.norm(f)
@@ -41,8 +45,26 @@ def test_it_bounds_what_the_feedback_asks_for_over_its_square(
         assert epsilon >= least
         if norm <= modest + 0.99 * L * least**2:
             assert epsilon == least
-    write_thresholds(asked, ends, least, NOT, thresholds)
-    assert (thresholds == least).all()
+    for counts, kind in ((everywhere, NOT), (nowhere, following)):
+        write_thresholds(asked, counts, ends, least, kind, thresholds)
+        assert (thresholds == least).all()
+
+
+@given(seeds, st.floats(0.0, 1.0), st.floats(0.03, 1.0))
+def test_a_level_below_a_held_one_asks_for_less_than_draws_that_one(
+    seed: int, nearness: float, threshold: float
+) -> None:
+    """It gets 2 s ‖f‖/ε² at most along s; held for good, that is 2 L s/50."""
+    rng, least = np.random.default_rng(seed), 0.03
+    following = Following(150.0, 1.3, 3.0)
+    asked = 10.0 ** rng.uniform(-1.0, 4.0) * unit(rng, 3)
+    held = how_held(nearness * threshold**2, threshold, least)
+    assert 0.0 <= held <= 1.0
+    assert held == 0.0 or (nearness < 1.0 and threshold > least)
+    below = threshold_below(asked, held, following)
+    assert held * (np.linalg.norm(asked) - 1.3) <= 3.0 * below**2 * (1.0 + 1e-12)
+    if np.linalg.norm(asked) <= 1.3:
+        assert below == 0.0
 
 
 class Slopes(NamedTuple):
