@@ -342,7 +342,7 @@ class Controller:
         if self._gains.stiffening:
             self._gains.wait(self.active_stack, self._state.t, period)
 
-    def while_free(self, advance: Callable[["FreeStep"], int]) -> int:
+    def _while_free(self, advance: Callable[["FreeStep"], int]) -> int:
         """Let a compiled loop make steps, without Python in between.
 
         Each of them is a `compute` that finds no limit violated, and an `applied` for
@@ -555,7 +555,7 @@ class Controller:
         return tuple(sorted(self._time_line.made, key=lambda each: each.at))
 
     @property
-    def settled(self) -> object:
+    def _settled(self) -> object:
         """An object that stays the same while nothing changes; None while it does.
 
         As long as it is the same, so are the tasks, the field and the limits.
@@ -579,7 +579,7 @@ class Controller:
         """
         return self._gains.feedback[self._setup.task(task).key].feedback
 
-    def linear_feedback(self, task: str, state: RobotState) -> dict[float, Feedback]:
+    def _linear_feedback(self, task: str, state: RobotState) -> dict[float, Feedback]:
         """Return a task's feedback for small errors about a state, now and later.
 
         With gains it is the one in force; an impedance gives other gains at each state.
@@ -629,7 +629,7 @@ class Controller:
         """
         return self._setup.contact(contact).weight(t)
 
-    def force_offset(self, contact: str) -> Array:
+    def _force_offset(self, contact: str) -> Array:
         """Return what is added to the commanded normal force of a contact, (1,) [N].
 
         Compensators write this array.

@@ -165,7 +165,7 @@ class LogWriter:
     ) -> None:
         controller, columns = self._controller, self._columns
         columns.begin_row()
-        settled = controller.settled
+        settled = controller._settled
         if settled is None or settled is not self._settled:
             self._settled = settled
             self._tasks.update()

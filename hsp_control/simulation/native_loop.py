@@ -53,7 +53,7 @@ class NativeLoop:
         if periods - k < 2:
             return None
         go = partial(self._go, start, end - start, periods, k, tau)
-        made = self._controller.while_free(go)
+        made = self._controller._while_free(go)
         return (*self._plant.moved(self._steps), k + made) if made else None
 
     def _go(

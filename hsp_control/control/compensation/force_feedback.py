@@ -82,7 +82,7 @@ class RunningForceFeedback:
         self.integrals = dict.fromkeys(names, 0.0)  # what is added to each command [N]
         self.felt = dict.fromkeys(names, np.nan)  # λ_m by contact, at the last step [N]
         for name in names:
-            controller.force_offset(name)[0] = 0.0
+            controller._force_offset(name)[0] = 0.0
 
     def measure(self, wrenches: Mapping[str, Array], pressed: bool) -> None:
         """Read the sensors' wrenches by frame; none counts before an effort acted."""
@@ -140,7 +140,7 @@ class RunningForceFeedback:
             if hindered and change * integral >= 0.0:
                 continue
             integral = min(max(integral + change, -bound), bound)
-            self.integrals[name] = self._controller.force_offset(name)[0] = integral
+            self.integrals[name] = self._controller._force_offset(name)[0] = integral
 
     @property
     def _fed(self) -> list[Contact]:

@@ -273,7 +273,7 @@ def loaded_loop(
     for task in controller.tasks:
         if (at := rows.get(task.name)) is None:
             continue
-        own_p, own_v, *_ = controller.linear_feedback(task.name, state)[-np.inf]
+        own_p, own_v, *_ = controller._linear_feedback(task.name, state)[-np.inf]
         if task.order == 1:  # e' + K e = 0 with K in the place of Kp
             own_p, own_v = np.zeros_like(own_p), own_p
         Kp[at, at], Kv[at, at] = own_p, own_v

@@ -135,7 +135,7 @@ def _task_findings(
     integral = {} if action is None else action.gains(controller.tasks)
     found: list[RateFinding | None] = []
     for task in tasks:
-        feedbacks = controller.linear_feedback(task.name, state)
+        feedbacks = controller._linear_feedback(task.name, state)
         for since, (Kp, Kv, *_) in feedbacks.items():
             Ki = integral.get(task.name, np.zeros_like(Kp))
             found += _findings_of(task, Kp, Kv, Ki, since, period, delays)

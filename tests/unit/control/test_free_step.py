@@ -41,7 +41,7 @@ def test_what_is_not_native_is_no_free_step() -> None:
     controller = experiment.controller
     controller.compute(0.0, experiment.q0, experiment.v0)
     found = []
-    controller.while_free(lambda step: len(found) or found.append(step) or 0)
+    controller._while_free(lambda step: len(found) or found.append(step) or 0)
     (step,) = found
     sending: list[Callable[[float], float]] = list(step.sending)
     assert sending

@@ -211,7 +211,7 @@ def test_one_native_call_is_the_same_as_its_parts(strength: float) -> None:
         q = panda().home() + 0.3 * rng.standard_normal(7)
         v = 0.3 * rng.standard_normal(7)
         parts = made.compute(0.3, q, v, modifier=lambda _, __, a: (a, None))
-        assert made.settled is not None
+        assert made._settled is not None
         once = made.compute(0.3, q, v)
         seen.add(once.status)
         assert once.status is parts.status

@@ -50,14 +50,14 @@ class Counted:
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.many: list[int] = []
         self._patch = monkeypatch
-        while_free = Controller.while_free
+        while_free = Controller._while_free
 
         def counted(controller: Controller, advance: Any) -> int:
             made = while_free(controller, advance)
             self.many.append(made)
             return made
 
-        monkeypatch.setattr(Controller, "while_free", counted)
+        monkeypatch.setattr(Controller, "_while_free", counted)
 
     def alone(self, run: Callable[[], Rollout]) -> Rollout:
         """Run with each period made alone."""
@@ -145,7 +145,7 @@ def test_after_it_the_controller_is_at_its_last_step(
 ) -> None:
     """Its time, too: who reads the state then reads q, v and t of one instant."""
     times: list[tuple[float, float, int]] = []
-    while_free = Controller.while_free
+    while_free = Controller._while_free
 
     def timed(controller: Controller, advance: Any) -> int:
         before = controller.state.t
@@ -153,7 +153,7 @@ def test_after_it_the_controller_is_at_its_last_step(
         times.append((before, controller.state.t, made))
         return made
 
-    monkeypatch.setattr(Controller, "while_free", timed)
+    monkeypatch.setattr(Controller, "_while_free", timed)
     short("panda_obstacle").run()
     before, after, made = map(np.array, zip(*times, strict=True))
     assert made.max() > 5

@@ -188,7 +188,7 @@ def test_gains_at_a_state_are_those_of_the_step(case: Case) -> None:
     again = bare.evaluate(state, feedback=used)
     np.testing.assert_allclose(again.acceleration, own.acceleration, rtol=1e-12)
     # For small errors the spring is not at its bound.
-    soft = controller.linear_feedback("hand", state)[-np.inf]
+    soft = controller._linear_feedback("hand", state)[-np.inf]
     kept = np.minimum(1.0, 0.1 / np.abs(own.error))
     np.testing.assert_allclose(soft.Kp * kept, Kp, rtol=1e-12)
     assert (kept < 1.0).any()
