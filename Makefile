@@ -28,15 +28,16 @@ help: ## list the targets
 # later start takes longer, and tests start hundreds of processes.
 demo test test-system thorough docs wheel-test: export PYTHONDONTWRITEBYTECODE :=
 # Without the field its terms weigh nothing: both runs log the same distance.
-SENTENCE := title=The same hand path. Only one elbow avoids the ball.
+LOOK := --set 'title=The same hand path. Only one elbow avoids the ball.' \
+  --set 'view.background="\#10171E"'
 demo: $(USE) ## the paper's run, and a Panda under a ball, with and without its field
 	@echo "Running paper/4_moving_obstacle; the first run compiles its kernels, once ..."
 	@$(BIN)/hsp run paper/4_moving_obstacle --out out/demo --no-view
 	@$(BIN)/hsp plot out/demo/4_moving_obstacle.npz --out out/demo
 	@echo "Running panda_obstacle, with its field and without ..."
-	@$(BIN)/hsp run panda_obstacle --out out/demo --no-view --set '$(SENTENCE)'
+	@$(BIN)/hsp run panda_obstacle --out out/demo --no-view $(LOOK)
 	@mv out/demo/panda_obstacle.npz 'out/demo/with the field.npz'
-	@$(BIN)/hsp run panda_obstacle --out out/demo --no-view --set '$(SENTENCE)' \
+	@$(BIN)/hsp run panda_obstacle --out out/demo --no-view $(LOOK) \
 	  --set null_space.fields.0.weight=0 --set null_space.fields.1.weight=0
 	@mv out/demo/panda_obstacle.npz out/demo/without.npz
 	@$(BIN)/hsp export 'out/demo/with the field.npz' out/demo/without.npz \

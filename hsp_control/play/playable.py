@@ -17,6 +17,7 @@ from hsp_control.geometry.links import link_shapes
 from hsp_control.play.session import ROW
 from hsp_control.robot import Robot
 from hsp_control.robot.description.sources import is_robot
+from hsp_control.visualization.palette import STAGE
 
 _PERIOD = 0.001  # control period where a configuration has none [s]
 
@@ -43,6 +44,8 @@ def playable_document(
         document = read_document(source, strict=strict, **reading)
     for assignment in overrides:
         document.override(assignment)
+    if not (document.to_dict().get("view") or {}).get("background"):
+        document.override(f'view.background="{STAGE}"')
     settings = document.to_dict().get("simulation") or {}
     period = settings.get("control_period")
     if period is None:

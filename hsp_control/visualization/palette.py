@@ -40,6 +40,9 @@ GRID = "#DFE3E6"
 PAPER = "#FFFFFF"
 """The background."""
 
+STAGE = "#10171E"
+"""A dark background, on which the robot stands in light."""
+
 EARLY, LATE = "#C9DCEA", "#0A3A5C"
 """The two ends of the time scale, light to dark blue."""
 OBSTACLE_EARLY = "#F7DCCB"

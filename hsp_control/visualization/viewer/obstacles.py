@@ -31,7 +31,7 @@ from hsp_control.visualization.viewer.robot_drawing import robot_entry
 from hsp_control.visualization.viewer.threejs import material, pose_at
 
 ROOT = "/obstacles"
-_OPACITY, _PALE = 0.75, 0.1
+_OPACITY, _PALE = 0.75, 0.05
 _EXTENT = 4.0  # edge of the square that stands for a half-space, over the scene's size
 _TOLD = 3  # number of obstacles that the legend names
 

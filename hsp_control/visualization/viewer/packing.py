@@ -188,7 +188,6 @@ _PROPERTIES = {
     "quaternion": _Property(2.0**-15, slerp, angle_error(ANGLE_BOUND)),
     "scale": _Property(POSITION_BOUND / 8, linear, distance_error(POSITION_BOUND)),
     "color": _Property(1 / 1024, linear, distance_error(1 / 256)),
-    "opacity": _Property(1 / 1024, linear, distance_error(1 / 256)),
     "visible": _Property(1.0, hold, distance_error(0.5)),
     "length": _Property(1 / 64, linear, distance_error(0.25)),
 }

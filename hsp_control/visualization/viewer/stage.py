@@ -1,6 +1,7 @@
 """The stage: background, lights, floor and camera."""
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -37,8 +38,9 @@ def draw_stage(
     yield from draw_background(view)
     center = 0.5 * (points.min(axis=0) + points.max(axis=0))
     size = scene_size(points)
-    yield from _lights(center, size, view.light)
-    yield from _floor(center, size, floor)
+    dark = is_dark(view.background)
+    yield from _lights(center, size, view.light, dark=dark)
+    yield from _floor(center, size, floor, view.background)
     yield set_property("/floor/grid", "visible", view.show.grid)
 
 
@@ -46,8 +48,8 @@ def draw_background(view: ViewSettings) -> Iterator[PageCommand]:
     """Yield the background alone."""
     sky = view.background
     horizon = palette.blend(sky, palette.MUTED, _HAZE)
-    yield set_property("/Background", "top_color", _channels(sky))
-    yield set_property("/Background", "bottom_color", _channels(horizon))
+    yield set_property("/Background", "top_color", palette.fractions(sky))
+    yield set_property("/Background", "bottom_color", palette.fractions(horizon))
 
 
 def stage_legend(view: ViewSettings) -> list[LegendEntry]:
@@ -60,7 +62,7 @@ def stage_legend(view: ViewSettings) -> list[LegendEntry]:
 
 def is_dark(color: str) -> bool:
     """Return whether white is easier to read on ``#RRGGBB`` than black."""
-    red, green, blue = (channel**2.2 for channel in _channels(color))
+    red, green, blue = (channel**2.2 for channel in palette.fractions(color))
     return bool(0.2126 * red + 0.7152 * green + 0.0722 * blue < 0.18)
 
 
@@ -77,9 +79,29 @@ def scene_size(points: Array) -> float:
     return max(float(np.linalg.norm(points - center, axis=1).max()), _FINE)
 
 
-def _lights(center: Array, size: float, strength: float) -> Iterator[PageCommand]:
-    sky = threejs.light("HemisphereLight", 0.57 * strength, groundColor=0xD5DCE2)
-    fill = threejs.light("DirectionalLight", 0.14 * strength)
+class _Studio(NamedTuple):
+    """How strong the lights are, the shadow and the grid."""
+
+    sky: float
+    key: float
+    fill: float  # from behind: on a dark stage it draws the robot's edge
+    fill_color: int
+    shadow: float  # opacity
+    grid: float  # opacity
+
+
+_LIGHT = _Studio(0.57, 0.44, 0.14, 0xFFFFFF, 0.16, 0.55)
+_DARK = _Studio(0.16, 0.62, 0.45, 0xBFD9FF, 0.5, 0.3)
+
+
+def _lights(
+    center: Array, size: float, strength: float, *, dark: bool
+) -> Iterator[PageCommand]:
+    studio = _DARK if dark else _LIGHT
+    sky = threejs.light("HemisphereLight", studio.sky * strength, groundColor=0xD5DCE2)
+    fill = threejs.light(
+        "DirectionalLight", studio.fill * strength, color=studio.fill_color
+    )
     back = np.array([-_LIGHT_FROM[0], 1.2 * abs(_LIGHT_FROM[1]), 0.6])
     yield set_object("/lights/sky", threejs.group([sky]))
     yield set_object("/lights/fill", threejs.group([fill]))
@@ -89,10 +111,10 @@ def _lights(center: Array, size: float, strength: float) -> Iterator[PageCommand
     distance = 4.0 * around
     key = threejs.light(
         "DirectionalLight",
-        0.44 * strength,
+        studio.key * strength,
         castShadow=True,
         shadow={
-            "radius": 3.0,
+            "radius": 9.0,
             "bias": -2e-4,
             "normalBias": 4e-3 * around,
             "mapSize": [2048, 2048],
@@ -113,21 +135,44 @@ def _lights(center: Array, size: float, strength: float) -> Iterator[PageCommand
     yield set_transform("/lights/key", pose_at(towards * distance))
 
 
-def _floor(center: Array, size: float, height: float) -> Iterator[PageCommand]:
+def _floor(
+    center: Array, size: float, height: float, background: str
+) -> Iterator[PageCommand]:
+    dark = is_dark(background)
+    studio = _DARK if dark else _LIGHT
     pose = pose_at([center[0], center[1], height])
-    yield set_object("/floor/shadow", threejs.group([_shadow(size)]))
+    shadow = threejs.shadow_catcher(12.0 * size, studio.shadow)
+    pool = [_pool(size, background)] if dark else []
+    yield set_object("/floor/shadow", threejs.group([*pool, shadow]))
     yield set_transform("/floor/shadow", pose)
     step = _round_step(size / 4.0)
     middle = np.round(center[:2] / step) * step
-    yield set_object("/floor/grid", threejs.group([_grid(size, step)]))
+    yield set_object("/floor/grid", threejs.group([_grid(size, step, studio.grid)]))
     yield set_transform("/floor/grid", pose_at([*middle, height]))
 
 
-def _shadow(size: float) -> Json:
-    return threejs.shadow_catcher(12.0 * size, 0.16)
+_RINGS, _SEGMENTS = 12, 48
 
 
-def _grid(size: float, step: float) -> Json:
+def _pool(size: float, background: str) -> Json:
+    """Return a pool of light on a dark floor, which fades with the distance."""
+    radii = np.linspace(0.0, 1.0, _RINGS + 1)
+    angles = np.linspace(0.0, 2.0 * np.pi, _SEGMENTS + 1)
+    around = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(_SEGMENTS + 1)])
+    rings = radii[:, None, None] * around
+    inner, outer = rings[:-1], rings[1:]
+    first = inner[:, :-1], outer[:, :-1], outer[:, 1:]
+    second = inner[:, :-1], outer[:, 1:], inner[:, 1:]
+    points = np.concatenate(
+        [np.stack(t, axis=2).reshape(-1, 3) for t in (first, second)]
+    )
+    colors = np.empty((len(points), 4))
+    colors[:, :3] = palette.fractions(palette.blend(background, palette.PAPER, 0.4))
+    colors[:, 3] = np.clip(1.0 - np.linalg.norm(points, axis=1), 0.0, 1.0) ** 2
+    return threejs.painted(2.8 * size * points, colors)
+
+
+def _grid(size: float, step: float, opacity: float) -> Json:
     """Return grid lines in x and y that fade with the distance from the middle."""
     reach = 2.6 * size
     ticks = np.arange(-np.floor(reach / step), np.floor(reach / step) + 1.0) * step
@@ -136,9 +181,9 @@ def _grid(size: float, step: float) -> Json:
     lines = np.array([(tick, place, 0.0) for tick in ticks for place in along])
     points = np.vstack([lines, lines[:, [1, 0, 2]]])
     colors = np.empty((len(points), 4))
-    colors[:, :3] = _channels(_GRID)
+    colors[:, :3] = palette.fractions(_GRID)
     distance = np.linalg.norm(points, axis=1) / reach
-    colors[:, 3] = 0.55 * np.clip(1.0 - distance, 0.0, 1.0) ** 1.5
+    colors[:, 3] = opacity * np.clip(1.0 - distance, 0.0, 1.0) ** 1.5
     return threejs.segments(points, colors)
 
 
@@ -146,10 +191,6 @@ def _round_step(length: float) -> float:
     """Return the largest of 1, 2, 5 times a power of ten that is at most a length."""
     power = 10.0 ** np.floor(np.log10(length))
     return float(power * max(n for n in (1.0, 2.0, 5.0) if n * power <= length * 1.001))
-
-
-def _channels(color: str) -> list[float]:
-    return [int(color[i : i + 2], 16) / 255 for i in (1, 3, 5)]
 
 
 FIELD_OF_VIEW = 32.0

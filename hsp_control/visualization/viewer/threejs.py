@@ -189,6 +189,19 @@ def segments(points: Array, colors: Array) -> Json:
     return thing
 
 
+def painted(points: Array, colors: Array) -> Json:
+    """Return unlit triangles; points (3n, 3) [m], colors with opacity (3n, 4)."""
+    surface = unlit_material("#FFFFFF") | {
+        "vertexColors": True,
+        "transparent": True,
+        "depthWrite": False,
+    }
+    geometry = buffer_geometry({"position": points, "color": colors})
+    thing = mesh(geometry, surface, shadow=False)
+    thing["object"] |= {"renderOrder": -3}  # below the shadow and the grid
+    return thing
+
+
 def shadow_catcher(size: float, opacity: float) -> Json:
     """Return a square in the x-y plane that shows only the shadows on it."""
     surface = {

@@ -215,14 +215,12 @@ class Play {
   layOut() {
     const sight = this.sight.update();
     const {grip, hover} = this.hand, active = grip ? grip.key : hover?.key ?? this.selected;
-    if (!this.gizmos.has(active)) this.overlay.hideCircle();
     for (const [key, gizmo] of this.gizmos) {
       gizmo.layOut(sight);
       const {name} = gizmo.target, away = key === Play.targetKey(name) ? this.away[name] : "";
       const lines = [away, key === active && (grip?.text ? `${name}   ${grip.text}` : name)];
       const at = sight.project(gizmo.position), radius = gizmo.ball * gizmo.enlarged + 9;
       this.overlay.place(key, at, radius, lines.filter(Boolean).join("\n"), Boolean(away));
-      if (key === active) this.overlay.showCircle(at, radius, key === this.selected);
     }
     this.layOutSpring(sight);
   }

@@ -163,13 +163,7 @@ function whenAway(act) {
   document.addEventListener("visibilitychange", () => { if (document.hidden) act(); });
 }
 
-// The keys; with a clip, those of player_bar.js hold instead.
-//
-//   tab, 1 … 9    select a target or an obstacle     space   pause, go on
-//   ← → ↑ ↓       move it by 1 cm (shift: 1 mm)      .       one step
-//   page up/down  the same vertically                r       reset
-//   escape        let go, select nothing             s       save
-//
+// The keys that the panel's foot names; with a clip, those of player_bar.js hold instead.
 // In a live loop the space bar is the dead-man's key, if it has one, and there is no pause, step,
 // reset or save. The arrows follow those of the world's horizontal axes that lie nearest to the
 // picture's; a coordinate that the program does not follow is left out. An orientation is turned,

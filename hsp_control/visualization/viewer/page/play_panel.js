@@ -245,18 +245,16 @@ class PlayPanel {
   }
 }
 
-// Over the scene: the name of what is selected or dragged, a circle around it, and the spring by
-// which a link is pulled. It also holds one invisible button per target and obstacle, at its
+// Over the scene: the name of what is selected or dragged, and the spring by which a link is pulled. It also holds one invisible button per target and obstacle, at its
 // place, so that the Tab key and screen readers find them.
 class PlayOverlay {
   constructor(parent) {
     this.box = make("div", {className: "play-overlay", innerHTML: `<div class="play-handles"></div>
-      <svg aria-hidden="true"><circle class="focus"/>
-        <g class="spring"><path class="halo"/><path class="coil"/><circle class="from" r="4"/>
+      <svg aria-hidden="true"><g class="spring"><path class="halo"/><path class="coil"/><circle class="from" r="4"/>
         <circle class="to" r="7"/></g></svg>
       <div class="play-label force" role="status"></div>`});
-    [this.handles, this.circle, this.spring, this.force] =
-      [".play-handles", ".focus", ".spring", ".force"].map((s) => this.box.querySelector(s));
+    [this.handles, this.spring, this.force] =
+      [".play-handles", ".spring", ".force"].map((s) => this.box.querySelector(s));
     parent.append(this.box);
     this.buttons = this.labels = new Map();
   }
@@ -285,15 +283,6 @@ class PlayOverlay {
     if (label.hidden) return;
     label.textContent = text;
     PlayOverlay.put(label, x, y - radius - 12);
-  }
-
-  hideCircle() { this.circle.style.display = "none"; }
-
-  // A circle of a radius [px] around a thing.
-  showCircle({x, y, ahead}, r, strong) {
-    this.circle.style.display = ahead ? "" : "none";
-    PlayOverlay.set(this.circle, {cx: x, cy: y, r});
-    this.circle.classList.toggle("strong", strong);
   }
 
   // A spring between two pixels with its force [N]; null hides it.

@@ -6,25 +6,12 @@
 //   player.seek(2.5);                         // shows t = 2.5 s, exactly and immediately
 //   player.addEventListener("time", ({detail}) => cursor.moveTo(detail.time));
 //
-// A clip, as viewer/clip.py writes it:
+// A clip is what viewer/clip.py writes: clocks (times), tracks that refer to them, and bands for the
+// time line. Before its first time and after its last one a track keeps its first and last value; all
+// but "visible" are interpolated, quaternions spherically. A path that is not in the scene is ignored.
 //
-//   start, end   [s]    first and last time that can be shown
-//   horizon      [s]    the end of the complete clip
-//   open                whether extensions will follow (a run that is being computed)
-//   play, loop, speed   initial state: playing or paused, repeated or once
-//   clocks              arrays of times [s], ascending
-//   tracks              [{path, property, clock, values}]: the animation of a node's property;
-//                       `clock` is the index of its times, `values` are all rows in one
-//                       Float32Array. Before its first time and after its last one, a
-//                       track keeps its first and its last value.
-//   bands               [{name, caption, color, spans, run}]: what the time line marks; `spans`
-//                       are [start, end] [s], ascending. See player_bar.js.
-//
-// The properties are those of Track.PROPERTIES. All but "visible" are interpolated, quaternions
-// spherically. A path that is not in the scene is ignored.
-//
-// Events: "time" (detail: {time, start, end}) when another time is shown; "state" when
-// playing, speed, loop or the clip has changed.
+// Events: "time" (detail: {time, start, end}) when another time is shown; "state" when playing,
+// speed, loop, the clip or the run that is seen has changed.
 "use strict";
 
 class Player extends EventTarget {
@@ -270,12 +257,6 @@ class Track {
     color({object}, time) {
       const value = this.linear(time);
       eachMaterial(object, (material) => material.color?.fromArray(value));
-    },
-    opacity({object}, time) {
-      const [opacity] = this.linear(time);
-      eachMaterial(object, (material) => {
-        Object.assign(material, {opacity, transparent: opacity < 1});
-      });
     },
     // The number of drawn rings of a trail after its first: see scene.js.
     length({object}, time) { drawRings(object, this.linear(time)[0]); },

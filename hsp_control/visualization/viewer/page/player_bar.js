@@ -1,9 +1,4 @@
-// The player's bar: buttons, the time line with its bands, and keys.
-//
-//   space   play, pause          home, end   to the start, to the end
-//   ← →     1/30 s (shift: 1 s)  + -         faster, slower
-//   l       repeat, or play once
-//
+// The player's bar: buttons, the time line with its bands, and the keys of docs/view.md.
 // Bands on the time line tell when a limit, a singularity or an obstacle acted on the law: one row
 // per kind. A band under the pointer, or with the focus, is named with its times; a click goes to
 // its start. While the player's time is inside a band, its caption stands above the bar.

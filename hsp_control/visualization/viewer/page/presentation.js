@@ -3,7 +3,8 @@
 //   p        begins and ends it             escape   ends it
 //
 // Legend, panels and details are put away. The bar and the pointer go, too, when the pointer
-// has rested for two seconds; they come back when it moves, or for the Tab key.
+// has rested for two seconds; they come back when it moves, or for the Tab key. Then the camera
+// begins to sway about its target, until somebody takes it.
 "use strict";
 
 class Presentation {
@@ -61,6 +62,29 @@ class Presentation {
     clearTimeout(this.timer);
     document.body.classList.remove("resting");
     if (!this.on) return;
-    this.timer = setTimeout(() => document.body.classList.add("resting"), Presentation.REST);
+    this.timer = setTimeout(() => {
+      document.body.classList.add("resting");
+      this.sway();
+    }, Presentation.REST);
+  }
+
+  sway() {
+    if (this.swaying || matchMedia("(prefers-reduced-motion: reduce)").matches) return;
+    this.swaying = true;
+    const {camera, controls, dom_element: pane} = viewer, home = camera.position.clone();
+    const begin = performance.now(), arm = home.clone().sub(controls.target);
+    let taken = false;
+    for (const kind of ["pointerdown", "wheel"]) {
+      pane.addEventListener(kind, () => { taken = true; }, {capture: true, once: true});
+    }
+    const step = (now) => {
+      this.swaying = this.on && !taken && viewer.controls === controls;
+      const t = (now - begin) / 1000, angle = 0.3 * Math.sin(0.25 * t) * (1 - Math.exp(-t / 3));
+      if (this.swaying) camera.position.copy(arm).applyAxisAngle(camera.up, angle).add(controls.target);
+      else if (!taken) camera.position.copy(home);
+      viewer.set_dirty();
+      if (this.swaying) requestAnimationFrame(step);
+    };
+    requestAnimationFrame(step);
   }
 }

@@ -3,14 +3,6 @@
 //   const side = new Side(player);
 //   side.show({runs, start, end, damped, panels, colors});   // as viewer/page_plots.py writes them
 //   side.select(1);          // emphasise the curves of one run; null: of all
-//   side.clear();
-//
-//   hover                values of all curves at the time under the pointer, in all plots
-//   click                go to that time
-//   drag                 zoom to a span; from the cursor, or with a finger: move the time
-//   pinch, ctrl + wheel  zoom; a wheel across moves the span
-//   double click, Esc    the whole run again
-//   g                    shows or hides the plots; so does the button in the bar
 //
 // In a plot with the focus + and - zoom, Home shows the whole run; all other keys are the
 // player's. All plots have the same span of time.

@@ -11,6 +11,8 @@ for (const name of ["Lights", "Grid", "Axes"]) viewer.delete_path([name]);
 // needs them, but nobody has to see them.
 viewer.gui.domElement.remove();
 
+viewer.renderer.shadowMap.type = MeshCat.THREE.VSMShadowMap;  // soft edges
+
 const player = new Player(viewer);
 const playerBar = new PlayerBar(player, document.body);
 const legend = new Legend(viewer, document.getElementById("caption"));
@@ -77,12 +79,33 @@ function newViewer(pane) {
   }
 }
 
+// What surrounds a dark stage, for surfaces to mirror: soft boxes above and beside it.
+function studio() {
+  const {Scene, Mesh, BoxGeometry, MeshBasicMaterial, BackSide, PMREMGenerator} = MeshCat.THREE;
+  const room = new Scene();
+  const box = (size, place, brightness, side = 0) => {
+    const material = new MeshBasicMaterial({side});
+    material.color.setScalar(brightness);  // beyond 1: a lamp
+    const mesh = new Mesh(new BoxGeometry(...size), material);
+    mesh.position.set(...place);
+    room.add(mesh);
+  };
+  box([20, 20, 20], [0, 0, 0], 0.12, BackSide);
+  box([6, 0.2, 3], [2, 7, 3], 5);
+  box([0.2, 5, 8], [-8, 2, 0], 1.6);
+  box([0.2, 5, 3], [8, 3, -5], 2.8);
+  const maker = new PMREMGenerator(viewer.renderer), {texture} = maker.fromScene(room, 0.04);
+  maker.dispose();
+  return texture;
+}
+
 // The object of a node, which is created if there is none.
 function node(path) { return viewer.scene_tree.find(path.split("/").filter(Boolean)).object; }
 
 function caption({title, legend: entries, dark}) {
   document.title = title;
   document.body.classList.toggle("dark", dark);
+  viewer.scene.environment = dark ? viewer.scene.environment ?? studio() : null;
   document.querySelector("#caption h1").textContent = title;
   legend.show(entries);
   refit();  // now it is known what title and legend cover
@@ -229,7 +252,19 @@ function set_object(command) {
     if (Array.isArray(material) && material.some(Array.isArray)) assignMaterials(object, parts);
     // Without normals, a mesh would be black.
     if (geometry?.isBufferGeometry && !geometry.attributes.normal) geometry.computeVertexNormals();
+    if (material) object.material = Array.isArray(object.material)
+      ? object.material.map(lit) : lit(object.material);
   });
+}
+
+// A material of a mesh file, lit as all others are.
+function lit(material) {
+  if (!material.isMeshPhongMaterial && !material.isMeshLambertMaterial) return material;
+  const standard = new MeshCat.THREE.MeshStandardMaterial({roughness: 0.5});
+  for (const name of ["color", "map", "opacity", "transparent", "side"]) {
+    standard[name] = material[name] ?? standard[name];
+  }
+  return standard;
 }
 
 // Assign its material to each group of triangles of a merged mesh.
