@@ -4,6 +4,7 @@ import socket
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import pytest
 from pages import Page
@@ -50,7 +51,9 @@ def refused(port: int) -> bool:
 
 def address(printed: str) -> int:
     (line,) = [line for line in printed.splitlines() if line.startswith("View: ")]
-    return int(line.rpartition(":")[2].strip("/"))
+    port = urlsplit(line.removeprefix("View: ").strip()).port
+    assert port is not None
+    return port
 
 
 def test_view_prints_its_address_and_keeps_no_script_waiting(

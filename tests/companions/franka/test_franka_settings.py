@@ -33,7 +33,10 @@ def test_text_and_file_say_what_python_says(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "match"),
     [
-        ("a?realtme=ignore", r"franka://a.*unknown key 'realtme'; did you mean 'realt"),
+        (
+            "a?realtme=ignore",
+            r"franka://a.*unknown argument 'realtme'; did you mean 'realt",
+        ),
         ("a?realtime=maybe", "realtime: unknown value 'maybe'"),
         ("a?recover=3", "recover: "),
         ("a?realtime=ignore&realtime=enforce", "the option 'realtime' is given twice"),

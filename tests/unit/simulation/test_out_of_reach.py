@@ -42,7 +42,7 @@ def test_an_error_that_stays_is_out_of_reach() -> None:
     assert not task.out[:STAY].any()
     assert (task.out[STAY + 1 :] == 0.31).all()
     assert task.words(0) == ""
-    assert task.words(-1) == "hand: target out of reach, 0.31 m"
+    assert task.words(-1) == "target out of reach, 0.31 m"
 
 
 def test_a_limit_is_a_reason_and_friction_is_none() -> None:
@@ -58,7 +58,7 @@ def test_what_moves_is_on_its_way() -> None:
     far = found(log(task__hand__error_rate=rate, task__hand__bounded=bounded))
     assert not far.out.any()
     assert far.words(0) == ""
-    assert far.words(-1) == "hand: target far away"
+    assert far.words(-1) == "target far away"
     pushed = np.zeros((len(T), 6))
     pushed[50] = 1.0  # it has to rest again
     out = found(log(task__hand__error_rate=pushed)).out
