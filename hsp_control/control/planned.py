@@ -1,6 +1,5 @@
 """Contacts and limits as functions of time, and what switches contacts."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -8,9 +7,7 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import RobotLimits
-from hsp_control.constraints.limits.acceleration_bounds import MotionLimits
 from hsp_control.control.evolution import ABSENT, PRESENT, Evolution
-from hsp_control.robot import Robot
 from hsp_control.trajectories.switch import Switch
 
 HELD = 0.1
@@ -133,36 +130,3 @@ class PlannedLimits:
         """Return the limits for times from t on: complete changes are folded."""
         folded = [(each, share.settled(t)) for each, share in self.sets]
         return PlannedLimits(tuple(pair for pair in folded if pair[1] != ABSENT))
-
-
-def mean_of(
-    sets: Sequence[tuple[RobotLimits | None, float]], robot: Robot
-) -> RobotLimits | None:
-    """Return the limits that a mixture keeps: the weighted mean of the numbers."""
-    # The bounds on efforts and accelerations are linear in them. Where one of them is
-    # inf, so is the mean. Distances are those of all sets.
-    if len(sets) == 1:
-        return sets[0][0]
-    numbers = np.sum([w * _numbers(each, robot.nv) for each, w in sets], axis=0)
-    numbers.flags.writeable = False
-    effort, rate, velocity, lower, upper, *motion = numbers[:-1].reshape(-1, robot.nv)
-    return RobotLimits(
-        robot=robot,
-        effort=effort,
-        effort_rate=rate,
-        velocity=velocity,
-        lower=lower,
-        upper=upper,
-        motion=MotionLimits._make((*motion, numbers[-1:])),
-        distances=tuple(one for each, _ in sets if each for one in each.distances),
-    )
-
-
-def _numbers(limits: RobotLimits | None, nv: int) -> Array:
-    """Return all numbers of limits in a row; None has numbers that bound nothing."""
-    if limits is None:
-        signs = 1.0, 1.0, 1.0, -1.0, 1.0, -1.0, 1.0, 1.0, 1.0, 1.0
-        return np.append(np.repeat(np.inf * np.array(signs), nv), 10.0)
-    x = limits
-    rows = x.effort, x.effort_rate, x.velocity, x.lower, x.upper, *x.motion
-    return np.asarray(np.concatenate(rows))

@@ -18,7 +18,7 @@ from hsp_control.tasks import Task
 from hsp_control.trajectories import HoldOrientation
 
 PERIOD = 0.005
-SHORT = 0.02  # without the rule of `threshold_below` 0.1 and more
+SHORT = 0.02  # 1 to 8 mm; without the rule of `threshold_below` 160 to 510 mm
 
 
 @pytest.mark.parametrize("postures", [False, True], ids=["two", "three"])
