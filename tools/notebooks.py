@@ -28,6 +28,7 @@ COLORS = 64
 """How many colours a picture keeps: enough for lines and their smooth edges."""
 
 _ANSI = re.compile(r"\x1b\[[0-9;]*m")
+_KEY = re.compile(r"\?key=\S+")  # of a page; it is another one for every user
 
 
 def main() -> None:
@@ -86,7 +87,7 @@ def keep_small(notebook: Any, folder: str) -> None:
 def _kept(outputs: list[Any], folder: str) -> list[Any]:
     texts = [out.text for out in outputs if out.output_type == "stream"]
     text = _ANSI.sub("", "".join(texts)).replace("\r\n", "\n")
-    text = text.replace(f"{folder}/", "").replace(folder, "")
+    text = _KEY.sub("", text).replace(f"{folder}/", "").replace(folder, "")
     kept = [nbformat.v4.new_output("stream", name="stdout", text=text)] if text else []
     pictures = (out.data.get("image/png") for out in outputs if "data" in out)
     for picture in filter(None, pictures):

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from playwright.sync_api import Error
 
 from hsp_control.companions.film.chromium import (
     find_browser,
@@ -59,6 +60,16 @@ def exported(
 def until(page: Any, expression: str) -> None:
     """Wait until an expression is true; playwright's own way needs eval."""
     deadline = time.monotonic() + PATIENCE
-    while not page.evaluate(expression):
+    while not _holds(page, expression):
         assert time.monotonic() < deadline, f"never: {expression}"
         time.sleep(0.02)
+
+
+def _holds(page: Any, expression: str) -> bool:
+    """Return whether an expression is true; of a page that loads anew it is not yet."""
+    try:
+        return bool(page.evaluate(expression))
+    except Error as error:
+        if "context was destroyed" not in str(error):
+            raise
+        return False
