@@ -25,7 +25,7 @@ from hsp_control.simulation.log_writer import LogWriter
 class Recorder:
     """Records a loop of one's own: `hsp plot`, `view`, `export` and `run` take its log.
 
-    Rows are on the disk at once, so that a killed program loses none::
+    Rows are on the disk at once, so that a killed program loses none:
 
         with hsp.Recorder(controller, "out/mine.npz") as recorder:
             while running:
