@@ -76,6 +76,7 @@ class Server:
         self._host, self._lockstep = host, lockstep
         self._deadline, self._patience, self._cut_at = deadline, patience, cut
         self._cut = False
+        self._announced: Motion | None = None
         self.client: Connection | None = None
         self.overrun = 0.0
         self._due = monotonic()
@@ -135,7 +136,11 @@ class Server:
             self._await(0, monotonic() + PERIOD)
             return
         begun = motion.commands > 0
-        longest = PERIOD if not begun else 0.0 if self._cut else self._patience
+        if begun:
+            longest = 0.0 if self._cut else self._patience
+        else:  # the first state tells a client that it has begun; it answers the next
+            longest = PATIENCE if motion is self._announced else PERIOD
+            self._announced = motion
         command = self._await(number, monotonic() + longest, motion)
         if box.motion is motion and (begun or command is not None):
             box.step(command)
