@@ -240,7 +240,7 @@ def _to_center(
 
 # -- zones of influence ---------------------------------------------------------------
 
-_ZONE_OPACITY = 0.13
+_ZONE_OPACITY = 0.06
 _SWATCH_OPACITY = 0.35  # in the legend: as pale as the zone it would be invisible
 
 
