@@ -10,7 +10,11 @@ FOLDER = Path(__file__).parent / "figures"
 PERIOD = 2.0 * pi / 3.0  # of the paper's circle and disk [s]
 FRAME_RATE = 15.0  # Hz
 NO_FIELD = ("null_space.fields.0.weight=0", "null_space.fields.1.weight=0")
-VIEW = {"camera": [2.0, 0.75, 1.1], "show": {"influence": False}}
+VIEW = {
+    "camera": [2.0, 0.75, 1.1],
+    "background": "#10171E",  # the stage of the demo's page
+    "show": {"influence": False},
+}
 
 
 def main() -> None:
@@ -63,7 +67,7 @@ def film_walking() -> None:
         "solo12_trot": ([0.7, -1.25, 0.5], [0.42, 0.0, 0.12], 4.0),
     }
     for name, (camera, target, end) in views.items():
-        rollout = hsp.load_experiment(f"whole_body/{name}").run()
+        rollout = hsp.load_experiment(f"walking/{name}").run()
         style = FilmStyle(
             size=(480, 300),
             frame_rate=FRAME_RATE,
