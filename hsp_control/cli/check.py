@@ -136,12 +136,12 @@ _LIMITS = {
 
 def warn_of_reach(experiment: Experiment) -> None:
     """Print which targets cannot be reached, by how much and when."""
-    controller, duration = (
-        experiment.controller,
-        experiment.scenario.simulation.duration,
-    )
-    robot, q0 = experiment.robot, experiment.q0
-    for found in out_of_reach(robot, controller.tasks, q0, duration):
+    robot, law = experiment.robot, experiment.controller
+    if robot.unactuated and experiment.scenario.plan is not None:
+        return  # it moves contacts and references
+    duration = experiment.scenario.simulation.duration
+    asked = experiment.q0, duration, law.contacts, law.limits
+    for found in out_of_reach(robot, law.tasks, *asked):
         print(f"hsp: {found.message}", file=sys.stderr)
 
 

@@ -1,15 +1,18 @@
 """Whether the targets of a run can be reached, as far as they are known before it."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
-from hsp_control.common.arrays import Array
+from hsp_control.common.arrays import Array, Indices
+from hsp_control.constraints.contacts import Contact, PointContact, SurfaceContact
+from hsp_control.constraints.limits import RobotLimits
 from hsp_control.robot import Robot
 from hsp_control.robot.inverse_kinematics import Target, reach
 from hsp_control.tasks import FramePose, FramePosition, Task
+from hsp_control.tasks.axes import axis_indices
 
 _TIMES = 40
 """At how many times of a run a target is looked at."""
@@ -51,75 +54,108 @@ class OutOfReach(NamedTuple):
 
 
 def out_of_reach(
-    robot: Robot, tasks: Iterable[Task], q0: Array, duration: float
+    robot: Robot,
+    tasks: Iterable[Task],
+    q0: Array,
+    duration: float,
+    contacts: Sequence[Contact] = (),
+    limits: RobotLimits | None = None,
 ) -> Iterator[OutOfReach]:
     """Yield the tasks whose targets leave the reach during a run.
 
-    By inverse kinematics of each frame by itself, within position limits: of robots
-    with a fixed base and single-dof joints, and targets known before the run.
+    By inverse kinematics of each frame by itself, within position limits, for targets
+    known before the run; of a robot with a floating base whose contacts stay where they
+    are, whatever its balance asks.
     """
-    if robot.unactuated or robot.nq != robot.nv:
+    held = _held(robot, contacts, q0)
+    if robot.unactuated and not held:
         return
+    box = robot.position_limits() if limits is None else (limits.lower, limits.upper)
+    search = _Search(robot, q0, duration, held, *box)
     for task in tasks:
-        whole = isinstance(task, FramePose)
-        tracked = whole or (isinstance(task, FramePosition) and task.axes == "xyz")
-        if not tracked or task.remembers:
+        if not isinstance(task, FramePose | FramePosition) or task.remembers:
             continue
-        found = _leaves(robot, task, q0, duration, 6 if whole else 3)
-        if found is not None and whole:
-            near = _leaves(robot, task, q0, duration, 3)
+        if isinstance(task, FramePosition):
+            found = search.leaves(task, axis_indices(task.axes))
+        elif (found := search.leaves(task, np.arange(6))) is not None:
+            near = search.leaves(task, np.arange(3))
             found = found._replace(turned=True) if near is None else near
         if found is not None:
             yield found
 
 
-def _leaves(
-    robot: Robot, task: Task, q0: Array, duration: float, rows: int
-) -> OutOfReach | None:
-    """Return when and by how much the target of a task is out of reach, if it is."""
-    times = duration * np.linspace(0.0, 1.0, _TIMES) ** _UNEVEN
-    places = [(t, _target(task, t)) for t in times]
-    away: list[float] = []
-    q = q0
-    for k, (_, place) in enumerate(places):
-        if k and place.isApprox(places[k - 1][1]):
-            away.append(away[-1])
-            continue
-        assert isinstance(task, FramePose | FramePosition)
-        # Once it is out of reach, the nearest place moves on with the target.
-        starts = 0 if max(away, default=0.0) > _REACHED else _STARTS
-        target = Target(task.frame_name, place, rows)
-        q, distance = _nearest(robot, target, q, starts)
-        away.append(distance)
-    if max(away) <= _REACHED:
-        return None
-    first = next(k for k, distance in enumerate(away) if distance > _REACHED)
-    worst = int(np.argmax(away))
-    since, most = float(times[first]), float(times[worst])
-    return OutOfReach(task.name, since, most, away[worst], turned=False)
+def _held(robot: Robot, contacts: Sequence[Contact], q0: Array) -> list[Target]:
+    """Return where contacts hold their frames; nothing if some move or end."""
+    state, found = robot.state(0.0, q0, np.zeros(robot.nv)), []
+    for contact in contacts:
+        at_origin = isinstance(contact, PointContact) and not contact.points.any()
+        if not contact.always or not (at_origin or isinstance(contact, SurfaceContact)):
+            return []
+        frame = state.frame(contact.frame)
+        place = pin.SE3(frame.rotation.copy(), frame.position.copy())
+        found.append(Target(contact.frame, place, contact.rows))
+    return found
 
 
-def _target(task: Task, t: float) -> pin.SE3:
+class _Search(NamedTuple):
+    """Looks for postures in which a robot reaches its targets."""
+
+    robot: Robot
+    q0: Array
+    duration: float  # of the run [s]
+    held: Sequence[Target]  # what stays where it is
+    lower: Array  # lower joint position limit, shape (nv,) [rad or m]
+    upper: Array  # upper joint position limit, shape (nv,) [rad or m]
+
+    def leaves(
+        self, task: FramePose | FramePosition, rows: Indices
+    ) -> OutOfReach | None:
+        """Return when and by how much rows of a target are out of reach, if so."""
+        times = self.duration * np.linspace(0.0, 1.0, _TIMES) ** _UNEVEN
+        places = [_target(task, t) for t in times]
+        away: list[float] = []
+        q = self.q0
+        for k, place in enumerate(places):
+            if k and place.isApprox(places[k - 1]):
+                away.append(away[-1])
+                continue
+            # Once it is out of reach, the nearest place moves on with the target.
+            starts = 0 if max(away, default=0.0) > _REACHED else _STARTS
+            q, distance = self._nearest(Target(task.frame_name, place, rows), q, starts)
+            away.append(distance)
+        if max(away) <= _REACHED:
+            return None
+        first = next(k for k, distance in enumerate(away) if distance > _REACHED)
+        worst = int(np.argmax(away))
+        since, most = float(times[first]), float(times[worst])
+        return OutOfReach(task.name, since, most, away[worst], turned=False)
+
+    def _nearest(self, target: Target, q: Array, starts: int) -> tuple[Array, float]:
+        """Return the posture nearest to a target, and its distance from it."""
+        robot, neutral = self.robot, self.robot.neutral()
+        lower, upper = self.lower, self.upper
+        here, base = robot.difference(neutral, q), list(robot.unactuated)
+        best = reach(robot, target, q, here, lower, upper, self.held)
+        rng = np.random.default_rng(0)
+        low, high = lower.clip(-np.pi, np.pi), upper.clip(-np.pi, np.pi)
+        for start in rng.uniform(low, high, (starts, robot.nv)):
+            if best.error <= _REACHED:
+                break
+            start[base] = here[base]
+            q = robot.integrate(neutral, start)
+            found = reach(robot, target, q, start, lower, upper, self.held)
+            if found.error < best.error:
+                best = found
+        return best.q, best.error
+
+
+def _target(task: FramePose | FramePosition, t: float) -> pin.SE3:
     """Return where a task's frame is to be at a time [s]."""
     if isinstance(task, FramePose):
         pose = task.pose.sample(t)
         return pin.SE3(pose.orientation.rotation.copy(), pose.position.position.copy())
-    assert isinstance(task, FramePosition)
-    return pin.SE3(np.eye(3), task.trajectory.sample(t).position.copy())
-
-
-def _nearest(
-    robot: Robot, target: Target, q: Array, starts: int
-) -> tuple[Array, float]:
-    """Return the posture nearest to a target, and its distance from it."""
-    lower, upper = robot.position_limits()
-    best = reach(robot, target, q, q, lower, upper)
-    rng = np.random.default_rng(0)
-    low, high = lower.clip(-np.pi, np.pi), upper.clip(-np.pi, np.pi)
-    for start in rng.uniform(low, high, (starts, robot.nv)):
-        if best.error <= _REACHED:
-            break
-        found = reach(robot, target, start, start, lower, upper)
-        if found.error < best.error:
-            best = found
-    return best.q, best.error
+    place = pin.SE3.Identity()
+    where = place.translation.copy()
+    where[axis_indices(task.axes)] = task.trajectory.sample(t).position
+    place.translation = where
+    return place

@@ -1,5 +1,6 @@
 """Simulates the closed loop of a controller and a plant."""
 
+import warnings
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -18,7 +19,11 @@ from hsp_control.control.compensation import Command, Compensation
 from hsp_control.control.compensation import check_rate as check_loop
 from hsp_control.control.controller import Controller
 from hsp_control.control.estimator import Estimator
-from hsp_control.control.first_state import warn_of_jump, warn_of_slow_efforts
+from hsp_control.control.first_state import (
+    StartWarning,
+    warn_of_jump,
+    warn_of_slow_efforts,
+)
 from hsp_control.control.plan import Plan, RunningPlan
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.in_python import check_kind
@@ -94,7 +99,7 @@ def simulate(
             they need a control period.
         scene: Obstacles to log; None: those of the controller.
         check_rate: Whether gains, impedances and fields with which the loop would be
-            unstable at its control period are refused.
+            unstable at its control period are refused, and high ones warned about.
         start_time: Time of the first row [s].
         on_progress: Called at every row with the fraction of the run that is done.
         on_row: Called with the writer of the log after every row.
@@ -145,14 +150,18 @@ def simulate(
         loop = continuous_loop(controller, plant, integrator, times, q, v)
     elif isinstance(plant, SampledPlant) and periods:
         if check_rate:
-            check_loop(
+            high = check_loop(
                 controller,
                 q,
                 log_period / periods,
                 compensation,
                 effort_delay=plant.effort_delay,
                 sensor_delay=plant.sensor_delay,
+                plant=plant.robot,
             )
+            for each in high:
+                told = f"{'.'.join(each.path)}: {each.message}"
+                warnings.warn(told, StartWarning, stacklevel=2)
         chain = ControlChain(Command(controller, compensation), plan, estimators)
         chain.begin(plant.inertial())
         running = chain.plan

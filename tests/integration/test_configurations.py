@@ -10,8 +10,15 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import yaml
+from places import ROOT
 
-from hsp_control import RobotState, Rollout, load_experiment
+from hsp_control import (
+    Controller,
+    JointPosture,
+    RobotState,
+    Rollout,
+    load_experiment,
+)
 from hsp_control.common.resources import bundled_configs
 from hsp_control.config import Experiment
 from hsp_control.null_space.fields import FieldSum
@@ -173,6 +180,26 @@ def test_a_configuration_makes_its_point(name: str) -> None:
     assert (np.abs(ours.v) < model.upperVelocityLimit).all()
     assert limit_margin(experiment, ours) > 0.0
     POINTS[name](experiment, ours, other)
+
+
+@pytest.mark.parametrize(
+    "name", [*bundled_configs(), str(ROOT / "examples" / "stream" / "panda.yaml")]
+)
+def test_the_first_effort_is_what_gravity_asks(name: str) -> None:
+    """To a tenth of each limit, of whoever begins at rest."""
+    experiment = load_experiment(name)
+    robot, law, q = experiment.robot, experiment.controller, experiment.q0
+    assert not experiment.v0.any() or name.startswith("paper/")  # on its trajectory
+    rest = np.zeros(robot.nv)
+    gravity = robot.inverse_dynamics(q, rest, rest)
+    if robot.unactuated:  # what holds a posture on its feet, and nothing else
+        still = JointPosture(q, joints=robot.joint_names[1:])
+        holding = Controller(robot, [still], limits=None, contacts=law.contacts)
+        gravity = holding.compute(0.0, q, rest).tau
+    first = law.compute(0.0, q, experiment.v0).tau
+    limit = np.asarray(robot.model.effortLimit)
+    limited = limit > 0.0  # planar3r has no motors' limits
+    assert (np.abs(first - gravity) <= 0.1 * limit)[limited].all()
 
 
 @pytest.mark.filterwarnings("error:the first effort of joint:UserWarning")

@@ -164,6 +164,44 @@ def test_check_tells_before_the_run_what_is_out_of_reach(
     assert ("reach" not in warned) if told is None else re.search(told, warned)
 
 
+@pytest.mark.parametrize(
+    ("config", "tasks", "told"),
+    [
+        (  # three links of 1 m each
+            MOVING,
+            "{tip: {type: frame_position, axes: x, trajectory: "
+            "{type: line, origin: world, start: [1], end: [5], duration: 2}}}",
+            r"reach by 2 m, from t = 1\.0\d s, most at 2 s",
+        ),
+        (
+            MOVING,
+            "{tip: {type: frame_position, axes: yx, trajectory: "
+            "{type: hold, point: [0, 4]}}}",
+            "reach by 1 m, at the start",
+        ),
+        (  # its feet stay where they are
+            "whole_body/talos_circle",
+            "{hand: {type: frame_position, frame: gripper_right_base_link, trajectory: "
+            "{type: hold, point: [4, 0, 1]}}}",
+            r"reach by 2(\.\d)? m, at the start",
+        ),
+        (
+            "whole_body/talos_circle",
+            "{hand: {type: frame_position, frame: gripper_right_base_link, trajectory: "
+            "{type: hold, origin: start, point: [0.2, 0, 0]}}}",
+            None,
+        ),
+    ],
+)
+def test_check_tells_of_targets_along_some_axes_and_of_hands_on_legs(
+    config: str, tasks: str, told: str | None, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ["--set", f"tasks={tasks}", "--set", "simulation.duration=2"]
+    assert main(["check", config, *options]) == 0
+    warned = capsys.readouterr().err
+    assert ("reach" not in warned) if told is None else re.search(told, warned)
+
+
 @pytest.mark.slow
 def test_plot_draws_beside_the_log(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
