@@ -22,8 +22,8 @@ import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
-from hsp_control.common.native import Timed, are_native, bind, only_if, sequence
-from hsp_control.common.step_plan import CallSequence
+from hsp_control.common.native import bind, only_if
+from hsp_control.common.step_plan import one_call
 from hsp_control.constraints.limits.acceleration_bounds import Bounds
 from hsp_control.control.actuation.deviation_cost import (
     Directions,
@@ -360,8 +360,9 @@ class LimitedStep:
         self._least_violation = bind(solve_step, LEAST_VIOLATION, *arguments)
         self._nearest = bind(solve_step, NEAREST, *arguments)
         forces = bind(solve_step, FORCES, *arguments)
-        self._find_forces = _one_call(self._write_mass_matrix, forces)
-        self._find_nearest = _one_call(self._write_mass_matrix, self._nearest)
+        self._find_forces = one_call([self._write_mass_matrix, forces], 0.0)
+        nearest = [self._write_mass_matrix, self._nearest]
+        self._find_nearest = one_call(nearest, 0.0)
 
     def nearest_if(
         self, before: Callable[[], Any], found: Array
@@ -451,10 +452,3 @@ class LimitedStep:
         upper[where] = np.maximum(high, reached + slack)
         beyond = np.maximum(low - reached, reached - high)
         return float(np.maximum(beyond, 0.0).max(initial=0.0))
-
-
-def _one_call(*calls: Callable[[], Any]) -> Callable[[], float]:
-    """Return one call for several, with the result of the last one."""
-    if are_native(calls):
-        return sequence([*map(Timed, calls)], 0.0)
-    return CallSequence(*calls)
