@@ -15,7 +15,7 @@ from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import NativeCall, rows_of
 from hsp_control.control.controller import Controller
-from hsp_control.control.free_step import FreeStep, is_free
+from hsp_control.control.mixture import FreeStep, is_free
 from hsp_control.robot.integrators import Steps
 from hsp_control.robot.native_move import move_to
 from hsp_control.simulation.limit_excess import LimitExcess

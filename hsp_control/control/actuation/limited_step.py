@@ -136,30 +136,13 @@ def solve_step(
     """Assemble the QP, solve it, and write what is delivered; return the `Status`."""
     # Or `UNSOLVED`, and then nothing is written to ``result``. It is written to
     # ``status``, shape (1,), too.
-    status[0] = _solve(
-        what, wanted, forces, directions, bounds, places, programmes, result
-    )
-    return int(status[0])
-
-
-@kernel
-def _solve(
-    what: int,
-    wanted: Wanted,
-    forces: Forces,
-    directions: Directions,
-    bounds: Bounds,
-    places: Places,
-    programmes: Programmes,
-    result: Result,
-) -> int:
-    """Do what `solve_step` does, and write no status."""
     qp, x = programmes, programmes.x
+    status[0] = UNSOLVED
     if what == LEAST_VIOLATION:
         code = minimise(qp.soft, False, x, qp.soft_memory)
         if code == SOLVED and _write_result(wanted, forces, bounds, places, x, result):
-            return Status.RELAXED
-        return UNSOLVED
+            status[0] = Status.RELAXED
+        return int(status[0])
     if what != NEAREST_AGAIN:
         _write_rows(wanted, forces, bounds, places, qp.nearest)
         if what == FORCES:
@@ -169,18 +152,18 @@ def _solve(
             if code == SOLVED and _write_result(
                 wanted, forces, bounds, places, x, result
             ):
-                return Status.REDISTRIBUTED
+                status[0] = Status.REDISTRIBUTED
+                return int(status[0])
         write_directions(directions)
     _start(forces, x)
     contacts_held = what != NEAREST_AGAIN and forces.first.shape[0] > 0
     count = write_inverse_root(directions, 1 if contacts_held else 0, qp.nearest.JT)
     _write_force_factor(forces, _FORCE_COST, qp.nearest)
     problem, warm = _moving(qp.nearest, count), what != NEAREST_AGAIN
-    if minimise(problem, warm, x, qp.memory) != SOLVED:
-        return UNSOLVED
-    if _write_result(wanted, forces, bounds, places, x, result):
-        return Status.LIMITED
-    return UNSOLVED
+    code = minimise(problem, warm, x, qp.memory)
+    if code == SOLVED and _write_result(wanted, forces, bounds, places, x, result):
+        status[0] = Status.LIMITED
+    return int(status[0])
 
 
 @kernel
