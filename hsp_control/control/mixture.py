@@ -16,8 +16,8 @@ from hsp_control.control.actuation import Actuation, Delivered
 from hsp_control.control.actuation.actuation import LOOK
 from hsp_control.control.actuation.limits_in_force import LimitSet, LimitsInForce
 from hsp_control.control.actuation.support import Support
+from hsp_control.control.evolution import PlannedContact
 from hsp_control.control.gains_in_force import GainsInForce
-from hsp_control.control.planned import PlannedContact
 from hsp_control.control.setup import PlannedTask, Setup, levels_of
 from hsp_control.law.outcome import BEYOND_ANY_LEVEL, DAMPED, NOT_FINITE
 from hsp_control.robot import RobotState

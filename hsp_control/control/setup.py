@@ -20,8 +20,14 @@ from hsp_control.common.exceptions import (
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits, RobotLimits
-from hsp_control.control.evolution import ABSENT, PRESENT, Evolution, EvolvingWeight
-from hsp_control.control.planned import PlannedContact, PlannedLimits
+from hsp_control.control.evolution import (
+    ABSENT,
+    PRESENT,
+    Evolution,
+    EvolvingWeight,
+    PlannedContact,
+    PlannedLimits,
+)
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.in_python import check_kind
 from hsp_control.declaration.nested import parts_within, with_parts_replaced
