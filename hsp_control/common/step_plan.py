@@ -110,9 +110,9 @@ def steps(
             for part in _parts(write)
         ]
     found: list[Callable[[float], Any]] = []
-    for native, group in groupby(parts, lambda part: isinstance(part, NativeCall)):
+    for _, group in groupby(parts, lambda part: isinstance(part, NativeCall)):
         calls = [*group]
-        found += [sequence(calls)] if native else calls
+        found += [sequence(calls)] if are_native(calls) else calls
     return found
 
 

@@ -10,7 +10,10 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError, GainError
 from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.control.actuation import Status
+from hsp_control.control.compensation.stage import Run, Stage
 from hsp_control.control.controller import Controller
+from hsp_control.control.measurement import LogChannel
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.equality import same
 from hsp_control.declaration.quantities import ArrayField, Gain, Names, Positive
@@ -118,16 +121,35 @@ class IntegralAction(Part, error=CompensationError):
         return gains
 
 
-class RunningIntegral:
+class RunningIntegral(Stage):
     """Integral action in one run: it keeps the integrals."""
 
     def __init__(self, declared: IntegralAction, controller: Controller) -> None:
+        self._controller = controller
         self._limit = np.inf if declared.limit is None else declared.limit
         self._gains = declared.gains(controller.tasks)
         self._feedback = {name: controller.feedback(name) for name in self._gains}
         # ∫e by task, shape (m,) [m·s or rad·s]
         self.integrals: dict[str, Array] = {
             name: np.zeros(len(Ki)) for name, Ki in self._gains.items()
+        }
+
+    def sent(self, run: Run) -> None:
+        """Integrate the errors of the fully active tasks; see `Stage.sent`."""
+        output, controller = run.output, self._controller
+        limited = output.status >= Status.LIMITED
+        errors: dict[str, Array | None] = {}
+        for name, rows in controller.task_rows.items():
+            if controller.weight_of(name, controller.state.t) >= 1.0:
+                errors[name] = output.task.error[rows]
+        saturated = bool(output.damped) or limited or run.starting
+        self.advance(errors, run.period, saturated)
+
+    def log_channels(self, run: Run) -> Mapping[str, LogChannel]:
+        """Return the integrals; see `Stage.log_channels`."""
+        return {
+            f"task.{name}.integral": LogChannel(integral, "m·s or rad·s", "∫e")
+            for name, integral in self.integrals.items()
         }
 
     def advance(
