@@ -17,7 +17,7 @@ from hsp_control.constraints.contacts import SurfaceContact
 from hsp_control.geometry.shapes import Box
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants import ContactPlant, Ground, RigidContact
-from hsp_control.simulation.plants.mujoco_plant import MujocoPlant
+from hsp_control.simulation.plants.mujoco_plant import Mujoco, MujocoPlant
 from hsp_control.trajectories import Blend, HoldOrientation
 
 COM, HAND, TRUNK = "center_of_mass", "hand", "trunk"
@@ -191,9 +191,11 @@ class Standing:
         ]
         plant = MujocoPlant(
             self.robot,
-            contacts=shapes,
-            ground=Ground(friction=FRICTION),
-            joint_limits=False,
+            Mujoco(
+                contacts=shapes,
+                ground=Ground(friction=FRICTION),
+                joint_limits=False,
+            ),
         )
         plant.reset(0.0, self.q0, np.zeros(self.robot.nv))
 

@@ -212,29 +212,28 @@ def _invoke(typing: Any, address: Any, words: Any, t: Any) -> Any:
 
 
 @kernel
-def run(calls: Indices, when: Array, t: float) -> float:
-    """Make calls, rows (code, arguments), whose time it is; return the last result."""
+def run(calls: Indices, t: float) -> float:
+    """Make calls, rows (code, arguments), at a time; return the last result."""
     value = 0.0
     for k in range(calls.shape[0]):
-        if when[k, 0] <= t < when[k, 1]:
-            value = _invoke(calls[k, 0], calls[k, 1], t)  # type: ignore[call-arg]
+        value = _invoke(calls[k, 0], calls[k, 1], t)  # type: ignore[call-arg]
     return value
 
 
 @kernel
-def run_once(calls: Indices, when: Array, stamp: Indices, made: Indices) -> None:
+def run_once(calls: Indices, stamp: Indices, made: Indices) -> None:
     """Make calls that do not depend on the time, unless ``made`` equals ``stamp``."""
     if made[0] != stamp[0]:
         made[0] = stamp[0]
-        run(calls, when, 0.0)
+        run(calls, 0.0)
 
 
 @kernel
-def run_if(calls: Indices, when: Array, found: Array) -> float:
+def run_if(calls: Indices, found: Array) -> float:
     """If ``found[1]``, make the calls; return ``found[0]`` plus the last result."""
     value = float(found[0])
     if found[1] != 0.0:
-        value += run(calls, when, 0.0)
+        value += run(calls, 0.0)
     return value
 
 
@@ -250,7 +249,7 @@ def entry() -> Callable[..., float]:
     """Return `run` as Python calls it."""
     return cast(
         "Callable[..., float]",
-        entry_point(run, (types.int64[:, ::1], types.float64[:, ::1], types.float64)),
+        entry_point(run, (types.int64[:, ::1], types.float64)),
     )
 
 

@@ -9,15 +9,12 @@ call them by their addresses.
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any, NamedTuple, Self, TypeGuard
+from typing import Any, Self, TypeGuard
 
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import is_compiled
-
-FOREVER = -np.inf, np.inf
-"""The window of time of a call that is always made [s]."""
 
 
 class NativeCall(partial[float]):
@@ -47,7 +44,7 @@ class NativeCall(partial[float]):
         address = adapters.adapter(kernel, kinds, timed)
         row = address, words.ctypes.data
         free = () if timed else (0.0,)
-        call = cls(adapters.entry(), np.array([row]), np.array([FOREVER]), *free)
+        call = cls(adapters.entry(), np.array([row]), *free)
         call.words = words
         call.recipe = cls.of, (kernel, arguments, timed)
         return call
@@ -61,7 +58,7 @@ class NativeCall(partial[float]):
 
         packed = np.array([address, *words], dtype=np.int64)
         row = adapters.foreign_adapter(len(words)), packed.ctypes.data
-        call = cls(adapters.entry(), np.array([row]), np.array([FOREVER]), 0.0)
+        call = cls(adapters.entry(), np.array([row]), 0.0)
         call.words, call.recipe = packed, recipe
         return call
 
@@ -69,8 +66,8 @@ class NativeCall(partial[float]):
     def over(
         cls, kernel: Callable[..., Any], calls: "Sequence[NativeCall]", *arguments: Any
     ) -> Self:
-        """Return a call of a kernel that makes calls: their `table` is given first."""
-        given = *table(calls), *arguments
+        """Return a call of a kernel that makes calls: their rows are given first."""
+        given = rows_of(calls), *arguments
         call = cls.of(kernel, given, timed=False)
         call.recipe, call.kept = (cls.over, (kernel, calls, *arguments)), given
         return call
@@ -84,19 +81,10 @@ def are_native(calls: Sequence[object]) -> TypeGuard[Sequence[NativeCall]]:
     return all(isinstance(call, NativeCall) for call in calls)
 
 
-def table(calls: Sequence[NativeCall]) -> tuple[Indices, Array]:
-    """Return calls' addresses, not the calls, and their windows, shape (parts, 2)."""
-    rows = [np.zeros((0, 2), dtype=np.int64), *(call.args[0] for call in calls)]
-    when = [np.zeros((0, 2)), *(call.args[1] for call in calls)]
-    return np.concatenate(rows), np.concatenate(when)
-
-
-class Timed(NamedTuple):
-    """A call and when it is made."""
-
-    call: Any  # the call; a native one in a `sequence`
-    start: float = FOREVER[0]  # start of its window of time [s]
-    end: float = FOREVER[1]  # end of its window [s]
+def rows_of(calls: Sequence[NativeCall]) -> Indices:
+    """Return calls as kernels make them: their addresses, not the calls, (parts, 2)."""
+    none = np.zeros((0, 2), dtype=np.int64)
+    return np.concatenate([none, *(call.args[0] for call in calls)])
 
 
 def bind(
@@ -156,20 +144,10 @@ def _make_if(calls: Sequence[Callable[[], float]], found: Array) -> float:
     return value + last
 
 
-def sequence(calls: Sequence[Timed], *free: float) -> NativeCall:
+def sequence(calls: Sequence[NativeCall], *free: float) -> NativeCall:
     """Return one call of the time that makes several; it returns the last result."""
     from hsp_control.common import adapters
 
-    rows = np.concatenate([each.call.args[0] for each in calls])
-    when = np.concatenate([_within(*each) for each in calls])
-    call = NativeCall(adapters.entry(), rows, when, *free)
+    call = NativeCall(adapters.entry(), rows_of(calls), *free)
     call.recipe = sequence, (calls, *free)
     return call
-
-
-def _within(call: NativeCall, start: float, end: float) -> Array:
-    """Return the windows of a call's parts within another window, shape (parts, 2)."""
-    windows: Array = call.args[1]
-    return np.column_stack(
-        [np.maximum(windows[:, 0], start), np.minimum(windows[:, 1], end)]
-    )

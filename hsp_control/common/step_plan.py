@@ -11,17 +11,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import groupby
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from hsp_control.common.kernels import KernelCall
-from hsp_control.common.native import (
-    FOREVER,
-    NativeCall,
-    Timed,
-    are_native,
-    bind,
-    sequence,
-)
+from hsp_control.common.native import NativeCall, are_native, bind, sequence
 
 
 def stay(t: float) -> None:
@@ -60,18 +51,18 @@ class KernelOutput:
 def planned(call: KernelCall, *others: Any) -> StepPlan:
     """Return the plan of a kernel's call, with further arguments after its own."""
     function, arguments = call
-    given, follow, write = _supplied(arguments)
+    given, follow, write = supplied(arguments)
     return StepPlan(follow, (*write, bind(function, *given, *others)))
 
 
-def _supplied(argument: Any) -> tuple[Any, tuple[Any, ...], tuple[Any, ...]]:
+def supplied(argument: Any) -> tuple[Any, tuple[Any, ...], tuple[Any, ...]]:
     """Return an argument as a kernel reads it, and the calls that write it."""
     if hasattr(argument, "supplied"):
         found: tuple[Any, tuple[Any, ...], tuple[Any, ...]] = argument.supplied()
         return found
     if type(argument) is not tuple:
         return argument, (), ()
-    parts = [_supplied(each) for each in argument]
+    parts = [supplied(each) for each in argument]
     follow = tuple(call for _, calls, _ in parts for call in calls)
     write = tuple(call for _, _, calls in parts for call in calls)
     return tuple(value for value, _, _ in parts), follow, write
@@ -102,19 +93,9 @@ class CallSequence:
         return [call(*arguments) for call in self.calls][self.result]
 
 
-class TimeWindow:
-    """A call of the time that is made only within a window of time."""
-
-    def __init__(
-        self, call: Callable[[float], object], start: float, end: float
-    ) -> None:
-        # the window [s]; at its end the call is not made
-        self.call, self.start, self.end = call, start, end
-
-    def __call__(self, t: float) -> None:
-        """Make the call if the time is within the window."""
-        if self.start <= t < self.end:
-            self.call(t)
+def one_call(calls: Sequence[Callable[..., Any]], *free: float) -> Callable[..., Any]:
+    """Return one call for several, with the result of the last: native if all are."""
+    return sequence(calls, *free) if are_native(calls) else CallSequence(*calls)
 
 
 def steps(
@@ -125,24 +106,14 @@ def steps(
     parts = [part for p in plans for follow in p.follow for part in _parts(follow)]
     for write in [*(write for p in plans for write in p.write), last]:
         parts += [
-            part if isinstance(part.call, NativeCall) else Timed(_whenever(part.call))
+            part if isinstance(part, NativeCall) else _whenever(part)
             for part in _parts(write)
         ]
     found: list[Callable[[float], Any]] = []
-    for native, group in groupby(parts, lambda p: isinstance(p.call, NativeCall)):
-        if native:
-            found.append(sequence(list(group)))
-        else:
-            found += [_when(*part) for part in group]
+    for _, group in groupby(parts, lambda part: isinstance(part, NativeCall)):
+        calls = [*group]
+        found += [sequence(calls)] if are_native(calls) else calls
     return found
-
-
-def merged(call: Callable[[float], Any]) -> Callable[[float], Any]:
-    """Return a call of the time as one native call, if all its parts are native."""
-    parts = list(_parts(call))
-    if len(parts) < 2 or not are_native([each.call for each in parts]):
-        return call
-    return sequence(parts)
 
 
 def in_order(calls: Sequence[Callable[[], object]]) -> list[Callable[[float], Any]]:
@@ -150,25 +121,13 @@ def in_order(calls: Sequence[Callable[[], object]]) -> list[Callable[[float], An
     return steps([StepPlan(write=tuple(calls[:-1]))], calls[-1])
 
 
-def _parts(
-    call: Callable[..., Any], start: float = -np.inf, end: float = np.inf
-) -> Iterator[Timed]:
-    """Yield the single calls of a call, each with its window of time."""
+def _parts(call: Callable[..., Any]) -> Iterator[Callable[..., Any]]:
+    """Yield the single calls of a call."""
     if isinstance(call, CallSequence):
         for each in call.calls:
-            yield from _parts(each, start, end)
-    elif call is stay:
-        return
-    elif isinstance(call, TimeWindow):
-        yield from _parts(call.call, max(start, call.start), min(end, call.end))
-    else:
-        yield Timed(call, start, end)
-
-
-def _when(
-    call: Callable[[float], Any], start: float, end: float
-) -> Callable[[float], Any]:
-    return call if (start, end) == FOREVER else TimeWindow(call, start, end)
+            yield from _parts(each)
+    elif call is not stay:
+        yield call
 
 
 def _whenever(call: Callable[[], Any]) -> Callable[[float], Any]:

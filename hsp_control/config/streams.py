@@ -11,7 +11,7 @@ from hsp_control.config.scenario import Scenario
 from hsp_control.declaration import within
 from hsp_control.declaration.nested import with_parts_replaced
 from hsp_control.robot.description.access import Access
-from hsp_control.trajectories.streams.listeners import is_local
+from hsp_control.trajectories.streams.mailbox import is_local
 from hsp_control.trajectories.streams.stream import Streamed
 
 

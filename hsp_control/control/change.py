@@ -12,8 +12,7 @@ from hsp_control.common.exceptions import ContactError, ControllerError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.constraints.contacts import CommandedForce
 from hsp_control.constraints.limits import LimitsOrNone, RobotLimits
-from hsp_control.control.evolution import ABSENT
-from hsp_control.control.planned import PlannedLimits
+from hsp_control.control.evolution import ABSENT, PlannedLimits
 from hsp_control.control.setup import (
     PlannedTerm,
     Setup,

@@ -4,7 +4,8 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import replace
 from math import isfinite
-from typing import TYPE_CHECKING, Any, overload
+from threading import RLock
+from typing import Any, overload
 
 import numpy as np
 import pinocchio as pin
@@ -16,7 +17,6 @@ from hsp_control.common.exceptions import (
     ImmutableError,
     NonFiniteError,
 )
-from hsp_control.common.identity_cache import IdentityCache
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits, RobotLimits
 from hsp_control.control.active_stack import ActiveStack
@@ -25,8 +25,12 @@ from hsp_control.control.actuation.limits_in_force import LimitsInForce
 from hsp_control.control.changes import Change, Changes, TimeLine
 from hsp_control.control.first_state import check_angles, warn_of_jump
 from hsp_control.control.gains_in_force import GainsInForce, check_held
-from hsp_control.control.guards import StepLock
-from hsp_control.control.mixture import AccelerationModifier, BoundStep, Mixture
+from hsp_control.control.mixture import (
+    AccelerationModifier,
+    BoundStep,
+    FreeStep,
+    Mixture,
+)
 from hsp_control.control.output import ControlOutput, Diagnostics
 from hsp_control.control.setup import Base, Declared
 from hsp_control.control.targets import RAMP, followed_stream, new_stream, target_of
@@ -41,9 +45,6 @@ from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.impedance import parts_of
 from hsp_control.tasks.task import Feedback
 from hsp_control.trajectories.streams.stream import Streamed
-
-if TYPE_CHECKING:
-    from hsp_control.control.free_step import FreeStep
 
 _MEMORY = 1.0
 """Changes that were complete this long ago are forgotten [s]; an integrator may ask for
@@ -114,7 +115,7 @@ class Controller:
             HspControlError: If a part does not fit the robot; the message contains its
                 key path.
         """
-        self._declared = Declared.checked(
+        self._declared = Declared(
             robot,
             tasks,
             field,
@@ -132,11 +133,10 @@ class Controller:
     def _allocate(self, changes: Sequence[Change]) -> None:
         """Set up what a copy has of its own, and compose the parts."""
         robot, given = self._declared.robot, self._declared.start
-        self._lock = StepLock()
+        self._lock = _StepLock()
         self._state = RobotState(robot)
         self._gains = GainsInForce(robot.nv)
         self._run = _Run(self._declared.robot.nv)
-        self._free = IdentityCache(_free_step)  # what it gives a compiled loop
         q = robot.home() if given is None else given
         state = robot.state(0.0, q, np.zeros(robot.nv))
         start = Start(state, self._declared.scene, known=given is not None)
@@ -342,7 +342,7 @@ class Controller:
         if self._gains.stiffening:
             self._gains.wait(self.active_stack, self._state.t, period)
 
-    def _while_free(self, advance: Callable[["FreeStep"], int]) -> int:
+    def _while_free(self, advance: Callable[[FreeStep], int]) -> int:
         """Let a compiled loop make steps, without Python in between.
 
         Each of them is a `compute` that finds no limit violated, and an `applied` for
@@ -364,8 +364,7 @@ class Controller:
                 or run.acceleration is not bound.active.acceleration
             ):
                 return 0
-            step = self._free.get(bound, self._state, self._limits)
-            return 0 if step is None else advance(step)
+            return 0 if bound.free is None else advance(bound.free)
 
     def disturbed(self, acceleration: ArrayLike) -> None:
         """Store an acceleration that something else than the efforts causes.
@@ -678,11 +677,9 @@ class Controller:
 
     def diagnose(self) -> Diagnostics:
         """Return quantities to plot, after `compute`, at the same state."""
-        active, out = self.active_stack, Diagnostics()
+        active = self.active_stack
         found = active.resolution.diagnose(active.first_task_row)
-        out.null_space_norm, out.manipulability, out._triangle = found
-        out.field_value = active.field_value()
-        return out
+        return Diagnostics(active.field_value(), *found)
 
     def flow(self, t: float, q: ArrayLike) -> Array:
         """Return v = J# x_d' + P g, shape (nv,): the robot once both errors have died.
@@ -751,15 +748,28 @@ class _Run:
         self.bound: BoundStep | None = None  # the step, while nothing changes
 
 
-def _free_step(
-    bound: BoundStep, state: RobotState, limits: LimitsInForce
-) -> "FreeStep | None":
-    from hsp_control.control.free_step import free_step  # here: it imports Numba
+class _StepLock:
+    """A lock: other threads wait for it, and the thread that has it is told."""
 
-    active = bound.active
-    if active.streamed or not bound.direct:
-        return None
-    return free_step(bound.move, state.effort, limits.applying(active.acceleration))
+    __slots__ = ("_held", "_lock")
+
+    def __init__(self) -> None:
+        self._lock, self._held = RLock(), False
+
+    def __enter__(self) -> None:
+        self._lock.acquire()
+        if self._held:  # by this thread: others are still waiting
+            self._lock.release()
+            raise ControllerError(
+                "a step of a controller calls the same controller, for example within "
+                "a field: it would wait for itself for ever; use the state that the "
+                "field is given, or a copy, controller.preview()"
+            )
+        self._held = True
+
+    def __exit__(self, *_: object) -> None:
+        self._held = False
+        self._lock.release()
 
 
 _INSTEAD = {

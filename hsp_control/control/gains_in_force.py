@@ -18,7 +18,7 @@ for the period h, then has the transition
     x(h) = x + h x' + ½ h² x'',     x'(h) = x' + h x''.
 """
 
-from typing import NamedTuple
+from copy import deepcopy
 
 import numpy as np
 
@@ -39,13 +39,6 @@ _SMALLEST = 1e-15
 """Smallest scale of gains that is tried."""
 _ROUNDING = 1e-7
 """Of the radius: a double eigenvalue of 1 has an error of the root of its rounding."""
-
-
-class GainsMemory(NamedTuple):
-    """What the gains remember besides the time line, by the tasks' keys."""
-
-    waiting: dict[int, Array]
-    offsets: dict[int, Array]
 
 
 class GainsInForce:
@@ -141,19 +134,17 @@ class GainsInForce:
         for in_force in self.feedback.values():
             in_force.feedback.offset[:] = 0.0
 
-    def memory(self) -> GainsMemory:
-        """Return a copy of what to `remember`."""
-        return GainsMemory(
-            {key: each.copy() for key, each in self._waiting.items()},
-            {key: each.feedback.offset.copy() for key, each in self.feedback.items()},
-        )
+    def memory(self) -> tuple[dict[int, Array], ...]:
+        """Return a copy of what to `remember`: by key, what waits, and the offsets."""
+        offsets = {key: each.feedback.offset for key, each in self.feedback.items()}
+        return deepcopy(self._waiting), deepcopy(offsets)
 
-    def remember(self, memory: GainsMemory) -> None:
+    def remember(self, memory: tuple[dict[int, Array], ...]) -> None:
         """Go on from a memory of the same setup."""
-        self._waiting = {key: each.copy() for key, each in memory.waiting.items()}
+        self._waiting, offsets = deepcopy(memory[0]), memory[1]
         for key, numbers in self._waiting.items():
             self.feedback[key].numbers[:] = numbers
-        for key, offset in memory.offsets.items():
+        for key, offset in offsets.items():
             self.feedback[key].feedback.offset[:] = offset
 
 

@@ -1,22 +1,27 @@
 """Steps while tasks and limits fade in and out: mixtures of what each set delivers."""
 
 from collections.abc import Callable, Collection, Sequence, Set
+from functools import cached_property
 from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
+from hsp_control.common.kernels import kernel
+from hsp_control.common.native import NativeCall, are_native
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation import Actuation, Delivered
 from hsp_control.control.actuation.actuation import LOOK
 from hsp_control.control.actuation.limits_in_force import LimitSet, LimitsInForce
 from hsp_control.control.actuation.support import Support
+from hsp_control.control.evolution import PlannedContact
 from hsp_control.control.gains_in_force import GainsInForce
-from hsp_control.control.planned import PlannedContact
 from hsp_control.control.setup import PlannedTask, Setup, levels_of
 from hsp_control.law.outcome import BEYOND_ANY_LEVEL, DAMPED, NOT_FINITE
 from hsp_control.robot import RobotState
+from hsp_control.robot.robot import Move
 
 AccelerationModifier = Callable[
     [RobotState, ActiveStack, Array], tuple[Array, Array | None]
@@ -161,7 +166,8 @@ class Mixture:
         if not self.steady or self.active is None:
             return None
         ((limits, _),) = self._limits.sets
-        return BoundStep(self._state, self.active, self.actuation(self.active, limits))
+        actuation = self.actuation(self.active, limits)
+        return BoundStep(self._state, self.active, actuation, self._limits)
 
     def prepare(self, stack: ActiveStack) -> None:
         """Compile what a step with a stack calls, now instead of in the step."""
@@ -222,14 +228,18 @@ class BoundStep:
     """A step while nothing changes: state, references, law and limits as one call."""
 
     def __init__(
-        self, state: RobotState, active: ActiveStack, actuation: Actuation
+        self,
+        state: RobotState,
+        active: ActiveStack,
+        actuation: Actuation,
+        limits: LimitsInForce,
     ) -> None:
         self.active = active
         self.damped = ""  # tasks of the first level with a bounded inverse, by name
         # whether the effort is M a + N wherever no limit is violated
         self.direct = actuation.direct
         self.move = state.bind_move([*active.calls, *actuation.calls()])
-        self._state, self._actuation = state, actuation
+        self._state, self._actuation, self._limits = state, actuation, limits
         self._code = active.resolution.code
 
     def make(self, t: float, q: ArrayLike, v: ArrayLike) -> Delivered:
@@ -246,6 +256,43 @@ class BoundStep:
         if self.direct and value < LOOK:
             return self._actuation.own
         return self._actuation.delivered(active.acceleration)
+
+    @cached_property
+    def free(self) -> "FreeStep | None":
+        """What a compiled loop calls instead; None if a part is no native call."""
+        if self.active.streamed or not self.direct:
+            return None
+        sending = self._limits.applying(self.active.acceleration)
+        return free_step(self.move, self._state.effort, sending)
+
+
+class FreeStep(NamedTuple):
+    """What `compute` and `applied` of a controller do where no limit is violated."""
+
+    # (t, q, v) ↦ a number that `is_free` understands; the effort and the acceleration
+    # are written
+    move: Any
+    effort: Array  # M a + N, shape (nv,) [N·m or N]
+    # calls of the time that record that this effort is held from now on, for the period
+    # of the last `Controller.applied`
+    sending: Sequence[NativeCall]
+
+
+def free_step(
+    move: Move, effort: Array, sending: Sequence[Callable[[float], Any]]
+) -> FreeStep | None:
+    """Return a free step of these parts; None where one of them is not native."""
+    from hsp_control.robot.native_move import NativeMove  # here: it imports Numba
+
+    if not isinstance(move, NativeMove) or not are_native(sending):
+        return None
+    return FreeStep(move, effort, sending)
+
+
+@kernel
+def is_free(value: float) -> bool:
+    """Return whether what a move returned means: valid, finite, no limit violated."""
+    return 0.0 <= value < LOOK
 
 
 def _mean(shares: Sequence[float], parts: Sequence[Array]) -> Array:

@@ -1,6 +1,7 @@
 """What a controller returns: an effort, and everything that explains it."""
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -179,23 +180,22 @@ class ControlOutput:
         return self._views
 
 
-class Diagnostics:
+class Diagnostics(NamedTuple):
     """Quantities to plot beside the effort.
 
     Attributes:
         field_value: The field's cost f, or its norm.
         null_space_norm: ‖e_N‖_W, which decays like exp(-K_N t) for a scalar gain.
         manipulability: det(J W⁻¹ Jᵀ) of the tasks' stacked Jacobian.
+        triangle: What `singular_values` computes them from.
     """
-
-    __slots__ = ("_triangle", "field_value", "manipulability", "null_space_norm")
 
     field_value: float
     null_space_norm: float
     manipulability: float
-    _triangle: bytes
+    triangle: bytes
 
     @property
     def singular_values(self) -> Array:
         """Those of J L⁻ᵀ, W = L Lᵀ, the largest first; computed when asked for."""
-        return singular_values(self._triangle)
+        return singular_values(self.triangle)

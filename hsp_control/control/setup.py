@@ -1,9 +1,10 @@
 """What a controller is made of, how that evolves, and whether it fits together."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal, Self, TypeVar
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -19,8 +20,14 @@ from hsp_control.common.exceptions import (
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits, RobotLimits
-from hsp_control.control.evolution import ABSENT, PRESENT, Evolution, EvolvingWeight
-from hsp_control.control.planned import PlannedContact, PlannedLimits
+from hsp_control.control.evolution import (
+    ABSENT,
+    PRESENT,
+    Evolution,
+    EvolvingWeight,
+    PlannedContact,
+    PlannedLimits,
+)
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.in_python import check_kind
 from hsp_control.declaration.nested import parts_within, with_parts_replaced
@@ -343,27 +350,11 @@ def levels_of(
     return tuple(tuple(levels[priority]) for priority in sorted(levels))
 
 
-@dataclass(frozen=True)
 class Declared:
     """What a controller is made of before anything relative in it is placed."""
 
-    robot: Robot
-    tasks: tuple[Task, ...]
-    field: NullSpaceField
-    gain: Array  # K_N: a scalar, shape (nv,) or (nv, nv) [1/s]
-    metric: Metric
-    threshold: float  # singular value below which an inverse is bounded
-    limits: Limits | None
-    contacts: tuple[Contact, ...]
-    base: Base | None  # what else than contacts acts on a floating base
-    scene: Scene
-    # configuration that relative parts refer to, shape (nq,); None: that of the first
-    # step
-    start: Array | None
-
-    @classmethod
-    def checked(
-        cls,
+    def __init__(
+        self,
         robot: Robot,
         tasks: Sequence[Task],
         field: NullSpaceField | None,
@@ -375,7 +366,7 @@ class Declared:
         base: Base | None,
         scene: Scene | Iterable[Obstacle],
         start: ArrayLike | None,
-    ) -> Self:
+    ) -> None:
         """Check each part by itself; see `Controller` for what they mean."""
         if isinstance(robot, str | Path):
             raise ControllerError(f"robot is {robot!r}; needs Robot.load({robot!r})")
@@ -388,37 +379,30 @@ class Declared:
             raise ControllerError(
                 f"singularity_threshold is {singularity_threshold}; must be positive"
             )
-        field = Rest() if field is None else field
+        self.robot, self.limits, self.base = robot, limits, base
+        self.threshold = float(singularity_threshold)
+        self.field = Rest() if field is None else field
         _check_parts("tasks", tasks, Task)
+        self.tasks = tuple(tasks)
         if metric is None:
             yields = any(impedance_of(task) is not None for task in tasks)
             own = MassMatrixMetric(inertia="robot")
             metric = own if yields else IdentityMetric()
+        self.metric: Metric = metric
         _check_parts("contacts", contacts, Contact)
-        check_kind("field is", field, NullSpaceField, ControllerError)
+        self.contacts = tuple(contacts)
+        check_kind("field is", self.field, NullSpaceField, ControllerError)
         check_kind("metric is", metric, Metric, ControllerError)
         if limits is not None:
             if limits == "none":
                 raise ControllerError("limits is 'none'; in Python it is None")
             check_kind("limits is", limits, Limits, ControllerError)
-        scene = scene if isinstance(scene, Scene) else Scene(scene)
-        known = None if start is None else robot.check_configuration(start).copy()
+        self.scene = scene if isinstance(scene, Scene) else Scene(scene)
+        # that of the first step where it is None
+        self.start = None if start is None else robot.check_configuration(start).copy()
         check_support(robot, contacts, base)
         with within("null_space", "gain"):
-            gain = as_gain(null_space_gain, "null_space_gain")
-        return cls(
-            robot,
-            tuple(tasks),
-            field,
-            gain,
-            metric,
-            float(singularity_threshold),
-            limits,
-            tuple(contacts),
-            base,
-            scene,
-            known,
-        )
+            self.gain = as_gain(null_space_gain, "null_space_gain")
 
     def placed(self, start: Start) -> Setup:
         """Return the setup with all parts placed where the robot starts."""
@@ -459,13 +443,11 @@ class Declared:
 
     def preview(self) -> "Declared":
         """Return the same parts with streams that begin anew."""
-        return replace(
-            self,
-            tasks=tuple(
-                with_parts_replaced(task, Streamed, Streamed.preview)
-                for task in self.tasks
-            ),
+        other = copy(self)
+        other.tasks = tuple(
+            with_parts_replaced(task, Streamed, Streamed.preview) for task in self.tasks
         )
+        return other
 
 
 def _refuse_streams(field: NullSpaceField) -> None:

@@ -9,7 +9,7 @@ from numba import types
 from hsp_control.common.adapters import entry_point, run
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
-from hsp_control.common.native import NativeCall, table
+from hsp_control.common.native import NativeCall, rows_of
 from hsp_control.robot.motion import REFUSED, copy_valid, number_of_steps
 
 
@@ -28,7 +28,7 @@ class NativeMove(partial[float]):
         stamp: Indices,
     ) -> Self:
         """Put the calls' rows together."""
-        move = cls(_entry(), *table(calls), q, v, unit_blocks, stamp)
+        move = cls(_entry(), rows_of(calls), q, v, unit_blocks, stamp)
         move.calls = calls
         return move
 
@@ -36,7 +36,6 @@ class NativeMove(partial[float]):
 @kernel
 def move_to(
     calls: Indices,
-    when: Array,
     q: Array,
     v: Array,
     unit_blocks: Indices,
@@ -48,17 +47,15 @@ def move_to(
     """Copy q and v and make the calls; see `NativeMove`."""
     if not copy_valid(t, q_in, v_in, q, v, unit_blocks, stamp):
         return REFUSED
-    return run(calls, when, t)
+    return run(calls, t)
 
 
 @cache
 def _entry() -> Callable[..., float]:
     own, table = types.float64[::1], types.int64[:, ::1]
     given = types.float64[:]  # with any strides
-    rest = own, own, table, types.int64[::1], types.float64, given, given
-    entry: Callable[..., float] = entry_point(
-        move_to, (table, types.float64[:, ::1], *rest)
-    )
+    kinds = table, own, own, table, types.int64[::1], types.float64, given, given
+    entry: Callable[..., float] = entry_point(move_to, kinds)
     return entry
 
 
@@ -66,12 +63,10 @@ _count = kernel(number_of_steps)
 
 
 @kernel
-def make_steps(
-    calls: Indices, when: Array, interval: Array, longest: float, h: Array
-) -> None:
+def make_steps(calls: Indices, interval: Array, longest: float, h: Array) -> None:
     """Divide an interval into equal steps [s], and make the calls of each."""
     t, duration = interval[0], interval[1] - interval[0]
     steps = _count(duration, longest)
     h[0] = duration / steps
     for k in range(steps):
-        run(calls, when, t + k * h[0])
+        run(calls, t + k * h[0])

@@ -21,7 +21,7 @@ from pinocchio import pinocchio_pywrap_default
 
 from hsp_control.common.arrays import Array, Indices, matrix_view
 from hsp_control.common.kernels import PLAIN, kernel
-from hsp_control.common.native import NativeCall, Timed, sequence
+from hsp_control.common.native import NativeCall, sequence
 
 _MODEL = b"N9pinocchio8ModelTplIdLi0ENS_25JointCollectionDefaultTplEEE"
 _DATA = b"N9pinocchio7DataTplIdLi0ENS_25JointCollectionDefaultTplEEE"
@@ -186,7 +186,7 @@ def _native(
     call.kept = references
     if what == "crba":  # writes one triangle
         both = call, NativeCall.of(_mirror, (matrix_view(data.M),), timed=False)
-        mirrored = sequence([*map(Timed, both)], 0.0)
+        mirrored = sequence(both, 0.0)
         mirrored.recipe, mirrored.kept = recipe, both
         return mirrored
     return call

@@ -127,26 +127,22 @@ class Robot(RobotModel):
             JointNotFoundError: If a joint to lock does not exist.
             FrameNotFoundError: If a tool frame's parent does not exist.
         """
+        given: dict[str, Any] = {
+            "root": root,
+            "locked": locked,
+            "tool_frames": tool_frames,
+            "gravity": gravity,
+            "mimic": None if mimic else False,
+            "project_inertias": project_inertias or None,
+            "xacro_args": xacro_args,
+        }
+        given = {key: value for key, value in given.items() if value is not None}
         if not isinstance(name, RobotDescription):
-            name = RobotDescription(
-                name,
-                root=root,
-                locked=locked,
-                tool_frames=tool_frames or {},
-                gravity=gravity,
-                mimic=mimic,
-                project_inertias=project_inertias,
-                xacro_args=xacro_args or {},
-            )
-        elif (
-            project_inertias
-            or not mimic
-            or any(x is not None for x in (root, locked, tool_frames))
-            or any(x is not None for x in (gravity, xacro_args))
-        ):
+            name = RobotDescription(name, **given)
+        elif given:
             raise ModelError(
-                "a RobotDescription says all about the robot: give root, locked, "
-                "tool_frames, gravity, mimic, project_inertias and xacro_args in it"
+                "a RobotDescription says all about the robot: give "
+                f"{' and '.join(given)} in it"
             )
         return cls._described(name, access)
 

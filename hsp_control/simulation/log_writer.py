@@ -127,6 +127,8 @@ class LogWriter:
         output: ControlOutput | None,
         tau: Array,
         log_channels: Mapping[str, LogChannel],
+        *,
+        keep: bool = True,
     ) -> None:
         """Write a row.
 
@@ -135,34 +137,11 @@ class LogWriter:
             output: The controller's output for it; None: the law's columns are empty.
             tau: The effort of the motors, shape (nv,).
             log_channels: Further values to log, by name.
+            keep: Whether the row is written; False: see `warm_up`.
 
         Raises:
             LogError: If the journal cannot be written.
         """
-        self._fill_row(state, output, tau, log_channels)
-        if self._journal is not None:
-            self._write_heading()
-            self._journal.write_row(self._columns.numbers)
-        self._columns.keep_row()
-
-    def warm_up(
-        self,
-        state: RobotState,
-        output: ControlOutput | None,
-        tau: Array,
-        log_channels: Mapping[str, LogChannel],
-    ) -> None:
-        """Do all for a row but write it: kernels are compiled, and the heading is."""
-        self._fill_row(state, output, tau, log_channels)
-        self._write_heading()
-
-    def _fill_row(
-        self,
-        state: RobotState,
-        output: ControlOutput | None,
-        tau: Array,
-        log_channels: Mapping[str, LogChannel],
-    ) -> None:
         controller, columns = self._controller, self._columns
         columns.begin_row()
         settled = controller._settled
@@ -195,6 +174,16 @@ class LogWriter:
             self._excess.see(controller.limits, state.q, state.v)
             log_channels = {**self._excess.take(controller.limits), **log_channels}
         write_channels(columns, log_channels)
+        self._write_heading()
+        if not keep:
+            return
+        if self._journal is not None:
+            self._journal.write_row(columns.numbers)
+        columns.keep_row()
+
+    def warm_up(self, *row: Any) -> None:
+        """Do all for a row but write it: kernels are compiled, and the heading is."""
+        self.record(*row, keep=False)
 
     def _fill_law(self, state: RobotState, output: ControlOutput) -> None:
         controller, columns = self._controller, self._columns

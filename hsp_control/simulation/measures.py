@@ -38,66 +38,41 @@ def measures(rollout: Rollout) -> dict[str, Measure]:
     if not len(rollout):
         return {}
     found: dict[str, Measure] = {}
+
+    def add(name: str, value: float, unit: str, meaning: str) -> None:
+        found[name] = Measure(float(value), unit, meaning)
+
     for part in task_errors(rollout):
         name = f"tracking.{part.label.replace(' ', '.')}"
-        what = f"error of {part.label}"
-        found[f"{name}.rms"] = Measure(_rms(part.norm), part.unit, f"rms {what}")
-        found[f"{name}.max"] = Measure(
-            _maximum(part.norm), part.unit, f"largest {what}"
-        )
-        found[f"{name}.end"] = Measure(
-            float(part.norm[-1]), part.unit, f"{what} at the end"
-        )
-    e_N = rollout["null_space_norm"]
-    unit = column_unit(rollout, "null_space_norm")
-    found["null_space_error.rms"] = Measure(_rms(e_N), unit, "rms null-space error")
-    found["null_space_error.max"] = Measure(
-        _maximum(e_N), unit, "largest null-space error"
-    )
-    found["null_space_error.end"] = Measure(
-        float(e_N[-1]), unit, "null-space error at the end"
-    )
-    found["manipulability.min"] = Measure(
-        _minimum(rollout["manipulability"]), "–", "minimum det(J W⁻¹ Jᵀ)"
-    )
-    found["singular_value.min"] = Measure(
-        _minimum(rollout["singular_values"]), "–", "smallest singular value"
-    )
-    found["damped.fraction"] = Measure(
-        float(np.mean(rollout["damped"])), "–", "fraction of time near a singularity"
-    )
+        what, norm = f"error of {part.label}", part.norm
+        add(f"{name}.rms", _rms(norm), part.unit, f"rms {what}")
+        add(f"{name}.max", norm.max(), part.unit, f"largest {what}")
+        add(f"{name}.end", norm[-1], part.unit, f"{what} at the end")
+    e_N, unit = rollout["null_space_norm"], column_unit(rollout, "null_space_norm")
+    add("null_space_error.rms", _rms(e_N), unit, "rms null-space error")
+    add("null_space_error.max", e_N.max(), unit, "largest null-space error")
+    add("null_space_error.end", e_N[-1], unit, "null-space error at the end")
+    least, values = rollout["manipulability"].min(), rollout["singular_values"]
+    add("manipulability.min", least, "–", "minimum det(J W⁻¹ Jᵀ)")
+    add("singular_value.min", values.min(), "–", "smallest singular value")
+    damped = rollout["damped"].mean()
+    add("damped.fraction", damped, "–", "fraction of time near a singularity")
     for field in distances(rollout):
-        found[f"distance.{field}.min"] = Measure(
-            _minimum(rollout[f"distance.{field}"]), "m", f"minimum distance of {field}"
-        )
-    unit = effort_unit(rollout)
-    found["effort.max"] = Measure(_maximum(np.abs(rollout.tau)), unit, "largest effort")
-    found["effort.rms"] = Measure(
-        _rms(np.linalg.norm(rollout.tau, axis=1)), unit, "rms effort of all joints"
-    )
-    unit = column_unit(rollout, "v")
-    found["speed.max"] = Measure(
-        _maximum(np.abs(rollout.v)), unit, "largest joint speed"
-    )
+        name, meaning = f"distance.{field}", f"minimum distance of {field}"
+        add(f"{name}.min", rollout[name].min(), "m", meaning)
+    tau, unit = rollout.tau, effort_unit(rollout)
+    add("effort.max", np.abs(tau).max(), unit, "largest effort")
+    rms = _rms(np.linalg.norm(tau, axis=1))
+    add("effort.rms", rms, unit, "rms effort of all joints")
+    speed, unit = np.abs(rollout.v).max(), column_unit(rollout, "v")
+    add("speed.max", speed, unit, "largest joint speed")
     for name, of in ((POSITION, "position"), (VELOCITY, "speed")):
         if name in rollout.columns:
-            unit = column_unit(rollout, name)
-            most = _maximum(np.nan_to_num(rollout[name]))
-            meaning = f"farthest beyond a {of} limit"
-            found[f"{name}.max"] = Measure(most, unit, meaning)
-    found["simulated_time"] = Measure(
-        float(rollout.t[-1] - rollout.t[0]), "s", "simulated time"
-    )
+            most, unit = np.nan_to_num(rollout[name]).max(), column_unit(rollout, name)
+            add(f"{name}.max", most, unit, f"farthest beyond a {of} limit")
+    add("simulated_time", rollout.t[-1] - rollout.t[0], "s", "simulated time")
     return found
 
 
 def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
-
-
-def _maximum(values: Array) -> float:
-    return float(values.max())
-
-
-def _minimum(values: Array) -> float:
-    return float(values.min())

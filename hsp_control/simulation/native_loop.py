@@ -13,9 +13,9 @@ import numpy as np
 from hsp_control.common.adapters import run
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
-from hsp_control.common.native import NativeCall, table
+from hsp_control.common.native import NativeCall, rows_of
 from hsp_control.control.controller import Controller
-from hsp_control.control.free_step import FreeStep, is_free
+from hsp_control.control.mixture import FreeStep, is_free
 from hsp_control.robot.integrators import Steps
 from hsp_control.robot.native_move import move_to
 from hsp_control.simulation.limit_excess import LimitExcess
@@ -84,24 +84,21 @@ class NativeLoop:
         assert steps.native is not None
         # Rows are addresses: what they lead to is kept, here and in the steps.
         self._seeing = self._excess.seeing(self._controller.limits, steps.q, steps.v)
-        moving = table([steps.native, *self._seeing])
+        moving = rows_of([steps.native, *self._seeing])
         own = steps.q, steps.v, self._plant.effort, step.effort, steps.interval
-        calls = *moving, *step.move.args, *table(step.sending)
+        calls = moving, *step.move.args, rows_of(step.sending)
         return NativeCall.of(_periods, (*calls, *own, self._which), timed=False)
 
 
 @kernel
 def _periods(
     moving: Indices,
-    moving_when: Array,
     law: Indices,
-    law_when: Array,
     q_law: Array,
     v_law: Array,
     unit_blocks: Indices,
     stamp: Indices,
     sending: Indices,
-    sending_when: Array,
     q: Array,
     v: Array,
     held: Array,
@@ -111,7 +108,7 @@ def _periods(
 ) -> int:
     """Move on from one period to another, or to one that is not free; return which.
 
-    ``law_when`` to ``stamp`` are `NativeMove`'s arguments. ``effort`` is written by the
+    ``law`` to ``stamp`` are `NativeMove`'s arguments. ``effort`` is written by the
     law, ``held`` is what the plant is under. ``interval`` gets a period's two ends.
     ``which`` holds when period 0 begins, the length of all periods together [s], how
     many they are, the present one, and the one to move on to.
@@ -122,10 +119,10 @@ def _periods(
     for k in range(first + 1, last + 1):
         interval[0] = t
         interval[1] = t = start + k * span / periods
-        run(moving, moving_when, t)
+        run(moving, t)
         if k == last:
             break
-        code = move_to(law, law_when, q_law, v_law, unit_blocks, stamp, t, q, v)
+        code = move_to(law, q_law, v_law, unit_blocks, stamp, t, q, v)
         if not is_free(code):
             return k
         square = 0.0
@@ -134,5 +131,5 @@ def _periods(
             square += effort[i] * effort[i]
         if not np.isfinite(square):
             return k
-        run(sending, sending_when, t)
+        run(sending, t)
     return last

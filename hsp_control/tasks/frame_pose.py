@@ -22,7 +22,6 @@ from hsp_control.common.rotations import (
     rotate,
     rotate_back,
 )
-from hsp_control.common.step_plan import merged
 from hsp_control.declaration import AnyOf
 from hsp_control.geometry.start import Start
 from hsp_control.law import TaskSample
@@ -265,7 +264,7 @@ class FramePose(FrameTask, TrackingTask, CompliantTask, type="frame_pose"):
             sample, frame = PoseSample.over(desired), state.frame(self.frame_name)
             place = frame.position, frame.rotation
             measure = bind(_measured_pose, desired, *place, values)
-            return _Reference(sample, merged(self.pose.follow(sample)), measure, values)
+            return _Reference(sample, self.pose.follow(sample), measure, values)
 
         reference = state.made(self, "reference", make)
         reference.follow(state.t)

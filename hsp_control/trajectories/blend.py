@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.kernels import kernel
+from hsp_control.common.kernels import KernelCall, kernel
 from hsp_control.common.linalg import multiply
 from hsp_control.common.native import bind
 from hsp_control.common.rotations import (
@@ -24,7 +24,6 @@ from hsp_control.common.rotations import (
 from hsp_control.declaration.quantities import Number, Positive, Vector, Vector3
 from hsp_control.declaration.rotation import Rotation, matrix_of
 from hsp_control.trajectories import checks
-from hsp_control.trajectories.following import Follower, follow_blended
 from hsp_control.trajectories.orientation import (
     OrientationSample,
     OrientationTrajectory,
@@ -81,27 +80,12 @@ class Blend(Trajectory, type="blend"):
         """The number n of coordinates."""
         return self.trajectory.dimension
 
-    def sample(self, t: float, out: TrajectorySample | None = None) -> TrajectorySample:
-        """Return the point at time t; see `Trajectory.sample`."""
-        out = self._output(out)
-        if t >= self.start_time:
-            self.trajectory.sample(t, out)
-        if t < self.start_time + self.duration:
-            _blend(self.start_time, self.duration, self._start_state, *out, float(t))
-        return out
-
-    def follow(self, out: TrajectorySample) -> Follower:
-        """Return the follower; see `Trajectory.follow`."""
-        out = self._output(out)
-        start, end = self.start_time, self.start_time + self.duration
-        blend = bind(_blend, start, self.duration, self._start_state, *out, timed=True)
-        return follow_blended(self.trajectory, out, blend, start, end)
-
-    @property
-    def _start_state(self) -> Array:
+    def kernel(self) -> KernelCall:
+        """Return the kernel; see `Trajectory.kernel`."""
         x = np.asarray(self.start)
         v = np.zeros_like(x) if self.start_velocity is None else self.start_velocity
-        return np.stack([x, np.asarray(v)])
+        start = np.stack([x, np.asarray(v)])
+        return _blend, (self.start_time, self.duration, start, self.trajectory)
 
 
 @kernel
@@ -109,29 +93,27 @@ def _blend(
     start_time: float,
     duration: float,
     start_state: Array,
+    desired: TrajectorySample,
     position: Array,
     velocity: Array,
     acceleration: Array,
     t: float,
 ) -> None:
-    """Blend the sample of x_d with the line x0 + (t - t0) v0, in place.
-
-    The rows of ``start_state`` are x0 and v0.
-    """
+    """Blend x_d with the line x0 + (t - t0) v0; ``start_state`` is x0 and v0."""
+    x_d, v_d, a_d = desired
     elapsed = t - start_time
-    if elapsed < 0.0:
-        for i in range(position.size):
-            position[i], velocity[i], acceleration[i] = start_state[0, i], 0.0, 0.0
-        return
-    if elapsed >= duration:
-        return
     s, s_dot, s_ddot = smooth_step(elapsed, 0.0, duration)
     for i in range(position.size):
-        x, v = start_state[0, i] + elapsed * start_state[1, i], start_state[1, i]
-        gap, gap_dot = position[i] - x, velocity[i] - v
-        position[i] = x + s * gap
-        velocity[i] = v + s_dot * gap + s * gap_dot
-        acceleration[i] = s_ddot * gap + 2.0 * s_dot * gap_dot + s * acceleration[i]
+        if elapsed < 0.0:
+            position[i], velocity[i], acceleration[i] = start_state[0, i], 0.0, 0.0
+        elif elapsed >= duration:
+            position[i], velocity[i], acceleration[i] = x_d[i], v_d[i], a_d[i]
+        else:
+            x, v = start_state[0, i] + elapsed * start_state[1, i], start_state[1, i]
+            gap, gap_dot = x_d[i] - x, v_d[i] - v
+            position[i] = x + s * gap
+            velocity[i] = v + s_dot * gap + s * gap_dot
+            acceleration[i] = s_ddot * gap + 2.0 * s_dot * gap_dot + s * a_d[i]
 
 
 class BlendOrientation(OrientationTrajectory, type="blend"):
@@ -195,27 +177,11 @@ class BlendOrientation(OrientationTrajectory, type="blend"):
         bind(_offset, R_d, R, w, w_dot, np.empty((3, 3)), y, y_dot, y_ddot)()
         return y, y_dot, y_ddot
 
-    def sample(
-        self, t: float, out: OrientationSample | None = None
-    ) -> OrientationSample:
-        """Return the orientation at time t; see `OrientationTrajectory.sample`."""
-        out = self._output(out)
-        if t >= self.start_time:
-            self.trajectory.sample(t, out)
-        if t < self.start_time + self.duration:
-            _blend_orientation(*self._parameters(), *out, float(t))
-        return out
-
-    def follow(self, out: OrientationSample) -> Follower:
-        """Return the follower; see `Trajectory.follow`."""
-        out = self._output(out)
-        blend = bind(_blend_orientation, *self._parameters(), *out, timed=True)
-        end = self.start_time + self.duration
-        return follow_blended(self.trajectory, out, blend, self.start_time, end)
-
-    def _parameters(self) -> tuple[float, float, Array, Array, Array]:
-        work = np.empty((11, 3))
-        return self.start_time, self.duration, self._start, self._coefficients, work
+    def kernel(self) -> KernelCall:
+        """Return the kernel; see `Trajectory.kernel`."""
+        motion = self._start, self._coefficients, np.empty((11, 3))
+        when = self.start_time, self.duration
+        return _blend_orientation, (*when, *motion, self.trajectory)
 
 
 @kernel
@@ -249,23 +215,25 @@ def _blend_orientation(
     start: Array,
     coefficients: Array,
     work: Array,
+    desired: OrientationSample,
     rotation: Array,
     velocity: Array,
     acceleration: Array,
     t: float,
 ) -> None:
-    """Multiply the sample of R_d by exp(y) from the right, in place.
+    """Write R_d exp(y).
 
     ω = ω_d + R w and ω' = ω_d' + ω × R w + R w', where w = Jexp y' in the body frame.
     """
+    R_d, omega_d, omega_d_dot = desired
     elapsed = t - start_time
-    if elapsed < 0.0:
-        for i in range(3):
+    for i in range(3):
+        velocity[i], acceleration[i] = omega_d[i], omega_d_dot[i]
+        if elapsed < 0.0:
             velocity[i] = acceleration[i] = 0.0
-            for j in range(3):
-                rotation[i, j] = start[i, j]
-        return
-    if elapsed >= duration:
+        for j in range(3):
+            rotation[i, j] = start[i, j] if elapsed < 0.0 else R_d[i, j]
+    if not 0.0 <= elapsed < duration:
         return
     y, y_dot, y_ddot = work[0], work[1], work[2]
     w, w_dot = work[3], work[4]

@@ -3,12 +3,8 @@
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
-from hsp_control.common.arrays import Array
-from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
-from hsp_control.common.step_plan import CallSequence, TimeWindow, says, stay
+from hsp_control.common.step_plan import one_call, says, stay, supplied
 
 Follower = Callable[[float], object]
 """A function of time [s] that writes the sample at that time into fixed memory."""
@@ -17,7 +13,8 @@ Follower = Callable[[float], object]
 def sampled(trajectory: Any, t: float, out: Any) -> Any:
     """Write a trajectory's sample at time t [s] with its kernel, and return it."""
     function, arguments = trajectory.kernel()
-    function(*arguments, *out, float(t))
+    given = [x.sample(t) if hasattr(x, "sample") else x for x in arguments]
+    function(*given, *out, float(t))
     return out
 
 
@@ -28,7 +25,8 @@ def follow_sampled(trajectory: Any, out: Any) -> Follower:
         return stay
     if says(trajectory, "kernel", "sample") == "kernel":
         function, arguments = trajectory.kernel()
-        return bind(function, *arguments, *out, timed=True)
+        given, follow, _ = supplied(arguments)
+        return follow_all(*follow, bind(function, *given, *out, timed=True))
     return follow_by(trajectory.sample, out)
 
 
@@ -37,7 +35,7 @@ def follow_all(*followers: Follower) -> Follower:
     moving = [follower for follower in followers if follower is not stay]
     if len(moving) < 2:
         return moving[0] if moving else stay
-    return CallSequence(*moving)
+    return one_call(moving)
 
 
 def follow_by(sampler: Callable[[float, Any], Any], out: Any) -> Follower:
@@ -50,29 +48,3 @@ def follow_by(sampler: Callable[[float, Any], Any], out: Any) -> Follower:
                 own[:] = other
 
     return follower
-
-
-def follow_blended(
-    trajectory: Any, out: Any, blend: Follower, start: float, end: float
-) -> Follower:
-    """Return the follower of a trajectory that ``blend`` changes until ``end``."""
-    target: Follower = trajectory.follow(out)
-    if target is stay:  # the blend changes ``out``, so it must be written every time
-        target = CallSequence(*map(_restorer, out))
-    return CallSequence(
-        TimeWindow(target, start, np.inf), TimeWindow(blend, -np.inf, end)
-    )
-
-
-def _restorer(out: Array) -> Follower:
-    """Return what writes the present values into ``out``, of any shape, at any time."""
-    flat = out.view()
-    flat.shape = (-1,)  # of the same memory, or it raises
-    return bind(_restore, flat.copy(), flat, timed=True)
-
-
-@kernel
-def _restore(constant: Array, out: Array, t: float) -> None:
-    """Write the constant values into ``out``, at any time."""
-    for i in range(out.shape[0]):
-        out[i] = constant[i]

@@ -9,7 +9,7 @@ from hsp_control.companions.walking.polygon import convex_hull
 from hsp_control.companions.walking.swing import Swing, turned
 from hsp_control.constraints.contacts import SurfaceContact
 from hsp_control.control.controller import Controller
-from hsp_control.control.planned import Switched
+from hsp_control.control.evolution import Switched
 from hsp_control.robot import RobotState
 from hsp_control.trajectories import ComposedPose
 from hsp_control.trajectories.fed import Fed, FedOrientation

@@ -15,10 +15,10 @@ from hsp_control.companions.walking.quadruped import QuadrupedPlan
 from hsp_control.companions.walking.quintic import at_rest, to_rest
 from hsp_control.companions.walking.swing import Swing, turned
 from hsp_control.control.controller import Controller
+from hsp_control.control.evolution import Switched
 from hsp_control.control.falling import FallDetector
 from hsp_control.control.measurement import LogChannel, Measurement
 from hsp_control.control.plan import RunningPlan
-from hsp_control.control.planned import Switched
 from hsp_control.robot import RobotState
 from hsp_control.trajectories.fed import Fed, FedOrientation
 from hsp_control.trajectories.switch import Switch

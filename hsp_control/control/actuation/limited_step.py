@@ -22,8 +22,8 @@ import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
-from hsp_control.common.native import Timed, are_native, bind, only_if, sequence
-from hsp_control.common.step_plan import CallSequence
+from hsp_control.common.native import bind, only_if
+from hsp_control.common.step_plan import one_call
 from hsp_control.constraints.limits.acceleration_bounds import Bounds
 from hsp_control.control.actuation.deviation_cost import (
     Directions,
@@ -136,30 +136,13 @@ def solve_step(
     """Assemble the QP, solve it, and write what is delivered; return the `Status`."""
     # Or `UNSOLVED`, and then nothing is written to ``result``. It is written to
     # ``status``, shape (1,), too.
-    status[0] = _solve(
-        what, wanted, forces, directions, bounds, places, programmes, result
-    )
-    return int(status[0])
-
-
-@kernel
-def _solve(
-    what: int,
-    wanted: Wanted,
-    forces: Forces,
-    directions: Directions,
-    bounds: Bounds,
-    places: Places,
-    programmes: Programmes,
-    result: Result,
-) -> int:
-    """Do what `solve_step` does, and write no status."""
     qp, x = programmes, programmes.x
+    status[0] = UNSOLVED
     if what == LEAST_VIOLATION:
         code = minimise(qp.soft, False, x, qp.soft_memory)
         if code == SOLVED and _write_result(wanted, forces, bounds, places, x, result):
-            return Status.RELAXED
-        return UNSOLVED
+            status[0] = Status.RELAXED
+        return int(status[0])
     if what != NEAREST_AGAIN:
         _write_rows(wanted, forces, bounds, places, qp.nearest)
         if what == FORCES:
@@ -169,18 +152,18 @@ def _solve(
             if code == SOLVED and _write_result(
                 wanted, forces, bounds, places, x, result
             ):
-                return Status.REDISTRIBUTED
+                status[0] = Status.REDISTRIBUTED
+                return int(status[0])
         write_directions(directions)
     _start(forces, x)
     contacts_held = what != NEAREST_AGAIN and forces.first.shape[0] > 0
     count = write_inverse_root(directions, 1 if contacts_held else 0, qp.nearest.JT)
     _write_force_factor(forces, _FORCE_COST, qp.nearest)
     problem, warm = _moving(qp.nearest, count), what != NEAREST_AGAIN
-    if minimise(problem, warm, x, qp.memory) != SOLVED:
-        return UNSOLVED
-    if _write_result(wanted, forces, bounds, places, x, result):
-        return Status.LIMITED
-    return UNSOLVED
+    code = minimise(problem, warm, x, qp.memory)
+    if code == SOLVED and _write_result(wanted, forces, bounds, places, x, result):
+        status[0] = Status.LIMITED
+    return int(status[0])
 
 
 @kernel
@@ -360,8 +343,9 @@ class LimitedStep:
         self._least_violation = bind(solve_step, LEAST_VIOLATION, *arguments)
         self._nearest = bind(solve_step, NEAREST, *arguments)
         forces = bind(solve_step, FORCES, *arguments)
-        self._find_forces = _one_call(self._write_mass_matrix, forces)
-        self._find_nearest = _one_call(self._write_mass_matrix, self._nearest)
+        self._find_forces = one_call([self._write_mass_matrix, forces], 0.0)
+        nearest = [self._write_mass_matrix, self._nearest]
+        self._find_nearest = one_call(nearest, 0.0)
 
     def nearest_if(
         self, before: Callable[[], Any], found: Array
@@ -451,10 +435,3 @@ class LimitedStep:
         upper[where] = np.maximum(high, reached + slack)
         beyond = np.maximum(low - reached, reached - high)
         return float(np.maximum(beyond, 0.0).max(initial=0.0))
-
-
-def _one_call(*calls: Callable[[], Any]) -> Callable[[], float]:
-    """Return one call for several, with the result of the last one."""
-    if are_native(calls):
-        return sequence([*map(Timed, calls)], 0.0)
-    return CallSequence(*calls)

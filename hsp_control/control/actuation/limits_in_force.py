@@ -11,8 +11,7 @@ from hsp_control.common.step_plan import in_order
 from hsp_control.constraints.limits import RobotLimits
 from hsp_control.constraints.limits.acceleration_bounds import Bounds, MotionLimits
 from hsp_control.control.actuation.sent_effort import SentEffort, effort_window
-from hsp_control.control.evolution import Evolution
-from hsp_control.control.planned import PlannedLimits
+from hsp_control.control.evolution import Evolution, PlannedLimits
 from hsp_control.robot import Robot, RobotState
 
 

@@ -21,7 +21,7 @@ from hsp_control.common.native import bind
 from hsp_control.common.step_plan import in_order
 from hsp_control.constraints.contacts import Contact, SlidingContact
 from hsp_control.constraints.contacts.contact import NORMAL, WRENCH, shares
-from hsp_control.control.planned import PlannedContact
+from hsp_control.control.evolution import PlannedContact
 from hsp_control.law import Resolution
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.kinematics import FrameMotion

@@ -11,7 +11,6 @@ from .momentum_observer import MomentumObserver as MomentumObserver
 from .predictor import Predictor as Predictor
 from .rate_check import RateFinding as RateFinding
 from .rate_check import check_rate as check_rate
-from .rate_check import rate_findings as rate_findings
 from .start_up_ramp import StartUpRamp as StartUpRamp
 from .velocity_filter import VelocityFilter as VelocityFilter
 

@@ -1,18 +1,32 @@
 """The set of compensators around the law."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY
-from typing import Literal
+from typing import Any, Literal
 
 from hsp_control.common.exceptions import CompensationError
 from hsp_control.constraints.contacts import Contact
-from hsp_control.control.compensation.force_feedback import ForceFeedback
-from hsp_control.control.compensation.friction_feed_forward import FrictionFeedForward
-from hsp_control.control.compensation.integral_action import IntegralAction
+from hsp_control.control.compensation.force_feedback import (
+    ForceFeedback,
+    RunningForceFeedback,
+)
+from hsp_control.control.compensation.friction_feed_forward import (
+    FrictionFeedForward,
+    RunningFriction,
+)
+from hsp_control.control.compensation.integral_action import (
+    IntegralAction,
+    RunningIntegral,
+)
 from hsp_control.control.compensation.momentum_observer import MomentumObserver
-from hsp_control.control.compensation.predictor import Predictor
-from hsp_control.control.compensation.start_up_ramp import StartUpRamp
-from hsp_control.control.compensation.velocity_filter import VelocityFilter
+from hsp_control.control.compensation.predictor import Predictor, RunningPredictor
+from hsp_control.control.compensation.stage import Stage
+from hsp_control.control.compensation.start_up_ramp import RunningRamp, StartUpRamp
+from hsp_control.control.compensation.velocity_filter import (
+    RunningFilter,
+    VelocityFilter,
+)
+from hsp_control.control.controller import Controller
 from hsp_control.declaration import Part, within
 from hsp_control.robot import Robot
 from hsp_control.tasks import Task
@@ -49,12 +63,13 @@ class Compensation(Part, error=CompensationError):
         """The names of the compensators that are not None."""
         return tuple(self.changed_fields())
 
-    def friction(self, robot: Robot) -> FrictionFeedForward | None:
-        """Return the friction feed-forward for a robot, its own in place of "urdf"."""
-        given = self.friction_feed_forward
-        if isinstance(given, str):
-            return FrictionFeedForward.of_model(robot)
-        return given
+    def begin(self, controller: Controller) -> list[Stage]:
+        """Return what runs, in the order of the chain; see `Command`."""
+        return [
+            begin(getattr(self, name), controller)
+            for name, begin in STAGES.items()
+            if getattr(self, name) is not None
+        ]
 
     def check(
         self, robot: Robot, tasks: Sequence[Task], contacts: Sequence[Contact] = ()
@@ -67,13 +82,11 @@ class Compensation(Part, error=CompensationError):
                         f"{robot.name} has a free-flyer root, and its contact forces "
                         "are not measured; needs a robot with a fixed base"
                     )
-        for name, part in (
-            ("momentum_observer", self.momentum_observer),
-            ("friction_feed_forward", self.friction(robot)),
-        ):
-            if part is not None:
+        for name in ("momentum_observer", "friction_feed_forward"):
+            part = getattr(self, name)
+            if isinstance(part, Part):
                 with within(name):
-                    part.check(robot)
+                    part.check(robot)  # type: ignore[attr-defined]
         self._check_compliance(tasks)
         self._check_forces(contacts)
         if self.integral_action is not None:
@@ -106,3 +119,15 @@ class Compensation(Part, error=CompensationError):
                         f"{task.name!r} is to yield by its impedance; set cancel to "
                         "false, or a clip [N·m] that is as large as the friction"
                     )
+
+
+STAGES: dict[str, Callable[[Any, Controller], Stage]] = {
+    "velocity_filter": lambda own, _: RunningFilter(own),
+    "start_up_ramp": lambda own, _: RunningRamp(own),
+    "friction_feed_forward": lambda own, made: RunningFriction(own, made.robot),
+    "momentum_observer": lambda own, made: own.begin(made.robot),
+    "predictor": lambda own, made: RunningPredictor(own, made.robot),
+    "force_feedback": RunningForceFeedback,
+    "integral_action": RunningIntegral,
+}
+"""What each compensator becomes in a run of a controller, in the order of the chain."""

@@ -11,7 +11,10 @@ from hsp_control.common.exceptions import CompensationError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.contacts.contact import NORMAL
+from hsp_control.control.actuation import Status
+from hsp_control.control.compensation.stage import Run, Stage
 from hsp_control.control.controller import Controller
+from hsp_control.control.measurement import LogChannel
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import Names, Positive
 from hsp_control.robot import RobotState
@@ -68,7 +71,7 @@ class ForceFeedback(Part, error=CompensationError):
                 )
 
 
-class RunningForceFeedback:
+class RunningForceFeedback(Stage):
     """Force feedback in one run: it keeps the integrals."""
 
     def __init__(self, declared: ForceFeedback, controller: Controller) -> None:
@@ -84,7 +87,14 @@ class RunningForceFeedback:
         for name in names:
             controller._force_offset(name)[0] = 0.0
 
-    def measure(self, wrenches: Mapping[str, Array], pressed: bool) -> None:
+    def measure(self, run: Run) -> None:
+        """Feel the forces; see `Stage.measure`."""
+        if self._declared.force == "measured":
+            self._read(run.wrenches, pressed=run.last_period > 0.0)
+        elif run.under_way:
+            self._estimate(run.measured, run.disturbance, run.output.forces)
+
+    def _read(self, wrenches: Mapping[str, Array], pressed: bool) -> None:
         """Read the sensors' wrenches by frame; none counts before an effort acted."""
         for contact in self._fed:
             if contact.frame not in wrenches:
@@ -98,7 +108,7 @@ class RunningForceFeedback:
             felt = float(contact.axes[:, 2] @ wrench[:3])
             self.felt[contact.name] = felt if pressed else np.nan
 
-    def estimate(self, state: RobotState, disturbance: Array, forces: Array) -> None:
+    def _estimate(self, state: RobotState, disturbance: Array, forces: Array) -> None:
         """Estimate forces from r, what acts besides those that were expected."""
         unexpected = np.linalg.solve(state.mass_matrix, disturbance)
         support = self._controller.active_stack.support
@@ -116,8 +126,10 @@ class RunningForceFeedback:
             expected = forces[columns].reshape(-1, 3)[:, 2].sum()
             self.felt[contact.name] = float(expected + (inverse @ F.T @ unexpected)[2])
 
-    def advance(self, t: float, period: float, forces: Array, hindered: bool) -> None:
+    def sent(self, run: Run) -> None:
         """Integrate the errors over one period, for the next effort."""
+        t, period, forces = self._controller.state.t, run.period, run.output.forces
+        hindered = run.output.status >= Status.LIMITED
         support = self._controller.active_stack.support
         gain, bound = self._declared.gain, self._declared.bound
         for contact in self._fed:
@@ -141,6 +153,17 @@ class RunningForceFeedback:
                 continue
             integral = min(max(integral + change, -bound), bound)
             self.integrals[name] = self._controller._force_offset(name)[0] = integral
+
+    def log_channels(self, run: Run) -> Mapping[str, LogChannel]:
+        """Return what is felt, and what it adds; see `Stage.log_channels`."""
+        found, how = dict[str, LogChannel](), self._declared.force
+        added = "what force feedback adds to the commanded normal force"
+        for name, felt in self.felt.items():
+            meaning = f"normal force, {how}"
+            found[f"contact.{name}.{how}"] = LogChannel(felt, "N", meaning)
+            integral = LogChannel(self.integrals[name], "N", added)
+            found[f"contact.{name}.integral"] = integral
+        return found
 
     @property
     def _fed(self) -> list[Contact]:

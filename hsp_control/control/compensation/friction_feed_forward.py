@@ -1,12 +1,15 @@
 """Feed-forward of joint friction."""
 
-from typing import Self
+from collections.abc import Mapping
+from typing import Any, Literal, Self
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError, SimulationError
 from hsp_control.control.active_stack import ActiveStack
+from hsp_control.control.compensation.stage import Run, Stage
+from hsp_control.control.measurement import LogChannel
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import Positive, Weights
 from hsp_control.law import VARYING
@@ -59,6 +62,27 @@ class FrictionFeedForward(Part, error=CompensationError):
         except SimulationError as error:
             with within(*error.path):
                 raise CompensationError(error.bare_message) from None
+
+
+class RunningFriction(Stage):
+    """A friction feed-forward in one run."""
+
+    def __init__(
+        self, declared: FrictionFeedForward | Literal["urdf"], robot: Robot
+    ) -> None:
+        own = FrictionFeedForward.of_model(robot) if declared == "urdf" else declared
+        self._declared: Any = own
+
+    def act(self, run: Run, state: RobotState, active: ActiveStack) -> None:
+        """Add the friction; see `Stage.act`."""
+        own = self._declared.effort(state, active)
+        run.friction = run.friction + active.share * own
+        run.effort = run.effort + own
+
+    def log_channels(self, run: Run) -> Mapping[str, LogChannel]:
+        """Return what was added; see `Stage.log_channels`."""
+        sent = LogChannel(run.friction_sent, "N·m or N", "feed-forward of friction")
+        return {"friction.feed_forward": sent}
 
 
 def desired_velocity(state: RobotState, active: ActiveStack) -> Array:

@@ -1,53 +1,29 @@
 """Integral action: e'' + Kv e' + Kp e + Ki ∫e = 0."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import KW_ONLY
+from collections.abc import Mapping, Sequence
+from dataclasses import KW_ONLY, field
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError, GainError
 from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.control.actuation import Status
+from hsp_control.control.compensation.stage import Run, Stage
 from hsp_control.control.controller import Controller
+from hsp_control.control.measurement import LogChannel
 from hsp_control.declaration import Part, within
-from hsp_control.declaration.equality import same
-from hsp_control.declaration.quantities import ArrayField, Gain, Names, Positive
+from hsp_control.declaration.quantities import (
+    READ_ONLY,
+    Gain,
+    Names,
+    Positive,
+    ReadOnlyDict,
+)
 from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.gains import as_gain, as_matrix
-
-
-class GainsByTask(Mapping[str, Array]):
-    """Gains by task name; they never change."""
-
-    def __init__(self, gains: Mapping[str, Array] | None = None) -> None:
-        self._gains = dict(gains or {})
-
-    def __getitem__(self, task: str) -> Array:
-        return self._gains[task]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._gains)
-
-    def __len__(self) -> int:
-        return len(self._gains)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Mapping) and same(self._gains, dict(other))
-
-    def __hash__(self) -> int:
-        gains = self._gains.items()
-        return hash(frozenset((k, g.shape, (g + 0.0).tobytes()) for k, g in gains))
-
-    def __repr__(self) -> str:
-        return repr({k: np.asarray(g).tolist() for k, g in self._gains.items()})
-
-    def __setstate__(self, state: dict[str, dict[str, Array]]) -> None:
-        for gain in state["_gains"].values():
-            gain.setflags(write=False)  # pickle forgets it
-        vars(self).update(state)
 
 
 class IntegralAction(Part, error=CompensationError):
@@ -65,9 +41,7 @@ class IntegralAction(Part, error=CompensationError):
     """Rate at which a constant error decays [1/s]: Ki = rate · Kp, for tasks that `ki`
     does not name."""
     _: KW_ONLY
-    ki: Annotated[Mapping[str, ArrayLike], ArrayField(dict[str, Gain], GainsByTask)] = (
-        GainsByTask()
-    )
+    ki: Annotated[Mapping[str, Gain], READ_ONLY] = field(default_factory=ReadOnlyDict)
     """Ki by task name [1/s³]: a number, one for each row, or a matrix."""
     tasks: Names | None = None
     """Names of the tasks with integral action [-]; all by default."""
@@ -85,9 +59,9 @@ class IntegralAction(Part, error=CompensationError):
         names = [task.name for task in tasks]
         named = [("ki", name) for name in self.ki]
         named += [("tasks", name) for name in self.tasks or ()]
-        for field, name in named:
+        for key, name in named:
             if name not in names:
-                with within(field):
+                with within(key):
                     raise CompensationError(
                         f"there is no task {name!r}{did_you_mean(name, names)} "
                         f"(there are {listing(names)})"
@@ -118,16 +92,35 @@ class IntegralAction(Part, error=CompensationError):
         return gains
 
 
-class RunningIntegral:
+class RunningIntegral(Stage):
     """Integral action in one run: it keeps the integrals."""
 
     def __init__(self, declared: IntegralAction, controller: Controller) -> None:
+        self._controller = controller
         self._limit = np.inf if declared.limit is None else declared.limit
         self._gains = declared.gains(controller.tasks)
         self._feedback = {name: controller.feedback(name) for name in self._gains}
         # ∫e by task, shape (m,) [m·s or rad·s]
         self.integrals: dict[str, Array] = {
             name: np.zeros(len(Ki)) for name, Ki in self._gains.items()
+        }
+
+    def sent(self, run: Run) -> None:
+        """Integrate the errors of the fully active tasks; see `Stage.sent`."""
+        output, controller = run.output, self._controller
+        limited = output.status >= Status.LIMITED
+        errors: dict[str, Array | None] = {}
+        for name, rows in controller.task_rows.items():
+            if controller.weight_of(name, controller.state.t) >= 1.0:
+                errors[name] = output.task.error[rows]
+        saturated = bool(output.damped) or limited or run.starting
+        self.advance(errors, run.period, saturated)
+
+    def log_channels(self, run: Run) -> Mapping[str, LogChannel]:
+        """Return the integrals; see `Stage.log_channels`."""
+        return {
+            f"task.{name}.integral": LogChannel(integral, "m·s or rad·s", "∫e")
+            for name, integral in self.integrals.items()
         }
 
     def advance(

@@ -8,6 +8,7 @@ momenta", ICRA 2003. With p = M v, p' = tau + Cᵀv - G + d for a disturbance d,
 is a low-pass of d. It needs no measured acceleration.
 """
 
+from collections.abc import Mapping
 from dataclasses import KW_ONLY
 from math import exp
 
@@ -15,10 +16,21 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError
+from hsp_control.common.linalg import cholesky
 from hsp_control.constraints.limits.joint_numbers import Positives, by_dof
+from hsp_control.control.active_stack import ActiveStack
+from hsp_control.control.compensation.stage import Run, Stage
+from hsp_control.control.measurement import LogChannel
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import Flag, Positive
+from hsp_control.law import VARYING
+from hsp_control.law.pseudo_inverse import (
+    apply_pseudo_inverse_transpose,
+    weighted_pseudo_inverse,
+)
 from hsp_control.robot import Robot, RobotState
+from hsp_control.tasks import Task
+from hsp_control.tasks.compliant_task import CompliantTask
 
 
 class MomentumObserver(Part, error=CompensationError):
@@ -67,7 +79,7 @@ class MomentumObserver(Part, error=CompensationError):
             return by_dof(self.clip, robot.nv, error=CompensationError)
 
 
-class RunningObserver:
+class RunningObserver(Stage):
     """A momentum observer in one run: it keeps the estimate and the last momentum."""
 
     def __init__(self, bandwidth: float, clip: Array) -> None:
@@ -90,7 +102,56 @@ class RunningObserver:
         self._momentum, self._drift = momentum, drift
         return self.disturbance
 
+    def measure(self, run: Run) -> None:
+        """Learn from the effort that acted; see `Stage.measure`."""
+        acted = run.under_way[0] if run.under_way else run.none
+        state = run.measured.update(run.t, run.q, run.v)
+        run.disturbance = self.update(state, acted, run.last_period)
+        if run.controller.limits is not None:
+            besides: Array = self.disturbance - self.cancelled
+            if besides.any():  # what is cancelled causes nothing
+                besides = np.asarray(np.linalg.solve(state.mass_matrix, besides), float)
+            run.controller.disturbed(besides)
+
+    def act(self, run: Run, state: RobotState, active: ActiveStack) -> None:
+        """Cancel the estimate; see `Stage.act`."""
+        run.effort = run.effort - self.cancelled
+
+    def log_channels(self, run: Run) -> Mapping[str, LogChannel]:
+        """Return r, and the force at each task of a frame that explains it."""
+        r, meaning = self.disturbance, "estimated disturbance r"
+        found = {"observer.disturbance": LogChannel(r, "N·m or N", meaning)}
+        threshold = run.controller.singularity_threshold
+        for task in run.controller.tasks:
+            if isinstance(task, CompliantTask) and task.wrench_unit is not None:
+                found[f"observer.wrench.{task.name}"] = LogChannel(
+                    task_wrench(task, run.measured, r, threshold),
+                    task.wrench_unit,
+                    "estimated force on the robot, in world axes",
+                )
+        return found
+
 
 def _drift(state: RobotState) -> Array:
     """Return Cᵀv - G = M'v - N, since M' = C + Cᵀ and N = C v + G."""
     return state.mass_matrix_rate @ state.v - state.nonlinear_effects
+
+
+def task_wrench(
+    task: Task, state: RobotState, disturbance: Array, threshold: float
+) -> Array:
+    """Return f = Λ J M⁻¹ r = J̄ᵀ r, shape (m,): the force at the rows of a task.
+
+    If r = Jᵀf then this is f. Whatever else r is, f is the force that moves the task as
+    r does. J̄ = M⁻¹JᵀΛ is bounded near singularities as the law's own pseudo-inverse is:
+    a force along a lost direction, which the joints do not feel, is taken for zero.
+    """
+    J = task.evaluate(state, feedback=task.feedback()).jacobian
+    m, nv = J.shape
+    L, B, Q = np.zeros((nv, nv)), np.zeros((m, nv)), np.zeros((m, nv))
+    X, part, force = np.zeros((m, m)), np.zeros(m), np.zeros(m)
+    if not cholesky(state.mass_matrix, L):
+        return np.full(m, np.nan)
+    weighted_pseudo_inverse(J, L, VARYING, threshold, B, Q, X)
+    apply_pseudo_inverse_transpose(Q, X, L, VARYING, disturbance.copy(), part, force)
+    return force

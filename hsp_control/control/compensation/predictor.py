@@ -1,12 +1,14 @@
 """Prediction of the state at which an effort will act."""
 
 from collections.abc import Iterable
+from itertools import islice
 from typing import Any
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError
+from hsp_control.control.compensation.stage import Run, Stage
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Count
 from hsp_control.robot import Robot
@@ -39,10 +41,11 @@ class Predictor(Part, error=CompensationError):
         return self.effort_delay + self.sensor_delay
 
 
-class RunningPredictor:
+class RunningPredictor(Stage):
     """Integrates the model under the efforts that are under way."""
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, declared: Predictor, robot: Robot) -> None:
+        self._declared = declared
         self._robot, self._period = robot, 0.0
         self._tau = np.zeros(robot.nv)
 
@@ -51,6 +54,13 @@ class RunningPredictor:
         state = vars(self) | {"_period": 0.0, "_tau": self._tau.copy()}
         state.pop("_advance", None)
         return state
+
+    def measure(self, run: Run) -> None:
+        """Return when and where the next effort will act; see `Stage.measure`."""
+        # Before any effort is sent, the robot is assumed to stay where it is.
+        efforts = (tau + run.disturbance for tau in islice(run.under_way, 1, None))
+        run.q, run.v = self.predict(run.q, run.v, efforts, run.period)
+        run.t += self._declared.effort_delay * run.period
 
     def predict(
         self, q: Array, v: Array, efforts: Iterable[Array], period: float

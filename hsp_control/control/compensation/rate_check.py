@@ -68,38 +68,23 @@ def check_rate(
     effort_delay: int | None = None,
     sensor_delay: int | None = None,
     plant: Robot | None = None,
+    strict: bool = True,
 ) -> list[RateFinding]:
-    """Check that the loop is stable at its rate.
+    """Return the problems of each task and of the null space at a control rate.
 
-    The arguments are those of `rate_findings`.
+    Args:
+        controller: The controller.
+        q: The configuration at which the loop is looked at, shape (nq,).
+        period: The control period [s].
+        compensation: The compensators; None: there are none.
+        effort_delay: Delay of efforts, in periods; None: that of the predictor.
+        sensor_delay: Delay of measurements, in periods; None: that of the predictor.
+        plant: The robot that moves, where it is known to differ from the model.
+        strict: Whether it is an error if the loop is unstable.
+
+    Raises:
+        UnstableRateError: If the loop is unstable, unless `strict` is false.
     """
-    found = rate_findings(
-        controller,
-        q,
-        period,
-        compensation,
-        effort_delay=effort_delay,
-        sensor_delay=sensor_delay,
-        plant=plant,
-    )
-    for finding in found:
-        if finding.unstable:
-            with within(*finding.path):
-                raise UnstableRateError(finding.message)
-    return found
-
-
-def rate_findings(
-    controller: Controller,
-    q: Array,
-    period: float,
-    compensation: Compensation | None = None,
-    *,
-    effort_delay: int | None = None,
-    sensor_delay: int | None = None,
-    plant: Robot | None = None,
-) -> list[RateFinding]:
-    """Return the problems of each task and of the null space at a control rate."""
     compensation = Compensation() if compensation is None else compensation
     if compensation.velocity_filter is not None:
         with within("compensation", "velocity_filter"):
@@ -118,7 +103,12 @@ def rate_findings(
     if plant is not None and not any(each and each.unstable for each in found):
         loaded = loaded_loop(controller, state, plant, period, *delays)
         found.append(None if loaded is None else _loaded_finding(loaded))
-    return [finding for finding in found if finding is not None]
+    problems = [finding for finding in found if finding is not None]
+    for finding in problems:
+        if strict and finding.unstable:
+            with within(*finding.path):
+                raise UnstableRateError(finding.message)
+    return problems
 
 
 _Delays = tuple[int, int, Compensation]

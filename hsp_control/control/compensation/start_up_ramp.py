@@ -1,9 +1,9 @@
 """A smooth transition from holding still to the law."""
 
-import numpy as np
-
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError
+from hsp_control.control.active_stack import ActiveStack
+from hsp_control.control.compensation.stage import Run, Stage
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import NonNegative, Positive
 from hsp_control.robot import RobotState
@@ -25,23 +25,22 @@ class StartUpRamp(Part, error=CompensationError):
     pure gravity compensation."""
 
 
-class RunningRamp:
+class RunningRamp(Stage):
     """A start-up ramp in one run: it knows when and where it began."""
 
-    def __init__(self, declared: StartUpRamp, state: RobotState) -> None:
-        self._frequency = declared.natural_frequency
-        self._schedule = Schedule([(state.t, None)], ramp=declared.duration)
-        self._q0 = state.q.copy()
+    def __init__(self, declared: StartUpRamp) -> None:
+        self._declared = declared
+        self._begun: tuple[Schedule, Array] | None = None  # at the first state
 
-    def weight(self, t: float) -> float:
-        """Return the weight s of the law at time t [s]."""
-        return self._schedule.weight(t)
-
-    def blend(self, state: RobotState, a: Array) -> Array:
-        """Return the blend with the law's acceleration a, shape (nv,)."""
-        s = self.weight(state.t)
-        if s >= 1.0:
-            return a
-        w = self._frequency
-        away = state.robot.difference(state.q, self._q0)
-        return np.asarray((1.0 - s) * (w * w * away - 2.0 * w * state.v) + s * a)
+    def act(self, run: Run, state: RobotState, active: ActiveStack) -> None:
+        """Blend the law's acceleration with what holds still; see `Stage.act`."""
+        if self._begun is None:
+            schedule = Schedule([(state.t, None)], ramp=self._declared.duration)
+            self._begun = schedule, state.q.copy()
+        schedule, q0 = self._begun
+        s = schedule.weight(state.t)
+        run.starting = s < 1.0
+        if run.starting:
+            w = self._declared.natural_frequency
+            away = state.robot.difference(state.q, q0)
+            run.a = (1.0 - s) * (w * w * away - 2.0 * w * state.v) + s * run.a

@@ -7,6 +7,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError
+from hsp_control.control.compensation.stage import Run, Stage
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Positive
 
@@ -59,12 +60,16 @@ class VelocityFilter(Part, error=CompensationError):
         return (b, 2.0 * b, b), a
 
 
-class RunningFilter:
+class RunningFilter(Stage):
     """A velocity filter in one run: it keeps the last inputs and outputs."""
 
     def __init__(self, declared: VelocityFilter) -> None:
         self._filter = declared
         self._past: tuple[Array, ...] | None = None
+
+    def measure(self, run: Run) -> None:
+        """Filter the velocity; see `Stage.measure`."""
+        run.v = self.apply(np.asarray(run.v, dtype=float), run.last_period)
 
     def apply(self, v: Array, period: float) -> Array:
         """Return the filtered velocity, a new array of shape (nv,)."""

@@ -50,15 +50,11 @@ class DroppedPeriods(Drive, type="dropped"):
     """Efforts are lost at random, and the drive keeps the last one that arrived."""
 
     stage: ClassVar[float] = 10.0
+    strength: ClassVar[str] = "probability"
 
     probability: Share
     """Probability that an effort is lost, independent of the others [-]; the first is
     never lost."""
-
-    @property
-    def active(self) -> bool:
-        """Whether efforts are lost."""
-        return self.probability > 0.0
 
     def begin(self, robot: Robot, random: np.random.Generator) -> Driving:
         """Return what keeps the last effort that arrived; see `Drive.begin`."""
@@ -78,14 +74,10 @@ class EffortDelay(Drive, type="delay"):
     """The effort commanded some periods ago; the first effort until there is one."""
 
     stage: ClassVar[float] = 20.0
+    strength: ClassVar[str] = "periods"
 
     periods: Periods
     """Delay of the efforts [control periods]."""
-
-    @property
-    def active(self) -> bool:
-        """Whether there is a delay."""
-        return self.periods > 0
 
     def begin(self, robot: Robot, random: np.random.Generator) -> Driving:
         """Return a queue of efforts, empty at first; see `Drive.begin`."""
@@ -103,14 +95,10 @@ class EffortNoise(Drive, type="noise"):
     """Gaussian white noise on the effort, constant during a period."""
 
     stage: ClassVar[float] = 40.0
+    strength: ClassVar[str] = "std"
 
     std: Weights
     """Standard deviation of effort noise [N·m or N], one number or nv."""
-
-    @property
-    def active(self) -> bool:
-        """Whether there is noise."""
-        return bool(np.any(self.std))
 
     def begin(self, robot: Robot, random: np.random.Generator) -> Driving:
         """Return what adds noise to the effort; see `Drive.begin`."""
@@ -123,15 +111,11 @@ class Jitter(Drive, type="jitter"):
     """Every effort takes effect after a uniformly random delay."""
 
     stage: ClassVar[float] = 30.0
+    strength: ClassVar[str] = "longest"
 
     longest: NonNegative
     """Maximum additional delay [s], drawn for each period; an effort takes effect at
     the end of its period at the latest."""
-
-    @property
-    def active(self) -> bool:
-        """Whether there is a delay."""
-        return self.longest > 0.0
 
     def begin(self, robot: Robot, random: np.random.Generator) -> Driving:
         """Return what draws a delay for each effort; see `Drive.begin`."""

@@ -3,7 +3,7 @@
 import importlib
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 import pinocchio as pin
@@ -15,16 +15,13 @@ from hsp_control.control.measurement import LogChannel
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Flag, Positive
 from hsp_control.robot import Robot
-from hsp_control.robot.friction import JointFriction
 from hsp_control.robot.integrators import Integrator
 from hsp_control.robot.motion import number_of_steps
 from hsp_control.robot.mujoco import scene
 from hsp_control.robot.mujoco_coordinates import MujocoCoordinates, joints_of
 from hsp_control.simulation.plants.mjcf import (
-    ContactShape,
     ContactShapes,
     Ground,
-    Solid,
     Solids,
     geoms_of,
     write_mjcf,
@@ -182,6 +179,44 @@ def _add_wrenches(
             sums[owner, 5] += sign * (x * world[1] - y * world[0])
 
 
+class Mujoco(FrictionalPart, type="mujoco"):
+    """MuJoCo, with its own integrator, friction and contacts."""
+
+    _: KW_ONLY
+    timestep: Positive = 0.001
+    """Maximum step of MuJoCo [s]."""
+    integrator: MujocoIntegrator = "implicitfast"
+    """Integrator of MuJoCo [-]."""
+    joint_limits: Flag = True
+    """Whether MuJoCo keeps joints within their limits [-]."""
+    contacts: ContactShapes = ()
+    """Shapes that may touch the ground and the solids, by frame name [-]."""
+    ground: Ground = Ground()
+    """The ground [-]; it exists only if `contacts` has entries."""
+    solids: Solids = ()
+    """Walls, tables, slopes and stairs, by name [-]."""
+
+    def __post_init__(self) -> None:
+        if self.solids and not self.contacts:
+            with within("solids"):
+                raise SimulationError(
+                    "nothing may touch them: declare contacts, the shapes of the robot "
+                    "that may"
+                )
+
+    @property
+    def longest_step(self) -> float:
+        """The longest step of MuJoCo [s]."""
+        return self.timestep
+
+    def engine(self, robot: Robot, integrator: Integrator) -> "MujocoPlant":
+        """Return the plant, which has its own integrator."""
+        return MujocoPlant(robot, self)
+
+
+_DESCRIBED = "timestep", "integrator", "joint_limits", "contacts", "ground", "solids"
+
+
 class MujocoPlant(MujocoEngine):
     """A robot in MuJoCo, built from the Pinocchio model.
 
@@ -189,39 +224,11 @@ class MujocoPlant(MujocoEngine):
     other collisions.
     """
 
-    def __init__(
-        self,
-        robot: Robot,
-        *,
-        timestep: float = 1e-3,
-        integrator: MujocoIntegrator = "implicitfast",
-        contacts: Sequence[ContactShape] = (),
-        ground: Ground | None = None,
-        solids: Sequence[Solid] = (),
-        joint_limits: bool = True,
-        friction: JointFriction | None = None,
-        pushes: Sequence[Push] = (),
-    ) -> None:
+    def __init__(self, robot: Robot, declared: Mujoco) -> None:
         """Build the MuJoCo model."""
         mujoco = import_mujoco()
-        if not 0.0 < timestep < np.inf:
-            raise SimulationError(f"mujoco: timestep is {timestep}; must be positive")
-        if integrator not in get_args(MujocoIntegrator):
-            raise SimulationError(
-                f"mujoco: integrator {integrator!r}: choose among "
-                f"{', '.join(get_args(MujocoIntegrator))}"
-            )
-        self.timestep, self.integrator = timestep, integrator
-        self.contacts = tuple(contacts)
-        self.ground = Ground() if ground is None else ground
-        self.solids = tuple(solids)
-        if self.solids and not self.contacts:
-            with within("solids"):
-                raise SimulationError(
-                    "nothing may touch them: declare contacts, the shapes of the robot "
-                    "that may"
-                )
-        self.joint_limits, self.friction = joint_limits, friction
+        self.declared, self.contacts = declared, declared.contacts
+        self.friction = declared.joint_friction(robot)
         joints = joints_of(robot)
         geoms: dict[int, list[Any]] = {}
         frame_of_geom: dict[str, str] = {}
@@ -237,12 +244,12 @@ class MujocoPlant(MujocoEngine):
         self.mjcf = write_mjcf(
             robot,
             joints,
-            integrator=integrator,
-            joint_limits=joint_limits,
-            friction=friction,
+            integrator=declared.integrator,
+            joint_limits=declared.joint_limits,
+            friction=self.friction,
             geoms=geoms,
-            ground=self.ground,
-            solids=self.solids,
+            ground=declared.ground,
+            solids=declared.solids,
         )
         try:
             model = mujoco.MjModel.from_xml_string(self.mjcf)
@@ -257,7 +264,8 @@ class MujocoPlant(MujocoEngine):
             {name: int(j.qposadr[0]) for name, j in zip(names, made, strict=True)},
             {name: int(j.dofadr[0]) for name, j in zip(names, made, strict=True)},
         )
-        super().__init__(robot, model, mujoco.MjData(model), coordinates, pushes)
+        data, pushes = mujoco.MjData(model), declared.pushes
+        super().__init__(robot, model, data, coordinates, pushes)
         self._owners = {
             model.geom(name).id: frame for name, frame in frame_of_geom.items()
         }
@@ -272,7 +280,7 @@ class MujocoPlant(MujocoEngine):
 
     def advance(self, t: float, end: float, tau: Array) -> tuple[Array, Array]:
         """Step MuJoCo from t to ``end``; see `SampledPlant.advance`."""
-        return self._step(t, end, tau, self.timestep)
+        return self._step(t, end, tau, self.declared.timestep)
 
     def log_channels(
         self, t: float, q: Array, v: Array, tau: Array
@@ -318,19 +326,14 @@ class MujocoPlant(MujocoEngine):
         """Return its settings."""
         return {
             **super().describe(),
-            "timestep": self.timestep,
-            "integrator": self.integrator,
-            "joint_limits": self.joint_limits,
-            "contacts": to_json_data(self.contacts),
-            "ground": to_json_data(self.ground),
-            "solids": to_json_data(self.solids),
+            **{name: to_json_data(getattr(self.declared, name)) for name in _DESCRIBED},
             "friction": to_json_data(self.friction),
         }
 
     def _places(self) -> dict[str, LogChannel]:
         """Return position and orientation of each loose solid."""
         found = {}
-        for solid in self.solids:
+        for solid in self.declared.solids:
             for k in range(solid.copies if solid.mass is not None else 0):
                 body = self.data.body(f"solid/{solid.name}/{k}")
                 prefix = f"plant.solid.{solid.name}" + (f"_{k + 1}" if k else "")
@@ -351,40 +354,3 @@ class MujocoPlant(MujocoEngine):
             for name, frame in self._origins.items()
         }
         return self._wrenches_about(self.data, origins)
-
-
-class Mujoco(FrictionalPart, type="mujoco"):
-    """MuJoCo, with its own integrator, friction and contacts."""
-
-    _: KW_ONLY
-    timestep: Positive = 0.001
-    """Maximum step of MuJoCo [s]."""
-    integrator: MujocoIntegrator = "implicitfast"
-    """Integrator of MuJoCo [-]."""
-    joint_limits: Flag = True
-    """Whether MuJoCo keeps joints within their limits [-]."""
-    contacts: ContactShapes = ()
-    """Shapes that may touch the ground and the solids, by frame name [-]."""
-    ground: Ground = Ground()
-    """The ground [-]; it exists only if `contacts` has entries."""
-    solids: Solids = ()
-    """Walls, tables, slopes and stairs, by name [-]."""
-
-    @property
-    def longest_step(self) -> float:
-        """The longest step of MuJoCo [s]."""
-        return self.timestep
-
-    def engine(self, robot: Robot, integrator: Integrator) -> MujocoPlant:
-        """Return the plant, which has its own integrator."""
-        return MujocoPlant(
-            robot,
-            timestep=self.timestep,
-            integrator=self.integrator,
-            contacts=self.contacts,
-            ground=self.ground,
-            solids=self.solids,
-            joint_limits=self.joint_limits,
-            friction=self.joint_friction(robot),
-            pushes=self.pushes,
-        )

@@ -216,14 +216,17 @@ class Imperfection(Part, ABC, error=SimulationError):
 
     Attributes:
         stage: The place in the chain; by default behind all of this package.
+        strength: The field that is zero, as a number or as nv numbers, where it changes
+            nothing; empty: there is none.
     """
 
     stage: ClassVar[float] = 100.0
+    strength: ClassVar[str] = ""
 
     @property
     def active(self) -> bool:
         """Whether it changes anything; a plant leaves out one that does not."""
-        return True
+        return not self.strength or bool(np.any(getattr(self, self.strength)))
 
     @property
     def periods(self) -> int:

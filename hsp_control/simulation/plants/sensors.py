@@ -84,15 +84,11 @@ class Encoder(Sensor, type="encoder_resolution"):
     """Joint positions rounded to counts; a root is exact."""
 
     stage: ClassVar[float] = 30.0
+    strength: ClassVar[str] = "resolution"
 
     resolution: Weights
     """Resolution of the encoders [rad or m], one number or nv: 2π/2¹⁹ for 19 bits per
     revolution; 0 is exact."""
-
-    @property
-    def active(self) -> bool:
-        """Whether a joint is rounded."""
-        return bool(np.any(self.resolution))
 
     def begin(
         self, robot: Robot, q: Array, v: Array, random: np.random.Generator
@@ -115,14 +111,10 @@ class PositionNoise(Sensor, type="position_noise"):
     """Gaussian white noise on the configuration, in its tangent space."""
 
     stage: ClassVar[float] = 20.0
+    strength: ClassVar[str] = "std"
 
     std: Weights
     """Standard deviation of position noise [rad or m], one number or nv."""
-
-    @property
-    def active(self) -> bool:
-        """Whether there is noise."""
-        return bool(np.any(self.std))
 
     def begin(
         self, robot: Robot, q: Array, v: Array, random: np.random.Generator
@@ -140,14 +132,10 @@ class VelocityNoise(Sensor, type="velocity_noise"):
     """Gaussian white noise on the velocity."""
 
     stage: ClassVar[float] = 50.0
+    strength: ClassVar[str] = "std"
 
     std: Weights
     """Standard deviation of velocity noise [rad/s or m/s], one number or nv."""
-
-    @property
-    def active(self) -> bool:
-        """Whether there is noise."""
-        return bool(np.any(self.std))
 
     def begin(
         self, robot: Robot, q: Array, v: Array, random: np.random.Generator
@@ -162,14 +150,10 @@ class SensorDelay(Sensor, type="delay"):
     """The state of some periods ago; the start state until there is one."""
 
     stage: ClassVar[float] = 10.0
+    strength: ClassVar[str] = "periods"
 
     periods: Periods
     """Delay of the measurements [control periods]."""
-
-    @property
-    def active(self) -> bool:
-        """Whether there is a delay."""
-        return self.periods > 0
 
     def begin(
         self, robot: Robot, q: Array, v: Array, random: np.random.Generator

@@ -28,8 +28,13 @@ from hsp_control.trajectories.orientation import (
 from hsp_control.trajectories.pose import PoseSample, PoseTrajectory
 from hsp_control.trajectories.remembering import Remembering
 from hsp_control.trajectories.streams.chart import Chart, State
-from hsp_control.trajectories.streams.listeners import check_address, is_address
-from hsp_control.trajectories.streams.mailbox import Mailbox, read_recording, recorded
+from hsp_control.trajectories.streams.mailbox import (
+    Mailbox,
+    check_address,
+    is_address,
+    read_recording,
+    recorded,
+)
 from hsp_control.trajectories.streams.message import ORIENTATION, POSE, Space
 from hsp_control.trajectories.streams.running import Policy, RunningStream, Source
 from hsp_control.trajectories.streams.segments import (

@@ -20,7 +20,7 @@ from hsp_control.companions.ros2.messages import (
 )
 from hsp_control.companions.ros2.node import Node, Publisher
 from hsp_control.trajectories.streams.inbox import Inbox
-from hsp_control.trajectories.streams.listeners import listening_inbox
+from hsp_control.trajectories.streams.mailbox import listening_inbox
 from hsp_control.trajectories.streams.message import ORIENTATION, POSE, Space
 
 POSITION = Space(3, False)

@@ -15,11 +15,10 @@ import hsp_control as hsp
 from hsp_control.common import adapters
 from hsp_control.common.arrays import Array
 from hsp_control.common.kernels import PLAIN, kernel
-from hsp_control.common.native import NativeCall, Timed, bind, once, only_if, sequence
+from hsp_control.common.native import NativeCall, bind, once, only_if, sequence
 from hsp_control.common.step_plan import (
     CallSequence,
     StepPlan,
-    TimeWindow,
     steps,
 )
 
@@ -101,7 +100,7 @@ def test_a_bound_call_is_the_kernel(
 def test_a_call_keeps_its_arrays_alive_and_lets_them_go() -> None:
     log = np.zeros(4)
     watched = weakref.ref(log)
-    call = sequence([Timed(bind(_note, log, 3.0), -np.inf, np.inf)])
+    call = sequence([bind(_note, log, 3.0)])
     del log
     gc.collect()
     for _ in range(3):
@@ -113,30 +112,13 @@ def test_a_call_keeps_its_arrays_alive_and_lets_them_go() -> None:
 
 
 @compiled
-def test_calls_are_made_in_turn_and_when_it_is_time() -> None:
+def test_calls_are_made_in_turn() -> None:
     log = np.zeros(9)
     first, last = bind(_note, log, 1.0), bind(_note, log, 2.0)
     timed = bind(_note_time, log, 10.0, timed=True)
-    calls = [
-        Timed(timed, -np.inf, np.inf),
-        Timed(last, 1.0, 2.0),
-        Timed(first, -np.inf, 1.5),
-    ]
-    call = sequence(calls)
-    assert call(0.0) == 1.0
-    assert called(log) == [10.0, 1.0]
-    assert call(1.0) == 1.0
-    assert called(log) == [11.0, 2.0, 1.0]
+    call = sequence([timed, sequence([last, first]), last])
     assert call(1.5) == 2.0
-    assert called(log) == [11.5, 2.0]
-    call(2.0)  # the end is not within
-    assert called(log) == [12.0]
-    # Within another sequence, a call is made when it is time for both.
-    call = sequence([Timed(first, 0.0, 9.0), Timed(sequence(calls), 1.5, 9.0)])
-    call(1.0)
-    assert called(log) == [1.0]
-    call(1.5)
-    assert called(log) == [1.0, 11.5, 2.0]
+    assert called(log) == [11.5, 2.0, 1.0, 2.0]
 
 
 def test_steps_are_references_then_what_reads_them_then_the_law() -> None:
@@ -149,24 +131,16 @@ def test_steps_are_references_then_what_reads_them_then_the_law() -> None:
     def own_write() -> None:
         _note(log, 7.0)
 
-    early = TimeWindow(
-        CallSequence(bind(_note_time, log, 20.0, timed=True), own), -np.inf, 1.0
-    )
+    timed = bind(_note_time, log, 20.0, timed=True)
+    pair = CallSequence(bind(_note, log, 2.0), bind(_note, log, 3.0), result=0)
     bounds = [
-        StepPlan(
-            (early, TimeWindow(own, 0.5, 3.0)), (bind(_note, log, 1.0), own_write)
-        ),
-        StepPlan(
-            (), (CallSequence(bind(_note, log, 2.0), bind(_note, log, 3.0), result=0),)
-        ),
+        StepPlan((CallSequence(timed, own), own), (bind(_note, log, 1.0), own_write)),
+        StepPlan((), (pair,)),
     ]
     found = steps(bounds, bind(_note, log, 4.0))
     outcome = [step(0.5) for step in found][-1]
     assert outcome == 4.0
     assert called(log) == [20.5, 100.5, 100.5, 1.0, 7.0, 2.0, 3.0, 4.0]
-    for step in found:
-        step(1.0)
-    assert called(log) == [101.0, 1.0, 7.0, 2.0, 3.0, 4.0]
 
 
 @pytest.mark.parametrize("plain", [False, True])

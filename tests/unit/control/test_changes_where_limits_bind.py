@@ -15,7 +15,7 @@ import hsp_control as hsp
 from hsp_control.common.arrays import Array
 from hsp_control.control.actuation import Status, actuation
 from hsp_control.control.compensation import Command, Compensation, FrictionFeedForward
-from hsp_control.control.planned import Switched
+from hsp_control.control.evolution import Switched
 from hsp_control.trajectories import HoldOrientation, Schedule
 from hsp_control.trajectories.switch import Switch
 

@@ -12,7 +12,7 @@ from compensation_cases import ALL, EVERYTHING, PANDA, Q0, H, circle, controller
 
 from hsp_control import Robot
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import CompensationError
+from hsp_control.common.exceptions import CompensationError, ImmutableError
 from hsp_control.control.compensation import (
     Command,
     Compensation,
@@ -61,7 +61,7 @@ def test_compensators_are_values() -> None:
     ki["hand"][0] = 0.0
     assert np.asarray(action.ki["hand"]).tolist() == [400.0, 800.0, 1200.0]
     assert eval(repr(own)) == own
-    with pytest.raises(TypeError):
+    with pytest.raises(ImmutableError):
         action.ki["arm"] = 1.0  # type: ignore[index]
     for each in (action, pickle.loads(pickle.dumps(action))):
         with pytest.raises(ValueError, match="read-only"):

@@ -14,7 +14,7 @@ from hsp_control.robot.motion import REFUSED
 if PLAIN:
     pytest.skip("plain Python has no native calls", allow_module_level=True)
 
-from hsp_control.control.free_step import free_step, is_free
+from hsp_control.control.mixture import free_step, is_free
 
 
 @pytest.mark.parametrize(

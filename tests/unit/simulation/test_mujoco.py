@@ -21,9 +21,9 @@ from hsp_control.common.resources import bundled_robots
 from hsp_control.geometry.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere
 from hsp_control.robot.description.loading import load_model
 from hsp_control.robot.description.sources import find_robot
-from hsp_control.robot.friction import JointFriction
+from hsp_control.robot.friction import Friction
 from hsp_control.simulation.plants import ContactShape, Ground, Push
-from hsp_control.simulation.plants.mujoco_plant import MujocoPlant
+from hsp_control.simulation.plants.mujoco_plant import Mujoco, MujocoPlant
 
 mujoco = pytest.importorskip("mujoco")
 from mujoco_oracle import mass_matrix  # noqa: E402
@@ -88,7 +88,7 @@ def random_state(robot: Robot, rng: np.random.Generator) -> tuple[Array, Array]:
 def test_mass_matrix_and_bias_agree_with_pinocchio(name: str) -> None:
     """M = TᵀM'T and N = Tᵀ(N' + M'T'v), T' by differences; power is kept."""
     robot = load(name)
-    plant = MujocoPlant(robot)
+    plant = MujocoPlant(robot, Mujoco())
     rng = np.random.default_rng(1)
     for _ in range(3):
         q, v = random_state(robot, rng)
@@ -114,7 +114,7 @@ def test_mass_matrix_and_bias_agree_with_pinocchio(name: str) -> None:
 @pytest.mark.parametrize("name", [*bundled_robots(), *OTHERS, "placed", "zoo"])
 def test_states_go_there_and_back(name: str) -> None:
     robot = load(name)
-    plant = MujocoPlant(robot)
+    plant = MujocoPlant(robot, Mujoco())
     rng = np.random.default_rng(2)
     for _ in range(10):
         q, v = random_state(robot, rng)
@@ -169,9 +169,9 @@ def stand(
     return robot.difference(reference, x)[:6], v, found
 
 
-def dampers(robot: Robot, springs: Array) -> JointFriction:
+def dampers(springs: Array) -> Friction:
     """Return what damps the springs: implicit, as such stiff ones must be."""
-    return JointFriction.of(robot, viscous=0.03 * springs)
+    return Friction(viscous=0.03 * springs)
 
 
 @pytest.mark.slow
@@ -185,8 +185,10 @@ def test_a_legged_robot_stands_on_its_own_feet(name: str) -> None:
     robot, q, feet, springs = standing(name)
     plant = MujocoPlant(
         robot,
-        contacts=[ContactShape(foot) for foot in feet],
-        friction=dampers(robot, springs),
+        Mujoco(
+            contacts=[ContactShape(foot) for foot in feet],
+            friction=dampers(springs),
+        ),
     )
     moved, v, forces = stand(plant, q, springs, 3.0)
     assert np.abs(moved[:3]).max() < 0.02
@@ -219,7 +221,7 @@ def test_a_contact_force_is_the_grounds_on_the_robot_about_the_frame() -> None:
     robot.model.addFrame(pin.Frame("aside", 1, 0, aside, kind))
     robot = Robot(robot.model, robot.source)
     shape = ContactShape("aside", Box((0.2, 0.2, 0.2)), (-0.5, 0.0, -0.2))
-    plant = MujocoPlant(robot, contacts=[shape], ground=Ground(height=1.0))
+    plant = MujocoPlant(robot, Mujoco(contacts=[shape], ground=Ground(height=1.0)))
     q = np.array([0.0, 0.0, 1.1, 0.0, 0.0, 0.0, 1.0])
     plant.reset(0.0, q, np.zeros(6))
     q, v = plant.advance(0.0, 1.0, np.zeros(6))
@@ -241,7 +243,7 @@ def test_friction_of_the_ground_is_coulombs(mu: float, slides: bool) -> None:
     robot.model.gravity.linear = 9.81 * np.array([np.sin(tilt), 0.0, -np.cos(tilt)])
     contact = ContactShape("body", Box((0.2, 0.2, 0.02)))
     ground = Ground(friction=mu)
-    plant = MujocoPlant(robot, contacts=[contact], ground=ground)
+    plant = MujocoPlant(robot, Mujoco(contacts=[contact], ground=ground))
     plant.reset(0.0, np.array([0, 0, 0.01, 0, 0, 0, 1.0]), np.zeros(6))
     _, v = plant.advance(0.0, 0.5, np.zeros(6))
     expected = 9.81 * (np.sin(tilt) - mu * np.cos(tilt)) if slides else 0.0
@@ -259,7 +261,9 @@ def test_shapes_touch_where_they_are() -> None:
     ]:
         for offset in (0.0, 0.3):
             contact = ContactShape("body", shape, (0.0, 0.0, offset))
-            plant = MujocoPlant(robot, contacts=[contact], ground=Ground(height=0.2))
+            plant = MujocoPlant(
+                robot, Mujoco(contacts=[contact], ground=Ground(height=0.2))
+            )
             found = plant.clearance(q)
             assert found == pytest.approx(height + offset - 0.2, abs=1e-6), shape
 
@@ -268,7 +272,7 @@ def test_shapes_touch_where_they_are() -> None:
 
 
 def test_a_floating_root_has_no_motor() -> None:
-    plant = MujocoPlant(ball())
+    plant = MujocoPlant(ball(), Mujoco())
     plant.reset(0.0, np.array([0, 0, 0, 0, 0, 0, 1.0]), np.zeros(6))
     with pytest.raises(
         SimulationError, match=r"^the effort at t = 0 s pushes the floa"
@@ -284,7 +288,7 @@ def test_a_joint_without_counterpart_is_refused() -> None:
     with pytest.raises(
         ModelError, match=r"joint 'neck' is a JointModelSphericalZYX, wh"
     ):
-        MujocoPlant(robot)
+        MujocoPlant(robot, Mujoco())
 
 
 def test_impossible_inertias_are_refused() -> None:
@@ -294,12 +298,10 @@ def test_impossible_inertias_are_refused() -> None:
     inertia = pin.Inertia(1.0, np.zeros(3), np.diag([1.0, 1.0, 3.0]))
     model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
     with pytest.raises(SimulationError, match=r"^MuJoCo rejects planar3r: .*inertia"):
-        MujocoPlant(Robot(model, find_robot("planar3r")))
+        MujocoPlant(Robot(model, find_robot("planar3r")), Mujoco())
 
 
 @pytest.mark.parametrize(("options", "kind", "message"), [
-    ({"timestep": 0.0}, SimulationError, r"^mujoco: timestep is 0.0; must be posi"),
-    ({"integrator": "rk4"}, SimulationError, r"^mujoco: integrator 'rk4': choose"),
     ({"contacts": [ContactShape("panda_tpc", Sphere(0.1))]},
      FrameNotFoundError,
      r"^contacts.panda_tpc: no frame 'panda_tpc'; did you mean 'panda_tcp'"),
@@ -309,14 +311,14 @@ def test_impossible_inertias_are_refused() -> None:
 ])  # fmt: skip
 def test_settings_that_are_none(options: Any, kind: Any, message: str) -> None:
     with pytest.raises(kind, match=message):
-        MujocoPlant(load("panda"), **options)
+        MujocoPlant(load("panda"), Mujoco(**options))
 
 
 def test_clearance_is_of_contacts() -> None:
     with pytest.raises(
         SimulationError, match=r"^panda has no contacts with the ground"
     ):
-        MujocoPlant(load("panda")).clearance(load("panda").home())
+        MujocoPlant(load("panda"), Mujoco()).clearance(load("panda").home())
 
 
 def test_a_foot_that_cannot_touch_is_refused(tmp_path: Path) -> None:
@@ -324,13 +326,13 @@ def test_a_foot_that_cannot_touch_is_refused(tmp_path: Path) -> None:
     robot = Robot.load(tmp_path / "bare.urdf")
     message = r"^contacts.upper: no collision geometry is fixed to it; give a shape$"
     with pytest.raises(SimulationError, match=message):
-        MujocoPlant(robot, contacts=[ContactShape("upper")])
+        MujocoPlant(robot, Mujoco(contacts=[ContactShape("upper")]))
     message = r"^ContactShape: shape: plane is not possible here; needs a sphere, "
     with pytest.raises(SimulationError, match=message):
         ContactShape("leg", HalfSpace())
     message = r"^contacts.base: it is fixed to the world and never moves$"
     with pytest.raises(SimulationError, match=message):
-        MujocoPlant(robot, contacts=[ContactShape("base", Sphere(0.1))])
+        MujocoPlant(robot, Mujoco(contacts=[ContactShape("base", Sphere(0.1))]))
 
 
 def test_a_motion_that_diverges_is_an_error(
@@ -339,7 +341,7 @@ def test_a_motion_that_diverges_is_an_error(
     """And it leaves no file behind, as MuJoCo does by default."""
     monkeypatch.chdir(tmp_path)
     robot = load("panda")
-    plant = MujocoPlant(robot)
+    plant = MujocoPlant(robot, Mujoco())
     plant.reset(0.0, robot.home(), np.zeros(7))
     with pytest.raises(
         SimulationError, match=r"^the motion diverged before t = 0.01 s"

@@ -13,12 +13,11 @@ from hsp_control.common.exceptions import (
     JointNotFoundError,
     SimulationError,
 )
-from hsp_control.robot.friction import JointFriction
 from hsp_control.simulation.plants import (
     MujocoScenePlant,
     Push,
 )
-from hsp_control.simulation.plants.mujoco_plant import MujocoPlant
+from hsp_control.simulation.plants.mujoco_plant import Mujoco, MujocoPlant
 from hsp_control.trajectories import Circle
 
 mujoco = pytest.importorskip("mujoco")
@@ -53,7 +52,7 @@ def test_it_moves_like_the_plant_that_is_made_of_the_robot() -> None:
     """The same engine with two models: one from the scene, one from the robot."""
     robot, model, data = cell(without_gripper())
     ours = MujocoScenePlant(robot, model, data)
-    theirs = MujocoPlant(robot, timestep=0.001, friction=JointFriction.of_model(robot))
+    theirs = MujocoPlant(robot, Mujoco(timestep=0.001, friction="urdf"))
     q, v = np.array([0.1, 0.5, -0.2, 1.0]), np.array([0.3, -0.2, 0.5, 0.1])
     ends = []
     for plant in (ours, theirs):

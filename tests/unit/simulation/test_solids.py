@@ -10,7 +10,7 @@ from hsp_control import Robot
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.geometry.shapes import Box, HalfSpace, Sphere
 from hsp_control.simulation.plants import ContactShape, Solid
-from hsp_control.simulation.plants.mujoco_plant import MujocoPlant
+from hsp_control.simulation.plants.mujoco_plant import Mujoco, MujocoPlant
 
 mujoco = pytest.importorskip("mujoco")
 TIP = "panda_tcp"
@@ -23,7 +23,9 @@ def panda() -> Robot:
 
 def plant(*solids: Solid, **options: Any) -> MujocoPlant:
     contacts = [ContactShape(TIP, Sphere(0.02))]
-    return MujocoPlant(panda(), **({"contacts": contacts, "solids": solids} | options))
+    return MujocoPlant(
+        panda(), Mujoco(**({"contacts": contacts, "solids": solids} | options))
+    )
 
 
 def test_stairs_are_copies() -> None:

@@ -22,7 +22,7 @@ from hsp_control.trajectories import (
 )
 from hsp_control.trajectories.streams import inbox
 from hsp_control.trajectories.streams.mailbox import read_recording
-from hsp_control.trajectories.streams.waypoints import SenderClock
+from hsp_control.trajectories.streams.running import SenderClock
 
 H = 5e-4
 """Time between samples [s]."""

@@ -1,0 +1,62 @@
+"""A stage of the chain of compensators, and what the stages of a run share."""
+
+from collections import deque
+from collections.abc import Mapping
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.control.active_stack import ActiveStack
+from hsp_control.control.controller import Controller
+from hsp_control.control.measurement import NO_WRENCHES, LogChannel
+from hsp_control.control.output import ControlOutput
+from hsp_control.robot import RobotState
+
+
+class Run:
+    """What the stages of one run share; they read it and write it, one by one."""
+
+    # time and state for which the law is to be evaluated, at first as they are measured
+    t: float
+    q: Array
+    v: Array
+    # acceleration to deliver, at first the law's, and effort besides M a + N, (nv,)
+    a: Array
+    effort: Array
+    output: ControlOutput  # the controller's, of the last effort
+
+    def __init__(
+        self, controller: Controller, measured: RobotState, ahead: int
+    ) -> None:
+        """Begin; ``ahead`` is the number of efforts on their way, besides the last."""
+        self.controller = controller
+        self.measured = measured  # the last measurement, where an observer needs it
+        self.wrenches: Mapping[str, Array] = NO_WRENCHES  # see `Measurement`
+        # how long the effort is held that comes next, and the last one: 0 at first [s]
+        self.period = self.last_period = 0.0
+        self.starting = False  # whether the law is not yet fully active
+        self.none = np.zeros(controller.robot.nv)
+        # effort that the model does not explain, and that friction consumes, (nv,)
+        self.disturbance: Array = self.none
+        self.friction: Array = self.none
+        self.friction_sent: Array = self.none  # of the last effort
+        # the efforts on the model, less friction: one for each period from the last
+        # measurement to the period that begins now
+        self.under_way: deque[Array] = deque(maxlen=1 + ahead)
+
+
+class Stage:
+    """What a compensator does in one run; what it does not override stays as it is."""
+
+    def measure(self, run: Run) -> None:
+        """Change the time and the state for which the law is evaluated."""
+
+    def act(self, run: Run, state: RobotState, active: ActiveStack) -> None:
+        """Change the acceleration or the effort; while tasks fade, for each set."""
+
+    def sent(self, run: Run) -> None:
+        """Go on for the period for which the effort of `Run.output` is held."""
+
+    def log_channels(self, run: Run) -> Mapping[str, LogChannel]:
+        """Return what to log, by name."""
+        return {}
