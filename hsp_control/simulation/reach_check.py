@@ -102,7 +102,7 @@ def _leaves(
 def _target(task: Task, t: float) -> pin.SE3:
     """Return where a task's frame is to be at a time [s]."""
     if isinstance(task, FramePose):
-        pose = task.pose.sample(t)
+        pose = task.followed.sample(t)
         return pin.SE3(pose.orientation.rotation.copy(), pose.position.position.copy())
     assert isinstance(task, FramePosition)
     return pin.SE3(np.eye(3), task.trajectory.sample(t).position.copy())

@@ -36,11 +36,6 @@ class FramePosition(FrameTask, TrackingTask, CompliantTask, type="frame_position
         """The position along the tracked axes."""
         return (ErrorPart("position", "m", "m/s", len(self.axes)),)
 
-    @property
-    def followed(self) -> Trajectory:
-        """The trajectory of a placed task."""
-        return self.trajectory
-
     def placed(self, start: Start) -> Self:
         """Return the task with its trajectory in the world; see `Task.placed`."""
         robot = start.state.robot
