@@ -12,7 +12,7 @@ from hsp_control.common.exceptions import CompensationError, GainError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.control.controller import Controller
 from hsp_control.declaration import Part, within
-from hsp_control.declaration.equality import same
+from hsp_control.declaration.families import same
 from hsp_control.declaration.quantities import ArrayField, Gain, Names, Positive
 from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
