@@ -17,6 +17,7 @@ from hsp_control.simulation.log_series import distance_label, joint_names, unrea
 from hsp_control.visualization.palette import SERIES
 from hsp_control.visualization.viewer import Viewer
 from hsp_control.visualization.viewer.clearances import capsules, distances, influence
+from hsp_control.visualization.viewer.clip import track_fields
 from hsp_control.visualization.viewer.commands import (
     PLAY,
     PageCommand,
@@ -111,14 +112,7 @@ class Picture:
         """Return the commands of a picture; see `draw`."""
         session, handles = self._session, self._session.handles
         changed, samples = list(self._changed_field()), list(self._samples())
-        tracks = [
-            {
-                "path": track.path,
-                "property": track.property,
-                "values": typed_array(track.values, np.float32),
-            }
-            for track in self._run.tracks(self._motion())
-        ]
+        tracks = [*map(track_fields, self._run.tracks(self._motion()))]
         poses, places = handles.places()
         level = "warning" if handles.warning or session.over else "info"
         text = session.over or handles.message

@@ -1,8 +1,7 @@
 """The tasks of a frame's orientation on SO(3), and of its pose."""
 
 from abc import abstractmethod
-from dataclasses import replace
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import pinocchio as pin
@@ -22,15 +21,13 @@ from hsp_control.common.rotations import (
     rotate_back,
 )
 from hsp_control.declaration import AnyOf
-from hsp_control.geometry.start import Start
 from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
-from hsp_control.robot.kinematics import FrameMotion
+from hsp_control.robot.kinematics import FrameKinematics, FrameMotion
 from hsp_control.tasks.compliant_task import CompliantTask
 from hsp_control.tasks.frame_task import (
     FrameTask,
     TrackingTask,
-    frame_of,
     place_orientation,
     place_pose,
 )
@@ -74,14 +71,9 @@ class FrameOrientation(
     def _default_name(self) -> str:
         return f"{super()._default_name()}_orientation"
 
-    def placed(self, start: Start) -> Self:
-        """Return the task with its trajectory in the world; see `Task.placed`."""
-        robot = start.state.robot
-        frame = frame_of(self.frame, robot)
-        here = start.state.frame(frame).rotation
-        trajectory = place_orientation(self.trajectory, here, self.blend)
-        placed = replace(self, frame=frame, trajectory=trajectory, blend=None)
-        return placed.checked(robot)
+    def _placed_at(self, here: FrameKinematics) -> dict[str, Any]:
+        trajectory = place_orientation(self.trajectory, here.rotation, self.blend)
+        return {"trajectory": trajectory, "blend": None}
 
     def kernel(self, state: RobotState) -> KernelCall:
         """Return the kernel; see `Task.kernel`."""
@@ -252,15 +244,10 @@ class FramePose(FrameTask, PoseTask, CompliantTask, type="frame_pose"):
     """The desired pose, world ← frame, or the trajectory of its origin, with the
     orientation of the start [m, rad]; held at the start by default."""
 
-    def placed(self, start: Start) -> Self:
-        """Return the task with its trajectory in the world; see `Task.placed`."""
-        robot = start.state.robot
-        frame = frame_of(self.frame, robot)
-        motion = start.state.frame(frame)
-        here = pin.SE3(motion.rotation, motion.position)
-        trajectory = place_pose(self.trajectory, here, self.blend)
-        placed = replace(self, frame=frame, trajectory=trajectory, blend=None)
-        return placed.checked(robot)
+    def _placed_at(self, here: FrameKinematics) -> dict[str, Any]:
+        place = pin.SE3(here.rotation, here.position)
+        trajectory = place_pose(self.trajectory, place, self.blend)
+        return {"trajectory": trajectory, "blend": None}
 
     def kernel(self, state: RobotState) -> KernelCall:
         """Return the kernel; see `Task.kernel`."""

@@ -174,6 +174,12 @@ def extend_clip(clip: Clip, number: int) -> PageCommand:
     return page_command("clip", CLIP, f"more {number}", **_fields(clip), begins=False)
 
 
+def track_fields(track: Track) -> Json:
+    """Return a track as the page takes it, without its times."""
+    values = typed_array(track.values, np.float32)
+    return {"path": track.path, "property": track.property, "values": values}
+
+
 def _fields(clip: Clip) -> Json:
     clocks = list({id(track.times): track.times for track in clip.tracks}.values())
     numbers = {id(clock): number for number, clock in enumerate(clocks)}
@@ -184,12 +190,7 @@ def _fields(clip: Clip) -> Json:
         "open": clip.open,
         "clocks": [typed_array(clock, np.float64) for clock in clocks],
         "tracks": [
-            {
-                "path": track.path,
-                "property": track.property,
-                "clock": numbers[id(track.times)],
-                "values": typed_array(track.values, np.float32),
-            }
+            {**track_fields(track), "clock": numbers[id(track.times)]}
             for track in clip.tracks
         ],
         "bands": [band._asdict() for band in clip.bands],
