@@ -10,8 +10,13 @@ from typing import Any
 
 from hsp_control.common.exceptions import ConfigError, HspControlError
 from hsp_control.common.suggestions import nearest
-from hsp_control.config.syntax import YamlError
-from hsp_control.config.yaml_reader import MAX_DEPTH, MAX_SIZE, Mark, read_yaml
+from hsp_control.config.yaml_reader import (
+    MAX_DEPTH,
+    MAX_SIZE,
+    Mark,
+    YamlError,
+    read_yaml,
+)
 from hsp_control.declaration.keys import KeyPath, split_assignment, written
 from hsp_control.declaration.located import locate, located
 from hsp_control.declaration.plain import shortened, shown

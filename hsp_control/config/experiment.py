@@ -2,12 +2,12 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import count
-from operator import is_
 from os import PathLike
 from pathlib import Path
 from time import monotonic, sleep
-from typing import Any, Literal, NoReturn, Self, cast
+from typing import Any, Literal, NoReturn, Self
 
 import yaml
 from numpy.typing import ArrayLike
@@ -21,21 +21,19 @@ from hsp_control.common.exceptions import (
 )
 from hsp_control.config.document import Document
 from hsp_control.config.loaded_scenario import LoadedScenario, load_scenario
-from hsp_control.config.loop_check import check_compensation, check_rates
 from hsp_control.config.scenario import Scenario
 from hsp_control.config.source import read_document
 from hsp_control.config.view_settings import ViewSettings
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits
 from hsp_control.control.changes import Change
-from hsp_control.control.compensation import Compensation, RateFinding
+from hsp_control.control.compensation import Compensation, RateFinding, check_rate
 from hsp_control.control.controller import Controller
 from hsp_control.control.estimator import Estimator, begun
 from hsp_control.control.plan import Plan
 from hsp_control.control.setup import Base
-from hsp_control.declaration import Part
 from hsp_control.declaration.named import keyed
-from hsp_control.declaration.nested import parts_within
+from hsp_control.declaration.nested import parts_within, with_parts_replaced
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.live.settings import LiveSettings
@@ -144,17 +142,6 @@ class Experiment:
             HspControlError: If a part is wrong, or does not fit the others; see
                 `load_experiment`.
         """
-        terms = () if field is None else tuple(terms_of(field))
-        scene, (terms, limits, changes) = named_obstacles(
-            scene if isinstance(scene, Scene) else Scene(scene),
-            (terms, limits, tuple(changes)),
-        )
-        null_space = {
-            "gain": null_space_gain,
-            "metric": metric,
-            "fields": terms,
-            "singularity_threshold": singularity_threshold,
-        }
         given = {
             "start": start,
             "compensation": compensation,
@@ -165,16 +152,12 @@ class Experiment:
         data = {
             "title": title,
             "description": description,
-            "robot": robot_description(robot),
-            "tasks": keyed(tasks),
-            "null_space": null_space,
-            "limits": limits,
-            "contacts": keyed(contacts),
-            "base": base,
+            **controller_data(
+                *(robot, tasks, field, null_space_gain, metric, singularity_threshold),
+                *(limits, contacts, base, scene, changes),
+            ),
             "plan": plan,
             "estimators": estimators,
-            "scene": scene,
-            "changes": changes,
             "plant": plant,
             **{key: part for key, part in given.items() if part is not None},
         }
@@ -235,8 +218,9 @@ class Experiment:
                 scenario.plan.begin(controller).start(robot.state(0.0, q0, v0))
         with document.at():
             begun(scenario.estimators, controller, plant.inertial())
-        check_compensation(document, scenario, controller)
-        rates = check_rates(document, scenario, controller, q0, plant.robot)
+        _check_compensation(document, scenario, controller)
+        with document.at():
+            rates = _rate_findings(scenario, controller, q0, plant.robot)
         vars(self).update(
             name=Path(document.name).stem,
             scenario=scenario,
@@ -392,41 +376,89 @@ def _integrator(scenario: Scenario) -> Integrator:
     return settings.integrator or own
 
 
-def robot_description(robot: str | Robot | RobotDescription) -> RobotDescription:
-    """Return what a configuration says about a robot."""
-    if isinstance(robot, str):
-        return RobotDescription(robot)
-    if isinstance(robot, RobotDescription):
-        return robot
-    if robot.description is None:
-        raise ModelError(
-            f"{robot.name} was not loaded by Robot.load, so that no configuration can "
-            "name it; give a name, a path or a RobotDescription"
-        )
-    return robot.description
+def controller_data(
+    robot: str | Robot | RobotDescription,
+    tasks: Sequence[Task],
+    field: NullSpaceField | None,
+    gain: ArrayLike,
+    metric: Metric | None,
+    threshold: float,
+    limits: Limits | None,
+    contacts: Sequence[Contact],
+    base: Base | None,
+    scene: Scene | Iterable[Obstacle],
+    changes: Sequence[Change] = (),
+) -> dict[str, Any]:
+    """Return what a configuration says about a controller; see `Experiment`.
 
-
-def named_obstacles(scene: Scene, parts: Any) -> tuple[Scene, Any]:
-    """Return the scene with the parts' own obstacles, and parts with their names."""
+    The parts' own obstacles are in its scene, and the parts have their names.
+    """
+    if isinstance(robot, Robot):
+        if robot.description is None:
+            raise ModelError(
+                f"{robot.name} was not loaded by Robot.load, so that no configuration "
+                "can name it; give a name, a path or a RobotDescription"
+            )
+        robot = robot.description
+    scene = scene if isinstance(scene, Scene) else Scene(scene)
     known = dict(scene)
 
-    def named(value: Any) -> Any:
-        if isinstance(value, Obstacle):
-            if known.setdefault(value.name, value) != value:
-                raise SceneError(f"two obstacles have the name {value.name!r}")
-            return value.name
-        if isinstance(value, tuple):
-            new = tuple(map(named, value))
-            return value if all(map(is_, value, new)) else new
-        if isinstance(value, Part):
-            fields = value.all_fields()
-            found = {name: named(each) for name, each in fields.items()}
-            changed = {k: each for k, each in found.items() if each is not fields[k]}
-            return replace(cast("Any", value), **changed) if changed else value
-        return value
+    def name_of(obstacle: Obstacle) -> str:
+        if known.setdefault(obstacle.name, obstacle) != obstacle:
+            raise SceneError(f"two obstacles have the name {obstacle.name!r}")
+        return obstacle.name
 
-    parts = named(parts)
-    return (scene if len(known) == len(scene) else Scene(known.values())), parts
+    named = partial(with_parts_replaced, kind=Obstacle, change=name_of)
+    null_space = {
+        "gain": gain,
+        "metric": metric,
+        "fields": named(() if field is None else tuple(terms_of(field))),
+        "singularity_threshold": threshold,
+    }
+    return {
+        "robot": RobotDescription(robot) if isinstance(robot, str) else robot,
+        "tasks": keyed(tasks),
+        "null_space": null_space,
+        "limits": named(limits),
+        "contacts": keyed(contacts),
+        "base": base,
+        "changes": named(tuple(changes)),
+        "scene": scene if len(known) == len(scene) else Scene(known.values()),
+    }
+
+
+def _check_compensation(
+    document: Document, scenario: Scenario, controller: Controller
+) -> None:
+    """Check the compensation against the robot, its tasks and contacts."""
+    compensation = scenario.compensation
+    if compensation.names and scenario.simulation.control_period is None:
+        raise document.error(
+            ("compensation",),
+            "compensation acts once per control period: set simulation.control_period "
+            "[s], for example to 0.001",
+        )
+    with document.at("compensation"):
+        compensation.check(controller.robot, controller.tasks, controller.contacts)
+
+
+def _rate_findings(
+    scenario: Scenario, controller: Controller, q0: Array, moving: Robot
+) -> tuple[RateFinding, ...]:
+    """Check that the loop is stable at its rate; return gains that are high for it."""
+    settings, plant = scenario.simulation, scenario.plant
+    if settings.control_period is None or not settings.check_rate:
+        return ()
+    found = check_rate(
+        controller,
+        q0,
+        settings.control_period,
+        scenario.compensation,
+        effort_delay=plant.effort_delay,
+        sensor_delay=plant.sensor_delay,
+        plant=moving,
+    )
+    return tuple(found)
 
 
 def _in_real_time(

@@ -11,13 +11,11 @@ from numpy.typing import ArrayLike
 
 from hsp_control.common.exceptions import HspControlError, LogError
 from hsp_control.config.document import Document
-from hsp_control.config.experiment import named_obstacles, robot_description
+from hsp_control.config.experiment import controller_data
 from hsp_control.config.loaded_scenario import load_scenario
 from hsp_control.control.controller import Controller
 from hsp_control.control.output import ControlOutput
-from hsp_control.declaration.named import keyed
 from hsp_control.declaration.plain_data import plain_data
-from hsp_control.null_space.fields.field import terms_of
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.log_writer import LogWriter
 
@@ -171,24 +169,12 @@ class Recorder:
 
 def _config_of(controller: Controller) -> tuple[dict[str, Any] | None, str]:
     """Return the configuration of a controller as data; or None, and why."""
-    parts = controller._declared
-    fields = terms_of(parts.field)
-    scene, (fields, limits) = named_obstacles(parts.scene, (fields, parts.limits))
+    own = controller._declared
     try:
-        data = {
-            "robot": robot_description(parts.robot),
-            "tasks": keyed(parts.tasks),
-            "null_space": {
-                "gain": parts.gain,
-                "metric": parts.metric,
-                "fields": fields,
-                "singularity_threshold": parts.threshold,
-            },
-            "limits": limits,
-            "contacts": keyed(parts.contacts),
-            "base": parts.base,
-            "scene": scene,
-        }
+        data = controller_data(
+            *(own.robot, own.tasks, own.field, own.gain, own.metric, own.threshold),
+            *(own.limits, own.contacts, own.base, own.scene),
+        )
         scenario = load_scenario(Document(data, {}, "recorded")).scenario
         config: dict[str, Any] = plain_data(scenario, defaults=True)
     except HspControlError as error:

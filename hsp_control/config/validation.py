@@ -12,7 +12,6 @@ from hsp_control.declaration.families import only_packages
 from hsp_control.declaration.located import locate
 from hsp_control.declaration.mistakes import (
     Finding,
-    Pending,
     domain_error,
     explained,
     findings,
@@ -22,8 +21,6 @@ from hsp_control.declaration.schema import shape
 Value = TypeVar("Value", bound=Part)
 
 _OTHERS = 5
-_MANY = 2000
-_ENTRIES = 20
 
 
 def validate(document: Document, part: type[Value]) -> Value:
@@ -35,23 +32,9 @@ def validate(document: Document, part: type[Value]) -> Value:
         with admitted:
             return TypeAdapter(part).validate_python(document.to_dict())
     except ValidationError as error:
-        pending = _first_entries(
-            [(each["loc"], each) for each in error.errors(include_url=False)]
-        )
+        pending = [(each["loc"], each) for each in error.errors(include_url=False)]
         found = findings(document, shape(part), pending)
     raise _summary(document, sorted(found, key=lambda f: _order(document, f)))
-
-
-def _first_entries(pending: list[Pending]) -> list[Pending]:
-    """Of very many errors, drop those of later entries in long lists."""
-    if len(pending) <= _MANY:
-        return pending
-    first = [
-        (path, error)
-        for path, error in pending
-        if all(part < _ENTRIES for part in path if isinstance(part, int))
-    ]
-    return first or pending[:1]
 
 
 def _order(document: Document, finding: Finding) -> tuple[bool, tuple[int, ...]]:

@@ -13,23 +13,30 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from hsp_control.config.syntax import YamlError, character_error, syntax_error
 from hsp_control.declaration.keys import KeyPath
 from hsp_control.declaration.plain import shown
 
 TAG = "tag:yaml.org,2002:"
 
+_HINTS = {
+    r"'\t'": "a tab in the indentation; use spaces",
+    "mapping values are not allowed": (
+        "a key is not allowed here; check the indentation, and put text that contains "
+        "': ' in quotes"
+    ),
+    "expected <block end>": "the indentation does not match the lines above",
+}
+"""Part of a message of PyYAML, and the message that replaces it."""
 
-class Scalar(NamedTuple):
-    """One kind of scalar."""
 
-    name: str  # its name in messages
-    # converts its text to its value; raises ValueError if it cannot
-    convert: Callable[[str], Any]
-    # regular expression of its text without quotes; None if only a tag selects it
-    pattern: str | None = None
-    # the characters that it can begin with; an empty string if the scalar can be empty
-    first: tuple[str, ...] = ()
+class YamlError(Exception):
+    """The text is not YAML, or uses a part of YAML that is not allowed."""
+
+    def __init__(self, line: int, message: str, path: KeyPath = ()) -> None:
+        super().__init__(line, message, path)
+        self.line = line  # the line of the error, counted from 1
+        self.message = message  # what is wrong there
+        self.path = path  # the key path of the error; empty if it is not known
 
 
 def _null(text: str) -> None:
@@ -58,32 +65,20 @@ def _text(text: str) -> str:
     return text
 
 
-SCALARS = {
-    TAG + "null": Scalar(
-        "null", _null, pattern=r"~|null|Null|NULL|", first=("~", "n", "N", "")
-    ),
-    TAG + "bool": Scalar(
-        "true or false",
-        _boolean,
-        pattern=r"true|True|TRUE|false|False|FALSE",
-        first=tuple("tTfF"),
-    ),
-    TAG + "int": Scalar(
-        "a 64-bit integer",
-        _integer,
-        pattern=r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+",
-        first=tuple("-+0123456789"),
-    ),
-    TAG + "float": Scalar(
+_SCALARS: dict[str, tuple[str, Callable[[str], Any], str | None]] = {
+    TAG + "null": ("null", _null, r"~|null|Null|NULL|"),
+    TAG + "bool": ("true or false", _boolean, "true|True|TRUE|false|False|FALSE"),
+    TAG + "int": ("a 64-bit integer", _integer, "[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+"),
+    TAG + "float": (
         "a number",
         _number,
-        pattern=r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?"
+        r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?"
         r"|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)",
-        first=tuple("-+.0123456789"),
     ),
-    TAG + "str": Scalar("text", _text),
+    TAG + "str": ("text", _text, None),
 }
-"""Every scalar that is allowed in a file, by tag."""
+"""By tag the scalars that are allowed: the name in messages, what converts the text (or
+raises ValueError), and the text without quotes; None if nothing else fits."""
 
 
 MAX_SIZE = 1_000_000
@@ -129,24 +124,41 @@ class _Composer(yaml.BaseLoader):
         return node
 
 
-for _tag, _scalar in SCALARS.items():
-    if _scalar.pattern is not None:
-        _regex = re.compile(rf"(?:{_scalar.pattern})\Z")
-        _Composer.add_implicit_resolver(_tag, _regex, _scalar.first)
+for _tag, (*_, _pattern) in _SCALARS.items():
+    if _pattern is not None:
+        _regex = re.compile(rf"(?:{_pattern})\Z")
+        _Composer.add_implicit_resolver(_tag, _regex, None)
 
 
 def _compose(text: str) -> yaml.Node | None:
     try:
         composer = _Composer(text)
     except yaml.reader.ReaderError as error:
-        raise character_error(error, text) from None
+        line = text.count("\n", 0, error.position) + 1
+        character = f"U+{ord(text[error.position]):04X}"
+        message = f"not YAML: the character {character} is not allowed"
+        raise YamlError(line, message) from None
     try:
         return composer.get_single_node()
     except yaml.MarkedYAMLError as error:
-        raise syntax_error(error) from None
+        raise _syntax_error(error) from None
     except (ValueError, OverflowError):  # raised by the scanner's own int() and chr()
         message = "not YAML: an escape sequence or a version number is out of range"
         raise YamlError(composer.line + 1, message) from None
+
+
+def _syntax_error(error: yaml.MarkedYAMLError) -> YamlError:
+    """Return the error for one of PyYAML."""
+    problem, context = error.problem or "", error.context or ""
+    mark = error.problem_mark or error.context_mark
+    line = mark.line + 1 if mark else 1
+    for part_of_problem, hint in _HINTS.items():
+        if part_of_problem in problem:
+            return YamlError(line, f"not YAML: {hint}")
+    if context and error.context_mark and error.context_mark.line + 1 != line:
+        context += f" from line {error.context_mark.line + 1}"
+    what = ", ".join(part for part in (context, problem) if part)
+    return YamlError(line, f"not YAML: {what}")
 
 
 class _Builder:
@@ -213,14 +225,14 @@ def _key(node: yaml.Node, path: KeyPath) -> str:
 
 def _value(node: yaml.Node, path: KeyPath) -> Any:
     line = _mark(node).line
-    scalar = SCALARS.get(node.tag)
-    if scalar is None or not isinstance(node, yaml.ScalarNode):
+    if node.tag not in _SCALARS or not isinstance(node, yaml.ScalarNode):
         tag = node.tag.replace(TAG, "!!")
         raise YamlError(line, f"the tag {tag!r} is not allowed: plain data only", path)
+    name, convert, _ = _SCALARS[node.tag]
     try:
-        return scalar.convert(node.value)
+        return convert(node.value)
     except ValueError:
-        what = f"{shown(node.value)} cannot be read as {scalar.name}"
+        what = f"{shown(node.value)} cannot be read as {name}"
         raise YamlError(line, what, path) from None
 
 

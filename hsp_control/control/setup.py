@@ -105,7 +105,7 @@ def checked_gain(gain: ArrayLike, robot: Robot, metric: Metric) -> Array:
     numbers is not enough: over the mass matrix some let e_N grow at some
     configurations.
     """
-    K_N = as_matrix(as_gain(gain, "null_space_gain"), robot.nv, "null_space_gain")
+    K_N = as_matrix(np.asarray(gain, dtype=float), robot.nv, "null_space_gain")
     if metric.form == VARYING:
         if not np.array_equal(K_N, K_N[0, 0] * np.eye(robot.nv)):
             raise GainError(

@@ -7,11 +7,11 @@ from contextvars import ContextVar
 from dataclasses import MISSING, Field
 from typing import Any, ClassVar, Self
 
+import numpy as np
 from pydantic_core import CoreSchema, PydanticCustomError
 
 from hsp_control.common.entry_points import entry_points, is_ours
 from hsp_control.common.exceptions import AccessError, ConfigError, HspControlError
-from hsp_control.declaration.equality import same
 
 
 class Declared:
@@ -52,6 +52,22 @@ class Declared:
             for f in value_fields(self)
             if not _is_default(self, f)
         }
+
+
+def same(a: Any, b: Any) -> bool:
+    """Return whether two values of a field are equal; arrays entry by entry."""
+    if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
+        if a is None or b is None:
+            return a is b
+        try:
+            return bool(np.array_equal(a, b))
+        except (TypeError, ValueError):
+            return False
+    if isinstance(a, tuple | list) and type(a) is type(b):
+        return len(a) == len(b) and all(map(same, a, b))
+    if isinstance(a, dict) and isinstance(b, dict):
+        return a.keys() == b.keys() and all(same(a[key], b[key]) for key in a)
+    return bool(a == b)
 
 
 def value_fields(part: Declared | type[Declared]) -> tuple["Field[Any]", ...]:

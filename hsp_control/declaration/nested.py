@@ -25,7 +25,7 @@ def parts_within(value: Any, kind: type[Kind]) -> Iterator[Kind]:
 
 
 def with_parts_replaced(
-    value: Any, kind: type[Kind], change: Callable[[Kind], Part]
+    value: Any, kind: type[Kind], change: Callable[[Kind], Any]
 ) -> Any:
     """Return a value in which all parts of a kind are changed; the rest is kept."""
     if isinstance(value, kind):

@@ -22,8 +22,7 @@ from pydantic_core import CoreSchema
 
 from hsp_control.common.exceptions import HspControlError, ImmutableError
 from hsp_control.declaration.any_of import AnyOf
-from hsp_control.declaration.equality import same
-from hsp_control.declaration.families import Declared, Family, value_fields
+from hsp_control.declaration.families import Declared, Family, same, value_fields
 from hsp_control.declaration.in_python import with_parts_made
 from hsp_control.declaration.mistakes import Carrier, argument_error
 from hsp_control.declaration.plain_data import plain_data

@@ -11,8 +11,7 @@ from pydantic.fields import FieldInfo
 from hsp_control.common.exceptions import ConfigError
 from hsp_control.declaration import schema
 from hsp_control.declaration.by_type import ByType, as_entry
-from hsp_control.declaration.equality import same
-from hsp_control.declaration.families import Declared
+from hsp_control.declaration.families import Declared, same
 from hsp_control.declaration.imported import name_of
 from hsp_control.declaration.located import within
 

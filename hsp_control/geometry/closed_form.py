@@ -110,11 +110,7 @@ class ClosedFormDistances:
 
     def measure(self, state: RobotState, distances: Array) -> None:
         """Write the distances [m] at the indices ``places`` of ``distances``."""
-        plan = self.compile(state, distances)
-        for follow in plan.follow:
-            follow(state.t)
-        for write in plan.write:
-            write()
+        self.compile(state, distances).run(state.t)
 
     def compile(self, state: RobotState, distances: Array) -> StepPlan:
         """Return the step plan of `measure` for this state and this array."""

@@ -4,7 +4,7 @@ import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
-from weakref import WeakKeyDictionary, WeakSet
+from weakref import WeakKeyDictionary
 from xml.etree.ElementTree import Element
 
 import coal
@@ -36,8 +36,6 @@ _MAX_SPHERES = 100
 """Maximum number of intervals between spheres on a capsule; a usual link has 10."""
 
 _log = logging.getLogger(__name__)
-_warned: "WeakSet[Robot]" = WeakSet()
-_incomplete: "WeakKeyDictionary[Robot, set[str]]" = WeakKeyDictionary()
 _found: "WeakKeyDictionary[Robot, dict[Proxy, tuple[LinkShape, ...]]]" = (
     WeakKeyDictionary()
 )
@@ -70,25 +68,28 @@ def link_shapes(robot: Robot, proxy: Proxy = "capsules") -> list[LinkShape]:
     if proxy not in get_args(Proxy):
         raise ModelError(f"proxy {proxy!r} is not one of {', '.join(get_args(Proxy))}")
     known = _found.setdefault(robot, {})
+    if "meshes" not in known:
+        known["meshes"] = tuple(_own_shapes(robot))
     if proxy not in known:
-        known[proxy] = tuple(_shapes_of(robot, proxy))
+        known[proxy] = tuple(_approximated(known["meshes"], proxy))
     return list(known[proxy])
 
 
-def _shapes_of(robot: Robot, proxy: Proxy) -> list[LinkShape]:
+def _own_shapes(robot: Robot) -> list[LinkShape]:
+    """Return the collision geometry of the links as it is, or what replaces it."""
     own = {part.prefix: _collision_shapes(robot, part) for part in robot.parts}
     without = [part for part in robot.parts if not own[part.prefix]]
-    if without and robot not in _warned:
-        _warned.add(robot)
+    if without:
         _log.warning(
             "%s has no collision geometry: using capsules of radius %g m between its "
             "joints", " and ".join(part.prefix + part.source.name for part in without),
             FALLBACK_RADIUS,
         )  # fmt: skip
     own |= {part.prefix: _between_joints(robot, part) for part in without}
-    shapes = [shape for part_shapes in own.values() for shape in part_shapes]
-    if proxy == "meshes":
-        return shapes
+    return [shape for part_shapes in own.values() for shape in part_shapes]
+
+
+def _approximated(shapes: Sequence[LinkShape], proxy: Proxy) -> list[LinkShape]:
     if proxy == "hulls":
         return [_replaced(shape, _hull(shape.geometry)) for shape in shapes]
     capsules = [_capsule(shape) for shape in _merge_rounded_cylinders(shapes)]
@@ -158,7 +159,7 @@ def _shapes_of_urdf(robot: Robot, part: RobotPart) -> list[LinkShape]:
         reason = (str(error).strip() or type(error).__name__).splitlines()[0]
         raise ModelError(f"{source.urdf}: a collision mesh: {reason}") from error
     if missing:
-        _report_missing(robot, part, missing, left=len(geometry.geometryObjects))
+        _report_missing(part, missing, left=len(geometry.geometryObjects))
     shapes = []
     for item in geometry.geometryObjects:
         frame = full.frames[item.parentFrame]
@@ -200,10 +201,8 @@ def _locate_meshes(xml: Element, source: RobotSource) -> dict[str, str]:
     return missing
 
 
-def _report_missing(
-    robot: Robot, part: RobotPart, missing: Mapping[str, str], left: int
-) -> None:
-    """Warn of meshes that do not exist, once for each robot."""
+def _report_missing(part: RobotPart, missing: Mapping[str, str], left: int) -> None:
+    """Warn of meshes that do not exist."""
     name = next(iter(missing.values()))
     hint = mesh_files.where_to_put(name)
     if not left:
@@ -211,13 +210,11 @@ def _report_missing(
             f"{part.source.urdf}: a collision mesh: no file {name!r}, and no other "
             f"shape of a link is left; {hint}, or give the links primitives"
         )
-    if part.prefix not in _incomplete.setdefault(robot, set()):
-        _incomplete[robot].add(part.prefix)
-        _log.warning(
-            "%s: collision meshes of %d links are missing, which distances therefore "
-            "do not see: %s (%s); %s",
-            part.prefix + part.source.name, len(missing), listing(missing), name, hint,
-        )  # fmt: skip
+    _log.warning(
+        "%s: collision meshes of %d links are missing, which distances therefore do "
+        "not see: %s (%s); %s",
+        part.prefix + part.source.name, len(missing), listing(missing), name, hint,
+    )  # fmt: skip
 
 
 def _finite(geometry: Any) -> bool:
@@ -251,7 +248,7 @@ def _between_joints(robot: Robot, part: RobotPart) -> list[LinkShape]:
     return shapes
 
 
-def _merge_rounded_cylinders(shapes: list[LinkShape]) -> list[LinkShape]:
+def _merge_rounded_cylinders(shapes: Sequence[LinkShape]) -> list[LinkShape]:
     """Merge each cylinder with spheres at its two ends: URDFs describe capsules so."""
     merged: list[LinkShape] = []
     used: set[int] = set()
@@ -270,7 +267,7 @@ def _merge_rounded_cylinders(shapes: list[LinkShape]) -> list[LinkShape]:
     return merged
 
 
-def _end_spheres(shapes: list[LinkShape], index: int) -> list[int] | None:
+def _end_spheres(shapes: Sequence[LinkShape], index: int) -> list[int] | None:
     """Return the indices of the spheres at both ends of a cylinder, or None."""
     shape = shapes[index]
     cylinder = shape.geometry

@@ -2,11 +2,11 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 import pinocchio as pin
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import AfterValidator, Field
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SceneError, TrajectoryError
@@ -51,11 +51,6 @@ def _streamed(trajectory: Part) -> bool:
     return bool(streams)
 
 
-def _or_world_axes(orientation: Any) -> Any:
-    """Return the world's axes for None, which logs of version 0.1 contain."""
-    return HoldOrientation((0.0, 0.0, 0.0)) if orientation is None else orientation
-
-
 def _from_world_axes(orientation: OrientationTrajectory) -> OrientationTrajectory:
     if _streamed(orientation):
         return orientation
@@ -73,11 +68,9 @@ class Obstacle(Part, error=SceneError):
     """Its shape, centred on its own frame [-]."""
     center: Annotated[Trajectory, AfterValidator(_in_space)]
     """Trajectory of its frame's origin in the world, of dimension 3 [m]."""
-    orientation: Annotated[
-        OrientationTrajectory,
-        BeforeValidator(_or_world_axes),
-        AfterValidator(_from_world_axes),
-    ] = HoldOrientation((0.0, 0.0, 0.0))
+    orientation: Annotated[OrientationTrajectory, AfterValidator(_from_world_axes)] = (
+        HoldOrientation((0.0, 0.0, 0.0))
+    )
     """Trajectory of its frame's orientation, body to world [-]; along the world's axes
     by default. One without a rotation begins along them."""
 

@@ -44,12 +44,6 @@ class Finding:
         return asdict(self)
 
 
-def check_elements(xml: Element) -> Iterator[Finding]:
-    """Yield what is wrong with the elements of a URDF; then the robot does not load."""
-    for where, problem in problems(xml):
-        yield Finding("error", "element", where, problem)
-
-
 _CURE = "project_inertias: true takes the nearest possible one, --fix writes it"
 
 
@@ -332,9 +326,11 @@ def inspect(source: RobotSource, description: RobotDescription) -> Inspection:
         ModelError: If its file is not XML, not a URDF, or too large.
     """
     xml = parse_urdf(source)
-    findings = list(check_elements(xml))
+    # What is wrong with its elements: then the robot does not load.
+    findings = [Finding("error", "element", *each) for each in problems(xml)]
     if not findings:
-        findings = list(_of_file(xml, source))
+        findings += [*check_inertias(xml), *check_limits(xml)]
+        findings += check_meshes(xml, source)
     facts = {"file": str(source.urdf)}
     errors = [f for f in findings if f.severity == "error"]
     if all(error.check == "inertia" for error in errors):
@@ -385,12 +381,6 @@ def _springs(robot: Robot) -> str:
         return "no effort limits, so they pull with any force"
     turned = f" and {moment:.3g} N·m" if np.isfinite(moment) else ""
     return f"a hand's pull with at most {force:.3g} N{turned} by default"
-
-
-def _of_file(xml: Element, source: RobotSource) -> Iterator[Finding]:
-    yield from check_inertias(xml)
-    yield from check_limits(xml)
-    yield from check_meshes(xml, source)
 
 
 def _of_robot(robot: Robot) -> Iterator[Finding]:

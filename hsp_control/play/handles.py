@@ -12,6 +12,7 @@ its tasks leave it free: the field may move in time, and the theorem holds throu
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -194,11 +195,10 @@ def obstacles_of(controller: Controller) -> dict[str, ObstacleGrip]:
     for obstacle in controller.scene.values():
         if not np.isfinite(obstacle.shape.bounding_radius):
             continue  # such as the floor
-        try:
-            ObstacleGrip(obstacle, controller).where(controller.state)
-        except HspControlError:
-            continue
-        found[obstacle.name] = ObstacleGrip(obstacle, controller)
+        grip = ObstacleGrip(obstacle, controller)
+        with suppress(HspControlError):  # it has no place
+            grip.where(controller.state)
+            found[obstacle.name] = grip
     return found
 
 

@@ -40,19 +40,11 @@ class Knob(NamedTuple):
 
     def describe(self) -> dict[str, Any]:
         """Return what a page must know of it."""
-        on_off = isinstance(self.value, bool)
-        return {
-            "id": self.id,
-            "group": self.group,
-            "label": self.label,
-            "note": self.note,
-            "unit": self.unit,
-            "kind": "switch" if on_off else "slider",
-            "value": self.value,
-            "low": self.low,
-            "high": self.high,
-            "log": self.low > 0.0 and self.high / self.low > 20.0,
-        }
+        about = self._asdict()
+        del about["turn"]
+        kind = "switch" if isinstance(self.value, bool) else "slider"
+        wide = self.low > 0.0 and self.high / self.low > 20.0
+        return {**about, "kind": kind, "log": wide}
 
     def checked(self, value: object) -> float | bool:
         """Return a value that a page sent, within the bounds."""
@@ -87,7 +79,8 @@ def _null_space(controller: Controller, period: float) -> Iterator[Knob]:
         low, high = _span(gain, period)
         note = "How fast the free joints take up the field's motion."
         id_, label = "null_space_gain", "Null-space gain K_N"
-        yield Knob(id_, group, label, "1/s", gain, low, high, _set_gain, note)
+        about = Changes.null_space_gain, note
+        yield Knob(id_, group, label, "1/s", gain, low, high, *about)
     for name, weight in switch.weights.items():
         if weight:
             turn, most = partial(switch.weigh, name), 5.0 * weight
@@ -152,23 +145,16 @@ def _span(rate: float, period: float) -> tuple[float, float]:
     return rate / _REACH, min(_REACH * rate, max(_BORNE / period, rate))
 
 
-def _set_gain(at: Changes, gain: float) -> None:
-    at.null_space_gain(gain)
-
-
 def _tune(name: str, ratio: float, at: Changes, frequency: float) -> None:
     at.gains(name, Gains(natural_frequency=frequency, damping_ratio=ratio))
 
 
 def _stiffen(name: str, impedance: Impedance, at: Changes, factor: float) -> None:
-    at.impedance(name, _scaled(impedance, factor))
-
-
-def _scaled(impedance: Impedance, factor: float) -> Impedance:
-    """Return an impedance with a multiple of the stiffness, and the same ratio."""
+    """Change to a multiple of a stiffness, with the same ratio."""
     damping = impedance.damping
-    return replace(
+    scaled = replace(
         impedance,
         stiffness=factor * np.asarray(impedance.stiffness, dtype=float),
         damping=None if damping is None else np.sqrt(factor) * np.asarray(damping),
     )
+    at.impedance(name, scaled)

@@ -2,7 +2,7 @@
 
 import operator
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,11 +17,12 @@ from hsp_control.simulation.log_series import distance_label, joint_names, unrea
 from hsp_control.visualization.palette import SERIES
 from hsp_control.visualization.viewer import Viewer
 from hsp_control.visualization.viewer.clearances import capsules, distances, influence
+from hsp_control.visualization.viewer.clip import track_fields
 from hsp_control.visualization.viewer.commands import (
+    PLAY,
     PageCommand,
     delete,
-    path_element,
-    play_command,
+    page_command,
     typed_array,
 )
 from hsp_control.visualization.viewer.motion import Layer, RunMotion
@@ -44,7 +45,7 @@ class Curve(NamedTuple):
 
     name: str
     column: str  # column of the log
-    rows: slice  # which components, of which the norm is shown
+    rows: slice = slice(0, 1)  # which components, of which the norm is shown
 
 
 class Plot(NamedTuple):
@@ -111,32 +112,20 @@ class Picture:
         """Return the commands of a picture; see `draw`."""
         session, handles = self._session, self._session.handles
         changed, samples = list(self._changed_field()), list(self._samples())
-        tracks = [
-            {
-                "path": track.path,
-                "property": track.property,
-                "values": typed_array(track.values, np.float32),
-            }
-            for track in self._run.tracks(self._motion())
-        ]
+        tracks = [*map(track_fields, self._run.tracks(self._motion()))]
         poses, places = handles.places()
+        level = "warning" if handles.warning or session.over else "info"
         text = session.over or handles.message
+        moving = {"t": session.t, "running": running, "rate": rate}
         return [
             *changed,
-            play_command("pose", "pose", tracks=tracks),
-            play_command(
-                "play_targets", "targets", poses=poses, obstacles=places,
-                away=self._away,
-            ),
-            play_command(
-                "play_state", "state", t=session.t, running=running, rate=rate,
-                message=text, level="warning" if handles.warning or session.over
-                else "info",
-            ),
-            play_command("play_values", "values", values=handles.settings),
+            _told("pose", tracks=tracks),
+            _told("targets", poses=poses, obstacles=places, away=self._away),
+            _told("state", **moving, message=text, level=level),
+            _told("values", values=handles.settings),
             self._force(),
             *samples,
-        ]  # fmt: skip
+        ]
 
     def _acting_terms(self) -> tuple[NullSpaceField, ...]:
         """Return the terms of the field that weigh anything now."""
@@ -171,52 +160,30 @@ class Picture:
 
     def _setup(self, title: str) -> PageCommand:
         session, state = self._session, self._session.controller.state
-        obstacles = [
-            {**grip.describe(state), "path": f"/obstacles/{path_element(name)}"}
-            for name, grip in session.handles.obstacles.items()
-        ]
+        handles = session.handles
         plots = []
-        for k, plot in enumerate(self._plots):
-            series = [
-                {"name": curve.name, "color": SERIES[i % len(SERIES)]}
-                for i, curve in enumerate(plot.curves)
-            ]
-            plots.append(
-                {
-                    "id": f"plot{k}",
-                    "title": plot.title,
-                    "note": plot.note,
-                    "unit": plot.unit,
-                    "log": plot.log,
-                    "series": series,
-                }
-            )
-        return play_command(
-            "play_setup",
+        for plot in self._plots:
+            names = enumerate(curve.name for curve in plot.curves)
+            series = [{"name": n, "color": SERIES[i % len(SERIES)]} for i, n in names]
+            plots.append({**plot._replace(curves=[])._asdict(), "series": series})
+        return _told(
             "setup",
             title=title,
-            targets=[grip.describe(state) for grip in session.handles.targets.values()],
-            obstacles=obstacles,
-            controls=[knob.describe() for knob in session.handles.knobs.values()],
+            targets=[grip.describe(state) for grip in handles.targets.values()],
+            obstacles=[grip.describe(state) for grip in handles.obstacles.values()],
+            controls=[knob.describe() for knob in handles.knobs.values()],
             plots=plots,
             pull=session.pushes is not None,
             loop=session.kind,
-            period_ms=1e3 * session.period,
         )
 
     def _force(self) -> PageCommand:
         pull = self._session.pull()
         if pull is None:
-            zero = [0.0, 0.0, 0.0]
-            return play_command(
-                "play_force", "force", visible=False, newtons=0.0,
-                **{"from": zero, "to": zero},
-            )  # fmt: skip
+            return _told("force", visible=False)
         point, hand, newtons = pull
-        return play_command(
-            "play_force", "force", visible=True, newtons=newtons,
-            **{"from": point.tolist(), "to": hand.tolist()},
-        )  # fmt: skip
+        ends = {"from": point.tolist(), "to": hand.tolist()}
+        return _told("force", visible=True, newtons=newtons, **ends)
 
     def _samples(self) -> Iterator[PageCommand]:
         """Yield the rows of the plots since the last picture."""
@@ -232,13 +199,19 @@ class Picture:
             [_values(rows, curve) for plot in self._plots for curve in plot.curves]
             or [np.zeros((len(times), 0))]
         )
-        yield play_command(
+        yield page_command(
             "play_samples",
+            PLAY,
             f"samples {self._batch % _BATCHES}",
-            number=self._batch,
             times=typed_array(times, np.float64),
             values=typed_array(values, np.float32),
         )
+
+
+def _told(name: str, **fields: Any) -> PageCommand:
+    """Return the newest word of a kind to the pages."""
+    kind = name if name == "pose" else f"play_{name}"
+    return page_command(kind, PLAY, name, **fields)
 
 
 def _values(rows: dict[str, Array], curve: Curve) -> Array:
@@ -258,17 +231,14 @@ def _plots(session: Played) -> Iterator[Plot]:
     rows, meta = session.recorder.rows(0), session.meta
     dofs = joint_names(Rollout(rows, meta))
     if controller.field.controls:
-        norm = Curve("‖e_N‖", "null_space_norm", slice(0, 1))
+        norm = Curve("‖e_N‖", "null_space_norm")
         unit = ", ".join(f"{unit}/s" for unit in dict.fromkeys(controller.robot.units))
         note = "Of the free joints' motion; K_N makes it decay."
         yield Plot("Null-space error ‖e_N‖", note, unit, True, [norm])
     names = [name for name in rows if name.startswith("distance.")]
     if names:
         labels = [distance_label(meta, n.removeprefix("distance.")) for n in names]
-        curves = [
-            Curve(label, name, slice(0, 1))
-            for label, name in zip(labels, names, strict=True)
-        ]
+        curves = [Curve(*each) for each in zip(labels, names, strict=True)]
         note = "To obstacles; below 0 is a collision."
         yield Plot("Clearance", note, "m", False, curves)
     curves = [Curve("‖τ‖", "tau", slice(0, len(dofs)))]

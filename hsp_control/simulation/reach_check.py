@@ -152,7 +152,7 @@ class _Search(NamedTuple):
 def _target(task: FramePose | FramePosition, t: float) -> pin.SE3:
     """Return where a task's frame is to be at a time [s]."""
     if isinstance(task, FramePose):
-        pose = task.pose.sample(t)
+        pose = task.followed.sample(t)
         return pin.SE3(pose.orientation.rotation.copy(), pose.position.position.copy())
     place = pin.SE3.Identity()
     where = place.translation.copy()

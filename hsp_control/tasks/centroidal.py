@@ -38,11 +38,6 @@ class CenterOfMass(TrackingTask, type="center_of_mass"):
         """Return True: see `Task.keeps_balance`."""
         return True
 
-    @property
-    def followed(self) -> Trajectory:
-        """The trajectory of a placed task."""
-        return self.trajectory
-
     def placed(self, start: Start) -> Self:
         """Return the task with its trajectory in the world; see `Task.placed`."""
         here = start.state.centroidal.position[axis_indices(self.axes)]
@@ -93,11 +88,6 @@ class AngularMomentum(Task, type="angular_momentum"):
     def feedback(self) -> Feedback:
         """Return new arrays of feedback: Kp = K and Kv = 1, for e' + K e = 0."""
         return Feedback(self.rate * np.eye(3), np.eye(3), np.zeros(3))
-
-    @property
-    def followed(self) -> Trajectory:
-        """The trajectory of a placed task."""
-        return self.trajectory
 
     def placed(self, start: Start) -> Self:
         """Return the task with its trajectory about zero; see `Task.placed`."""

@@ -1,8 +1,7 @@
 """The tasks of a frame's orientation on SO(3), and of its pose."""
 
-from collections.abc import Callable
-from dataclasses import replace
-from typing import Annotated, ClassVar, NamedTuple, Self
+from abc import abstractmethod
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import pinocchio as pin
@@ -10,7 +9,6 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array
 from hsp_control.common.kernels import KernelCall, kernel
 from hsp_control.common.linalg import multiply
-from hsp_control.common.native import bind
 from hsp_control.common.rotations import (
     compose_back,
     cross,
@@ -23,15 +21,13 @@ from hsp_control.common.rotations import (
     rotate_back,
 )
 from hsp_control.declaration import AnyOf
-from hsp_control.geometry.start import Start
 from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
-from hsp_control.robot.kinematics import FrameMotion
+from hsp_control.robot.kinematics import FrameKinematics, FrameMotion
 from hsp_control.tasks.compliant_task import CompliantTask
 from hsp_control.tasks.frame_task import (
     FrameTask,
     TrackingTask,
-    frame_of,
     place_orientation,
     place_pose,
 )
@@ -42,7 +38,6 @@ from hsp_control.trajectories import (
     HoldOrientation,
     OrientationSample,
     OrientationTrajectory,
-    PoseSample,
     PoseTrajectory,
     Trajectory,
 )
@@ -76,19 +71,9 @@ class FrameOrientation(
     def _default_name(self) -> str:
         return f"{super()._default_name()}_orientation"
 
-    @property
-    def followed(self) -> OrientationTrajectory:
-        """The trajectory of a placed task."""
-        return self.trajectory
-
-    def placed(self, start: Start) -> Self:
-        """Return the task with its trajectory in the world; see `Task.placed`."""
-        robot = start.state.robot
-        frame = frame_of(self.frame, robot)
-        here = start.state.frame(frame).rotation
-        trajectory = place_orientation(self.trajectory, here, self.blend)
-        placed = replace(self, frame=frame, trajectory=trajectory, blend=None)
-        return placed.checked(robot)
+    def _placed_at(self, here: FrameKinematics) -> dict[str, Any]:
+        trajectory = place_orientation(self.trajectory, here.rotation, self.blend)
+        return {"trajectory": trajectory, "blend": None}
 
     def kernel(self, state: RobotState) -> KernelCall:
         """Return the kernel; see `Task.kernel`."""
@@ -106,11 +91,16 @@ class FrameOrientation(
 
     def measure(self, state: RobotState) -> tuple[Array, Array]:
         """Return desired and actual orientation, quaternions (x, y, z, w)."""
-        desired, actual = np.zeros(4), np.zeros(4)
-        quaternion_from_rotation(self.trajectory.sample(state.t).rotation, desired)
-        quaternion_from_rotation(state.frame(self.frame_name).rotation, actual)
-        # q and -q are one rotation: choose the sign that is closer to the desired one.
-        return desired, actual if desired @ actual >= 0.0 else -actual
+        desired = self.trajectory.sample(state.t).rotation
+        return _quaternions(desired, state.frame(self.frame_name).rotation)
+
+
+def _quaternions(desired: Array, actual: Array) -> tuple[Array, Array]:
+    """Return two rotations as quaternions; q and -q are one: of the nearer sign."""
+    q_d, q = np.zeros((2, 4))
+    quaternion_from_rotation(desired, q_d)
+    quaternion_from_rotation(actual, q)
+    return q_d, q if q_d @ q >= 0.0 else -q
 
 
 @kernel
@@ -195,13 +185,47 @@ def _track_orientation(
 PoseOrPoint = Annotated[PoseTrajectory | Trajectory, AnyOf(PoseTrajectory, Trajectory)]
 """The trajectory of a pose, or of its origin: then the orientation is held."""
 
-POSE_ERROR = (
-    ErrorPart("position", "m", "m/s", 3),
-    ErrorPart("orientation", "rad", "rad/s", 3),
-)
+
+class PoseTask(TrackingTask):
+    """A task whose reference is a pose; a subclass has the field ``trajectory``."""
+
+    @property
+    def error_parts(self) -> tuple[ErrorPart, ...]:
+        """Position and rotation vector."""
+        return (
+            ErrorPart("position", "m", "m/s", 3),
+            ErrorPart("orientation", "rad", "rad/s", 3),
+        )
+
+    @property
+    def followed(self) -> PoseTrajectory:
+        """The trajectory of a placed task."""
+        trajectory = super().followed
+        if not isinstance(trajectory, PoseTrajectory):
+            raise self._not_placed("orientation")
+        return trajectory
+
+    @abstractmethod
+    def actual(self, state: RobotState) -> tuple[Array, Array]:
+        """Return the actual position (3,) [m] and rotation (3, 3)."""
+
+    def reference_rate(self, state: RobotState) -> Array:
+        """Return x_d' and w_d in the reference's axes, shape (6,) [m/s, rad/s]."""
+        sample = self.followed.sample(state.t)
+        velocity, turning = sample.position.velocity, sample.orientation
+        return np.concatenate([velocity, turning.angular_velocity])
+
+    def measure(self, state: RobotState) -> tuple[Array, Array]:
+        """Return desired and actual pose: x, y, z [m], quaternion (x, y, z, w)."""
+        sample = self.followed.sample(state.t)
+        position, rotation = self.actual(state)
+        turns = _quaternions(sample.orientation.rotation, rotation)
+        poses = zip((sample.position.position, position), turns, strict=True)
+        desired, actual = map(np.concatenate, poses)
+        return desired, actual
 
 
-class FramePose(FrameTask, TrackingTask, CompliantTask, type="frame_pose"):
+class FramePose(FrameTask, PoseTask, CompliantTask, type="frame_pose"):
     """e = (x_d - x, -log(R_dᵀ R)), the pose of a frame in the world [m, rad].
 
     Position rows are in world axes; orientation rows are those of `FrameOrientation`.
@@ -220,96 +244,24 @@ class FramePose(FrameTask, TrackingTask, CompliantTask, type="frame_pose"):
     """The desired pose, world ← frame, or the trajectory of its origin, with the
     orientation of the start [m, rad]; held at the start by default."""
 
-    @property
-    def error_parts(self) -> tuple[ErrorPart, ...]:
-        """Position and rotation vector."""
-        return POSE_ERROR
-
-    @property
-    def pose(self) -> PoseTrajectory:
-        """The trajectory of a placed task."""
-        if not isinstance(self.trajectory, PoseTrajectory):
-            raise self._not_placed("orientation")
-        return self.trajectory
-
-    @property
-    def followed(self) -> PoseTrajectory:
-        """The trajectory of a placed task."""
-        return self.pose
-
-    def placed(self, start: Start) -> Self:
-        """Return the task with its trajectory in the world; see `Task.placed`."""
-        robot = start.state.robot
-        frame = frame_of(self.frame, robot)
-        motion = start.state.frame(frame)
-        here = pin.SE3(motion.rotation, motion.position)
-        trajectory = place_pose(self.trajectory, here, self.blend)
-        placed = replace(self, frame=frame, trajectory=trajectory, blend=None)
-        return placed.checked(robot)
+    def _placed_at(self, here: FrameKinematics) -> dict[str, Any]:
+        place = pin.SE3(here.rotation, here.position)
+        trajectory = place_pose(self.trajectory, place, self.blend)
+        return {"trajectory": trajectory, "blend": None}
 
     def kernel(self, state: RobotState) -> KernelCall:
         """Return the kernel; see `Task.kernel`."""
         scratch = np.zeros((ORIENTATION_SCRATCH, 3))
-        return track_pose, (state.frame(self.frame_name), self.pose, scratch)
+        return track_pose, (state.frame(self.frame_name), self.followed, scratch)
 
     def _rotating(self, state: RobotState) -> Rotating:
         motion = state.frame(self.frame_name).motion
         return Rotating(3, motion.rotation, motion.velocity[3:])
 
-    def _reference(self, state: RobotState) -> "_Reference":
-        """Return the reference at the state's time; the state keeps the memory."""
-
-        def make() -> _Reference:
-            desired, values = np.zeros((8, 3)), np.zeros((2, 7))
-            sample, frame = PoseSample.over(desired), state.frame(self.frame_name)
-            place = frame.position, frame.rotation
-            measure = bind(_measured_pose, desired, *place, values)
-            return _Reference(sample, self.pose.follow(sample), measure, values)
-
-        reference = state.made(self, "reference", make)
-        reference.follow(state.t)
-        return reference
-
-    def reference_rate(self, state: RobotState) -> Array:
-        """Return x_d' and w_d in world axes, shape (6,) [m/s, rad/s]."""
-        sample = self._reference(state).sample
-        velocity, turning = (
-            sample.position.velocity,
-            sample.orientation.angular_velocity,
-        )
-        return np.concatenate([velocity, turning])
-
-    def measure(self, state: RobotState) -> tuple[Array, Array]:
-        """Return desired and actual pose: x, y, z [m], quaternion (x, y, z, w)."""
-        state.frame(self.frame_name)
-        reference = self._reference(state)
-        reference.measure()
-        desired, actual = reference.values.copy()
-        return desired, actual
-
-
-class _Reference(NamedTuple):
-    """The reference of a pose at a state's time."""
-
-    sample: PoseSample
-    follow: Callable[[float], object]  # writes it for a time [s]
-    measure: Callable[[], object]  # writes `values` for the reference and the frame
-    values: Array  # what `FramePose.measure` returns, (2, 7)
-
-
-@kernel
-def _measured_pose(desired: Array, position: Array, R: Array, values: Array) -> None:
-    """Write the desired and the actual pose; see `FramePose.measure`."""
-    for i in range(3):
-        values[0, i], values[1, i] = desired[0, i], position[i]
-    quaternion_from_rotation(desired[3:6], values[0, 3:])
-    quaternion_from_rotation(R, values[1, 3:])
-    alike = 0.0
-    for i in range(3, 7):
-        alike += values[0, i] * values[1, i]
-    if alike < 0.0:
-        for i in range(3, 7):
-            values[1, i] *= -1.0
+    def actual(self, state: RobotState) -> tuple[Array, Array]:
+        """Return position and rotation of the frame in the world."""
+        frame = state.frame(self.frame_name)
+        return frame.position, frame.rotation
 
 
 @kernel

@@ -1,16 +1,16 @@
 """The task of a frame's origin, along all world axes or some of them."""
 
-from dataclasses import KW_ONLY, replace
-from typing import ClassVar, Self
+from dataclasses import KW_ONLY
+from typing import Any, ClassVar
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.kernels import KernelCall
 from hsp_control.declaration.quantities import Axes
-from hsp_control.geometry.start import Start
 from hsp_control.robot import RobotState
+from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.tasks.axes import axis_indices, track_axes
 from hsp_control.tasks.compliant_task import CompliantTask
-from hsp_control.tasks.frame_task import FrameTask, TrackingTask, frame_of, place_point
+from hsp_control.tasks.frame_task import FrameTask, TrackingTask, place_point
 from hsp_control.tasks.task import Drawn, ErrorPart
 from hsp_control.trajectories import Hold, Trajectory
 
@@ -36,19 +36,10 @@ class FramePosition(FrameTask, TrackingTask, CompliantTask, type="frame_position
         """The position along the tracked axes."""
         return (ErrorPart("position", "m", "m/s", len(self.axes)),)
 
-    @property
-    def followed(self) -> Trajectory:
-        """The trajectory of a placed task."""
-        return self.trajectory
-
-    def placed(self, start: Start) -> Self:
-        """Return the task with its trajectory in the world; see `Task.placed`."""
-        robot = start.state.robot
-        frame = frame_of(self.frame, robot)
-        here = start.state.frame(frame).position[axis_indices(self.axes)]
-        trajectory = place_point(self.trajectory, here, self.blend)
-        placed = replace(self, frame=frame, trajectory=trajectory, blend=None)
-        return placed.checked(robot)
+    def _placed_at(self, here: FrameKinematics) -> dict[str, Any]:
+        begin = here.position[axis_indices(self.axes)]
+        trajectory = place_point(self.trajectory, begin, self.blend)
+        return {"trajectory": trajectory, "blend": None}
 
     def kernel(self, state: RobotState) -> KernelCall:
         """Return the kernel; see `Task.kernel`."""

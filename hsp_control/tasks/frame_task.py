@@ -1,6 +1,8 @@
 """Base classes of tasks that follow a trajectory, or track a frame; its placing."""
 
-from dataclasses import KW_ONLY
+from abc import abstractmethod
+from dataclasses import KW_ONLY, replace
+from typing import Any, Self
 
 import numpy as np
 import pinocchio as pin
@@ -9,7 +11,9 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TaskError
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Positive
+from hsp_control.geometry.start import Start
 from hsp_control.robot import Robot
+from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.tasks.task import SecondOrderTask, default_name
 from hsp_control.trajectories import (
     Blend,
@@ -94,6 +98,17 @@ class FrameTask(SecondOrderTask):
 
     def _default_name(self) -> str:
         return default_name(self.frame or "end_effector")
+
+    def placed(self, start: Start) -> Self:
+        """Return the task with its trajectory in the world; see `Task.placed`."""
+        robot = start.state.robot
+        frame = frame_of(self.frame, robot)
+        changes = self._placed_at(start.state.frame(frame))
+        return replace(self, frame=frame, **changes).checked(robot)
+
+    @abstractmethod
+    def _placed_at(self, here: FrameKinematics) -> dict[str, Any]:
+        """Return the fields that change where the frame starts."""
 
     def keeps_balance(self, robot: Robot) -> bool:
         """Whether the frame belongs to the trunk; see `Robot.is_on_trunk`."""

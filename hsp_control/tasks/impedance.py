@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, replace
-from typing import Annotated, Any, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,13 +10,10 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import GainError
 from hsp_control.declaration import Part, within
-from hsp_control.declaration.quantities import ArrayField, Gain, Positive, read_only
+from hsp_control.declaration.quantities import Gain, Positive, PositiveNumbers
 from hsp_control.robot import Robot
 from hsp_control.tasks.gains import as_gain, as_matrix
 from hsp_control.tasks.task import ErrorPart, LargestError, each_part
-
-Bound = Annotated[ArrayLike, ArrayField(Positive | list[Positive], read_only)]
-"""A number, or one number for each row."""
 
 
 class Impedance(Part, error=GainError):
@@ -40,7 +37,7 @@ class Impedance(Part, error=GainError):
     damping_ratio: Positive | None = None
     """ζ of every mode of the task's inertia and K [-]; 1, critical damping, by default.
     D then follows the inertia."""
-    largest_error: Bound | None = None
+    largest_error: PositiveNumbers | None = None
     """Error at which the spring's force stops growing [m or rad], a number or one for
     each row, instead of `largest_force`; it needs a diagonal stiffness. None by
     default."""

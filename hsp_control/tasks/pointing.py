@@ -13,11 +13,10 @@ from hsp_control.common.exceptions import TaskError
 from hsp_control.common.kernels import KernelCall, kernel
 from hsp_control.common.rotations import cross, rotate, rotate_back
 from hsp_control.declaration.quantities import Vector3
-from hsp_control.geometry.start import Start
 from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
-from hsp_control.robot.kinematics import FrameMotion
-from hsp_control.tasks.frame_task import FrameTask, frame_of, place_orientation
+from hsp_control.robot.kinematics import FrameKinematics, FrameMotion
+from hsp_control.tasks.frame_task import FrameTask, place_orientation
 from hsp_control.tasks.task import Drawn, ErrorPart, Feedback, add_feedback
 from hsp_control.trajectories import (
     HoldOrientation,
@@ -83,15 +82,11 @@ class Pointing(FrameTask, type="pointing"):
         changes: dict[str, Any] = {"direction": None, "trajectory": trajectory}
         return replace(self, **changes)
 
-    def placed(self, start: Start) -> Self:
-        """Return the task for the robot; see `Task.placed`."""
-        robot = start.state.robot
-        frame = frame_of(self.frame, robot)
-        trajectory = self.trajectory
-        if trajectory is not None:
-            here = start.state.frame(frame).rotation @ self._turn
-            trajectory = place_orientation(trajectory, here, None)
-        return replace(self, frame=frame, trajectory=trajectory).checked(robot)
+    def _placed_at(self, here: FrameKinematics) -> dict[str, Any]:
+        if self.trajectory is None:
+            return {}
+        turned = here.rotation @ self._turn
+        return {"trajectory": place_orientation(self.trajectory, turned, None)}
 
     @cached_property
     def _desired(self) -> OrientationTrajectory:

@@ -9,7 +9,6 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TaskError
 from hsp_control.common.kernels import KernelCall, kernel
-from hsp_control.common.rotations import quaternion_from_rotation
 from hsp_control.common.step_plan import KernelOutput
 from hsp_control.declaration import within
 from hsp_control.geometry.start import Start
@@ -17,16 +16,16 @@ from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.kinematics import FrameMotion
 from hsp_control.tasks.frame_pose import (
     ORIENTATION_SCRATCH,
-    POSE_ERROR,
     PoseOrPoint,
+    PoseTask,
     track_pose,
 )
-from hsp_control.tasks.frame_task import TrackingTask, frame_of, place_pose
-from hsp_control.tasks.task import ErrorPart, default_name
-from hsp_control.trajectories import ComposedPose, PoseTrajectory
+from hsp_control.tasks.frame_task import frame_of, place_pose
+from hsp_control.tasks.task import default_name
+from hsp_control.trajectories import ComposedPose
 
 
-class RelativePose(TrackingTask, type="relative_pose"):
+class RelativePose(PoseTask, type="relative_pose"):
     """e = (x_d - x, -log(R_dᵀ Q)), x = R_rᵀ(p - p_r), Q = R_rᵀ R [m, rad].
 
     The pose of a frame relative to a reference frame r, in the axes of r. Both errors
@@ -42,11 +41,6 @@ class RelativePose(TrackingTask, type="relative_pose"):
     reference: str
     """Name of the frame that the pose is relative to [-]."""
 
-    @property
-    def error_parts(self) -> tuple[ErrorPart, ...]:
-        """Position and rotation vector, in the axes of the reference."""
-        return POSE_ERROR
-
     def _default_name(self) -> str:
         return default_name(f"{self.frame or 'end_effector'}_from_{self.reference}")
 
@@ -56,18 +50,6 @@ class RelativePose(TrackingTask, type="relative_pose"):
         if self.frame is None:
             raise self._not_placed("frame")
         return self.frame
-
-    @property
-    def pose(self) -> PoseTrajectory:
-        """The trajectory of a placed task."""
-        if not isinstance(self.trajectory, PoseTrajectory):
-            raise self._not_placed("orientation")
-        return self.trajectory
-
-    @property
-    def followed(self) -> PoseTrajectory:
-        """The trajectory of a placed task."""
-        return self.pose
 
     def placed(self, start: Start) -> Self:
         """Return the task with its trajectory in the reference; see `Task.placed`."""
@@ -91,31 +73,14 @@ class RelativePose(TrackingTask, type="relative_pose"):
         frames = state.frame(self.frame_name), state.frame(self.reference)
         motion = FrameMotion.allocate(state.robot.nv)
         relative = KernelOutput((_relative_kinematics, (*frames, state.v)), motion)
-        return track_pose, (relative, self.pose, np.zeros((ORIENTATION_SCRATCH, 3)))
+        return track_pose, (relative, self.followed, np.zeros((ORIENTATION_SCRATCH, 3)))
 
-    def reference_rate(self, state: RobotState) -> Array:
-        """Return x_d' and w_d in the reference's axes, shape (6,) [m/s, rad/s]."""
-        sample = self.pose.sample(state.t)
-        return np.concatenate(
-            [sample.position.velocity, sample.orientation.angular_velocity]
-        )
-
-    def measure(self, state: RobotState) -> tuple[Array, Array]:
-        """Return desired and actual pose: x, y, z [m], quaternion (x, y, z, w)."""
-        sample, relative = self.pose.sample(state.t), self._relative(state)
-        desired, actual = np.zeros(7), np.zeros(7)
-        desired[:3], actual[:3] = sample.position.position, relative.position
-        quaternion_from_rotation(sample.orientation.rotation, desired[3:])
-        quaternion_from_rotation(relative.rotation, actual[3:])
-        if desired[3:] @ actual[3:] < 0.0:
-            actual[3:] *= -1.0
-        return desired, actual
-
-    def _relative(self, state: RobotState) -> FrameMotion:
+    def actual(self, state: RobotState) -> tuple[Array, Array]:
+        """Return position and rotation of the frame in the reference."""
         frame, reference = state.frame(self.frame_name), state.frame(self.reference)
         relative = FrameMotion.allocate(state.robot.nv)
         _relative_kinematics(frame.motion, reference.motion, state.v, relative)
-        return relative
+        return relative.position, relative.rotation
 
 
 @kernel

@@ -236,8 +236,9 @@ class Task(Part, ABC, family="tasks", error=TaskError):
 
     @property
     def followed(self) -> AnyReference | None:
-        """The trajectory that a placed task follows; None if it has none."""
-        return None
+        """The trajectory that a placed task follows, its field; None if it has none."""
+        trajectory: AnyReference | None = getattr(self, "trajectory", None)
+        return trajectory
 
     @property
     def remembers(self) -> bool:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from clips import told
+from clips import Recorder, told
 from numpy.typing import NDArray
 
 import hsp_control as hsp
@@ -14,7 +14,7 @@ from hsp_control.common.exceptions import ConfigError
 from hsp_control.play import Picture, Session, play
 from hsp_control.play.knobs import _scaled, knobs_of
 from hsp_control.play.playable import playable
-from hsp_control.visualization.viewer import SceneRecorder, Viewer
+from hsp_control.visualization.viewer import Viewer
 
 Array = NDArray[np.float64]
 PANDA = "panda_obstacle"
@@ -292,10 +292,10 @@ def test_the_log_has_an_end(session: Session, monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_the_picture_follows_what_is_dragged(session: Session) -> None:
-    viewer = Viewer(session.experiment.robot, transport=SceneRecorder())
+    viewer = Viewer(session.experiment.robot, transport=Recorder())
     picture = Picture(session, viewer)
     recorder = viewer.transport
-    assert isinstance(recorder, SceneRecorder)
+    assert isinstance(recorder, Recorder)
     setup = told(recorder, "/play", "setup")
     assert [each["name"] for each in setup["targets"]] == ["hand", "posture"]
     assert [each["name"] for each in setup["obstacles"]] == ["ball"]
@@ -335,7 +335,7 @@ def test_the_picture_follows_what_is_dragged(session: Session) -> None:
 
 def test_a_target_out_of_reach_is_said_and_by_how_much(still: Session) -> None:
     """Half a metre too high; within reach again nothing is said."""
-    recorder = SceneRecorder()
+    recorder = Recorder()
     picture = Picture(still, Viewer(still.experiment.robot, transport=recorder))
 
     def said() -> str:
@@ -362,7 +362,7 @@ def test_a_target_out_of_reach_is_said_and_by_how_much(still: Session) -> None:
 
 
 def test_the_loop_does_what_the_page_says_about_time(session: Session) -> None:
-    viewer = Viewer(session.experiment.robot, transport=SceneRecorder())
+    viewer = Viewer(session.experiment.robot, transport=Recorder())
     said: list[list[dict[str, Any]]] = [
         [{"do": "pause"}],
         [],

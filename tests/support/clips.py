@@ -6,10 +6,38 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.visualization.viewer import SceneRecorder
-from hsp_control.visualization.viewer.commands import CLIP
+from hsp_control.visualization.viewer.commands import CLIP, Json, key_of, unpack
 
 
-def told(recorder: SceneRecorder, path: str, kind: str) -> dict[str, Any]:
+class Recorder(SceneRecorder):
+    """A recorder that says what it keeps."""
+
+    def paths(self, below: str = "") -> list[str]:
+        """Return the paths of all objects that begin with ``below``."""
+        return [
+            path
+            for path, name, _ in self.scene.items()
+            if name == "object" and path.startswith(below)
+        ]
+
+    def command(self, path: str, name: str) -> Json | None:
+        """Return the command that set the property ``name`` of a node, or None."""
+        packed = self.scene.get(key_of(path, name))
+        return None if packed is None else unpack(packed)
+
+    def transform(self, path: str) -> np.ndarray:
+        """Return the pose of a node in the world, shape (4, 4)."""
+        total: np.ndarray = np.eye(4)
+        nodes = path.split("/")
+        for depth in range(2, len(nodes) + 1):
+            command = self.command("/".join(nodes[:depth]), "transform")
+            if command is not None:
+                matrix: Any = command["matrix"]
+                total = total @ np.reshape(matrix, (4, 4)).T
+        return total
+
+
+def told(recorder: Recorder, path: str, kind: str) -> dict[str, Any]:
     """Return the last command of a kind at a path; there is one."""
     command = recorder.command(path, kind)
     assert command is not None
@@ -19,7 +47,7 @@ def told(recorder: SceneRecorder, path: str, kind: str) -> dict[str, Any]:
 class Clip:
     """The clip of a recorder: what each node does, at any time."""
 
-    def __init__(self, recorder: SceneRecorder) -> None:
+    def __init__(self, recorder: Recorder) -> None:
         begin = recorder.command(CLIP, "begin")
         assert begin is not None
         self.start, self.end = begin["start"], begin["end"]

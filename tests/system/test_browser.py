@@ -22,12 +22,11 @@ from hsp_control.cli import main
 from hsp_control.companions.film import FilmStyle, export_film
 from hsp_control.companions.film.encoding import find_ffmpeg
 from hsp_control.visualization.viewer import LiveView, Viewer, export_html
-from hsp_control.visualization.viewer.commands import PLOTS
+from hsp_control.visualization.viewer.commands import PLOTS, key_of
 from hsp_control.visualization.viewer.packing import (
     ANGLE_BOUND,
     POSITION_BOUND,
 )
-from hsp_control.visualization.viewer.pipe import key_of
 
 pytest.importorskip("playwright.sync_api")
 pytestmark = [pytest.mark.browser, pytest.mark.slow]

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from clips import Clip, told
+from clips import Clip, Recorder, told
 
 from hsp_control import Obstacle, Robot, Rollout, load_experiment
 from hsp_control.geometry import Scene
@@ -23,7 +23,7 @@ from hsp_control.geometry.shapes import (
     Sphere,
 )
 from hsp_control.trajectories import Hold
-from hsp_control.visualization.viewer import SceneRecorder, Viewer
+from hsp_control.visualization.viewer import Viewer
 from hsp_control.visualization.viewer.commands import CAPTION, CLIP
 from hsp_control.visualization.viewer.threejs import _Y_TO_Z
 
@@ -43,11 +43,11 @@ def arm() -> Robot:
 
 
 @pytest.fixture
-def recorder() -> SceneRecorder:
-    return SceneRecorder()
+def recorder() -> Recorder:
+    return Recorder()
 
 
-def children(recorder: SceneRecorder, path: str) -> list[dict[str, Any]]:
+def children(recorder: Recorder, path: str) -> list[dict[str, Any]]:
     command = told(recorder, path, "object")
     return list(command["object"]["object"]["children"])
 
@@ -61,7 +61,7 @@ def matrix(thing: dict[str, Any]) -> np.ndarray:
 
 @pytest.mark.parametrize("name", ["planar3r", "iiwa14", "panda"])
 def test_every_visual_stands_where_pinocchio_puts_it(name: str) -> None:
-    robot, recorder = Robot.load(name), SceneRecorder()
+    robot, recorder = Robot.load(name), Recorder()
     viewer = Viewer(robot, transport=recorder)
     geometry = pin.buildGeomFromUrdf(
         robot.model,
@@ -89,13 +89,13 @@ def test_every_visual_stands_where_pinocchio_puts_it(name: str) -> None:
             np.testing.assert_allclose(shown, expected, atol=1e-12)
 
 
-def geometries(recorder: SceneRecorder, path: str) -> list[dict[str, Any]]:
+def geometries(recorder: Recorder, path: str) -> list[dict[str, Any]]:
     command = told(recorder, path, "object")
     return list(command["object"]["geometries"])
 
 
 def test_a_robot_without_visuals_gets_a_body(
-    tmp_path: Path, recorder: SceneRecorder, caplog: pytest.LogCaptureFixture
+    tmp_path: Path, recorder: Recorder, caplog: pytest.LogCaptureFixture
 ) -> None:
     text = Robot.load("planar3r").source.urdf.read_text()
     bare = tmp_path / "bare.urdf"
@@ -109,7 +109,7 @@ def test_a_robot_without_visuals_gets_a_body(
 
 
 def test_paths_target_and_obstacle_follow_the_log(
-    arm: Robot, run: Rollout, recorder: SceneRecorder
+    arm: Robot, run: Rollout, recorder: Recorder
 ) -> None:
     viewer = Viewer(arm, transport=recorder)
     viewer.draw_scene(run)
@@ -152,7 +152,7 @@ def test_paths_target_and_obstacle_follow_the_log(
 
 
 def test_a_state_is_shown_with_what_the_run_did_then(
-    arm: Robot, run: Rollout, recorder: SceneRecorder
+    arm: Robot, run: Rollout, recorder: Recorder
 ) -> None:
     viewer = Viewer(arm, transport=recorder)
     viewer.draw_scene(run)
@@ -182,7 +182,7 @@ SHAPES: list[Shape] = [
 
 @pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: type(shape).__name__)
 def test_every_shape_of_obstacle_is_drawn(
-    shape: Shape, arm: Robot, run: Rollout, recorder: SceneRecorder
+    shape: Shape, arm: Robot, run: Rollout, recorder: Recorder
 ) -> None:
     viewer = Viewer(arm, transport=recorder)
     viewer.draw_scene(Scene([Obstacle("it", shape, Hold([1.0, 0.0, 0.2]))]))
@@ -200,7 +200,7 @@ def test_every_shape_of_obstacle_is_drawn(
 
 
 def test_a_mesh_is_drawn_and_one_that_is_gone_becomes_a_ball(
-    tmp_path: Path, arm: Robot, run: Rollout, recorder: SceneRecorder
+    tmp_path: Path, arm: Robot, run: Rollout, recorder: Recorder
 ) -> None:
     file = tmp_path / "triangle.obj"
     file.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 3 4\n")

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from clips import Clip, told
+from clips import Clip, Recorder, told
 
 from hsp_control import Robot, Rollout, load_experiment
 from hsp_control.common.exceptions import ViewerError
-from hsp_control.visualization.viewer import SceneRecorder, Viewer, robot_of, view_logs
+from hsp_control.visualization.viewer import Viewer, robot_of, view_logs
 from hsp_control.visualization.viewer.commands import CAMERA, CLIP
 from hsp_control.visualization.viewer.motion import motion_of
 
@@ -29,12 +29,12 @@ def arm() -> Robot:
 
 
 @pytest.fixture
-def recorder() -> SceneRecorder:
-    return SceneRecorder()
+def recorder() -> Recorder:
+    return Recorder()
 
 
 def test_coarse_logs_play_smoothly_and_fine_ones_are_thinned(
-    arm: Robot, run: Rollout, recorder: SceneRecorder
+    arm: Robot, run: Rollout, recorder: Recorder
 ) -> None:
     viewer = Viewer(arm, transport=recorder)
     coarse = Rollout({k: v[::10] for k, v in run.columns.items()}, run.meta)
@@ -62,23 +62,23 @@ def resampled(run: Rollout, rows: int) -> Rollout:
 
 
 def test_what_cannot_be_played_is_refused(arm: Robot, run: Rollout) -> None:
-    viewer = Viewer(arm, transport=SceneRecorder())
+    viewer = Viewer(arm, transport=Recorder())
     with pytest.raises(ViewerError, match="speed -1 must be positive"):
         viewer.play(run, speed=-1)
     with pytest.raises(ViewerError, match=r"ings: camra: .*did you mean 'camera'"):
-        Viewer(arm, transport=SceneRecorder(), camra=[1, 2, 3])
+        Viewer(arm, transport=Recorder(), camra=[1, 2, 3])
     with pytest.raises(ViewerError, match=r"controller is for iiwa14 with nq = 7"):
         viewer.play(run, controller=load_experiment("iiwa_singular").controller)
     empty = Rollout({k: v[:0] for k, v in run.columns.items()}, run.meta)
     with pytest.raises(ViewerError, match="the run is empty"):
         viewer.play(empty)
-    other = Viewer(Robot.load("iiwa14"), transport=SceneRecorder())
+    other = Viewer(Robot.load("iiwa14"), transport=Recorder())
     with pytest.raises(ViewerError, match=r"of planar3r with nq = 6.*iiwa14 with nq"):
         other.draw_scene(run)
 
 
 def test_a_log_is_viewed_as_its_configuration_says(
-    tmp_path: Path, run: Rollout, recorder: SceneRecorder
+    tmp_path: Path, run: Rollout, recorder: Recorder
 ) -> None:
     look = {"camera": [0, 0, 9], "speed": 20.0, "show": {"paths": False}}
     config = {**(run.config or {}), "view": look}
@@ -103,7 +103,7 @@ def test_a_log_is_viewed_as_its_configuration_says(
 def test_a_log_whose_controller_is_gone_shows_what_its_columns_tell(
     tmp_path: Path,
     run: Rollout,
-    recorder: SceneRecorder,
+    recorder: Recorder,
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     config = {**(run.config or {})}

@@ -16,8 +16,7 @@ from hsp_control.companions.sweeps.distributions import (
     linear,
     logarithmic,
 )
-from hsp_control.config.syntax import YamlError
-from hsp_control.config.yaml_reader import read_yaml
+from hsp_control.config.yaml_reader import YamlError, read_yaml
 
 MAX_LEVELS = 100_000
 """Most values in a range; more is probably a typing error."""

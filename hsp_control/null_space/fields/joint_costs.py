@@ -22,7 +22,26 @@ from hsp_control.robot.robot import Posture, configuration
 from hsp_control.trajectories import Hold, Trajectory, TrajectorySample
 
 
-class JointCentering(Cost, type="joint_centering"):
+class LimitedJointsCost(Cost):
+    """A cost of the joints that have limits; others do not count."""
+
+    _: KW_ONLY
+    weights: Weights = 1.0
+    """w_i of the joints [1/s], one number or nv."""
+
+    def placed(self, start: Start) -> Self:
+        """Return the cost, checked; see `NullSpaceField.placed`."""
+        robot = start.state.robot
+        with within("weights"):
+            per_dof(self.weights, robot.nv)
+        if not limited_joints(robot).size:
+            raise FieldError(
+                f"no joint of {robot.name} has limits; use a target posture instead"
+            )
+        return self
+
+
+class JointCentering(LimitedJointsCost, type="joint_centering"):
     """f = ½ Σ w_i ((q_i - m_i)/r_i)², m_i the middle and r_i half of the range.
 
     Joints without limits, continuous joints and a floating root do not count. After
@@ -30,22 +49,6 @@ class JointCentering(Cost, type="joint_centering"):
     Half a range of less than 1 rad or 1 m counts as that: else a finger that opens by
     4 cm would be drawn back at 2500 1/s, faster than any control period can follow.
     """
-
-    _: KW_ONLY
-    weights: Weights = 1.0
-    """w_i of the joints [1/s], one number or nv."""
-
-    def placed(self, start: Start) -> Self:
-        """Return the cost, checked."""
-        robot = start.state.robot
-        with within("weights"):
-            per_dof(self.weights, robot.nv)
-        if not limited_joints(robot).size:
-            raise FieldError(
-                f"no joint of {robot.name} has limits, so no range has a middle; use a "
-                "target posture instead"
-            )
-        return self
 
     def kernel(self, state: RobotState) -> KernelCall:
         """Return the kernel; see `Cost.kernel`."""
@@ -239,7 +242,7 @@ def _equal_angles(
     return f
 
 
-class LimitBarrier(Cost, type="limit_barrier"):
+class LimitBarrier(LimitedJointsCost, type="limit_barrier"):
     """f = Σ w_i (b((q_i - lower_i)/u_i) + b((upper_i - q_i)/u_i)).
 
     u_i is ``zone`` times half the range, and b the function `barrier_at`: a joint adds
@@ -250,18 +253,6 @@ class LimitBarrier(Cost, type="limit_barrier"):
     zone: Fraction = 0.3
     """Width of the zone before a limit, as a fraction of half the range, at most 1
     [-]."""
-    _: KW_ONLY
-    weights: Weights = 1.0
-    """w_i of the joints [1/s], one number or nv."""
-
-    def placed(self, start: Start) -> Self:
-        """Return the cost, checked; see `NullSpaceField.placed`."""
-        robot = start.state.robot
-        with within("weights"):
-            per_dof(self.weights, robot.nv)
-        if not limited_joints(robot).size:
-            raise FieldError(f"no joint of {robot.name} has limits")
-        return self
 
     def kernel(self, state: RobotState) -> KernelCall:
         """Return the kernel; see `Cost.kernel`."""

@@ -104,15 +104,7 @@ def _manipulability(
     half_log = 0.0
     for i in range(k):
         half_log += log(L[i, i])
-        for j in range(n):
-            slope[i, j] = JW[i, j]
-    solve_columns(L, slope)
-    for i in range(k):
-        for j in range(n):
-            slope_rate[i, j] = JW_dot[i, j]
-            for p in range(k):
-                slope_rate[i, j] -= G_dot[i, p] * slope[p, j]
-    solve_columns(L, slope_rate)
+    _solve_with_rate(L, G_dot, JW, JW_dot, slope, slope_rate)
     # f = -φ, or f = -exp(power φ) with ∂f = power f ∂φ and f' = power f φ'
     value, outer, outer_rate = -half_log, -1.0, 0.0
     if power > 0:

@@ -26,11 +26,6 @@ from hsp_control.visualization.viewer.commands import (
     translucent,
 )
 from hsp_control.visualization.viewer.motion import Layer, RunMotion, Track
-from hsp_control.visualization.viewer.threejs import (
-    always_visible,
-    material,
-    quaternions_along,
-)
 
 _RADIUS = 0.007  # radius of an arrow's shaft, over the robot's size
 _FULL_WIDTH = 12.0  # length over radius from which an arrow has its full radius
@@ -71,7 +66,7 @@ def _tracks(
     path: str, times: Array, origins: Array, vectors: Array, scales: Array
 ) -> Iterator[Track]:
     yield Track(path, "position", times, origins)
-    yield Track(path, "quaternion", times, quaternions_along(vectors))
+    yield Track(path, "quaternion", times, threejs.quaternions_along(vectors))
     yield Track(path, "scale", times, scales)
 
 
@@ -99,7 +94,7 @@ def contacts(robot: Robot, motion: RunMotion, root: str) -> Layer:
     def draw(_: float) -> Iterator[PageCommand]:
         for path in paths.values():
             # Contacts lie inside the legs' meshes.
-            surface = always_visible(material(WARNING, glow=0.5))
+            surface = threejs.always_visible(threejs.material(WARNING, glow=0.5))
             yield set_object(f"{path}/force", unit_arrow(surface, _RADIUS * size))
             ball = threejs.sphere(1.5 * _RADIUS * size)
             yield set_object(f"{path}/point", threejs.mesh_group(ball, surface))
@@ -181,11 +176,11 @@ def self_motion(
 
     def draw(_: float) -> Iterator[PageCommand]:
         for joint in joints:
-            surface = always_visible(material(FIELD, glow=0.5))
+            surface = threejs.always_visible(threejs.material(FIELD, glow=0.5))
             yield set_object(node("velocity", joint), unit_arrow(surface, radius))
             if controls:
-                pale = material(FIELD, opacity=_FIELD_OPACITY, glow=0.5)
-                wide = unit_arrow(always_visible(pale), _WIDENING * radius)
+                pale = threejs.material(FIELD, opacity=_FIELD_OPACITY, glow=0.5)
+                wide = unit_arrow(threejs.always_visible(pale), _WIDENING * radius)
                 yield set_object(node("field", joint), wide)
 
     def tracks(motion: RunMotion) -> Iterator[Track]:
@@ -274,7 +269,7 @@ def ellipsoid(robot: Robot, controller: Controller | None, root: str) -> Layer:
 
     def draw(_: float) -> Iterator[PageCommand]:
         for path in paths.values():
-            surface = material(TASK, opacity=_ELLIPSOID_OPACITY, glow=0.4)
+            surface = threejs.material(TASK, opacity=_ELLIPSOID_OPACITY, glow=0.4)
             ball = threejs.mesh_group(threejs.sphere(1.0), surface, shadow=False)
             yield set_object(path, ball)
 

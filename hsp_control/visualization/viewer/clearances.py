@@ -26,8 +26,8 @@ from hsp_control.visualization.viewer.commands import (
     Json,
     LegendEntry,
     PageCommand,
+    page_command,
     path_element,
-    set_length_label,
     set_object,
     set_transform,
     translucent,
@@ -42,11 +42,6 @@ from hsp_control.visualization.viewer.obstacles import (
     coal_surface,
     obstacle_tracks,
     surface_of,
-)
-from hsp_control.visualization.viewer.threejs import (
-    always_visible,
-    material,
-    unlit_material,
 )
 
 # -- the shapes of links --------------------------------------------------------------
@@ -109,7 +104,7 @@ def _measured_shapes(
 
 def _solid(shape: LinkShape) -> Json:
     """Return a shape as a three.js object in its joint's frame."""
-    surface = material(_MEASURED, opacity=_MEASURED_OPACITY, glow=0.4)
+    surface = threejs.material(_MEASURED, opacity=_MEASURED_OPACITY, glow=0.4)
     solid, pose = coal_surface(shape.geometry)
     pose = shape.placement.homogeneous @ pose
     return threejs.mesh(solid, surface, pose, shadow=False)
@@ -152,13 +147,13 @@ def distances(controller: Controller, root: str, color: str) -> Layer:
 
     def draw(size: float) -> Iterator[PageCommand]:
         for _, path, *_ in found:
-            surface = always_visible(unlit_material(color))
+            surface = threejs.always_visible(threejs.unlit_material(color))
             yield set_object(f"{path}/bar", unit_bar(surface, _BAR_RADIUS * size))
             for end in ("start", "end"):
                 ball = threejs.sphere(_END_RADIUS * size)
                 thing = threejs.mesh_group(ball, surface, shadow=False)
                 yield set_object(f"{path}/{end}", thing)
-            yield set_length_label(f"{path}/bar")
+            yield page_command("length_label", f"{path}/bar", "length label")
 
     def tracks(motion: RunMotion) -> Iterator[Track]:
         rows = [[each.closest(state) for each in found] for state in motion.states()]
@@ -280,7 +275,7 @@ def influence(field: NullSpaceField, shown: dict[str, Shape], root: str) -> Laye
 
 def zone(shape: Shape, reach: float, size: float) -> Json:
     """Return the surface at a distance [m] from a shape's convex hull, for three.js."""
-    surface = material(OBSTACLE, opacity=_ZONE_OPACITY, glow=0.6)
+    surface = threejs.material(OBSTACLE, opacity=_ZONE_OPACITY, glow=0.6)
     if isinstance(shape, HalfSpace):
         surface |= {"side": 2, "opacity": 0.5 * _ZONE_OPACITY}
     else:  # only its back faces are drawn: it never covers the robot

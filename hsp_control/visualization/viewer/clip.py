@@ -1,6 +1,6 @@
 """A clip: an animation that the page plays, and the bands on its time line."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,10 +16,11 @@ from hsp_control.simulation.log_series import FAR, OUT, Unreached, unreached
 from hsp_control.visualization import palette
 from hsp_control.visualization.viewer.analysis import acts, from_the_start
 from hsp_control.visualization.viewer.commands import (
+    CLIP,
     Json,
     PageCommand,
-    clip_command,
     forget_clip,
+    page_command,
     typed_array,
 )
 from hsp_control.visualization.viewer.motion import Track
@@ -149,8 +150,9 @@ def set_clip(
     keep: bool = False,
 ) -> list[PageCommand]:
     """Return the commands that replace the current clip."""
-    begin = clip_command(
+    begin = page_command(
         "clip",
+        CLIP,
         "begin",
         **_fields(clip),
         begins=True,
@@ -164,16 +166,22 @@ def set_clip(
 
 def remove_clip() -> list[PageCommand]:
     """Return the commands that remove the clip; then commands move the scene."""
-    return [forget_clip(), clip_command("still", "begin")]
+    return [forget_clip(), page_command("still", CLIP, "begin")]
 
 
 def extend_clip(clip: Clip, number: int) -> PageCommand:
     """Return the command that appends a clip to the current one."""
-    return clip_command("clip", f"more {number}", **_fields(clip), begins=False)
+    return page_command("clip", CLIP, f"more {number}", **_fields(clip), begins=False)
+
+
+def track_fields(track: Track) -> Json:
+    """Return a track as the page takes it, without its times."""
+    values = typed_array(track.values, np.float32)
+    return {"path": track.path, "property": track.property, "values": values}
 
 
 def _fields(clip: Clip) -> Json:
-    clocks = _clocks(clip.tracks)
+    clocks = list({id(track.times): track.times for track in clip.tracks}.values())
     numbers = {id(clock): number for number, clock in enumerate(clocks)}
     return {
         "start": float(clip.start),
@@ -182,18 +190,8 @@ def _fields(clip: Clip) -> Json:
         "open": clip.open,
         "clocks": [typed_array(clock, np.float64) for clock in clocks],
         "tracks": [
-            {
-                "path": track.path,
-                "property": track.property,
-                "clock": numbers[id(track.times)],
-                "values": typed_array(track.values, np.float32),
-            }
+            {**track_fields(track), "clock": numbers[id(track.times)]}
             for track in clip.tracks
         ],
         "bands": [band._asdict() for band in clip.bands],
     }
-
-
-def _clocks(tracks: Iterable[Track]) -> list[Array]:
-    """Return the distinct arrays of times of the tracks."""
-    return list({id(track.times): track.times for track in tracks}.values())

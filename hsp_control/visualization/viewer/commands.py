@@ -1,19 +1,24 @@
 """Commands for the page, in MessagePack: Meshcat's and a few additional ones."""
 
-import struct
-from functools import lru_cache
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
 import umsgpack  # type: ignore[import-untyped]
 
 from hsp_control.common.arrays import Array
-from hsp_control.visualization.viewer.pipe import LatestCommands, key_of
 
 Json = dict[str, Any]
 
 CAMERA, CAPTION, CLIP, PLAY = "/camera", "/caption", "/clip", "/play"
 PLOTS = "/plots"
+_SEPARATOR = "\0"
+_STAGE = {"Background", "camera", "caption", "floor", "lights"}
+
+
+def key_of(path: str, name: str) -> str:
+    """Return the key of a command that sets a property of a node."""
+    return f"{path}{_SEPARATOR}{name}"
 
 
 class PageCommand(NamedTuple):
@@ -26,12 +31,65 @@ class PageCommand(NamedTuple):
     packed: bytes  # the command itself, a map in MessagePack
     deletes: bool = False  # whether it deletes the node and all nodes below it
 
-    def keep_in(self, scene: LatestCommands) -> None:
-        """Store it in a scene, or remove there what it deletes."""
-        if self.deletes:
-            scene.drop(self.path)
-        else:
-            scene.put(self.key, self.packed)
+
+class LatestCommands:
+    """Packed commands by key, oldest first: replayed in order they build the scene."""
+
+    def __init__(self, packed: dict[str, bytes] | None = None) -> None:
+        """Start without commands."""
+        self._packed = packed or {}
+
+    def keep(self, commands: Iterable[PageCommand], *, told: bool = False) -> None:
+        """Store commands in place of the last ones with their keys.
+
+        Those of a node that one deletes are dropped; ``told``: it is stored itself, for
+        a page that may show the node.
+        """
+        for command in commands:
+            if command.deletes:
+                self._drop(command.path)
+            self._packed.pop(command.key, None)  # the new one comes last
+            if told or not command.deletes:
+                self._packed[command.key] = command.packed
+
+    def _drop(self, path: str) -> None:
+        for key in list(self._packed):
+            node = key.partition(_SEPARATOR)[0]
+            if node == path or node.startswith(f"{path}/"):
+                del self._packed[key]
+
+    def pop_all(self) -> list[bytes]:
+        """Return all packed commands, oldest first, and remove them."""
+        packed = list(self._packed.values())
+        self._packed.clear()
+        return packed
+
+    def items(self) -> list[tuple[str, str, bytes]]:
+        """Return (path, property, packed command) of all commands, oldest first."""
+        return [
+            (path, name, packed)
+            for key, packed in self._packed.items()
+            for path, _, name in [key.partition(_SEPARATOR)]
+        ]
+
+    def get(self, key: str) -> bytes | None:
+        """Return the packed command with a key, or None."""
+        return self._packed.get(key)
+
+    def copy(self) -> "LatestCommands":
+        """Return an independent copy."""
+        return LatestCommands(dict(self._packed))
+
+    def stage(self) -> list[bytes]:
+        """Return the packed commands that a page shows without waiting for meshes."""
+        return [
+            packed
+            for path, name, packed in self.items()
+            if name == "transform" or path.lstrip("/").partition("/")[0] in _STAGE
+        ]
+
+    def __len__(self) -> int:
+        return len(self._packed)
 
 
 class LegendEntry(NamedTuple):
@@ -53,32 +111,30 @@ def translucent(color: str, opacity: float) -> str:
 
 def set_object(path: str, thing: Json) -> PageCommand:
     """Return the command that sets a node's object (see `threejs`)."""
-    return _command("set_object", path, "object", object=thing)
+    return page_command("set_object", path, "object", object=thing)
 
 
 def set_transform(path: str, transform: Array) -> PageCommand:
     """Return the command that sets a node's pose in its parent, shape (4, 4)."""
-    matrix = np.ascontiguousarray(transform.T, dtype="<f8")
-    return PageCommand(
-        path, key_of(path, "transform"), _transform_head(path) + matrix.tobytes()
-    )
+    matrix = typed_array(transform.T, np.float64)
+    return page_command("set_transform", path, "transform", matrix=matrix)
 
 
 def set_property(path: str, name: str, value: Any) -> PageCommand:
     """Return the command that sets a property of a node, such as ``visible``."""
-    return _command("set_property", path, name, property=name, value=value)
+    return page_command("set_property", path, name, property=name, value=value)
 
 
 def set_ghost(path: str, color: str, opacity: float) -> PageCommand:
     """Return the command that makes a node a ghost: tinted and translucent."""
-    return _command("ghost", path, "ghost", color=color, opacity=float(opacity))
+    return page_command("ghost", path, "ghost", color=color, opacity=float(opacity))
 
 
 def set_trail(
     path: str, points: Array, radius: float, color: int, *, sleeve: bool = False
 ) -> PageCommand:
     """Return the command that sets a node's object to a path in space, a tube."""
-    return _command(
+    return page_command(
         "trail",
         path,
         "object",
@@ -89,25 +145,9 @@ def set_trail(
     )
 
 
-def extend_trail(path: str, points: Array, number: int) -> PageCommand:
-    """Return the command that appends points to a path; points (N, 3) [m]."""
-    more = typed_array(points, np.float32)
-    return _command("trail_more", path, f"more {number}", points=more)
-
-
-def set_length_label(path: str) -> PageCommand:
-    """Return the command that labels a bar along z with its length [m]."""
-    return _command("length_label", path, "length label")
-
-
 def delete(path: str) -> PageCommand:
     """Return the command that deletes a node and all nodes below it."""
-    return _command("delete", path, "delete")._replace(deletes=True)
-
-
-def set_camera(**view: Any) -> PageCommand:
-    """Return the command that places the camera: see `look_at`."""
-    return _command("camera", CAMERA, "camera", **view)
+    return page_command("delete", path, "delete")._replace(deletes=True)
 
 
 def set_caption(
@@ -115,29 +155,19 @@ def set_caption(
 ) -> PageCommand:
     """Return the command that sets the title and the legend beside the scene."""
     entries = [{**entry._asdict(), "paths": list(entry.paths)} for entry in legend]
-    return _command(
+    return page_command(
         "caption", CAPTION, "caption", title=title, legend=entries, dark=dark
     )
 
 
 def set_time(text: str) -> PageCommand:
     """Return the command that sets the time below the title; "" hides it."""
-    return _command("time", CAPTION, "time", text=text)
+    return page_command("time", CAPTION, "time", text=text)
 
 
 def set_status(text: str) -> PageCommand:
     """Return the command that sets the program's status line; "" hides it."""
-    return _command("status", CAPTION, "status", text=text)
-
-
-def clip_command(kind: str, name: str, **fields: Any) -> PageCommand:
-    """Return a command for the clip: see `hsp_control.visualization.viewer.clip`."""
-    return _command(kind, CLIP, name, **fields)
-
-
-def play_command(kind: str, name: str, **fields: Any) -> PageCommand:
-    """Return a command for a page that is played with: see `hsp_control.play`."""
-    return _command(kind, PLAY, name, **fields)
+    return page_command("status", CAPTION, "status", text=text)
 
 
 def forget_clip() -> PageCommand:
@@ -146,19 +176,9 @@ def forget_clip() -> PageCommand:
     return PageCommand(CLIP, key_of(CLIP, "nothing"), packed, deletes=True)
 
 
-def set_plots(plots: Json, arrays: list[Json]) -> PageCommand:
-    """Return the command that shows plots in place of earlier ones."""
-    return _command("plots", PLOTS, "plots", plots=plots, arrays=arrays)
-
-
 def remove_plots() -> PageCommand:
     """Return the command that removes the plots, also from the scene."""
-    return _command("no_plots", PLOTS, "plots")._replace(deletes=True)
-
-
-def seek(time: float) -> PageCommand:
-    """Return the command that pauses the player at a time of its clip [s]."""
-    return clip_command("seek", "seek", time=float(time))
+    return page_command("no_plots", PLOTS, "plots")._replace(deletes=True)
 
 
 def typed_array(values: Any, dtype: type[np.generic]) -> umsgpack.Ext:
@@ -187,20 +207,10 @@ def unpack(packed: bytes) -> Json:
     return dict(umsgpack.unpackb(packed, ext_handlers=handlers))
 
 
-def _command(kind: str, path: str, name: str, **fields: Any) -> PageCommand:
+def page_command(kind: str, path: str, name: str, **fields: Any) -> PageCommand:
+    """Return the command of a kind that sets a property of a node."""
     packed = umsgpack.packb({"type": kind, "path": path, **fields})
     return PageCommand(path, key_of(path, name), packed)
-
-
-@lru_cache(maxsize=4096)
-def _transform_head(path: str) -> bytes:
-    """Return the bytes before the matrix; cached, as packing them costs the most."""
-    head = b"".join(
-        umsgpack.packb(word)
-        for word in ("type", "set_transform", "path", path, "matrix")
-    )
-    ext8_of_16_doubles = struct.pack("BBB", 0xC7, 16 * 8, 0x18)
-    return b"\x83" + head + ext8_of_16_doubles
 
 
 def path_element(name: str) -> str:

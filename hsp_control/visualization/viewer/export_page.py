@@ -9,15 +9,14 @@ from hsp_control.common.exceptions import ExportError
 from hsp_control.control.controller import Controller
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
-from hsp_control.visualization.viewer.commands import Json, unpack
+from hsp_control.visualization.viewer.commands import Json
 from hsp_control.visualization.viewer.comparison import (
     GHOST_OPACITY,
     ComparedRun,
     ghost_color,
     run_parts,
 )
-from hsp_control.visualization.viewer.offline_page import assemble
-from hsp_control.visualization.viewer.packed_scene import reduce_scene
+from hsp_control.visualization.viewer.offline_page import scene_page
 from hsp_control.visualization.viewer.packing import ArrayTable
 from hsp_control.visualization.viewer.page_plots import pack_panels
 from hsp_control.visualization.viewer.replay import rebuild_run
@@ -91,10 +90,7 @@ def page_of(runs: Sequence[ComparedRun], view: dict[str, Any]) -> str:
             viewer.play(first.rollout, controller=first.controller)
         else:
             viewer.compare(runs, beside=beside, ghosts=False)
-    commands = [unpack(packed) for _, _, packed in recorder.scene.items()]
     content: Json = {
-        "type": "show",
-        "commands": reduce_scene(commands, arrays),
         "plots": pack_panels(runs, arrays),
         "about": [_about(run) for run in runs],
     }
@@ -108,7 +104,7 @@ def page_of(runs: Sequence[ComparedRun], view: dict[str, Any]) -> str:
     titles = {str(run.rollout.meta.get("title") or "") for run in runs}
     title = titles.pop() if len(titles) == 1 else " and ".join(names)
     title = title or first.robot.name
-    return assemble(title, {**content, "arrays": arrays.entries})
+    return scene_page(recorder.scene, title, arrays, **content)
 
 
 def _runs(

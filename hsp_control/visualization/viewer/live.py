@@ -2,7 +2,6 @@
 
 import logging
 import time
-from collections import deque
 from typing import Any
 
 import numpy as np
@@ -22,7 +21,6 @@ from hsp_control.visualization.viewer.viewer import Viewer
 
 MIN_PERIOD = 0.1  # minimum time between two messages to the page [s]
 MAX_PERIOD = 1.0  # maximum time between two messages [s]
-RATE_WINDOW = 2.0  # time over which the computing rate is measured [s]
 DRAWING_SHARE = 0.03  # maximum share of the computing time that drawing takes
 PLOTS_SHARE = 0.01  # maximum share of the computing time that the plots take
 PLOTS_PERIOD = 1.0  # minimum time between two pictures of the plots [s]
@@ -49,7 +47,8 @@ class LiveView:
         motion = motion_of(robot, preview)
         shown = viewer.view.show.all_fields()
         layers = all_layers(robot, motion, controller, dark=viewer.dark)
-        layers["paths"], self._extend = growing_paths(motion, "/paths")
+        layers["paths"], extend = growing_paths(motion, "/paths")
+        self._extend = extend if shown["paths"] else lambda _: ()
         # Layers that are hidden are not computed now.
         layers = {name: layer for name, layer in layers.items() if shown[name]}
         self._run = RunDrawing(viewer.drawing, motion, layers, shown=shown)
@@ -57,8 +56,6 @@ class LiveView:
         self._pieces = 0
         self._cost = 0.0  # s per drawn row
         self._next = self._next_plots = 0.0
-        # (wall time, time of the run).
-        self._marks: deque[tuple[float, float]] = deque()
         self._begin: float | None = None
         self._size = viewer.set_stage(self._run, experiment.scenario.title)
 
@@ -97,7 +94,7 @@ class LiveView:
         rows = Rollout(recorder.rows(self._sent), self._meta)
         # From the last row sent on, whose bands may go on.
         joined = Rollout(recorder.rows(max(self._sent - 1, 0)), self._meta)
-        rate = self._rate(now, float(rows.t[-1]))
+        rate = float(rows.t[-1]) / max(now - (self._begin or 0.0), 1e-9)
         # Drawn rows per second of computing, times their cost, is drawing's share.
         finest = max(COARSEST, rate * self._cost / DRAWING_SHARE)
         before = time.thread_time()
@@ -122,15 +119,6 @@ class LiveView:
         took = time.thread_time() - before
         self._next_plots = now + max(PLOTS_PERIOD, took / PLOTS_SHARE)
 
-    def _rate(self, now: float, computed: float) -> float:
-        """Return the seconds of the run that are computed per second, recently."""
-        marks = self._marks
-        marks.append((now, computed))
-        while len(marks) > 2 and marks[1][0] < now - RATE_WINDOW:
-            marks.popleft()
-        then, before = marks[0]
-        return (computed - before) / (now - then) if now > then else 0.0
-
     def _commands(self, motion: RunMotion, rows: Rollout, rate: float) -> list[Any]:
         first = not self._pieces
         duration = self._experiment.scenario.simulation.duration
@@ -142,14 +130,13 @@ class LiveView:
             bands_of(rows, self._experiment.controller, duration=duration),
         )
         view = self._viewer.view
-        clip_commands = (
+        shown = (
             set_clip(clip, play=True, speed=view.speed, loop=view.loop)
             if first
             else [extend_clip(clip, self._pieces)]
         )
-        grown = self._extend(motion) if "paths" in self._run.layers else ()
-        told = [set_status(f"computing at {_shown(rate)} × real time")] if rate else []
-        return [*grown, *clip_commands, *told]
+        told = [] if first else [set_status(f"computing at {_shown(rate)} × real time")]
+        return [*self._extend(motion), *shown, *told]
 
 
 def _preview(experiment: Experiment) -> Rollout:

@@ -28,7 +28,6 @@ from hsp_control.visualization.viewer.commands import (
 )
 from hsp_control.visualization.viewer.motion import Layer, RunMotion, Track
 from hsp_control.visualization.viewer.robot_drawing import robot_entry
-from hsp_control.visualization.viewer.threejs import material, pose_at
 
 ROOT = "/obstacles"
 _OPACITY, _PALE = 0.75, 0.05
@@ -48,10 +47,10 @@ _FACES = np.array(
 
 def obstacle(shape: Shape, size: float, color: str = OBSTACLE) -> Json:
     """Return a shape as a three.js object, in a scene of a size [m]."""
-    surface = material(color, opacity=_OPACITY, glow=0.3)
+    surface = threejs.material(color, opacity=_OPACITY, glow=0.3)
     solid, pose = surface_of(shape, size)
     if isinstance(shape, shapes.HalfSpace):  # a floor or a wall: it must not glare
-        surface = material(MUTED, opacity=_PALE, glow=0.3) | {"side": 2}
+        surface = threejs.material(MUTED, opacity=_PALE, glow=0.3) | {"side": 2}
     elif solid["type"] == "BufferGeometry" and not isinstance(shape, shapes.PointCloud):
         surface |= {"side": 2}
     thing = threejs.mesh(solid, surface, pose)
@@ -64,7 +63,7 @@ def obstacle(shape: Shape, size: float, color: str = OBSTACLE) -> Json:
 def surface_of(shape: Shape, size: float, margin: float = 0.0) -> tuple[Json, Array]:
     """Return the surface at a distance [m] from a shape (its hull), and its pose."""
     if isinstance(shape, shapes.HalfSpace):
-        return threejs.plane(_EXTENT * size), pose_at([0.0, 0.0, margin])
+        return threejs.plane(_EXTENT * size), threejs.pose_at([0.0, 0.0, margin])
     if isinstance(shape, shapes.PointCloud):
         points = np.asarray(shape.points)
         if margin:
@@ -83,7 +82,7 @@ def coal_surface(geometry: Any, margin: float = 0.0) -> tuple[Json, Array]:
             return threejs.sphere(geometry.radius + margin), np.eye(4)
         case coal.Capsule():
             length, radius = 2.0 * geometry.halfLength, geometry.radius + margin
-            return threejs.capsule(length, radius, radius), pose_at(
+            return threejs.capsule(length, radius, radius), threejs.pose_at(
                 [0.0, 0.0, -0.5 * length]
             )
         case coal.Cylinder():

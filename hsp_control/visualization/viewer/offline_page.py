@@ -2,24 +2,26 @@
 
 import base64
 import gzip
-import html
 import json
 import re
-from collections.abc import Iterable
 from html import escape
 from pathlib import Path
+from typing import Any
 
 import umsgpack  # type: ignore[import-untyped]
 
-from hsp_control.visualization.viewer.commands import CAPTION, PLOTS, Json, unpack
+from hsp_control.visualization.viewer.commands import (
+    CAPTION,
+    PLOTS,
+    LatestCommands,
+    key_of,
+    unpack,
+)
 from hsp_control.visualization.viewer.packed_scene import reduce_scene
 from hsp_control.visualization.viewer.packing import ArrayTable
-from hsp_control.visualization.viewer.pipe import LatestCommands, key_of
 from hsp_control.visualization.viewer.transport import meshcat_page
 
 _FILES = Path(__file__).parent / "page"
-_SCRIPTS = ("offline.js",)
-_STYLES = ("offline.css",)
 _NOTE = (
     "Written by hsp_control. Holds Meshcat's page, which holds three.js, and uPlot "
     "(all MIT)."
@@ -31,24 +33,24 @@ _POLICY = (
 )
 
 
-def assemble(title: str, content: Json) -> str:
-    """Return the page's HTML: the live page with its files inlined, and its content."""
+def scene_page(
+    scene: LatestCommands, title: str, arrays: ArrayTable, **more: Any
+) -> str:
+    """Return a page that shows a scene, and what is beside it; see `offline.js`."""
+    commands = [unpack(packed) for path, _, packed in scene.items() if path != PLOTS]
+    reduced = reduce_scene(commands, arrays)
+    content = {"type": "show", "commands": reduced, **more, "arrays": arrays.entries}
     live = (_FILES / "index.html").read_text(encoding="utf-8")
     body = live[live.index("<body>") + len("<body>") : live.index("</body>")]
     names = re.findall(r'<script src="([^"]+)"></script>', body)
     body = re.sub(r"<script.*?</script>\s*", "", body, flags=re.DOTALL)
     styles = [
-        *((_FILES / name).read_text(encoding="utf-8") for name in _stylesheets(live)),
+        *map(_text, re.findall(r'<link rel="stylesheet" href="([^"]+)">', live)),
         *re.findall(r"<style>(.*?)</style>", live, flags=re.DOTALL),
-        *((_FILES / name).read_text(encoding="utf-8") for name in _STYLES),
+        _text("offline.css"),
     ]
-    start = (_FILES / "offline_start.js").read_text(encoding="utf-8")
-    licence = (_FILES / "uPlot.LICENSE.txt").read_text(encoding="utf-8")
-    scripts = [
-        f"/* uPlot:\n{licence}*/",
-        *(_live_script(name).read_text(encoding="utf-8") for name in names),
-        *((_FILES / name).read_text(encoding="utf-8") for name in _SCRIPTS),
-    ]
+    licence = _text("uPlot.LICENSE.txt")
+    scripts = [f"/* uPlot:\n{licence}*/", *map(_text, names), _text("offline.js")]
     return "\n".join(
         [
             "<!DOCTYPE html>",
@@ -58,14 +60,14 @@ def assemble(title: str, content: Json) -> str:
             '<meta charset="utf-8">',
             f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">',
             '<meta name="viewport" content="width=device-width, initial-scale=1">',
-            f"<title>{html.escape(title)}</title>",
+            f"<title>{escape(title)}</title>",
             '<link rel="icon" href="data:,">',
             *(f"<style>{style}</style>" for style in styles),
             "</head>",
             f"<body>{body.rstrip()}",
             _block("scripts", json.dumps(scripts).encode()),
             _block("content", umsgpack.packb(content)),
-            f"<script>{start}</script>",
+            f"<script>{_text('offline_start.js')}</script>",
             "</body>",
             "</html>",
             "",
@@ -73,13 +75,11 @@ def assemble(title: str, content: Json) -> str:
     )
 
 
-def _stylesheets(page: str) -> Iterable[str]:
-    return re.findall(r'<link rel="stylesheet" href="([^"]+)">', page)
-
-
-def _live_script(name: str) -> Path:
+def _text(name: str) -> str:
+    """Return a file of the page, or of Meshcat's."""
     own = _FILES / name
-    return own if own.is_file() else meshcat_page() / name
+    file = own if own.is_file() else meshcat_page() / name
+    return file.read_text(encoding="utf-8")
 
 
 def _block(name: str, data: bytes) -> str:
@@ -118,19 +118,9 @@ class InlineView:
         """
         self.height = height
         self._url = url
-        arrays = ArrayTable()
-        commands = [
-            unpack(packed) for path, _, packed in scene.items() if path != PLOTS
-        ]
         caption = scene.get(key_of(CAPTION, "caption"))
         title = str(unpack(caption)["title"]) if caption else "hsp_control"
-        content = {
-            "type": "show",
-            "commands": reduce_scene(commands, arrays),
-            "plots": None,
-            "about": None,
-        }
-        self.page = assemble(title, {**content, "arrays": arrays.entries})
+        self.page = scene_page(scene, title, ArrayTable(), plots=None)
 
     @property
     def size(self) -> int:

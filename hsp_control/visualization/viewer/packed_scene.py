@@ -8,8 +8,6 @@ from pathlib import PurePath
 from typing import Any, NamedTuple
 
 import numpy as np
-import scipy.sparse
-import scipy.sparse.csgraph
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import ExportError
@@ -19,47 +17,6 @@ from hsp_control.visualization.viewer.threejs import material, matrix, unique_na
 
 CREASE = np.radians(38.0)
 """Angle between neighbouring triangles from which their edge is a crease [rad]."""
-
-
-def weld(
-    vertices: Array, triangles: Indices, tolerance: float
-) -> tuple[Array, Indices]:
-    """Merge vertices at the same position; drop triangles that become degenerate."""
-    cells = np.rint((vertices - vertices.min(axis=0)) / tolerance).astype(np.int64)
-    _, first, cell = np.unique(cells, axis=0, return_index=True, return_inverse=True)
-    triangles = cell.reshape(-1)[triangles]
-    a, b, c = triangles.T
-    return vertices[first], triangles[(a != b) & (b != c) & (c != a)]
-
-
-def split_creases(vertices: Array, triangles: Indices) -> tuple[Array, Indices]:
-    """Duplicate the vertices of creases: normals are smooth across other edges."""
-    corners = np.arange(triangles.size).reshape(-1, 3)
-    normals = np.cross(
-        vertices[triangles[:, 1]] - vertices[triangles[:, 0]],
-        vertices[triangles[:, 2]] - vertices[triangles[:, 0]],
-    )
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    normals /= np.where(lengths > 0.0, lengths, 1.0)
-    sides = ((0, 1), (1, 2), (2, 0))
-    edges = np.concatenate([triangles[:, side] for side in sides])
-    ends = np.concatenate([corners[:, side] for side in sides])
-    backwards = edges[:, 0] > edges[:, 1]
-    edges[backwards], ends[backwards] = edges[backwards, ::-1], ends[backwards, ::-1]
-    order = np.lexsort(edges.T)
-    edges, ends = edges[order], ends[order]
-    shared = np.flatnonzero((edges[1:] == edges[:-1]).all(axis=1))
-    here, there = ends[shared], ends[shared + 1]
-    cosine = np.sum(normals[here[:, 0] // 3] * normals[there[:, 0] // 3], axis=1)
-    smooth = cosine > np.cos(CREASE)
-    a, b = here[smooth].ravel(), there[smooth].ravel()
-    joined = scipy.sparse.coo_array(
-        (np.ones(len(a), bool), (a, b)), shape=(corners.size, corners.size)
-    )
-    count, group = scipy.sparse.csgraph.connected_components(joined, directed=False)
-    split = np.empty((count, 3))
-    split[group] = vertices[triangles.ravel()]
-    return split, group.astype(np.int64).reshape(-1, 3)
 
 
 def sort_along_curve(vertices: Array, triangles: Indices) -> tuple[Array, Indices]:
@@ -212,108 +169,63 @@ def _packed(value: Any, arrays: ArrayTable) -> Any:
     return value
 
 
-class _MeshFileReplacer:
-    """Replaces the mesh files of one object by triangles."""
+def _without_files(thing: Json, owner: str, arrays: ArrayTable) -> Json:
+    """Return an object with triangles in place of its mesh files."""
+    known = thing.get("geometries", [])
+    files = {g["uuid"]: g for g in known if g["type"] == "_meshfile_geometry"}
+    geometries = [each for each in known if each["uuid"] not in files]
+    materials = list(thing.get("materials", []))
 
-    def __init__(self, thing: Json, owner: str, arrays: ArrayTable) -> None:
-        self._owner, self._arrays = owner, arrays
-        self._files = {
-            geometry["uuid"]: geometry
-            for geometry in thing.get("geometries", [])
-            if geometry["type"] == "_meshfile_geometry"
-        }
-        self.geometries = [
-            geometry
-            for geometry in thing.get("geometries", [])
-            if geometry["uuid"] not in self._files
-        ]
-        self.materials = list(thing.get("materials", []))
+    def mesh(piece: Piece, scale: float, surface: str, shadows: Json) -> Json:
+        geometry = _geometry(piece, scale, arrays)
+        geometries.append(geometry)
+        about = {"geometry": geometry["uuid"], "material": surface}
+        return {"uuid": unique_name(), "type": "Mesh", **about, **shadows}
 
-    def replaced(self, node: Json, scale: float) -> Json:
-        """Return a node of the object without mesh files."""
+    def replaced(node: Json, scale: float) -> Json:
         if "matrix" in node:
             axes = np.reshape(node["matrix"], (4, 4))[:3, :3]
             scale *= float(np.linalg.norm(axes, axis=1).max())
+        shadows = {k: v for k, v in node.items() if k.endswith("Shadow")}
         if node["type"] == "_meshfile_object":
-            children = [
-                self._mesh(piece, scale, self._surface(piece), {})
-                for piece in read_mesh(node, self._owner)
-            ]
-            shadows = {k: v for k, v in node.items() if k.endswith("Shadow")}
-            for child in children:
-                child |= shadows
-            return {
-                "uuid": node["uuid"],
-                "type": "Group",
-                "matrix": node.get("matrix", matrix(np.eye(4))),
-                "children": children,
-            }
-        file = self._files.get(node.get("geometry"))
-        if file is not None:
-            (piece,) = read_mesh(file, self._owner) or [_empty_piece()]
-            return self._mesh(piece, scale, node["material"], node)
-        if "children" in node:
-            children = [self.replaced(child, scale) for child in node["children"]]
+            children = []
+            for piece in read_mesh(node, owner):
+                color = piece.color or (0.72, 0.74, 0.76, 1.0)
+                surface = material(color, opacity=color[3])
+                materials.append(surface)
+                children.append(mesh(piece, scale, surface["uuid"], shadows))
+        elif file := files.get(node.get("geometry")):
+            pieces = read_mesh(file, owner)
+            children = [mesh(p, scale, node["material"], shadows) for p in pieces]
+        elif "children" in node:
+            children = [replaced(child, scale) for child in node["children"]]
             return {**node, "children": children}
-        return node
+        else:
+            return node
+        place = node.get("matrix", matrix(np.eye(4)))
+        group = {"uuid": node["uuid"], "type": "Group", "matrix": place}
+        return {**group, "children": children}
 
-    def _surface(self, piece: Piece) -> str:
-        color = piece.color or (0.72, 0.74, 0.76, 1.0)
-        surface = material(color, opacity=color[3])
-        self.materials.append(surface)
-        return str(surface["uuid"])
-
-    def _mesh(self, piece: Piece, scale: float, surface: str, node: Json) -> Json:
-        geometry = _geometry(piece, scale, self._arrays)
-        self.geometries.append(geometry)
-        return {
-            **node,
-            "uuid": unique_name(),
-            "type": "Mesh",
-            "geometry": geometry["uuid"],
-            "material": surface,
-        }
-
-
-def _without_files(thing: Json, owner: str, arrays: ArrayTable) -> Json:
-    files = _MeshFileReplacer(thing, owner, arrays)
-    node = files.replaced(thing["object"], 1.0)
-    return {
-        **thing,
-        "geometries": files.geometries,
-        "materials": files.materials,
-        "object": node,
-    }
+    drawn = replaced(thing["object"], 1.0)
+    about = {"geometries": geometries, "materials": materials}
+    return {**thing, **about, "object": drawn}
 
 
 def _geometry(piece: Piece, scale: float, arrays: ArrayTable) -> Json:
     """Return a piece as a packed geometry; the page computes its normals."""
-    size = float(np.ptp(piece.vertices, axis=0).max(initial=0.0)) or 1.0
-    vertices, triangles = weld(piece.vertices, piece.triangles, 1e-6 * size)
-    vertices, triangles = sort_along_curve(*split_creases(vertices, triangles))
+    import trimesh
+    from trimesh.graph import smooth_shade
+
+    solid = trimesh.Trimesh(piece.vertices, piece.triangles)  # with vertices merged
+    solid.update_faces(solid.nondegenerate_faces())
+    # The vertices of creases are doubled: normals are smooth across other edges.
+    solid = smooth_shade(solid, angle=CREASE, facet_minarea=None)
+    vertices, triangles = sort_along_curve(solid.vertices, solid.faces)
+    size = float(np.ptp(vertices, axis=0).max(initial=0.0)) or 1.0
     step = max(VERTEX_STEP / scale, size * 2.0**-16)
-    return {
-        "uuid": unique_name(),
-        "type": "BufferGeometry",
-        "data": {
-            "attributes": {
-                "position": {
-                    "itemSize": 3,
-                    "type": "Float32Array",
-                    "array": arrays.numbers(vertices, step),
-                    "normalized": False,
-                }
-            },
-            "index": {
-                "itemSize": 1,
-                "type": "Uint32Array",
-                "array": arrays.triangles(triangles),
-                "normalized": False,
-            },
-        },
-    }
-
-
-def _empty_piece() -> Piece:
-    corner: Array = np.zeros((3, 3))
-    return Piece(corner, np.array([[0, 1, 2]]), None)
+    places = arrays.numbers(vertices, step)
+    corners = arrays.whole(triangles.astype(np.uint32).ravel())
+    position = {"itemSize": 3, "type": "Float32Array", "array": places}
+    index = {"itemSize": 1, "type": "Uint32Array", "array": corners}
+    data = {"attributes": {"position": position}, "index": index}
+    return {"uuid": unique_name(), "type": "BufferGeometry", "data": data}

@@ -52,16 +52,8 @@ class ArrayTable:
             step=[1.0],
         )
 
-    def triangles(self, triangles: Indices) -> Json:
-        """Store triangles, shape (n, 3); vertices must be numbered by first use."""
-        flat = triangles.ravel()
-        unused = np.maximum.accumulate(np.concatenate([[0], flat[:-1] + 1]))
-        return self._store((unused - flat).reshape(-1, 3), kind="triangles")
-
     def _store(self, whole: Indices, **about: Any) -> Json:
-        differences = whole
-        if about["kind"] != "triangles":
-            differences = np.diff(whole, axis=0, prepend=0)
+        differences = np.diff(whole, axis=0, prepend=0)
         zigzag = (differences << 1) ^ (differences >> 63)
         largest = int(zigzag.max(initial=0))
         width = next(n for n in range(1, 9) if largest < 256**n)
@@ -214,7 +206,8 @@ def _keyframes(name: str, times: Array, values: Array) -> tuple[Array, Array, fl
     """Return a track's keyframes: times, values, and the resolution of the values."""
     prop = _PROPERTIES.get(name)
     if prop is None or not len(times):
-        return times, values, _float32_step(values)
+        # The resolution of float32 at the largest value.
+        return times, values, max(np.abs(values).max(initial=0.0), 1e-12) * 2.0**-23
     rounded = values.min(axis=0) + prop.step * np.rint(
         (values - values.min(axis=0)) / prop.step
     )
@@ -222,8 +215,3 @@ def _keyframes(name: str, times: Array, values: Array) -> tuple[Array, Array, fl
     if len(rows) > 1 and np.array_equal(rounded[rows], rounded[rows[[0] * len(rows)]]):
         rows = rows[:1]  # it is constant
     return times[rows], rounded[rows], prop.step
-
-
-def _float32_step(values: Array) -> Any:
-    """Return the resolution of float32 at the largest value."""
-    return max(float(np.abs(values).max(initial=0.0)), 1e-12) * 2.0**-23

@@ -17,7 +17,12 @@ from hsp_control.simulation.log_writer import LogWriter, continuous_dofs
 from hsp_control.simulation.rollout import complete_columns
 from hsp_control.visualization import palette
 from hsp_control.visualization.viewer.analysis import expected_floor
-from hsp_control.visualization.viewer.commands import Json, PageCommand, set_plots
+from hsp_control.visualization.viewer.commands import (
+    PLOTS,
+    Json,
+    PageCommand,
+    page_command,
+)
 from hsp_control.visualization.viewer.comparison import ComparedRun
 from hsp_control.visualization.viewer.packing import (
     CLOCK_STEP,
@@ -61,22 +66,16 @@ class Panel(NamedTuple):
     note: str = ""  # A remark beside the title, or ""
 
 
-def panels_of(rollout: Rollout, controller: Controller | None = None) -> list[Panel]:
-    """Return the plots of a log, without those whose columns it lacks."""
-    return list(_panels(rollout, controller))
-
-
-def _panels(rollout: Rollout, controller: Controller | None) -> Iterator[Panel]:
-    errors = [
-        Series(
-            f"{part.label} [{part.unit}]",
-            part.norm,
-            palette.task(part.task),
-            part.unit == "rad",
-        )
-        for part in log_series.task_errors(rollout)
-    ]
-    units = ", ".join(dict.fromkeys(p.unit for p in log_series.task_errors(rollout)))
+def panels_of(
+    rollout: Rollout, controller: Controller | None = None
+) -> Iterator[Panel]:
+    """Yield the plots of a log, without those whose columns it lacks."""
+    errors, kinds = [], list[str]()
+    for part in log_series.task_errors(rollout):
+        name, color = f"{part.label} [{part.unit}]", palette.task(part.task)
+        errors.append(Series(name, part.norm, color, part.unit == "rad"))
+        kinds.append(part.unit)
+    units = ", ".join(dict.fromkeys(kinds))
     if errors:
         yield Panel("Task error ‖e‖", units, errors, logarithmic=True)
     period = log_series.held_period(rollout)
@@ -119,13 +118,8 @@ def _null_space(rollout: Rollout, controller: Controller | None) -> Iterator[Ser
     decay = predicted_decay(rollout)
     for predicted, gain in zip((decay.slow, decay.fast), decay.gains, strict=True):
         if predicted is not None:
-            yield Series(
-                f"predicted: exp(−{gain:g} t)",
-                predicted,
-                palette.INK,
-                dashed=True,
-                predicted=True,
-            )
+            name = f"predicted: exp(−{gain:g} t)"
+            yield Series(name, predicted, palette.INK, dashed=True, predicted=True)
             if decay.fast is decay.slow:
                 break
     yield Series("‖e_N‖", rollout["null_space_norm"], palette.FIELD)
@@ -180,14 +174,9 @@ def pack_panels(runs: Sequence[ComparedRun], arrays: ArrayTable) -> Json:
             panels[key] = panels.get(key, panel)._replace(edges=list(both))
             known = curves.setdefault(key, [])
             colors = {curve.series.name: curve.series.color for curve in known}
-            known += [
-                _Curve(
-                    number,
-                    run.rollout.t,
-                    each._replace(color=colors.get(each.name, each.color)),
-                )
-                for each in panel.series
-            ]
+            for each in panel.series:
+                alike = each._replace(color=colors.get(each.name, each.color))
+                known.append(_Curve(number, run.rollout.t, alike))
     return {
         "runs": [run.name for run in runs],
         "start": min(float(run.rollout.t[0]) for run in runs),
@@ -195,9 +184,6 @@ def pack_panels(runs: Sequence[ComparedRun], arrays: ArrayTable) -> Json:
         "damped": [_damped(run.rollout) for run in runs],
         "panels": [_packed(panels[key], curves[key], arrays) for key in panels],
         "colors": {
-            "ink": palette.INK,
-            "muted": palette.MUTED,
-            "grid": palette.GRID,
             "contact": palette.OBSTACLE,
             "warning": palette.WARNING,
         },
@@ -229,28 +215,14 @@ def _packed(panel: Panel, curves: Sequence[_Curve], arrays: ArrayTable) -> Json:
         shown = shown[:, None]
         rounded = step * np.rint(shown / step)
         keys = keyframe_rows(times, shown, rounded, linear, distance_error(bound))
-        packed.append(
-            {
-                "name": series.name,
-                "run": run,
-                "color": series.color,
-                "dashed": series.dashed,
-                "band": series.band,
-                "predicted": series.predicted,
-                "times": arrays.numbers(times[keys], CLOCK_STEP, np.float64),
-                "values": arrays.numbers(rounded[keys], step),
-            }
-        )
-    return {
-        "title": panel.title,
-        "unit": panel.unit,
-        "note": panel.note,
-        "logarithmic": panel.logarithmic,
-        "edges": [edge._asdict() for edge in panel.edges],
-        "low": low,
-        "high": high,
-        "series": packed,
-    }
+        numbers = {
+            "times": arrays.numbers(times[keys], CLOCK_STEP, np.float64),
+            "values": arrays.numbers(rounded[keys], step),
+        }
+        packed.append({**series._asdict(), "run": run, **numbers})
+    edges = [edge._asdict() for edge in panel.edges]
+    about = {"edges": edges, "low": low, "high": high, "series": packed}
+    return {**panel._asdict(), **about}
 
 
 def _range(panel: Panel, values: Array) -> tuple[float, float]:
@@ -296,7 +268,7 @@ def _command(runs: Sequence[ComparedRun], end: float | None) -> PageCommand:
     plots = pack_panels(runs, arrays)
     if end is not None:
         plots["end"] = max(end, plots["end"])
-    return set_plots(plots, arrays.entries)
+    return page_command("plots", PLOTS, "plots", plots=plots, arrays=arrays.entries)
 
 
 def _chosen(count: int) -> Indices:

@@ -27,13 +27,6 @@ from hsp_control.visualization.viewer.commands import (
     set_transform,
 )
 from hsp_control.visualization.viewer.motion import RunMotion, Track, pose_tracks
-from hsp_control.visualization.viewer.threejs import (
-    collada_object,
-    material,
-    mesh_geometry,
-    pose_along,
-    pose_at,
-)
 
 _GREY = (0.72, 0.74, 0.76, 1.0)
 _MESHES = {".dae", ".obj", ".stl"}  # formats that the page can read
@@ -180,20 +173,20 @@ def _numbers(text: str | None) -> tuple[float, ...]:
     return tuple(map(float, (text or "").split()))
 
 
-_THICKNESS = 0.034  # a link's radius at the base, over the robot's reach
+_THICKNESS = 0.034  # a link's radius at the base, over the robot's size
 _TAPER = 0.55  # the radius at the last joint, over that at the base
 
 
 def placeholder(robot: Robot, joint: int) -> Json | None:
     """Return a drum at a joint and capsules to its children; None if there are none."""
     radius = _radius(robot, joint)
-    surface = material(LINK, glow=0.5)
+    surface = threejs.material(LINK, glow=0.5)
     things = [_drum(robot, joint, radius)] if joint else _feet(robot, radius)
     for start, end, end_radius in _links(robot, joint):
         length = float(np.linalg.norm(end - start))
         if length > radius:
             body = threejs.capsule(length, 0.8 * radius, 0.8 * end_radius)
-            pose = pose_along(end - start)
+            pose = threejs.pose_along(end - start)
             pose[:3, 3] = start
             things.append(threejs.mesh(body, surface, pose))
     return threejs.group(things) if things else None
@@ -226,7 +219,7 @@ def _base(robot: Robot, joint: str) -> Array:
 
 def _feet(robot: Robot, radius: float) -> list[Json]:
     """Return the base plates of robots that are fixed to the ground."""
-    surface = material(JOINT)
+    surface = threejs.material(JOINT)
     plate = [2.2 * radius, 0.4 * radius, 0.15 * radius]
     return [
         threejs.mesh(
@@ -239,7 +232,7 @@ def _feet(robot: Robot, radius: float) -> list[Json]:
 
 def _drum(robot: Robot, joint: int, radius: float) -> Json:
     """Return the drum that shows a joint's position and axis."""
-    surface = material(JOINT)
+    surface = threejs.material(JOINT)
     model = robot.model
     if model.joints[joint].nv != 1:
         return threejs.mesh(threejs.sphere(1.15 * radius), surface)
@@ -247,7 +240,7 @@ def _drum(robot: Robot, joint: int, radius: float) -> Json:
     pin.computeJointJacobians(model, data, robot.neutral())
     motion = np.asarray(data.joints[joint].S).reshape(6, -1)[:, 0]
     turns = bool(np.any(motion[3:]))
-    pose = pose_along(motion[3:] if turns else motion[:3])
+    pose = threejs.pose_along(motion[3:] if turns else motion[:3])
     if turns:
         drum = threejs.rounded_cylinder(1.15 * radius, 2.5 * radius, 0.25 * radius)
         return threejs.mesh(drum, surface, pose)
@@ -263,22 +256,7 @@ def _radius(robot: Robot, joint: int) -> float:
     for index in range(1, model.njoints):
         depth[index] = depth[model.parents[index]] + 1
     fraction = depth[joint] / max(depth)
-    return _THICKNESS * reach(robot) * (1.0 - (1.0 - _TAPER) * fraction)
-
-
-def reach(robot: Robot) -> float:
-    """Return the length of the longest chain of links [m]."""
-    model = robot.model
-    lengths = np.zeros(model.njoints)
-    for joint in range(2, model.njoints):
-        parent = model.parents[joint]
-        step = np.linalg.norm(model.jointPlacements[joint].translation)
-        lengths[joint] = lengths[parent] + step
-    for frame in model.frames:
-        tip = lengths[frame.parentJoint] + np.linalg.norm(frame.placement.translation)
-        if frame.parentJoint > 0:
-            lengths[0] = max(lengths[0], tip)
-    return float(lengths.max()) or 1.0
+    return _THICKNESS * robot.size * (1.0 - (1.0 - _TAPER) * fraction)
 
 
 ROOT = "/robot"  # default node of a robot in the scene tree
@@ -375,7 +353,7 @@ def _half_height(visual: Visual) -> float:
 
 def _thing(visual: Visual) -> Json | None:
     """Return one piece of a link, or None if it cannot be shown."""
-    surface = material(visual.color, opacity=visual.color[3])
+    surface = threejs.material(visual.color, opacity=visual.color[3])
     size, pose = visual.size, visual.pose
     match visual.kind:
         case "box":
@@ -385,7 +363,7 @@ def _thing(visual: Visual) -> Json | None:
         case "cylinder":
             return threejs.mesh(threejs.cylinder(*size), surface, pose)
         case "capsule":
-            half = pose_at([0.0, 0.0, -size[1] / 2.0])
+            half = threejs.pose_at([0.0, 0.0, -size[1] / 2.0])
             body = threejs.capsule(size[1], size[0], size[0])
             return threejs.mesh(body, surface, pose @ half)
         case "ellipsoid":
@@ -397,8 +375,8 @@ def _thing(visual: Visual) -> Json | None:
         return None
     pose = pose @ np.diag([*visual.size, 1.0])
     if visual.file.suffix.lower() != ".dae":
-        return threejs.mesh(mesh_geometry(visual.file), surface, pose)
-    thing = collada_object(visual.file)
+        return threejs.mesh(threejs.mesh_geometry(visual.file), surface, pose)
+    thing = threejs.collada_object(visual.file)
     thing["object"] |= {
         "matrix": threejs.matrix(pose),
         "castShadow": True,

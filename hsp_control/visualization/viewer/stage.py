@@ -13,16 +13,16 @@ from hsp_control.robot import Robot
 from hsp_control.visualization import palette
 from hsp_control.visualization.viewer import threejs
 from hsp_control.visualization.viewer.commands import (
+    CAMERA,
     Json,
     LegendEntry,
     PageCommand,
-    set_camera,
+    page_command,
     set_object,
     set_property,
     set_transform,
     translucent,
 )
-from hsp_control.visualization.viewer.threejs import pose_at
 
 _HAZE = 0.19  # share of grey in the background's colour at the horizon
 _GRID = "#8794A1"
@@ -105,7 +105,7 @@ def _lights(
     back = np.array([-_LIGHT_FROM[0], 1.2 * abs(_LIGHT_FROM[1]), 0.6])
     yield set_object("/lights/sky", threejs.group([sky]))
     yield set_object("/lights/fill", threejs.group([fill]))
-    yield set_transform("/lights/fill", pose_at(back * 4.0 * size))
+    yield set_transform("/lights/fill", threejs.pose_at(back * 4.0 * size))
     # The light points at the origin; objects that cast shadows must be in its view.
     around = float(np.linalg.norm(center)) + 1.3 * size
     distance = 4.0 * around
@@ -132,7 +132,7 @@ def _lights(
     )
     towards = _LIGHT_FROM / np.linalg.norm(_LIGHT_FROM)
     yield set_object("/lights/key", threejs.group([key]))
-    yield set_transform("/lights/key", pose_at(towards * distance))
+    yield set_transform("/lights/key", threejs.pose_at(towards * distance))
 
 
 def _floor(
@@ -140,7 +140,7 @@ def _floor(
 ) -> Iterator[PageCommand]:
     dark = is_dark(background)
     studio = _DARK if dark else _LIGHT
-    pose = pose_at([center[0], center[1], height])
+    pose = threejs.pose_at([center[0], center[1], height])
     shadow = threejs.shadow_catcher(12.0 * size, studio.shadow)
     pool = [_pool(size, background)] if dark else []
     yield set_object("/floor/shadow", threejs.group([*pool, shadow]))
@@ -148,7 +148,7 @@ def _floor(
     step = _round_step(size / 4.0)
     middle = np.round(center[:2] / step) * step
     yield set_object("/floor/grid", threejs.group([_grid(size, step, studio.grid)]))
-    yield set_transform("/floor/grid", pose_at([*middle, height]))
+    yield set_transform("/floor/grid", threejs.pose_at([*middle, height]))
 
 
 _RINGS, _SEGMENTS = 12, 48
@@ -228,7 +228,10 @@ def look_at(
     else:
         view["direction"] = direction.tolist()
     steep = abs(direction[2]) > _COS_STEEP * np.linalg.norm(direction)
-    return set_camera(
+    return page_command(
+        "camera",
+        CAMERA,
+        "camera",
         **view,
         target=center.tolist(),
         up=[0.0, 1.0, 0.0] if steep else [0.0, 0.0, 1.0],

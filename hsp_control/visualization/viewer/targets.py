@@ -1,7 +1,6 @@
 """Targets of the tasks in a log, their markers, and desired and actual paths."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from itertools import count
 from typing import NamedTuple
 
 import numpy as np
@@ -15,18 +14,11 @@ from hsp_control.visualization.viewer.commands import (
     Json,
     LegendEntry,
     PageCommand,
-    extend_trail,
     path_element,
     set_object,
     set_trail,
 )
 from hsp_control.visualization.viewer.motion import Layer, RunMotion, Track
-from hsp_control.visualization.viewer.threejs import (
-    color_number,
-    material,
-    pose_along,
-    quaternions_along,
-)
 
 AXES = (OBSTACLE, TASK, ACTUAL)
 """x, y and z axis of a target: like red, green, blue, but safe for colour blindness."""
@@ -92,7 +84,7 @@ def target_markers(motion: RunMotion, root: str) -> Layer:
             if target.rotation is not None:
                 yield Track(path, "quaternion", times, target.rotation)
             elif target.direction is not None:
-                turned = quaternions_along(target.direction)
+                turned = threejs.quaternions_along(target.direction)
                 yield Track(path, "quaternion", times, turned)
 
     def legend() -> list[LegendEntry]:
@@ -104,15 +96,17 @@ def target_markers(motion: RunMotion, root: str) -> Layer:
 
 def _mark(target: TaskTarget, radius: float) -> Json:
     if target.rotation is None and target.direction is None:
-        return threejs.mesh_group(threejs.sphere(4.5 * radius), material(DESIRED))
+        return threejs.mesh_group(
+            threejs.sphere(4.5 * radius), threejs.material(DESIRED)
+        )
     if target.rotation is None:
         return threejs.mesh_group(
-            threejs.arrow(60 * radius, 2 * radius), material(DESIRED)
+            threejs.arrow(60 * radius, 2 * radius), threejs.material(DESIRED)
         )
     arrow = threejs.arrow(40.0 * radius, 1.5 * radius)
     return threejs.group(
         [
-            threejs.mesh(arrow, material(color), pose_along(axis))
+            threejs.mesh(arrow, threejs.material(color), threejs.pose_along(axis))
             for axis, color in zip(np.eye(3), AXES, strict=True)
         ]
     )
@@ -143,7 +137,7 @@ def paths(
         thickness = _GHOST_NARROWING * radius if ghost else radius
         for name, points in actual.items():
             path = _node(root, name, "actual")
-            yield set_trail(path, points, thickness, color_number(color))
+            yield set_trail(path, points, thickness, threejs.color_number(color))
 
     def tracks(_: RunMotion) -> Iterator[Track]:
         for target in targets:  # the rings have their own times
@@ -164,30 +158,33 @@ def growing_paths(
     rings = np.arange(len(preview.times))
     sleeves = _moving(preview, "desired", rings)
     targets = [t for t in read_targets(preview.rows) if t.desired is not None]
-    drawn = {target.name: 0 for target in targets}  # rings of each actual path
-    pieces = count(1)
+    points = {target.name: np.zeros((0, 3)) for target in targets}
+    radius = 0.0
+
+    def trails() -> Iterator[PageCommand]:
+        for name, path in points.items():
+            node = _node(root, name, "actual")
+            yield set_trail(node, path, radius, threejs.color_number(ACTUAL))
 
     def draw(size: float) -> Iterator[PageCommand]:
-        yield from _draw_sleeves(sleeves, root, PATH_RADIUS * size)
-        for name in drawn:
-            path, radius = _node(root, name, "actual"), PATH_RADIUS * size
-            yield set_trail(path, np.zeros((0, 3)), radius, color_number(ACTUAL))
+        nonlocal radius
+        radius = PATH_RADIUS * size
+        yield from _draw_sleeves(sleeves, root, radius)
+        yield from trails()
 
     def tracks(motion: RunMotion) -> Iterator[Track]:
-        for name, before in drawn.items():
-            numbers = before + np.arange(len(motion.times), dtype=float)[:, None]
-            path = _node(root, name, "actual")
-            yield Track(path, "length", motion.times, numbers)
-            drawn[name] = before + len(motion.times)
+        for name, before in points.items():
+            numbers = len(before) + np.arange(len(motion.times), dtype=float)[:, None]
+            yield Track(_node(root, name, "actual"), "length", motion.times, numbers)
 
     def extend(motion: RunMotion) -> Iterator[PageCommand]:
-        piece = next(pieces)
         for target in read_targets(motion.rows):
-            if target.name in drawn:
-                path = _node(root, target.name, "actual")
-                yield extend_trail(path, target.actual, piece)
+            if target.name in points:
+                known = points[target.name]
+                points[target.name] = np.vstack([known, target.actual])
+        yield from trails()
 
-    layer = Layer(draw, tracks, lambda: _path_legend(root, sleeves, drawn, ACTUAL))
+    layer = Layer(draw, tracks, lambda: _path_legend(root, sleeves, points, ACTUAL))
     return layer, extend
 
 
@@ -211,7 +208,7 @@ def _draw_sleeves(
 ) -> Iterator[PageCommand]:
     for name, points in sleeves.items():
         path, wide = _node(root, name, "desired"), _DESIRED_WIDENING * radius
-        yield set_trail(path, points, wide, color_number(DESIRED), sleeve=True)
+        yield set_trail(path, points, wide, threejs.color_number(DESIRED), sleeve=True)
 
 
 def _path_legend(

@@ -18,10 +18,11 @@ from hsp_control.simulation import Rollout
 from hsp_control.visualization.viewer import transport
 from hsp_control.visualization.viewer.clip import bands_of, remove_clip, set_clip
 from hsp_control.visualization.viewer.commands import (
+    CLIP,
     PageCommand,
     delete,
+    page_command,
     remove_plots,
-    seek,
     set_caption,
     set_status,
     set_time,
@@ -387,7 +388,7 @@ class Viewer:
     def _move_others(self, time: float) -> list[PageCommand]:
         """Return the commands that move all but the robot to a time [s]."""
         if self._obstacles is None:
-            return [seek(time)]
+            return [page_command("seek", CLIP, "seek", time=float(time))]
         return [*self._obstacles.move(time), set_time(f"t = {time:.2f} s")]
 
     def _placements(self, q: Array) -> Any:

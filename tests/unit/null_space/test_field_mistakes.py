@@ -122,8 +122,7 @@ ERRORS: dict[str, tuple[Callable[[], Any], type[HspControlError], str]] = {
      FieldError, r"^Uncontrolled: an uncontrolled null space has no weight$"),
     # placing
     "centering, no limits": (lambda: on("planar3r", JointCentering()), FieldError,
-     r"^no joint of planar3r has limits, so no range has a middle; use a target "
-     r"posture instead$"),
+     r"^no joint of planar3r has limits; use a target posture instead$"),
     "centering, number of weights": (
      lambda: on("panda", JointCentering(weights=[1.0, 2.0])), FieldError,
      r"^weights: weights have shape \(2,\); needs one number or 7$"),
@@ -145,12 +144,12 @@ ERRORS: dict[str, tuple[Callable[[], Any], type[HspControlError], str]] = {
      SceneError,
      r"^obstacle: no obstacle 'bal'; did you mean 'ball'\? \(the scene has ball\)$"),
     "barrier, no limits": (lambda: on("planar3r", LimitBarrier()), FieldError,
-     r"^no joint of planar3r has limits$"),
+     r"^no joint of planar3r has limits; use a target posture instead$"),
     "barrier, number of weights": (
      lambda: on("panda", LimitBarrier(weights=[1.0, 2.0])), FieldError,
      r"^weights: weights have shape \(2,\); needs one number or 7$"),
     "in a sum, placed": (lambda: on("planar3r", Rest() + LimitBarrier()), FieldError,
-     r"^1: no joint of planar3r has limits$"),
+     r"^1: no joint of planar3r has limits; use a target posture instead$"),
     "posture, not placed": (lambda: used(TargetPosture("home")), FieldError,
      r"^field 'target_posture': a controller would look up its posture; outside of "
      r"one, call `placed` first$"),

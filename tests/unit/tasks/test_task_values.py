@@ -147,7 +147,7 @@ THERE = SE3(TURNED, np.array([0.4, 0.1, 0.5]))
 )
 def test_a_pose_is_held(value: Any) -> None:
     for task in (FramePose("hand", value), FramePose(trajectory=value)):
-        held = task.pose.sample(0.0)
+        held = task.followed.sample(0.0)
         np.testing.assert_allclose(held.position.position, THERE.translation)
         np.testing.assert_allclose(held.orientation.rotation, THERE.rotation)
 

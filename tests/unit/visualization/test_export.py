@@ -90,12 +90,6 @@ def unpacked(entry: dict[str, Any]) -> np.ndarray:
     planes = data.reshape(width, columns, rows).astype(np.int64)
     zigzag = sum(planes[k] << 8 * k for k in range(width))
     whole = np.asarray((zigzag >> 1) ^ -(zigzag & 1)).T
-    if entry["kind"] == "triangles":
-        corners, unused = np.empty(3 * rows, np.int64), 0
-        for i, difference in enumerate(whole.ravel()):
-            corners[i] = unused - difference
-            unused = max(unused, corners[i] + 1)
-        return corners.reshape(-1, 3)
     return np.array(entry["offset"]) + np.cumsum(whole, axis=0) * entry["step"]
 
 

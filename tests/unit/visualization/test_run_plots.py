@@ -11,13 +11,12 @@ from hsp_control.visualization.viewer import (
     SceneRecorder,
     Viewer,
 )
-from hsp_control.visualization.viewer.commands import PLOTS, unpack
+from hsp_control.visualization.viewer.commands import PLOTS, key_of, unpack
 from hsp_control.visualization.viewer.page_plots import (
     PREVIEW_ROWS,
     plots_of,
     plots_so_far,
 )
-from hsp_control.visualization.viewer.pipe import key_of
 
 MOVING = "paper/4_moving_obstacle"
 

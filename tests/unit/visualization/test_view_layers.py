@@ -6,7 +6,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
-from clips import Clip
+from clips import Clip, Recorder, told
 
 from hsp_control import (
     Experiment,
@@ -29,7 +29,6 @@ from hsp_control.null_space.metrics import MetricSample
 from hsp_control.visualization.viewer import (
     ComparedRun,
     LiveView,
-    SceneRecorder,
     Viewer,
     live,
 )
@@ -59,23 +58,23 @@ def spatial() -> tuple[Experiment, Rollout]:
 
 
 @pytest.fixture
-def recorder() -> SceneRecorder:
-    return SceneRecorder()
+def recorder() -> Recorder:
+    return Recorder()
 
 
-def drawn(experiment: Experiment, rollout: Rollout, recorder: SceneRecorder) -> Clip:
+def drawn(experiment: Experiment, rollout: Rollout, recorder: Recorder) -> Clip:
     viewer = Viewer(experiment.robot, transport=recorder)
     viewer.play(rollout, controller=experiment.controller)
     return Clip(recorder)
 
 
-def legend(recorder: SceneRecorder) -> list[dict[str, Any]]:
+def legend(recorder: Recorder) -> list[dict[str, Any]]:
     caption = recorder.command(CAPTION, "caption")
     assert caption is not None
     return list(caption["legend"])
 
 
-def names(recorder: SceneRecorder) -> list[str]:
+def names(recorder: Recorder) -> list[str]:
     return [entry["name"] for entry in legend(recorder)]
 
 
@@ -103,7 +102,7 @@ def tip(clip: Clip, path: str, time: float) -> np.ndarray:
 
 
 def test_self_motion_moves_the_joints_and_not_the_hand(
-    planar: tuple[Experiment, Rollout], recorder: SceneRecorder
+    planar: tuple[Experiment, Rollout], recorder: Recorder
 ) -> None:
     experiment, rollout = planar
     clip = drawn(experiment, rollout, recorder)
@@ -142,7 +141,7 @@ def test_self_motion_moves_the_joints_and_not_the_hand(
 
 
 def test_the_velocity_slips_into_its_field(
-    planar: tuple[Experiment, Rollout], recorder: SceneRecorder
+    planar: tuple[Experiment, Rollout], recorder: Recorder
 ) -> None:
     experiment, rollout = planar
     clip = drawn(experiment, rollout, recorder)
@@ -185,7 +184,7 @@ def test_the_projector_is_the_laws_own(name: str) -> None:
 
 
 def test_bars_are_as_long_as_the_distances_in_the_log(
-    spatial: tuple[Experiment, Rollout], recorder: SceneRecorder
+    spatial: tuple[Experiment, Rollout], recorder: Recorder
 ) -> None:
     experiment, rollout = spatial
     clip = drawn(experiment, rollout, recorder)
@@ -206,7 +205,7 @@ def test_bars_are_as_long_as_the_distances_in_the_log(
 
 
 def test_distances_end_on_the_capsules_that_are_measured(
-    spatial: tuple[Experiment, Rollout], recorder: SceneRecorder
+    spatial: tuple[Experiment, Rollout], recorder: Recorder
 ) -> None:
     experiment, rollout = spatial
     clip = drawn(experiment, rollout, recorder)
@@ -241,7 +240,7 @@ def test_distances_end_on_the_capsules_that_are_measured(
 
 
 def drawn_capsules(
-    recorder: SceneRecorder, path: str
+    recorder: Recorder, path: str
 ) -> list[tuple[np.ndarray, np.ndarray, float]]:
     """Return ends and radii of the capsules and spheres of a node, in its frame."""
     thing = recorder.command(path, "object")["object"]  # type: ignore[index]
@@ -265,7 +264,7 @@ def drawn_capsules(
 def test_minimum_distances_of_limits_are_drawn_and_unmeasured_links_are_not(
     planar: tuple[Experiment, Rollout],
     spatial: tuple[Experiment, Rollout],
-    recorder: SceneRecorder,
+    recorder: Recorder,
 ) -> None:
     experiment, rollout = planar
     assert not drawn(experiment, rollout, recorder).paths("/capsules")
@@ -356,7 +355,7 @@ def test_a_zone_lies_at_the_influence_from_its_obstacle(
 
 
 def test_the_ellipsoid_is_the_image_of_the_ball_of_joint_speeds(
-    spatial: tuple[Experiment, Rollout], recorder: SceneRecorder
+    spatial: tuple[Experiment, Rollout], recorder: Recorder
 ) -> None:
     experiment, rollout = spatial
     clip = drawn(experiment, rollout, recorder)
@@ -374,7 +373,7 @@ def test_the_ellipsoid_is_the_image_of_the_ball_of_joint_speeds(
 # -- contacts -------------------------------------------------------------------------
 
 
-def test_contact_forces_are_arrows_at_their_points(recorder: SceneRecorder) -> None:
+def test_contact_forces_are_arrows_at_their_points(recorder: Recorder) -> None:
     robot = Robot.load("panda")
     mass = sum(inertia.mass for inertia in robot.model.inertias)
     weight = np.array([0.0, 0.0, 9.81 * mass])
@@ -408,7 +407,7 @@ def test_contact_forces_are_arrows_at_their_points(recorder: SceneRecorder) -> N
 
 
 def test_each_layer_can_be_switched(
-    spatial: tuple[Experiment, Rollout], recorder: SceneRecorder
+    spatial: tuple[Experiment, Rollout], recorder: Recorder
 ) -> None:
     experiment, rollout = spatial
     off = dict.fromkeys([*LAYERS, "grid"], False)
@@ -430,7 +429,7 @@ def test_each_layer_can_be_switched(
 
 
 def comparison(
-    planar: tuple[Experiment, Rollout], recorder: SceneRecorder, **how: Any
+    planar: tuple[Experiment, Rollout], recorder: Recorder, **how: Any
 ) -> tuple[Clip, Rollout]:
     experiment, rollout = planar
     other = load_experiment("paper/2_rest", "simulation.duration=0.5")
@@ -445,7 +444,7 @@ def comparison(
 
 
 def test_runs_of_one_robot_lie_over_each_other_as_ghosts(
-    planar: tuple[Experiment, Rollout], recorder: SceneRecorder
+    planar: tuple[Experiment, Rollout], recorder: Recorder
 ) -> None:
     clip, rest = comparison(planar, recorder)
     assert (clip.start, clip.end) == (0.0, 1.5)
@@ -469,7 +468,7 @@ def test_runs_of_one_robot_lie_over_each_other_as_ghosts(
 # -- live -----------------------------------------------------------------------------
 
 
-class Watched(SceneRecorder):
+class Watched(Recorder):
     """Keeps what was sent, too."""
 
     def __init__(self) -> None:
@@ -517,8 +516,8 @@ def test_a_run_is_shown_while_it_is_computed(monkeypatch: pytest.MonkeyPatch) ->
         state = experiment.robot.state(0.0, rollout.q[row], rollout.v[row])
         expected = pin.SE3ToXYZQUAT(state.data.oMi[1])[3:]
         assert abs(quaternion @ expected) == pytest.approx(1.0, abs=1e-6)
-    trail = [c["points"] for c in transport.sent if c["type"] == "trail_more"]
-    assert sum(map(len, trail)) == 3 * len(times)
+    trail = told(transport, "/paths/tip/actual", "object")["points"]
+    assert len(trail) == 3 * len(times)
 
     view.finish(rollout)
     begin = transport.command(CLIP, "begin")

@@ -27,6 +27,7 @@
 // panel is closed, the page is hidden, or a plot is scrolled out of sight.
 class LivePlots {
   static SPAN = 10;  // s
+  static GAP = 0.3;  // s without a row
   static PERIOD = 50;  // ms
 
   constructor(parent, definitions, isOpen) {
@@ -47,7 +48,6 @@ class LivePlots {
   clear() {
     this.times = [];
     this.rows = [];  // as `add` gets them; null: a gap
-    this.spacing = null;  // s, usual time between two rows
     for (const plot of this.plots) plot.stale = true;
   }
 
@@ -58,9 +58,7 @@ class LivePlots {
       const step = time - (this.times.at(-1) ?? -Infinity);
       if (Math.abs(step) < 1e-9) return;  // the same row again
       if (step < 0) this.clear();
-      else if (step > Math.max(0.1, 4 * this.spacing) && this.times.length) this.put(time - 1e-6, null);
-      else if (this.spacing === null || step < this.spacing) this.spacing = step;
-      else if (step < 3 * this.spacing) this.spacing += 0.05 * (step - this.spacing);
+      else if (step > LivePlots.GAP && this.times.length) this.put(time - 1e-6, null);
       this.put(time, values.subarray(k * width, (k + 1) * width));
     });
     const old = this.times.findIndex((time) => time > this.end - LivePlots.SPAN - 1);

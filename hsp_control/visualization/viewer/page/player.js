@@ -193,7 +193,6 @@ class Track {
     Object.assign(this, {path, times, values, count: times.length});
     this.width = times.length ? values.length / times.length : 1;
     this.apply = Track.PROPERTIES[property] ?? (() => {});
-    this._at = 0;
     this._value = new Array(this.width).fill(0);
   }
 
@@ -210,12 +209,7 @@ class Track {
 
   // The rows before and after a time, and the fraction of the way between them.
   bracket(time) {
-    const {times, count} = this;
-    let low = this._at, high = count - 1;
-    if (!(times[low] <= time)) low = 0;
-    else if (low + 2 < count && time < times[low + 2]) high = Math.min(high, low + 2);
-    [low, high] = bracketed(times, time, low, high);
-    this._at = low;
+    const {times, count} = this, [low, high] = bracketed(times, time, 0, count - 1);
     const fraction = high > low ? (time - times[low]) / (times[high] - times[low]) : 0;
     return [low, high, clamp(fraction, 0, 1)];
   }

@@ -48,7 +48,6 @@ const commandHandlers = {
   trail(command) {
     viewer.set_object(command.path.split("/").filter(Boolean), trailMesh(command));
   },
-  trail_more({path, points}) { extendTrail(node(path), points); },
   length_label({path}) { lengthLabels.paths.add(path); },
   // Load a clip, or append an extension to the current one.
   clip(command) { if (command.begins) player.load(command, command.keep); else player.extend(command); },

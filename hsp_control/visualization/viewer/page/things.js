@@ -22,7 +22,7 @@ function trailGeometry(points, radius) {
   const count = points.length / 3;
   const geometry = count > 1 ? new TubeGeometry(polyline(points), count - 1, radius, SIDES)
     : new BufferGeometry();
-  geometry.userData = {points};
+  geometry.userData = {trail: true};
   return geometry;
 }
 
@@ -52,28 +52,14 @@ function trailMesh({points, radius, color, sleeve}) {
   const {Mesh, MeshBasicMaterial, BackSide, FrontSide} = MeshCat.THREE;
   const material = new MeshBasicMaterial({color, side: sleeve ? BackSide : FrontSide});
   const mesh = new Mesh(trailGeometry(points, radius), material);
-  mesh.userData = {radius};
-  mesh.frustumCulled = false;  // it grows
+  mesh.frustumCulled = false;  // a part of it may be drawn
   return mesh;
-}
-
-// Append points to a trail.
-function extendTrail(object, more) {
-  object.traverse((mesh) => {
-    const {points} = mesh.geometry?.userData ?? {};
-    if (!points) return;
-    const all = new Float32Array(points.length + more.length);
-    all.set(points);
-    all.set(more, points.length);
-    mesh.geometry.dispose();
-    mesh.geometry = trailGeometry(all, mesh.userData.radius);
-  });
 }
 
 // Draw only the given number of rings after the first.
 function drawRings(object, rings) {
   object.traverse(({geometry}) => {
-    if (geometry?.userData.points) geometry.setDrawRange(0, 6 * SIDES * Math.floor(rings + 1e-6));
+    if (geometry?.userData.trail) geometry.setDrawRange(0, 6 * SIDES * Math.floor(rings + 1e-6));
   });
 }
 

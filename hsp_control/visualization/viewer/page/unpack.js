@@ -10,14 +10,6 @@ function unpackArray({kind, rows, columns, width, bytes, offset, step}) {
     }
     return number % 2 ? -(number + 1) / 2 : number / 2;
   };
-  if (kind === "triangles") {
-    const corners = new Uint32Array(3 * rows);
-    for (let i = 0, unused = 0; i < corners.length; i++) {
-      corners[i] = unused - whole(Math.floor(i / 3), i % 3);
-      unused = Math.max(unused, corners[i] + 1);
-    }
-    return corners;
-  }
   const kinds = {Float32Array, Float64Array, Uint8Array, Uint32Array};
   const values = new kinds[kind](rows * columns);
   for (let column = 0; column < columns; column++) {
