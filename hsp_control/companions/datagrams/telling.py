@@ -11,10 +11,12 @@ import numpy as np
 
 from hsp_control.common.addresses import name_and_options
 from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.rotations import quaternion_from_rotation
 from hsp_control.common.suggestions import did_you_mean
 from hsp_control.declaration.nested import parts_within
 from hsp_control.robot import RobotState
 from hsp_control.simulation.control_chain import EffortSource
+from hsp_control.tasks import JointPosture
 from hsp_control.trajectories.streams.stream import Streamed
 from hsp_control.trajectories.streams.udp_listener import host_and_port
 
@@ -89,7 +91,11 @@ class Teller:
         self._socket.setblocking(False)
         self._next = float("-inf")
         self._number, self._said = 0, False
+        robot, tasks = source.controller.robot, source.controller.tasks
+        frames = [getattr(each, "frame", None) or robot.end_effector for each in tasks]
+        self._frames = dict.fromkeys(frames or [robot.end_effector])
         self._measured(source.controller.state)  # what it needs is compiled now
+        self._poses(source.controller.state)
         source.log_channels()
 
     def __call__(self, t: float) -> None:
@@ -130,6 +136,7 @@ class Teller:
             "q": _numbers(controller.robot.joint_positions(state.q)),
             "v": _numbers(state.v),
             "tau": _numbers(output.tau),
+            "frames": self._poses(state),
             "tasks": self._measured(state),
             "bounded": output.bounded,
             "damped": output.damped,
@@ -138,12 +145,23 @@ class Teller:
             "log": {name: _numbers(np.ravel(each.value)) for name, each in logged},
         }
 
-    def _measured(self, state: RobotState) -> dict[str, dict[str, list[float | None]]]:
+    def _poses(self, state: RobotState) -> dict[str, list[float | None]]:
+        """Return the poses of the tasks' frames, or of the hand."""
+        found, quaternion = {}, np.zeros(4)
+        for name in self._frames:
+            frame = state.frame(name)
+            quaternion_from_rotation(frame.rotation, quaternion)
+            found[name] = _numbers([*frame.position, *quaternion])
+        return found
+
+    def _measured(self, state: RobotState) -> dict[str, dict[str, Any]]:
         """Return where each task is, and where it should be."""
-        found = {}
+        found: dict[str, dict[str, Any]] = {}
         for task in self._source.controller.tasks:
             reference, actual = map(_numbers, task.measure(state))
             found[task.name] = {"actual": actual, "reference": reference}
+            if isinstance(task, JointPosture):
+                found[task.name]["joints"] = task.joints
         return found
 
     def _send(self, what: dict[str, Any]) -> None:

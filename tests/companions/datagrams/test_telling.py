@@ -66,6 +66,7 @@ def test_it_tells_what_a_policy_needs(states: socket.socket) -> None:
         assert each["q"] == q.tolist()
         assert each["tau"] == tau.tolist()
         hand = each["tasks"]["hand"]
+        assert each["frames"] == {"panda_tcp": hand["actual"]}
         assert set(each["log"]) == {"observer.disturbance", "observer.wrench.hand"}
         where = panda().state(t, q, np.zeros(7)).position("panda_tcp")
         np.testing.assert_allclose(hand["actual"][:3], where, atol=1e-12)
