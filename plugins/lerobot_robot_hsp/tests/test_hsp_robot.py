@@ -87,7 +87,7 @@ def test_it_moves_the_hand_and_the_fingers_and_sees_them(arm: Running) -> None:
         assert far["ee.x"] < 1.0
         robot.send_action({name: first[name] for name in goal})
         settled(robot, "ee.z", first["ee.z"], 1e-3)
-        with pytest.raises(ValueError, match="the action has no ee.y"):
+        with pytest.raises(ValueError, match=r"the action has no ee\.y"):
             robot.send_action({"ee.x": 0.3})
     assert not robot.is_connected
 
