@@ -104,6 +104,11 @@ sims: $(STAMP) ## robosuite's own arms and our law in them, in .venv-sims
 	  $(call new-venv,$(BIN)/python,.venv-sims); fi
 	@.venv-sims/bin/python tools/simulators.py $(ARGS)
 
+lerobot: $(STAMP) ## LeRobot's own commands on our arm, in .venv-lerobot (8 GB)
+	@if ! .venv-lerobot/bin/python -m pip --version > /dev/null 2>&1; then \
+	  $(call new-venv,$(BIN)/python,.venv-lerobot); fi
+	@.venv-lerobot/bin/python tools/lerobot.py $(ARGS)
+
 release: wheel ## beside the wheel the sources with their tests; check what PyPI shows
 	@dir=$$(mktemp -d); trap 'rm -rf "$$dir"' EXIT; \
 	$(call new-venv,$(BIN)/python,"$$dir"); \
@@ -166,7 +171,7 @@ clean: ## remove caches, builds and the demo's output; .venv stays
 	@rm -rf build dist machine_code docs/_build docs/_static/replays docs/reference/generated out/demo .coverage .*_cache .hypothesis
 	@find hsp_control tests -name __pycache__ -prune -exec rm -rf {} +
 
-.PHONY: help docs links figures animations notebooks demo quick sims test test-system thorough lint coverage fuzz mutants wheel wheel-test release format constraints clean
+.PHONY: help docs links figures animations notebooks demo quick sims lerobot test test-system thorough lint coverage fuzz mutants wheel wheel-test release format constraints clean
 
 # ------------------------------------------------------------------- the environment
 

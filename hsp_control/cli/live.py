@@ -33,6 +33,7 @@ from hsp_control.live import (
     InProcessRobot,
     LoopReport,
     OperatorRequests,
+    Publisher,
     connect,
     publish,
     run_loop,
@@ -74,6 +75,7 @@ def live(options: argparse.Namespace) -> int:
     robot_log = options.out / f"{name}-robot.journal"
     requests = OperatorRequests()
     on_period: list[Callable[[float], object]] = []
+    publisher: Publisher | None = None
     with ExitStack() as stack:
         page = stack.enter_context(steering_page(options, loaded.scenario))
         experiment = Experiment.of(loaded)
@@ -91,7 +93,7 @@ def live(options: argparse.Namespace) -> int:
         }
 
         def run(hardware: Hardware) -> LoopReport:
-            return run_loop(
+            report = run_loop(
                 command,
                 hardware,
                 duration=None if duration == inf else duration,
@@ -101,6 +103,9 @@ def live(options: argparse.Namespace) -> int:
                 on_period=_in_turn(on_period),
                 **options_of_loop,
             )
+            if publisher is not None:
+                publisher.ended(report.ended, report.reason)
+            return report
 
         dry_run_robot = InProcessRobot(simulated_robot(experiment))
         run_loop(
@@ -123,7 +128,8 @@ def live(options: argparse.Namespace) -> int:
             for line in hardware.lines:
                 out.print(line, highlight=False)
         if options.publish is not None:
-            on_period.append(publish(options.publish, command))
+            publisher = publish(options.publish, command)
+            on_period.append(publisher)
         if page is not None:
             on_period.append(let_steer(page, experiment, requests, loop_log))
         if hardware is not None:

@@ -5,6 +5,7 @@ from hsp_control.simulation.control_chain import EffortSource as EffortSource
 
 from .hardware import Hardware as Hardware
 from .hardware import Measurement as Measurement
+from .hardware import Publisher as Publisher
 from .hardware import connect as connect
 from .hardware import publish as publish
 from .link import Faults as Faults

@@ -110,7 +110,17 @@ def connect(url: str, robot: Robot, period: float) -> Hardware:
     return make(address, robot, period)
 
 
-def publish(url: str, source: EffortSource) -> Callable[[float], object]:
+class Publisher(Protocol):
+    """Tells others the state of a loop; `run_loop` calls it as ``on_period``."""
+
+    def __call__(self, t: float) -> object:
+        """Tell the state at the controller's time t [s], if it is time again."""
+
+    def ended(self, ended: str, reason: str) -> object:
+        """Tell how the run ended, as `LoopReport` says it."""
+
+
+def publish(url: str, source: EffortSource) -> Publisher:
     """Return what publishes a loop, once a period, to those who watch at an address.
 
     Args:
@@ -122,7 +132,7 @@ def publish(url: str, source: EffortSource) -> Callable[[float], object]:
         HardwareError: If the address is wrong, or something is not installed.
     """
     address, known = _known("--publish", url, "publishers")
-    make: Callable[[str, EffortSource], Callable[[float], object]] = known.load()
+    make: Callable[[str, EffortSource], Publisher] = known.load()
     return make(address, source)
 
 

@@ -231,7 +231,11 @@ def add_live(live: argparse.ArgumentParser) -> None:
         help="franka://ADDRESS, or another robot that an installed package can reach; "
         "default: a simulated one",
     )
-    live.add_argument("--publish", metavar="ros2://NAME", help="topics for watchers")
+    live.add_argument(
+        "--publish",
+        metavar="NAME://ADDRESS",
+        help="tell the state: udp://HOST:PORT to a policy, ros2://NAME to watchers",
+    )
     live.add_argument(
         "--duration",
         type=float,

@@ -1,9 +1,7 @@
 """What ``ros2://`` means to ``hsp live``; needs Cyclone DDS only where it is used."""
 
-from collections.abc import Callable
-
 from hsp_control.companions.ros2.installed import check_installed
-from hsp_control.live.hardware import Hardware
+from hsp_control.live.hardware import Hardware, Publisher
 from hsp_control.robot import Robot
 from hsp_control.simulation.control_chain import EffortSource
 
@@ -25,7 +23,7 @@ def connect(address: str, robot: Robot, period: float) -> Hardware:
     return Ros2Hardware(address, robot, period)
 
 
-def publish(address: str, effort_source: EffortSource) -> Callable[[float], None]:
+def publish(address: str, effort_source: EffortSource) -> Publisher:
     """Return what publishes a loop's states and poses; see `Watched`.
 
     Args:

@@ -79,6 +79,9 @@ class Watched:
                 if len(value) >= 3:  # fewer: a point along some axes only
                     self._pose(task, what).send(PoseStamped(header, _pose_of(value)))
 
+    def ended(self, ended: str, reason: str) -> None:
+        """Do nothing: the topics have no words."""
+
     def _pose(self, task: Task, what: str) -> Publisher[PoseStamped]:
         """Return a publisher; a task may be added while the loop runs."""
         name = task.name.replace("-", "_")  # which ROS 2 does not allow

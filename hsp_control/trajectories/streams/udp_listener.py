@@ -21,20 +21,26 @@ _log = logging.getLogger(__name__)
 _POLL = 0.2  # how soon a listener notices that nobody needs it any more [s]
 
 
-def check_address(source: str) -> tuple[str, int]:
-    """Return host and port of an address ``udp://host:port``."""
+def host_and_port(source: str) -> tuple[str, int] | None:
+    """Return host and port of an address ``udp://host:port``; None: it is none."""
     try:
         parts = urlsplit(source)
         host, port = parts.hostname, parts.port
     except ValueError:
-        host = port = None
-    plain = source == f"{SCHEME}{host}:{port}"
-    if not (source.startswith(SCHEME) and host and port and plain):
+        return None
+    if host and port and source == f"{SCHEME}{host}:{port}":
+        return host, port
+    return None
+
+
+def check_address(source: str) -> tuple[str, int]:
+    """Return host and port of an address ``udp://host:port``."""
+    if (found := host_and_port(source)) is None:
         raise StreamError(
             f"source is {source!r}; needs udp://HOST:PORT, for example "
             "udp://127.0.0.1:5005, or the path of a recording"
         )
-    return host, port
+    return found
 
 
 def is_local(source: str) -> bool:

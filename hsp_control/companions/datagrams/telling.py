@@ -1,0 +1,182 @@
+"""A live loop tells what a policy needs, one JSON text in each datagram."""
+
+import json
+import logging
+import socket
+from collections.abc import Iterable
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from hsp_control.common.addresses import name_and_options
+from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.rotations import quaternion_from_rotation
+from hsp_control.common.suggestions import did_you_mean
+from hsp_control.declaration.nested import parts_within
+from hsp_control.robot import RobotState
+from hsp_control.simulation.control_chain import EffortSource
+from hsp_control.tasks import JointPosture
+from hsp_control.trajectories.streams.stream import Streamed
+from hsp_control.trajectories.streams.udp_listener import host_and_port
+
+_RATE = 100.0
+"""Datagrams in a second of the controller's time by default [1/s]."""
+_FASTEST = 10_000.0
+_BYES = 3
+"""How often the end is told: a datagram may be lost."""
+_log = logging.getLogger(__name__)
+
+
+def publish(address: str, source: EffortSource) -> "Teller":
+    """Return what tells a loop's state to another process; see `Teller`.
+
+    Args:
+        address: ``HOST:PORT?rate=HZ``.
+        source: What computes the efforts.
+
+    Raises:
+        HardwareError: If the address is invalid or unknown.
+    """
+    where = f"udp://{address}"
+    try:
+        name, options = name_and_options(address)
+    except ValueError as error:
+        raise HardwareError(f"{where}: {error}") from None
+    for key in options:
+        if key != "rate":
+            raise HardwareError(
+                f"{where}: there is no option {key!r}{did_you_mean(key, ['rate'])} "
+                "(known: rate)"
+            )
+    host, port = host_and_port(f"udp://{name}") or ("", 0)
+    if not port:
+        raise HardwareError(
+            f"{where}: needs udp://HOST:PORT, for example udp://127.0.0.1:5006"
+        )
+    text = options.get("rate", str(_RATE))
+    try:
+        rate = float(text)
+    except ValueError:
+        rate = 0.0
+    if not 0.0 < rate <= _FASTEST:
+        raise HardwareError(
+            f"{where}: the rate is {text!r}; needs a number above 0, at most "
+            f"{_FASTEST:g} Hz"
+        )
+    try:
+        found = socket.getaddrinfo(host, port, socket.AF_INET, socket.SOCK_DGRAM)
+    except OSError as error:
+        raise HardwareError(f"{where}: {error.strerror or error}") from None
+    return Teller(found[0][4], rate, source)
+
+
+class Teller:
+    """Sends the state of a loop to one address; `run_loop` calls it as ``on_period``.
+
+    Nobody need listen, and nothing waits: what cannot be sent is dropped, and said
+    once. ``docs/companions/datagrams.md`` has the keys.
+    """
+
+    def __init__(self, to: Any, rate: float, source: EffortSource) -> None:
+        """Open the socket.
+
+        Args:
+            to: The address of the other side, host and port.
+            rate: Datagrams in a second of the controller's time [1/s].
+            source: What computes the efforts.
+        """
+        self._to, self._every, self._source = to, 1.0 / rate, source
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+        self._next = float("-inf")
+        self._number, self._said = 0, False
+        robot, tasks = source.controller.robot, source.controller.tasks
+        frames = [getattr(each, "frame", None) or robot.end_effector for each in tasks]
+        self._frames = dict.fromkeys(frames or [robot.end_effector])
+        self._measured(source.controller.state)  # what it needs is compiled now
+        self._poses(source.controller.state)
+        source.log_channels()
+
+    def __call__(self, t: float) -> None:
+        """Tell the state, if it is time again.
+
+        Args:
+            t: The controller's time [s].
+        """
+        if t < self._next - 1e-9:
+            return
+        self._next = t + self._every
+        self._send({"phase": "running", **self._state()})
+
+    def ended(self, ended: str, reason: str) -> None:
+        """Tell how the run ended, and close the socket.
+
+        Args:
+            ended: ``completed``, ``operator`` or ``fault``.
+            reason: Why.
+        """
+        for _ in range(_BYES):
+            self._send({"phase": ended, "reason": reason})
+        self._socket.close()
+
+    def _state(self) -> dict[str, Any]:
+        """Return what a policy needs, as JSON data."""
+        source = self._source
+        state, output, controller = source.state, source.output, source.controller
+        streams = {}
+        for task in controller.tasks:
+            for stream in parts_within(task, Streamed) if task.remembers else ():
+                told = {**stream.counts(), "reason": stream.last_rejection}
+                streams.setdefault(task.name, told)
+        logged = source.log_channels().items()
+        return {
+            "t": state.t,
+            "joints": controller.robot.dof_names,
+            "q": _numbers(controller.robot.joint_positions(state.q)),
+            "v": _numbers(state.v),
+            "tau": _numbers(output.tau),
+            "frames": self._poses(state),
+            "tasks": self._measured(state),
+            "bounded": output.bounded,
+            "damped": output.damped,
+            "status": output.status.name.lower(),
+            "streams": streams,
+            "log": {name: _numbers(np.ravel(each.value)) for name, each in logged},
+        }
+
+    def _poses(self, state: RobotState) -> dict[str, list[float | None]]:
+        """Return the poses of the tasks' frames, or of the hand."""
+        found, quaternion = {}, np.zeros(4)
+        for name in self._frames:
+            frame = state.frame(name)
+            quaternion_from_rotation(frame.rotation, quaternion)
+            found[name] = _numbers([*frame.position, *quaternion])
+        return found
+
+    def _measured(self, state: RobotState) -> dict[str, dict[str, Any]]:
+        """Return where each task is, and where it should be."""
+        found: dict[str, dict[str, Any]] = {}
+        for task in self._source.controller.tasks:
+            reference, actual = map(_numbers, task.measure(state))
+            found[task.name] = {"actual": actual, "reference": reference}
+            if isinstance(task, JointPosture):
+                found[task.name]["joints"] = task.joints
+        return found
+
+    def _send(self, what: dict[str, Any]) -> None:
+        self._number += 1
+        text = json.dumps({"number": self._number, **what})
+        try:
+            self._socket.sendto(text.encode(), self._to)
+        except OSError as error:
+            if not self._said:
+                _log.warning(
+                    "udp://%s:%s: the state is not told there: %s", *self._to, error
+                )
+            self._said = True
+
+
+def _numbers(values: Iterable[Any]) -> list[float | None]:
+    """Return numbers as JSON has them: it knows neither NaN nor Infinity."""
+    return [float(each) if isfinite(each) else None for each in values]
