@@ -105,6 +105,8 @@ def _run_and_save(
             log, status = _saved_elsewhere(rollout, log, error), 2
         journal.unlink(missing_ok=True)
     tell(rollout, log, stopwatch)
+    for line in checks.advice_of_run(experiment, rollout):
+        print(f"hsp: {line}", file=sys.stderr)
     if screen is not None:
         screen.finish(rollout)
     return status

@@ -15,7 +15,7 @@ import yaml
 
 from hsp_control.config.syntax import YamlError, character_error, syntax_error
 from hsp_control.declaration.keys import KeyPath
-from hsp_control.declaration.plain import shown
+from hsp_control.declaration.language import shown
 
 TAG = "tag:yaml.org,2002:"
 

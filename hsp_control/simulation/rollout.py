@@ -14,6 +14,7 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LogError
 from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.declaration.language import spoken
 from hsp_control.robot import Robot, RobotState
 from hsp_control.simulation.journal import KILLED, JournalReader, is_journal
 
@@ -168,15 +169,19 @@ class Rollout:
             LogError: If the file is missing, truncated, or not a log of this version.
         """
         path = Path(path)
+        if path.suffix in (".yaml", ".yml"):
+            made = spoken(f"hsp run {path} writes", "load_experiment(...).run() makes")
+            raise LogError(f"{path}: a configuration, not a log; {made} one")
         try:
             reading = _read_journal if is_journal(path) else _read_npz
             columns, meta = reading(path)
         except LogError:
             raise
         except FileNotFoundError:
-            near = [file.name for file in path.parent.glob("*.npz")]
+            folders = path.parent, path.parent / "out"
+            near = [str(f) for folder in folders for f in folder.glob("*.npz")]
             raise LogError(
-                f"{path}: no such file{did_you_mean(path.name, near)}"
+                f"{path}: no such file{did_you_mean(str(path), near)}"
             ) from None
         except _UNREADABLE as error:
             reason = str(error).splitlines()[0] if str(error) else type(error).__name__

@@ -34,10 +34,10 @@ class Parser(argparse.ArgumentParser):
         found, unknown = super().parse_known_args(args, namespace)
         if unknown:
             options = [name for name in unknown if name.startswith("-")]
-            name = (options or unknown)[0]
-            known = self._option_string_actions
-            hint = did_you_mean(name.split("=")[0], known) if options else ""
-            self.error(f"there is no {name!r} here{hint}")
+            if not options:
+                self.error(f"{unknown[0]!r} is one argument too many")
+            hint = did_you_mean(options[0].split("=")[0], self._option_string_actions)
+            self.error(f"there is no {options[0]!r} here{hint}")
         return found, unknown
 
     def error(self, message: str) -> NoReturn:
@@ -51,8 +51,8 @@ class Parser(argparse.ArgumentParser):
             )
             name = mistyped[1]
             message = (
-                f"there is no command {name!r}{did_you_mean(name, commands)}; "
-                "hsp --help lists all"
+                f"there is no command {name!r}{did_you_mean(name, commands)} "
+                "(hsp --help lists all)"
             )
         super().error(message)
 

@@ -269,7 +269,7 @@ def versions_without(package: str) -> Callable[[str], str]:
             ["run", MOVING, "--veiw"],
             "there is no '--veiw' here; did you mean '--view'?",
         ),
-        (["check", MOVING, "twice"], "there is no 'twice' here"),
+        (["check", MOVING, "twice"], "'twice' is one argument too many"),
         # Not taken for --strict.
         (["run", MOVING, "--st", "a=1"], "no '--st' here; did you mean '--set'?"),
     ],
