@@ -109,24 +109,29 @@ class Rollout:
         # Each update overwrites the state's arrays, so np.array must copy.
         return np.array([np.array(function(state.update(*row))) for row in rows])
 
-    def plot(self, *, paper: bool = False) -> Any:
+    def plot(self, *others: "Rollout", paper: bool = False, **options: Any) -> Any:
         """Return a figure of the run, which Jupyter shows inline.
 
         It compares the run with what the law predicts: errors, field and efforts. What
         ``hsp plot`` saves is this and the paper's figure.
 
         Args:
-            paper: Whether it is the paper's five panels instead.
+            others: Other runs, drawn in the same panels.
+            paper: Whether it is the paper's five panels instead, of this run alone.
+            options: ``panels=["errors", "null_space"]``, ``width="84mm"`` for a figure
+                in a paper, and ``names`` of the runs; see `plots.diagnostics_figure`.
 
         Returns:
             The ``matplotlib.figure.Figure``.
 
         Raises:
-            PlotError: If the log has no rows.
+            PlotError: If a log has no rows, or there is no such panel.
         """
         # Here: what draws is a room above, and takes long to import.
         plots = import_module("hsp_control.visualization.plots")
-        return plots.paper_figure(self) if paper else plots.diagnostics_figure(self)
+        if paper:
+            return plots.paper_figure(self, **options)
+        return plots.diagnostics_figure(self, *others, **options)
 
     def save(self, path: str | Path) -> Path:
         """Write one ``.npz`` without pickles, which NumPy can read by itself.

@@ -130,8 +130,14 @@ def command_line() -> argparse.ArgumentParser:
     add_page(view)
     add_strict(view)
 
-    plot = _command(commands, "plot", "draw the figures of a log")
-    plot.add_argument("log", type=Path, metavar="LOG", help="written by hsp run")
+    plot = _command(commands, "plot", "draw the figures of a log, or several together")
+    plot.add_argument(
+        "logs",
+        nargs="+",
+        type=Path,
+        metavar="LOG",
+        help="written by hsp run; several are drawn in the same panels",
+    )
     plot.add_argument("--out", type=Path, metavar="DIR", help="default: beside the log")
     plot.add_argument(
         "--format",
@@ -140,7 +146,15 @@ def command_line() -> argparse.ArgumentParser:
         dest="formats",
         help="may be given more than once; default: png",
     )
-
+    plot.add_argument(
+        "--panels",
+        default="",
+        metavar="NAME,...",
+        help="draw these only, such as errors,null_space; another name lists all",
+    )
+    plot.add_argument(
+        "--width", metavar="84mm", help="for a paper, without heading and foot"
+    )
     plot.add_argument(
         "--relative",
         action="store_true",
