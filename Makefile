@@ -39,7 +39,7 @@ demo: $(USE) ## the paper's run, and a Panda under a ball, with and without its 
 	@mv out/demo/panda_obstacle.npz 'out/demo/with the field.npz'
 	@$(BIN)/hsp run panda_obstacle --out out/demo --no-view $(LOOK) \
 	  --set null_space.fields.0.weight=0 --set null_space.fields.1.weight=0
-	@mv out/demo/panda_obstacle.npz out/demo/without.npz
+	@mv out/demo/panda_obstacle,*.npz out/demo/without.npz
 	@$(BIN)/hsp export 'out/demo/with the field.npz' out/demo/without.npz \
 	  --html out/demo/panda.html
 	@echo
@@ -125,7 +125,7 @@ wheel-test: wheel ## build the wheel, install it elsewhere, use it from there
 	hsp robots; \
 	hsp check paper/4_moving_obstacle; \
 	hsp run paper/4_moving_obstacle --set simulation.duration=1 --out out --no-view; \
-	hsp export out/4_moving_obstacle.npz --html out/page.html; \
+	hsp export out/4_moving_obstacle,*.npz --html out/page.html; \
 	compiled=$$(find "$$dir/venv" -path '*/hsp_control/*/__pycache__/*.nbc'); \
 	if [ -n "$$compiled" ]; then echo "Compiled, though the wheel has code: $$compiled"; exit 1; fi; \
 	echo "The wheel works."

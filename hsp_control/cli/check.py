@@ -20,6 +20,7 @@ from hsp_control.inspection.inspect import too_weak
 from hsp_control.robot import Robot
 from hsp_control.robot.description.inertias import impossible_inertias
 from hsp_control.robot.description.urdf import read_urdf
+from hsp_control.simulation import Rollout
 from hsp_control.simulation.initial_state import posture_search
 from hsp_control.simulation.reach_check import out_of_reach
 
@@ -170,6 +171,16 @@ def robot_advice(robot: Robot) -> Iterator[str]:
                 f"{listing(links, limit=6)}; project_inertias: true takes the nearest "
                 "possible ones (see hsp inspect)."
             )
+
+
+def advice_of_run(experiment: Experiment, rollout: Rollout) -> Iterator[str]:
+    """Yield what `hsp check` advises if a run began singular."""
+    controller = experiment.controller
+    if not rollout["singular_values"][0].min() < controller.singularity_threshold:
+        return
+    first = controller.preview().compute(0.0, experiment.q0, experiment.v0)
+    if first.damped:
+        yield from start_advice(experiment, first.damped)
 
 
 def start_advice(experiment: Experiment, damped: str = "") -> Iterator[str]:

@@ -2,10 +2,12 @@
 
 import argparse
 import json
+import re
 import sys
 import tempfile
 from collections.abc import Callable
 from dataclasses import asdict
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -39,7 +41,7 @@ def run(options: argparse.Namespace) -> int:
     """Simulate, save the log and print a summary; rows computed so far are kept."""
     loaded = load_scenario(read(options))
     options.out.mkdir(parents=True, exist_ok=True)  # fails before the work, not after
-    log = _log_of(Path(loaded.document.name), options.out)
+    log = _log_of(Path(loaded.document.name), options)
     tell = _tell_json if options.json else _tell
     if not options.view:
         return _run_and_save(_built(loaded), log, tell, None)
@@ -53,9 +55,27 @@ def run(options: argparse.Namespace) -> int:
         return max(_run_and_save(experiment, log, tell, None), 2)
 
 
-def _log_of(source: Path, folder: Path) -> Path:
-    """Return the path of a run's log, which never replaces the log that it repeats."""
-    log = folder / f"{source.stem}.npz"
+_LONGEST = 120  # of a file's name, without its ending
+_SHOWN = re.compile(r"\s*(title|description|view)\b")
+"""What does not change a run, but how it is shown."""
+
+
+def file_name(words: str) -> str:
+    """Return words as the name of a file; what is too long ends in its hash."""
+    name = re.sub(r"[\s/\\]+", "_", words)
+    if len(name) <= _LONGEST:
+        return name
+    return f"{name[: _LONGEST - 9]}-{sha256(words.encode()).hexdigest()[:8]}"
+
+
+def _log_of(source: Path, options: argparse.Namespace) -> Path:
+    """Return the path of a run's log, whose name says what was set.
+
+    So it does not replace the log of another run, nor ever that which it repeats.
+    """
+    changed = [each for each in options.overrides if not _SHOWN.match(each)]
+    folder: Path = options.out
+    log = folder / f"{file_name(','.join([source.stem, *changed]))}.npz"
     if log.exists() and source.exists() and log.samefile(source):
         return log.with_stem(f"{log.stem}-again")
     return log
@@ -105,6 +125,8 @@ def _run_and_save(
             log, status = _saved_elsewhere(rollout, log, error), 2
         journal.unlink(missing_ok=True)
     tell(rollout, log, stopwatch)
+    for line in checks.advice_of_run(experiment, rollout):
+        print(f"hsp: {line}", file=sys.stderr)
     if screen is not None:
         screen.finish(rollout)
     return status
@@ -146,22 +168,33 @@ def view(options: argparse.Namespace) -> int:
 
 
 def plot(options: argparse.Namespace) -> int:
-    """Draw the figures of a log, or of a file whose ending a companion knows."""
+    """Draw the figures of logs, or of a file whose ending a companion knows."""
+    first = options.logs[0]
     others = entry_points("plots")
-    if other := others.get(options.log.suffix.removeprefix(".")):
+    if other := others.get(first.suffix.removeprefix(".")):
         return int(other.load()(options))
-    from hsp_control.visualization.plots import save_figures
+    from hsp_control.visualization.plots import (
+        diagnostics_figure,
+        save_figure,
+        save_figures,
+    )
 
-    rollout = Rollout.load(options.log)
-    folder = options.out or options.log.parent
+    runs = [Rollout.load(log) for log in options.logs]
+    folder, formats = options.out or first.parent, options.formats or ["png"]
+    panels = [name.strip() for name in options.panels.split(",") if name.strip()]
     with working("Drawing"):
-        files = save_figures(
-            rollout,
-            folder,
-            options.log.stem,
-            formats=options.formats or ["png"],
-            absolute=not options.relative,
-        )
+        if len(runs) == 1 and not panels and not options.width:
+            absolute = not options.relative
+            files = save_figures(
+                runs[0], folder, first.stem, formats, absolute=absolute
+            )
+        else:
+            names = [log.stem for log in options.logs]
+            figure = diagnostics_figure(
+                *runs, names=names, panels=panels, width=options.width
+            )
+            stem = f"{'+'.join(names)}-{'-'.join(panels) or 'diagnostics'}"
+            files = save_figure(figure, folder / file_name(stem), formats)
     for file in files:
         _out.print(f"Figure: {file}")
     return 0

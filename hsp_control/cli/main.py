@@ -56,7 +56,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if ends_in_order and signal.getsignal(signal.SIGINT) is end_quietly:
             signal.signal(signal.SIGINT, signal.default_int_handler)
         run = _function_of(options.command) if added is None else added.run
-        with consoles.compiling_shown(consoles.errors), consoles.warnings_printed():
+        from hsp_control.declaration.language import in_yaml
+
+        shown = consoles.compiling_shown(consoles.errors)
+        with in_yaml(), shown, consoles.warnings_printed():
             return int(run(options))
     except HspControlError as error:
         print(f"hsp: {consoles.message_of(error)}", file=sys.stderr)

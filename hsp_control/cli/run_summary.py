@@ -8,7 +8,17 @@ from rich.table import Table
 
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.limit_excess import POSITION, VELOCITY
-from hsp_control.simulation.log_series import FAR, OUT, unreached
+from hsp_control.simulation.log_series import (
+    FAR,
+    OUT,
+    ErrorPart,
+    effort_units,
+    rate_unit,
+    rows_compare,
+    task_errors,
+    task_names,
+    unreached,
+)
 
 
 def summary(rollout: Rollout) -> Table:
@@ -18,31 +28,47 @@ def summary(rollout: Rollout) -> Table:
         "run", f"{len(rollout)} rows to t = {rollout.t[-1]:g} s, {rollout.status}"
     )
     tasks = rollout.meta["tasks"]
+    parts: dict[str, list[ErrorPart]] = {task: [] for task in tasks}
+    for part in task_errors(rollout):
+        parts[task_names(rollout)[part.task]].append(part)
     away = {each.task: each for each in unreached(rollout.columns, tasks)}
     for task in tasks:
-        error = np.linalg.norm(rollout[f"task.{task}.error"], axis=1)
-        tracked = error[np.isfinite(error)]  # a task may be off for a while
-        if not len(tracked):
-            table.add_row(f"task {task}", "was never active")
-            continue
-        rms, last = float(np.sqrt(np.mean(tracked**2))), tracked[-1]
-        table.add_row(f"task {task}", f"|e| rms {rms:.3g}, at the end {last:.3g}")
+        for part in parts[task]:
+            tracked = part.norm[np.isfinite(part.norm)]  # it may be off for a while
+            if not len(tracked):
+                table.add_row(f"task {part.label}", "was never active")
+                continue
+            rms, last, unit = np.sqrt(np.mean(tracked**2)), tracked[-1], part.unit
+            table.add_row(
+                f"task {part.label}",
+                f"|e| rms {rms:.3g} {unit}, at the end {last:.3g} {unit}",
+            )
         for words, rows in ((FAR, away[task].far), (OUT, away[task].out > 0.0)):
             if count := int(rows.sum()):
                 text = f"{count} rows: {words}"
                 if words == OUT and rows[-1]:
                     text += f", {away[task].length(-1)} at the end"
                 table.add_row("", text)
-    norm = rollout["null_space_norm"]
+    norm, unit = rollout["null_space_norm"], rate_unit(rollout)
     table.add_row(
-        "null space", f"|e_N| {norm[0]:.3g} at the start, {norm[-1]:.3g} at the end"
+        "null space",
+        f"|e_N| {norm[0]:.3g} {unit} at the start, {norm[-1]:.3g} {unit} at the end",
     )
-    table.add_row(
-        "det(J W⁻¹ Jᵀ)",
-        f"minimum {np.nanmin(rollout['manipulability']):.4g}, "
-        f"smallest singular value {np.nanmin(rollout['singular_values']):.3g}",
-    )
-    table.add_row("effort", f"largest {np.abs(rollout.tau).max():.3g}")
+    smallest = f"smallest singular value {np.nanmin(rollout['singular_values']):.3g}"
+    if rows_compare(rollout):
+        least = f"minimum {np.nanmin(rollout['manipulability']):.4g}, {smallest}"
+        table.add_row("det(J W⁻¹ Jᵀ)", least)
+    else:  # determinants of different sizes do not compare
+        table.add_row("J L⁻ᵀ", smallest)
+    largest, units = np.abs(rollout.tau).max(axis=0), np.array(effort_units(rollout))
+    acts = (
+        largest > 0.0 if largest.any() else largest == 0.0
+    )  # a floating base has none
+    most = [
+        f"{largest[units == unit].max():.3g} {unit}"
+        for unit in dict.fromkeys(units[acts].tolist())
+    ]
+    table.add_row("effort", f"largest {' and '.join(most)}")
     for row in limit_rows(rollout):
         table.add_row("limits", row)
     if damped := int((rollout["damped"] > 0.0).sum()):

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from copy import deepcopy
 from os import PathLike, fspath
 from pathlib import Path
@@ -17,9 +17,10 @@ from hsp_control.config.yaml_reader import (
     YamlError,
     read_yaml,
 )
+from hsp_control.declaration.families import only_packages
 from hsp_control.declaration.keys import KeyPath, split_assignment, written
+from hsp_control.declaration.language import in_yaml, shortened, shown, spoken
 from hsp_control.declaration.located import locate, located
-from hsp_control.declaration.plain import shortened, shown
 from hsp_control.robot.description.access import ANYWHERE
 
 
@@ -73,6 +74,7 @@ class Document:
         self.packages: frozenset[str] | None = None
         self._data = deepcopy(data)
         self._origins: dict[KeyPath, Mark | str] = dict(marks)
+        self._written = bool(marks)  # as a text, not in Python
 
     @classmethod
     def read(cls, path: str | PathLike[str]) -> "Document":
@@ -109,6 +111,16 @@ class Document:
             raise located(f"{name}:{marks[()].line}", message)
         return cls(data, marks, name)
 
+    @contextmanager
+    def reading(self) -> Iterator[None]:
+        """Read the data: messages speak their language, other packages are refused."""
+        with ExitStack() as stack:
+            if self._written:
+                stack.enter_context(in_yaml())
+            if self.packages is not None:
+                stack.enter_context(only_packages(*self.packages))
+            yield
+
     def to_dict(self) -> dict[str, Any]:
         """Return a copy of the data."""
         return deepcopy(self._data)
@@ -118,7 +130,10 @@ class Document:
 
         The value is YAML. Keys with a dot need quotes: ``frames.'a.b'.parent=x``.
         """
-        origin = shortened(f"--set {' '.join(assignment.split())}", _LONGEST_ORIGIN)
+        if not isinstance(assignment, str):
+            raise ConfigError(f"{shown(assignment)} is no text like 'key.path=value'")
+        words = " ".join(assignment.split())
+        origin = shortened(spoken(f"--set {words}", repr(words)), _LONGEST_ORIGIN)
         try:
             keys, text = split_assignment(assignment)
             value, _ = read_yaml(text)
@@ -136,8 +151,18 @@ class Document:
             raise located(origin, str(error)) from None
         for inside in [key for key in self._origins if key[: len(path)] == path]:
             del self._origins[inside]
+        for end in range(1, len(path)):  # what was created on the way
+            if self._written:
+                self._origins.setdefault(path[:end], origin)
         self._origins[path] = origin
         return path
+
+    def beside(self, path: KeyPath) -> list[str]:
+        """Return the other keys of the mapping that has the last key of a path."""
+        holder: Any = self._data
+        for part in path[:-1]:
+            holder = holder[part]
+        return [key for key in holder if key != path[-1]]
 
     def __contains__(self, path: KeyPath) -> bool:
         value: Any = self._data

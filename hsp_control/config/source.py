@@ -13,8 +13,9 @@ from hsp_control.common.resources import bundled_configs
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.config.document import Document
 from hsp_control.config.streams import with_recordings
+from hsp_control.declaration.language import shown, spoken
 from hsp_control.robot.description.access import only_within
-from hsp_control.robot.description.sources import packaged_folders
+from hsp_control.robot.description.sources import is_robot, packaged_folders
 from hsp_control.simulation import Rollout
 
 
@@ -36,6 +37,8 @@ def read_document(
 def _read(source: str | PathLike[str] | dict[str, Any]) -> Document:
     if isinstance(source, dict):
         return Document(source, {}, "configuration")
+    if not isinstance(source, str | PathLike):
+        raise ConfigError(f"{shown(source)} is neither a name, a path nor a dict")
     path = Path(source)
     if path.suffix in {".npz", ".journal"}:
         run = Rollout.load(path)
@@ -67,6 +70,12 @@ def _read(source: str | PathLike[str] | dict[str, Any]) -> Document:
         return Document.read(path)
     if str(source) in known:
         return Document.read(known[str(source)])
+    if is_robot(str(source)):
+        raise ConfigError(
+            f"{str(source)!r} is a robot, and this needs a configuration; "
+            + spoken(f"hsp play {source} drives", f"Robot.load({source!r}) loads")
+            + " the robot"
+        )
     raise ConfigError(
         f"no configuration {str(source)!r}{did_you_mean(str(source), known)} "
         f"(give the path of a .yaml file, or one of: {listing(known)})"

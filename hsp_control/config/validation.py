@@ -1,14 +1,13 @@
 """Check a document against its schema, and report all mistakes in one error."""
 
-from contextlib import AbstractContextManager, nullcontext
 from typing import TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
 from hsp_control.common.exceptions import HspControlError
+from hsp_control.common.suggestions import did_you_mean
 from hsp_control.config.document import Document
 from hsp_control.declaration import Part
-from hsp_control.declaration.families import only_packages
 from hsp_control.declaration.located import locate
 from hsp_control.declaration.mistakes import (
     Finding,
@@ -25,16 +24,13 @@ _OTHERS = 5
 
 def validate(document: Document, part: type[Value]) -> Value:
     """Return the document as a part; an error names up to six mistakes in order."""
-    admitted: AbstractContextManager[None] = nullcontext()
-    if document.packages is not None:
-        admitted = only_packages(*document.packages)
-    try:
-        with admitted:
+    with document.reading():
+        try:
             return TypeAdapter(part).validate_python(document.to_dict())
-    except ValidationError as error:
-        pending = [(each["loc"], each) for each in error.errors(include_url=False)]
-        found = findings(document, shape(part), pending)
-    raise _summary(document, sorted(found, key=lambda f: _order(document, f)))
+        except ValidationError as error:
+            pending = [(each["loc"], each) for each in error.errors(include_url=False)]
+            found = findings(document, shape(part), pending)
+        raise _summary(document, sorted(found, key=lambda f: _order(document, f)))
 
 
 def _order(document: Document, finding: Finding) -> tuple[bool, tuple[int, ...]]:
@@ -47,7 +43,10 @@ def _error(document: Document, finding: Finding) -> HspControlError:
     """Return the error of a finding; one that a part raised keeps its class."""
     own = domain_error(finding.error)
     if own is None:
-        return document.error(finding.path, explained(finding))
+        message = explained(finding)
+        if finding.kind == "union_tag_not_found" and isinstance(finding.path[-1], str):
+            message += did_you_mean(finding.path[-1], document.beside(finding.path))
+        return document.error(finding.path, message)
     path = (*finding.path, *own.path)
     error = type(own)(own.bare_message)
     locate(error, document.location(path), path)

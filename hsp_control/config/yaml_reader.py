@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import yaml
 
 from hsp_control.declaration.keys import KeyPath
-from hsp_control.declaration.plain import shown
+from hsp_control.declaration.language import shown
 
 TAG = "tag:yaml.org,2002:"
 

@@ -295,9 +295,11 @@ class Controller:
         if q is not None and v is not None:
             self._state.update(t, q, v)  # type: ignore[arg-type]
         elif not isinstance(t, RobotState):
+            missing = " and ".join(
+                name for name, value in (("q", q), ("v", v)) if value is None
+            )
             raise ControllerError(
-                "compute needs t, q and v, or a RobotState; got "
-                f"{type(t).__name__} alone"
+                f"compute needs t, q and v, or a RobotState; {missing} is missing"
             )
         elif t.robot is not self._declared.robot:
             raise ControllerError(

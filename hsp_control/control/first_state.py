@@ -7,6 +7,7 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ConfigurationError
 from hsp_control.constraints.limits import RobotLimits
+from hsp_control.declaration.language import spoken
 from hsp_control.robot import Robot
 
 FAR = 2.0
@@ -62,8 +63,9 @@ def warn_of_jump(robot: Robot, q: Array, v: Array, tau: Array) -> None:
     warnings.warn(
         f"the first effort of joint {robot.dof_names[j]!r} is {tau[j]:.3g} {unit}, but "
         f"gravity asks for {gravity[j]:.3g} {unit}: a jump of {100.0 * share[j]:.0f} % "
-        f"of its limit of {limit[j]:.3g} {unit}; let tasks begin gently with blend=1.0 "
-        "(YAML blend: 1.0), or start on the trajectory with its velocity",
+        f"of its limit of {limit[j]:.3g} {unit}; let tasks begin gently with "
+        f"{spoken('blend: 1.0', 'blend=1.0')}, or start on the trajectory with its "
+        "velocity",
         StartWarning,
         stacklevel=3,
     )

@@ -29,9 +29,8 @@ from hsp_control.control.evolution import (
     PlannedLimits,
 )
 from hsp_control.declaration import Part, within
-from hsp_control.declaration.in_python import check_kind
+from hsp_control.declaration.language import check_kind, shortened
 from hsp_control.declaration.nested import parts_within, with_parts_replaced
-from hsp_control.declaration.plain import shortened
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.start import Start
 from hsp_control.law import VARYING, MetricSample
@@ -51,7 +50,7 @@ Base = Literal["flying", "driven"]
 
 def _check_parts(what: str, parts: object, kind: type[Part]) -> None:
     """Check that an argument is several parts of a kind."""
-    if isinstance(parts, kind) or not isinstance(parts, Iterable):
+    if isinstance(parts, kind | Mapping | str) or not isinstance(parts, Iterable):
         raise ControllerError(
             f"{what} is {shortened(repr(parts))}; needs several, such as "
             f"[{kind.__name__.lower()}]"
@@ -388,11 +387,10 @@ class Declared:
             yields = any(impedance_of(task) is not None for task in tasks)
             own = MassMatrixMetric(inertia="robot")
             metric = own if yields else IdentityMetric()
-        self.metric: Metric = metric
         _check_parts("contacts", contacts, Contact)
         self.contacts = tuple(contacts)
         check_kind("field is", self.field, NullSpaceField, ControllerError)
-        check_kind("metric is", metric, Metric, ControllerError)
+        self.metric: Metric = check_kind("metric is", metric, Metric, ControllerError)
         if limits is not None:
             if limits == "none":
                 raise ControllerError("limits is 'none'; in Python it is None")

@@ -9,7 +9,7 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ControllerError
 from hsp_control.control.change import AddTask, Change, ChangeReference
-from hsp_control.declaration.plain import shortened
+from hsp_control.declaration.language import shortened
 from hsp_control.declaration.rotation import matrix_of
 from hsp_control.tasks import Task
 from hsp_control.trajectories import (

@@ -19,7 +19,7 @@ from pydantic import (
 from pydantic_core import CoreSchema, core_schema
 
 from hsp_control.declaration.families import Declared
-from hsp_control.declaration.plain import kind, shown
+from hsp_control.declaration.language import kind, shown, spoken
 
 
 class ByType:
@@ -60,7 +60,8 @@ class ByType:
             found = (getattr(made, name) for name in value)
             return tuple(part for part in found if part is not None)
         if isinstance(value, str) or not isinstance(value, Iterable):
-            raise ValueError(f"{shown(value)} is {kind(value)}; expected a mapping")
+            needed = spoken("a mapping", f"a list of {self.base.__name__}(...)")
+            raise ValueError(f"{shown(value)} is {kind(value)}; expected {needed}")
         return self._distinct(tuple(value))
 
     def _distinct(self, parts: tuple[Declared, ...]) -> tuple[Declared, ...]:

@@ -11,6 +11,7 @@ from pydantic import BeforeValidator, WithJsonSchema
 
 from hsp_control.common.exceptions import ConfigError
 from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.declaration.language import spoken
 
 _functions: dict[str, Callable[..., Any]] = {}
 
@@ -56,10 +57,12 @@ def _named(value: Any) -> Any:
         return value
     if value not in _functions:
         there = f"there are {listing(_functions)}" if _functions else "there is none"
-        raise ValueError(
+        unknown = (
             f"no function {value!r} was imported{did_you_mean(value, _functions)} "
             f"({there}); --import FILE.py runs the file that has it"
         )
+        named = f"{value!r} is a str; needs the function itself"
+        raise ValueError(spoken(unknown, named))
     return _functions[value]
 
 

@@ -3,7 +3,7 @@
 import re
 from typing import TypeAlias
 
-from hsp_control.declaration.plain import shortened
+from hsp_control.declaration.language import shortened
 
 KeyPath: TypeAlias = tuple[str | int, ...]
 

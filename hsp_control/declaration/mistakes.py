@@ -19,9 +19,9 @@ from pydantic_core import ErrorDetails
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.common.suggestions import did_you_mean, listing, nearest
 from hsp_control.declaration.families import Declared
-from hsp_control.declaration.in_python import misfit
 from hsp_control.declaration.keys import KeyPath, written
-from hsp_control.declaration.plain import joined, kind, shown
+from hsp_control.declaration.language import joined, kind, misfit, shown, spoken
+from hsp_control.declaration.plain_data import plain_data
 from hsp_control.declaration.schema import (
     Shape,
     entry,
@@ -189,12 +189,12 @@ def _misfit(finding: Finding) -> bool:
     return finding.kind in ("mismatch", "literal_error", "enum")
 
 
-_SIMPLE = {
-    float: ("a number", "numbers"),
-    int: ("an integer", "integers"),
-    bool: ("true or false", "booleans"),
-    str: ("text", "texts"),
-    Path: ("a path", "paths"),
+_SIMPLE = {  # in YAML, of several, in Python
+    float: ("a number", "numbers", "a number"),
+    int: ("an integer", "integers", "an int"),
+    bool: ("true or false", "booleans", "True or False"),
+    str: ("text", "texts", "a str"),
+    Path: ("a path", "paths", "a path"),
 }
 _COMPARISONS = {
     "greater_than": ("gt", "greater than"),
@@ -214,7 +214,7 @@ def explained(finding: Finding, key: str = "key") -> str:
     value, expected = finding.value, finding.expected
     match finding.kind:
         case "mismatch" if words := joined(_words(expected)):
-            return _mismatch(value, words, literals(expected.options))
+            return _mismatch(value, words, expected)
         case "extra_forbidden":
             return f"unknown {key} {_unknown(value, keys(expected))}"
         case "missing":
@@ -224,8 +224,8 @@ def explained(finding: Finding, key: str = "key") -> str:
         case "union_tag_not_found" if tag := expected.discriminator:
             return f"missing key {tag!r}; {_tags(expected, tag)}"
         case "misspelt_tag" if tag := expected.discriminator:
-            hint = f"did you mean {tag!r}? ({_tags(expected, tag)})"
-            return f"unknown key {value!r}; {hint}"
+            hint = _near(value, [tag])
+            return f"unknown key {value!r}{hint} ({_tags(expected, tag)})"
         case "literal_error" | "enum" if choices := literals(expected.options):
             return f"unknown value {_unknown(value, choices)}"
         case "too_short" | "too_long" | "string_too_short" | "string_too_long":
@@ -260,12 +260,46 @@ def _tags(expected: Shape, key: str) -> str:
 
 
 def _near(value: Any, options: Iterable[Any]) -> str:
-    return did_you_mean(value, map(str, options)) if isinstance(value, str) else ""
+    if not isinstance(value, str):
+        return ""
+    if ":" in value:
+        return "; write a space after the colon"
+    return did_you_mean(value, map(str, options))
 
 
-def _mismatch(value: Any, words: str, choices: list[Any]) -> str:
-    given = "nothing given" if value is None else f"{shown(value)} is {kind(value)}"
-    return f"{given}; expected {words}{_near(value, choices)}"
+def _mismatch(value: Any, words: str, expected: Shape) -> str:
+    if value is None:
+        given = spoken("nothing given", "None")
+    else:
+        given = f"{shown(value)} is {kind(value)}"
+    return f"{given}; expected {words}{_inside(expected)}{_meant(value, expected)}"
+
+
+def _inside(expected: Shape) -> str:
+    """Return which keys the mapping has that is expected, if it is one part's."""
+    (option, *others) = expected.options
+    if others or not is_model(option) or expected.discriminator:
+        return ""
+    return f" of {listing(keys(expected), 6)}"
+
+
+def _meant(value: Any, expected: Shape) -> str:
+    """Return the mapping that the user meant by a type's name, or by a bare value."""
+    choices = literals(expected.options)
+    if (tag := expected.discriminator) is None:
+        return _near(value, choices)
+    types = tagged(expected.options, tag)
+    if isinstance(value, str):
+        near = nearest(value, map(str, types))
+        return f"; did you mean {{{tag}: {near}}}?" if near else ""
+    for member in expected.options:
+        try:
+            part = member.of_value(value)
+        except HspControlError:
+            continue
+        if part is not None:
+            return f"; did you mean {shown(plain_data(part))}?"
+    return ""
 
 
 def _wrong_length(finding: Finding) -> str:
@@ -306,7 +340,7 @@ def _words(expected: Shape, *, many: bool = False) -> list[str]:
     found: list[str] = []
     for option in expected.options:
         inner = shape(option)
-        choices = [shown(choice) for choice in literals([option])]
+        choices = [spoken(shown(each), repr(each)) for each in literals([option])]
         if inner.options != (option,):  # an alias, or ``Annotated``
             words = _words(inner, many=many)
         else:
@@ -319,12 +353,14 @@ def _words(expected: Shape, *, many: bool = False) -> list[str]:
 
 def _word(option: Any, bounds: tuple[int, int | None], *, many: bool) -> str:
     if option in _SIMPLE:
-        return _SIMPLE[option][many]
+        one, several, in_python = _SIMPLE[option]
+        return several if many else spoken(one, in_python)
     container = get_origin(option) or option
     if not isinstance(container, type):
         return ""
     if is_model(container) or issubclass(container, Mapping):
-        return "mappings" if many else "a mapping"
+        one, several = spoken("a mapping", "a dict"), spoken("mappings", "dicts")
+        return several if many else one
     if issubclass(container, Collection):
         return _list(option, bounds, many=many)
     return ""
@@ -379,7 +415,7 @@ def _in_python(finding: Finding) -> str:
     options = finding.expected.options
     wanted = all(isinstance(o, type) and issubclass(o, Declared) for o in options)
     known = finding.kind in ("mismatch", "union_tag_not_found")
-    if not (wanted and known and options) or isinstance(finding.value, Mapping):
+    if not (wanted and known and options):
         return ""
     bases = [each.family.base if each.family else each for each in options]
     return misfit(finding.value, [*dict.fromkeys(bases)])

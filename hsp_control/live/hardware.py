@@ -7,7 +7,7 @@ from typing import Protocol, runtime_checkable
 from hsp_control.common.arrays import Array
 from hsp_control.common.entry_points import entry_points
 from hsp_control.common.exceptions import HspControlError, LiveError
-from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.common.suggestions import listing, nearest
 from hsp_control.control.measurement import Measurement as Measurement
 from hsp_control.live.settings import LiveSettings
 from hsp_control.robot import Robot
@@ -142,8 +142,10 @@ def _known(option: str, url: str, group: str) -> tuple[str, EntryPoint]:
     known = entry_points(group)
     if not separator or name not in known:
         there = listing(known) or "none"
+        near = nearest(name, known)
         raise LiveError(
             f"{option} {url!r}: needs NAME://ADDRESS with a name that an installed "
-            f"package provides{did_you_mean(name, known)} (installed: {there})"
+            f"package provides{f'; did you mean {near}://ADDRESS?' if near else ''} "
+            f"(installed: {there})"
         )
     return address, known[name]

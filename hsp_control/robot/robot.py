@@ -127,6 +127,8 @@ class Robot(RobotModel):
             JointNotFoundError: If a joint to lock does not exist.
             FrameNotFoundError: If a tool frame's parent does not exist.
         """
+        if isinstance(name, pin.Model):
+            raise ModelError("a pinocchio.Model; needs Robot.from_pinocchio(model)")
         given: dict[str, Any] = {
             "root": root,
             "locked": locked,

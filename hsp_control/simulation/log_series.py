@@ -145,6 +145,37 @@ def constant_metric(rollout: Rollout) -> Array | None:
     return None if matrix is None else np.array(matrix)
 
 
+def limit(rollout: Rollout, name: str) -> Array:
+    """Return a limit of `RobotLimits` at the end of a run, shape (nv,), or inf."""
+    known = rollout.meta.get("limits", {}).get(name) or [None] * rollout.v.shape[1]
+    return np.array([np.inf if each is None else each for each in known])
+
+
+def rows_compare(rollout: Rollout) -> bool:
+    """Return whether the tasks' rows are as many all the time.
+
+    Between determinants of different sizes there is nothing to compare.
+    """
+    sizes = np.isfinite(rollout["singular_values"]).sum(axis=1)
+    return len(np.unique(sizes)) == 1
+
+
+def spans_of(
+    times: Array, active: NDArray[np.bool_], closed: float = 0.0
+) -> list[tuple[float, float]]:
+    """Return the intervals in which rows are active; each row lasts until the next."""
+    edges = np.diff(np.concatenate([[False], active, [False]]).astype(np.int8))
+    starts = times[np.flatnonzero(edges > 0)].tolist()
+    stops = times[np.flatnonzero(edges < 0).clip(max=len(times) - 1)].tolist()
+    spans: list[tuple[float, float]] = []
+    for start, stop in zip(starts, stops, strict=True):
+        if spans and start - spans[-1][1] <= closed:
+            spans[-1] = spans[-1][0], stop
+        else:
+            spans.append((start, stop))
+    return spans
+
+
 def field_terms(rollout: Rollout) -> list[str]:
     """Return the names of the field's terms whose share of g is in the log."""
     inside = re.compile(r"field\.(.+)\.g")
@@ -291,7 +322,7 @@ RESTING = 0.1
 """An error rests if it changes by less than this share of itself in a second [1/s]."""
 STAYS = 0.3
 """Time that it has to rest: a step begins at rest, too [s]."""
-_LIMITED = 2  # the log's status from which on a limit changes the motion
+LIMITED = 2  # the log's status from which on a limit changes the motion
 
 
 class Unreached(NamedTuple):
@@ -333,7 +364,7 @@ def unreached(
     moved = {} if moved is None else moved
     times, none = columns["t"], np.zeros(len(columns["t"]))
     held = (columns.get("damped", none) > 0.0) | (
-        columns.get("status", none) >= _LIMITED
+        columns.get("status", none) >= LIMITED
     )
     for task, described in tasks.items():
         if f"task.{task}.error" not in columns:

@@ -255,7 +255,7 @@ class LogWriter:
     def meta(self, status: str, message: str, **meta: Any) -> dict[str, Any]:
         """Return the meta data of a rollout of these rows, as JSON data."""
         controller = self._controller
-        robot, metric = controller.robot, controller.metric
+        robot, metric, limits = controller.robot, controller.metric, controller.limits
         return {
             "format": FORMAT,
             "status": status,
@@ -270,6 +270,12 @@ class LogWriter:
                 "continuous": continuous_dofs(robot),
                 "skeleton_parents": self._parents,
                 "joint_coordinates": robot.source.joint_coordinates,
+            },
+            "limits": {}
+            if limits is None
+            else {
+                name: [x if np.isfinite(x) else None for x in vars(limits)[name]]
+                for name in ("lower", "upper", "velocity", "effort")
             },
             "tasks": self._tasks.meta(),
             **self._came_during_run(),

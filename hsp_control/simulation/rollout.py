@@ -14,6 +14,7 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LogError
 from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.declaration.language import spoken
 from hsp_control.robot import Robot, RobotState
 from hsp_control.simulation.journal import KILLED, JournalReader, is_journal
 
@@ -108,24 +109,29 @@ class Rollout:
         # Each update overwrites the state's arrays, so np.array must copy.
         return np.array([np.array(function(state.update(*row))) for row in rows])
 
-    def plot(self, *, paper: bool = False) -> Any:
+    def plot(self, *others: "Rollout", paper: bool = False, **options: Any) -> Any:
         """Return a figure of the run, which Jupyter shows inline.
 
         It compares the run with what the law predicts: errors, field and efforts. What
         ``hsp plot`` saves is this and the paper's figure.
 
         Args:
-            paper: Whether it is the paper's five panels instead.
+            others: Other runs, drawn in the same panels.
+            paper: Whether it is the paper's five panels instead, of this run alone.
+            options: ``panels=["errors", "null_space"]``, ``width="84mm"`` for a figure
+                in a paper, and ``names`` of the runs; see `plots.diagnostics_figure`.
 
         Returns:
             The ``matplotlib.figure.Figure``.
 
         Raises:
-            PlotError: If the log has no rows.
+            PlotError: If a log has no rows, or there is no such panel.
         """
         # Here: what draws is a room above, and takes long to import.
         plots = import_module("hsp_control.visualization.plots")
-        return plots.paper_figure(self) if paper else plots.diagnostics_figure(self)
+        if paper:
+            return plots.paper_figure(self, **options)
+        return plots.diagnostics_figure(self, *others, **options)
 
     def save(self, path: str | Path) -> Path:
         """Write one ``.npz`` without pickles, which NumPy can read by itself.
@@ -168,15 +174,19 @@ class Rollout:
             LogError: If the file is missing, truncated, or not a log of this version.
         """
         path = Path(path)
+        if path.suffix in (".yaml", ".yml"):
+            made = spoken(f"hsp run {path} writes", "load_experiment(...).run() makes")
+            raise LogError(f"{path}: a configuration, not a log; {made} one")
         try:
             reading = _read_journal if is_journal(path) else _read_npz
             columns, meta = reading(path)
         except LogError:
             raise
         except FileNotFoundError:
-            near = [file.name for file in path.parent.glob("*.npz")]
+            folders = path.parent, path.parent / "out"
+            near = [str(f) for folder in folders for f in folder.glob("*.npz")]
             raise LogError(
-                f"{path}: no such file{did_you_mean(path.name, near)}"
+                f"{path}: no such file{did_you_mean(str(path), near)}"
             ) from None
         except _UNREADABLE as error:
             reason = str(error).splitlines()[0] if str(error) else type(error).__name__

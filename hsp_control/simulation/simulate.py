@@ -26,7 +26,7 @@ from hsp_control.control.first_state import (
 )
 from hsp_control.control.plan import Plan, RunningPlan
 from hsp_control.declaration import Part, within
-from hsp_control.declaration.in_python import check_kind
+from hsp_control.declaration.language import check_kind
 from hsp_control.declaration.quantities import Flag, Positive
 from hsp_control.geometry.scene import Scene
 from hsp_control.robot.integrators import Dop853, Integrator, Rk4
@@ -46,6 +46,8 @@ from hsp_control.simulation.plants import (
 )
 from hsp_control.simulation.rollout import Rollout
 
+LOG_PERIOD = 0.01
+"""Time between two rows where nothing else is said [s]."""
 MAX_ROWS = 10_000_000
 """Most rows of a log; see also `log_columns.MAX_SIZE`."""
 MAX_STEPS = 1e9
@@ -59,7 +61,7 @@ def simulate(
     *,
     duration: float,
     control_period: float | None = None,
-    log_period: float = 0.01,
+    log_period: float = LOG_PERIOD,
     integrator: Integrator | None = None,
     plant: Plant | PlantPart | None = None,
     compensation: Compensation | None = None,
@@ -124,6 +126,8 @@ def simulate(
     robot = controller.robot
     integrator = integrator or default_integrator(plant, control_period)
     check_kind("integrator is", integrator, Integrator, SimulationError)
+    if compensation is not None:
+        check_kind("compensation is", compensation, Compensation, SimulationError)
     if isinstance(plant, str | type):
         check_kind("plant is", plant, PlantPart, SimulationError)
     if plant is None:
@@ -238,7 +242,18 @@ def _count_rows(
         )
     if control_period is None:
         return rows, 0
-    periods = _whole(log_period, control_period, "log_period", "control_period")
+    try:
+        periods = _whole(log_period, control_period, "log_period", "control_period")
+    except SimulationError:
+        if log_period != LOG_PERIOD or not 0.0 < control_period < np.inf:
+            raise
+        fitting = max(round(LOG_PERIOD / control_period), 1) * control_period
+        with within("control_period"):
+            raise SimulationError(
+                f"a row is logged every {LOG_PERIOD:g} s unless log_period says "
+                f"otherwise, which is not a whole multiple of {control_period:g} s; "
+                f"give log_period, too, for example {fitting:g}"
+            ) from None
     check_steps(duration, control_period, "control_period")
     return rows, periods
 
@@ -276,7 +291,7 @@ class SimulationSettings(Part, error=SimulationError):
 
     duration: Positive = 10.0
     """Length of the run [s]."""
-    log_period: Positive = 0.01
+    log_period: Positive = LOG_PERIOD
     """Time between two rows of the log [s]."""
     control_period: Positive | None = None
     """Time for which an effort is held [s]; without it, the law is evaluated in every

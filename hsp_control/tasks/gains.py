@@ -92,6 +92,8 @@ def as_matrix(gain: Array, size: int, name: str) -> Array:
 def as_gain(value: ArrayLike, name: str) -> Array:
     """Return a gain as an array of 0, 1 or 2 dimensions."""
     try:
+        if isinstance(value, str):
+            raise TypeError
         gain = np.array(value, dtype=float)
     except (TypeError, ValueError):
         raise GainError(

@@ -70,10 +70,11 @@ def test_it_runs_plots_and_exports(installed: Path, tmp_path: Path) -> None:
     short = ["--set", "simulation.duration=0.3"]
     ran = hsp(installed, "run", DEMO, "--out", ".", *short, where=tmp_path)
     assert ran.returncode == 0, ran.stderr
+    log = "demo,simulation.duration=0.3.npz"
     for words in (
-        ["plot", "demo.npz"],
-        ["export", "demo.npz", "--html", "demo.html"],
-        ["run", "demo.npz", "--out", "again"],
+        ["plot", log],
+        ["export", log, "--html", "demo.html"],
+        ["run", log, "--out", "again"],
     ):
         ran = hsp(installed, *words, where=tmp_path)
         assert ran.returncode == 0, ran.stderr

@@ -34,10 +34,10 @@ class Parser(argparse.ArgumentParser):
         found, unknown = super().parse_known_args(args, namespace)
         if unknown:
             options = [name for name in unknown if name.startswith("-")]
-            name = (options or unknown)[0]
-            known = self._option_string_actions
-            hint = did_you_mean(name.split("=")[0], known) if options else ""
-            self.error(f"there is no {name!r} here{hint}")
+            if not options:
+                self.error(f"{unknown[0]!r} is one argument too many")
+            hint = did_you_mean(options[0].split("=")[0], self._option_string_actions)
+            self.error(f"there is no {options[0]!r} here{hint}")
         return found, unknown
 
     def error(self, message: str) -> NoReturn:
@@ -51,8 +51,8 @@ class Parser(argparse.ArgumentParser):
             )
             name = mistyped[1]
             message = (
-                f"there is no command {name!r}{did_you_mean(name, commands)}; "
-                "hsp --help lists all"
+                f"there is no command {name!r}{did_you_mean(name, commands)} "
+                "(hsp --help lists all)"
             )
         super().error(message)
 
@@ -130,8 +130,14 @@ def command_line() -> argparse.ArgumentParser:
     add_page(view)
     add_strict(view)
 
-    plot = _command(commands, "plot", "draw the figures of a log")
-    plot.add_argument("log", type=Path, metavar="LOG", help="written by hsp run")
+    plot = _command(commands, "plot", "draw the figures of a log, or several together")
+    plot.add_argument(
+        "logs",
+        nargs="+",
+        type=Path,
+        metavar="LOG",
+        help="written by hsp run; several are drawn in the same panels",
+    )
     plot.add_argument("--out", type=Path, metavar="DIR", help="default: beside the log")
     plot.add_argument(
         "--format",
@@ -140,7 +146,15 @@ def command_line() -> argparse.ArgumentParser:
         dest="formats",
         help="may be given more than once; default: png",
     )
-
+    plot.add_argument(
+        "--panels",
+        default="",
+        metavar="NAME,...",
+        help="draw these only, such as errors,null_space; another name lists all",
+    )
+    plot.add_argument(
+        "--width", metavar="84mm", help="for a paper, without heading and foot"
+    )
     plot.add_argument(
         "--relative",
         action="store_true",

@@ -124,7 +124,7 @@ class Teller:
         """Return what a policy needs, as JSON data."""
         source = self._source
         state, output, controller = source.state, source.output, source.controller
-        streams = {}
+        streams: dict[str, dict[str, Any]] = {}
         for task in controller.tasks:
             for stream in parts_within(task, Streamed) if task.remembers else ():
                 told = {**stream.counts(), "reason": stream.last_rejection}

@@ -86,10 +86,11 @@ def sweep(options: argparse.Namespace) -> int:
 
 def plot(options: argparse.Namespace) -> int:
     """Print and draw the contents of a sweep's file."""
-    swept = Sweep.load(options.log)
-    _print_summary(swept, None)
-    folder = options.out or options.log.parent
-    _draw(swept, folder, options.log.stem, options.formats or ["png"])
+    for file in options.logs:
+        swept = Sweep.load(file)
+        _print_summary(swept, None)
+        folder = options.out or file.parent
+        _draw(swept, folder, file.stem, options.formats or ["png"])
     return 0
 
 

@@ -10,7 +10,7 @@ from hsp_control.companions.sweeps.parquet import require_parquet
 from hsp_control.companions.sweeps.plan import Plan
 from hsp_control.companions.sweeps.results import Sweep
 from hsp_control.companions.sweeps.row import CRASHED, TIMED_OUT, Row
-from hsp_control.declaration.plain import shown
+from hsp_control.declaration.language import shown
 from hsp_control.simulation.measures import Measure
 
 

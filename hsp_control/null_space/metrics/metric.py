@@ -20,6 +20,7 @@ from hsp_control.declaration.quantities import (
     Matrix,
     Number,
     Positive,
+    numbers,
     read_only,
 )
 from hsp_control.geometry.start import Start
@@ -218,6 +219,12 @@ class ConstantMetric(FixedMetric, type="constant"):
 
     matrix: Annotated[ArrayLike, ArrayField(_Entries, _array)]
     """W, shape (nv, nv), or its diagonal, shape (nv,) [-]."""
+
+    @classmethod
+    def of_value(cls, value: object) -> Self | None:
+        """Return the metric of a matrix, or of its diagonal."""
+        matrix = numbers(value)
+        return None if matrix is None else cls(matrix)
 
     def __post_init__(self) -> None:
         """Check the matrix."""

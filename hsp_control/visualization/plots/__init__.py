@@ -2,14 +2,15 @@
 
 from hsp_control.simulation.log_series import chosen_rows as chosen_rows
 
+from .curves import draw_determinant as draw_determinant
 from .curves import draw_distances as draw_distances
 from .curves import draw_efforts as draw_efforts
 from .curves import draw_field_terms as draw_field_terms
 from .curves import draw_field_value as draw_field_value
 from .curves import draw_joint_positions as draw_joint_positions
-from .curves import draw_manipulability as draw_manipulability
 from .curves import draw_null_space_error as draw_null_space_error
 from .curves import draw_singular_values as draw_singular_values
+from .curves import draw_speeds as draw_speeds
 from .curves import draw_task_errors as draw_task_errors
 from .figures import diagnostics_figure as diagnostics_figure
 from .figures import new_figure as new_figure

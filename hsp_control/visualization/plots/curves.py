@@ -9,16 +9,20 @@ from matplotlib.transforms import ScaledTranslation
 from hsp_control.common.arrays import Array
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.log_series import (
+    LIMITED,
     column_unit,
     effort_units,
     field_terms,
     held_period,
     joint_names,
     joint_positions,
+    limit,
     logged_distances,
     position_units,
     predicted_decay,
     rate_unit,
+    rows_compare,
+    spans_of,
     task_errors,
 )
 from hsp_control.visualization import palette
@@ -76,6 +80,7 @@ def _fitting(axes: Axes, labels: Sequence[str]) -> int:
 MAX_NAMED, SELECTED = 14, 7
 """Of more than 14 lines, only the 7 that vary most get a colour and a name."""
 _DASHES = ("-", "--", ":", "-.")  # neighbours differ without their colours, too
+_NEAR = 0.2  # a limit is near within this share of a joint's own range
 
 
 def draw_lines(
@@ -84,11 +89,13 @@ def draw_lines(
     values: Array,
     names: Sequence[str],
     units: Sequence[str] | None = None,
+    limits: tuple[Array, Array] | None = None,
 ) -> str:
     """Draw one line per column, named in the legend; return the units of what is drawn.
 
     If the named lines differ in their units, names tell them; lines without a name are
-    drawn only if they share a unit with named ones. Shapes: t (N,), values (N, k).
+    drawn only if they share a unit with named ones. A lower or upper limit of a named
+    line is drawn if it comes near. Shapes: t (N,), values (N, k), limits (k,) each.
     """
     units = list(units or [""] * len(names))
     named, others = list(range(len(names))), []
@@ -112,6 +119,21 @@ def draw_lines(
         )
     if others:
         note(axes, f"{len(others)} others (grey)")
+    label: str | None = "limits"
+    lower, upper = limits or (np.full(len(names), np.nan),) * 2
+    for place, k in enumerate(named):
+        low, high = lower[k], upper[k]
+        room = _NEAR * (high - low) if np.isfinite([low, high]).all() else -1.0
+        for edge in (low, high):
+            if np.nanmin(np.abs(values[:, k] - edge)) <= room:
+                axes.axhline(
+                    edge,
+                    color=palette.series(place),
+                    linewidth=0.9,
+                    linestyle=(0, (1, 1.5)),
+                    label=label,
+                )
+                label = None
     return ", ".join(kinds)
 
 
@@ -139,19 +161,23 @@ def log_scale(axes: Axes, values: Array, *, top: float = 0.0) -> None:
     axes.set_yscale("log")  # after the limits: there may be no positive value
 
 
-def mark_damped(axes: Axes, rollout: Rollout) -> None:
-    """Shade the times at which the law is damped near a singularity, not exact."""
-    t, damped = rollout.t, rollout["damped"] > 0.0
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], damped, [False]])))
-    for start, stop in edges.reshape(-1, 2).tolist():
-        axes.axvspan(
-            float(t[start]),
-            float(t[stop - 1]),
-            color=palette.WARNING,
-            alpha=0.15,
-            linewidth=0.8,
-            label="damped near a singularity" if start == edges[0] else None,
-        )
+def mark_steps(axes: Axes, rollout: Rollout) -> None:
+    """Shade the times at which steps are not the law's: limited, bounded or damped."""
+    columns, limited = rollout.columns, np.zeros(len(rollout), bool)
+    if "status" in columns:
+        limited = rollout["status"] >= LIMITED
+    far = [columns[name] > 0.0 for name in columns if name.endswith(".bounded")]
+    for words, color, active in (
+        ("limited", palette.DESIRED, limited),
+        ("error bounded", palette.TASK, np.any([0.0 * limited, *far], axis=0)),
+        ("damped near a singularity", palette.WARNING, rollout["damped"] > 0.0),
+    ):
+        label: str | None = words
+        for start, stop in spans_of(rollout.t, active):
+            axes.axvspan(
+                start, stop, color=color, alpha=0.15, linewidth=0.8, label=label
+            )
+            label = None
 
 
 def mark_frames(axes: Axes, times: Array) -> None:
@@ -183,7 +209,7 @@ def draw_task_errors(axes: Axes, rollout: Rollout) -> None:
             marker=point_marker(t),
             label=literal_text(f"{part.label} [{part.unit}]"),
         )
-    mark_damped(axes, rollout)
+    mark_steps(axes, rollout)
     norms = [np.zeros(0), *(part.norm for part in parts)]
     log_scale(axes, np.concatenate(norms), top=1e-6)
     units = ", ".join(dict.fromkeys(part.unit for part in parts))
@@ -197,15 +223,31 @@ def draw_joint_positions(
     """Draw the joint positions, unwrapped: not limited to one turn."""
     positions, what = joint_positions(rollout, absolute=absolute)
     names, units = joint_names(rollout), position_units(rollout)
-    unit = draw_lines(axes, rollout.t, positions, names, units)
+    both = limit(rollout, "lower"), limit(rollout, "upper")
+    own = "absolute" not in what  # limits are those of the joints
+    unit = draw_lines(axes, rollout.t, positions, names, units, both if own else None)
+    mark_steps(axes, rollout)
     axes.set_ylabel(f"{what} [{unit}]")
     finish_time_axis(axes, rollout.t)
 
 
+def draw_speeds(axes: Axes, rollout: Rollout) -> None:
+    """Draw the joints' speeds, with the limits that they come near."""
+    most = limit(rollout, "velocity")
+    units = [f"{unit}/s" for unit in position_units(rollout)]
+    names = joint_names(rollout)
+    unit = draw_lines(axes, rollout.t, rollout.v, names, units, (-most, most))
+    mark_steps(axes, rollout)
+    axes.set_ylabel(f"joint speed [{unit}]")
+    finish_time_axis(axes, rollout.t)
+
+
 def draw_efforts(axes: Axes, rollout: Rollout) -> None:
-    """Draw the joints' efforts tau."""
+    """Draw the joints' efforts tau, with the limits that they come near."""
     names, units = joint_names(rollout), effort_units(rollout)
-    unit = draw_lines(axes, rollout.t, rollout.tau, names, units)
+    most = limit(rollout, "effort")
+    unit = draw_lines(axes, rollout.t, rollout.tau, names, units, (-most, most))
+    mark_steps(axes, rollout)
     axes.set_ylabel(f"effort τ [{unit}]")
     finish_time_axis(axes, rollout.t)
 
@@ -213,11 +255,19 @@ def draw_efforts(axes: Axes, rollout: Rollout) -> None:
 _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
 
-def draw_manipulability(axes: Axes, rollout: Rollout) -> None:
-    """Draw det(J W⁻¹ Jᵀ), the square of Yoshikawa's measure, and mark its minimum."""
-    t, values = rollout.t, rollout["manipulability"]
+def draw_determinant(axes: Axes, rollout: Rollout) -> None:
+    """Draw det(J W⁻¹ Jᵀ), the square of Yoshikawa's measure, and mark its minimum.
+
+    Where the tasks' rows change in number, as of a robot that walks, determinants do
+    not compare, and the smallest singular value is drawn.
+    """
+    t, values, what = rollout.t, rollout["manipulability"], "manipulability"
+    name = r"$\det(J\,W^{-1}J^{\mathsf{T}})$"
+    if not rows_compare(rollout):
+        what, name = "singular_values", r"smallest $\sigma$ of $J\,L^{-\mathsf{T}}$"
+        values = np.nanmin(rollout[what], axis=1)
     axes.plot(t, values, color=palette.TASK, marker=point_marker(t))
-    minimum = int(np.argmin(values))
+    minimum = int(np.nanargmin(values))
     axes.plot(
         t[minimum],
         values[minimum],
@@ -231,11 +281,10 @@ def draw_manipulability(axes: Axes, rollout: Rollout) -> None:
         zorder=3,
         label=f"minimum {values[minimum]:.3g} at {t[minimum]:.2f} s",
     )
-    mark_damped(axes, rollout)
+    mark_steps(axes, rollout)
     maximum = float(values[np.isfinite(values)].max(initial=1e-12))
     axes.set_ylim(0.0, 1.08 * maximum)
-    unit = column_unit(rollout, "manipulability")
-    axes.set_ylabel(rf"$\det(J\,W^{{-1}}J^{{\mathsf{{T}}}})$ [{unit}]")
+    axes.set_ylabel(f"{name} [{column_unit(rollout, what)}]")
     finish_time_axis(axes, t)
 
 
@@ -244,8 +293,8 @@ def draw_singular_values(axes: Axes, rollout: Rollout) -> None:
     values = rollout["singular_values"]
     names = [f"σ{k + 1}".translate(_SUBSCRIPTS) for k in range(values.shape[1])]
     draw_lines(axes, rollout.t, values, names)
-    mark_damped(axes, rollout)
-    if float(values.min()) < 0.05 * float(values.max()):
+    mark_steps(axes, rollout)
+    if float(np.nanmin(values)) < 0.05 * float(np.nanmax(values)):
         log_scale(axes, values)
     else:
         axes.set_ylim(bottom=0.0)
@@ -291,7 +340,7 @@ def draw_null_space_error(axes: Axes, rollout: Rollout) -> None:
         note(axes, decay.why_not)
     if period := held_period(rollout):
         note(axes, f"effort held for {1e3 * period:g} ms")
-    mark_damped(axes, rollout)
+    mark_steps(axes, rollout)
     log_scale(axes, norm, top=1e-6)
     axes.set_ylabel(rf"$\Vert e_N \Vert_W$ [{rate_unit(rollout)}]")
     finish_time_axis(axes, t)

@@ -4,35 +4,46 @@ No display is needed: figures have an Agg canvas, and pyplot is not imported.
 """
 
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from io import BytesIO
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 from cycler import cycler
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.lines import Line2D
 
 from hsp_control.common.exceptions import PlotError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.simulation import Rollout
-from hsp_control.simulation.log_series import chosen_rows, distances, field_terms
+from hsp_control.simulation.log_series import (
+    chosen_rows,
+    distances,
+    field_terms,
+    rows_compare,
+)
 from hsp_control.visualization import palette
 from hsp_control.visualization.plots.curves import (
+    draw_determinant,
     draw_distances,
     draw_efforts,
     draw_field_terms,
     draw_field_value,
     draw_joint_positions,
-    draw_manipulability,
     draw_null_space_error,
     draw_singular_values,
+    draw_speeds,
     draw_task_errors,
+    legend_below,
     literal_text,
     mark_frames,
 )
@@ -142,7 +153,7 @@ def paper_figure(
     times: Sequence[float] | None = None,
     title: str | None = None,
 ) -> Figure:
-    """Return the paper's five panels: path, joints, manipulability, frames twice."""
+    """Return the paper's five panels: path, joints, determinant, frames twice."""
     _check(rollout)
     rows = chosen_rows(rollout, frames, times)
     if not rows:
@@ -157,7 +168,7 @@ def paper_figure(
         draw_end_effector(a, rollout)
         a.set_anchor("NW")
         draw_joint_positions(b, rollout, absolute=absolute)
-        draw_manipulability(c, rollout)
+        draw_determinant(c, rollout)
         strip, together = lower.subfigures(1, 2, width_ratios=(1.9, 1.0))
         columns = columns_for(rollout, len(rows), 6.8, 2.7)
         cells = strip.subplots(-(-len(rows) // columns), columns, squeeze=False)
@@ -169,39 +180,164 @@ def paper_figure(
         draw_superimposed(e, rollout, rows)
         e.set_anchor("N")
         together.suptitle("(e)  Frames together", **_HEADING)
-        titles = ["End effector", "Joints", "Manipulability"]
+        titles = ["End effector", "Joints", _determinant(rollout)]
         _letter_titles([a, b, c], titles, pad=18.0)  # space for the frames' numbers
         for over_time in (b, c):
             mark_frames(over_time, rollout.t[rows])
     return figure
 
 
-def diagnostics_figure(rollout: Rollout) -> Figure:
-    """Return a figure that compares a run with the law's predictions."""
-    _check(rollout)
+def _determinant(rollout: Rollout) -> str:
+    return "Determinant" if rows_compare(rollout) else "Smallest singular value"
+
+
+PANELS: dict[str, tuple[Callable[[Axes, Rollout], None], str]] = {
+    "errors": (draw_task_errors, "Task error"),
+    "null_space": (draw_null_space_error, "Null-space error"),
+    "field": (draw_field_value, "Null-space field"),
+    "efforts": (draw_efforts, "Efforts"),
+    "singular_values": (draw_singular_values, "Singular values"),
+    "determinant": (draw_determinant, "Determinant"),
+    "distances": (draw_distances, "Distances"),
+    "terms": (draw_field_terms, "The field's terms"),
+    "joints": (draw_joint_positions, "Joints"),
+    "speeds": (draw_speeds, "Joint speeds"),
+}
+"""The panels of `diagnostics_figure`, by name: what draws each, and its title."""
+_SHAPE = 0.72, 0.55  # height of a panel over its width, and its legend's [inches]
+_LOG_DASHES: tuple[Any, ...] = ("-", (0, (6, 1.5)), "-.", ":")
+"""Of the first log, the second and so on."""
+_THIN, _REFERENCE = 1.3, 1.1  # predictions are thinner, limits thinner still [pt]
+
+
+def diagnostics_figure(
+    rollout: Rollout,
+    *others: Rollout,
+    names: Sequence[str] = (),
+    panels: Sequence[str] = (),
+    width: str | float | None = None,
+) -> Figure:
+    """Return a figure that compares runs with the law's predictions.
+
+    Args:
+        rollout: The run.
+        others: Runs to draw in the same panels.
+        names: What the runs are called; by default as their logs say.
+        panels: The names of the panels, of `PANELS`; by default most of them.
+        width: The width for a paper, such as ``84mm``, or in metres: without heading
+            and foot. By default it is that of a page.
+
+    Raises:
+        PlotError: If a log has no rows, or there is no such panel.
+    """
+    runs = [rollout, *others]
+    for each in runs:
+        _check(each)
+    chosen = _chosen_panels(runs, panels)
+    inches = None if width is None else _inches(width)
+    rows = 2 if len(chosen) > 3 else 1
+    columns = -(-len(chosen) // rows)
+    if inches is not None:
+        columns = min(max(round(inches / 3.0), 1), len(chosen))
+        rows = -(-len(chosen) // columns)
+    wide = 3.6 * columns if inches is None else inches
+    high = rows * (_SHAPE[0] * wide / columns + _SHAPE[1])
     with styled():
-        panels = [
-            (draw_task_errors, "Task error"),
-            (draw_null_space_error, "Null-space error"),
-            (draw_field_value, "Null-space field"),
-            (draw_efforts, "Efforts"),
-            (draw_singular_values, "Singular values"),
-            (draw_manipulability, "Manipulability"),
-        ]
-        if distances(rollout):
-            panels.append((draw_distances, "Distances"))
-        if len(field_terms(rollout)) > 1:
-            panels.append((draw_field_terms, "The field's terms"))
-        columns = -(-len(panels) // 2)
-        figure = new_figure(3.6 * columns, 6.8)
-        _add_title(figure, rollout)
-        axes = figure.subplots(2, columns).ravel().tolist()
-        for one, (draw, _) in zip(axes, panels, strict=False):
-            draw(one, rollout)
-        for unused in axes[len(panels) :]:
+        figure = new_figure(wide, high if inches else high + 0.6)
+        if inches is None:
+            _add_title(figure, rollout)
+        if others:
+            figure.suptitle("")  # the names of the logs stand there
+            _name_logs(figure, names or _names_of(runs))
+        axes = figure.subplots(rows, columns, squeeze=False).ravel().tolist()
+        for one, name in zip(axes, chosen, strict=False):
+            _draw_together(one, PANELS[name][0], runs)
+        for unused in axes[len(chosen) :]:
             unused.set_axis_off()
-        _letter_titles(axes, [title for _, title in panels])
+        titles = [PANELS[name][1] for name in chosen]
+        if "determinant" in chosen:
+            titles[chosen.index("determinant")] = _determinant(rollout)
+        _letter_titles(axes, titles)
     return figure
+
+
+def _chosen_panels(runs: Sequence[Rollout], panels: Sequence[str]) -> list[str]:
+    """Return the panels that are asked for and can be drawn of all runs."""
+    absent = {"distances"} if not all(map(distances, runs)) else set()
+    if not all(len(field_terms(run)) > 1 for run in runs):
+        absent.add("terms")
+    own = [*PANELS][:8]
+    if not all(map(rows_compare, runs)):
+        own.remove("determinant")
+    for name in panels:
+        if name not in PANELS:
+            near = f"{did_you_mean(name, PANELS)} (there are {listing(PANELS)})"
+            raise PlotError(f"no panel {name!r}{near}")
+        if name in absent:
+            raise PlotError(f"the log has no {name} to draw")
+    return [*dict.fromkeys(panels)] or [name for name in own if name not in absent]
+
+
+def _draw_together(
+    axes: Axes, draw: Callable[[Axes, Rollout], None], runs: Sequence[Rollout]
+) -> None:
+    """Draw runs in one panel: one or two curves by colour, more of them by dashes."""
+    spans, curves = [], 0
+    for number, run in enumerate(runs):
+        known: set[Artist] = {*axes.lines, *axes.patches}
+        axes.autoscale(axis="y")
+        draw(axes, run)
+        spans.append((*axes.get_xlim(), *axes.get_ylim()))
+        if len(runs) == 1:
+            return
+        for artist in (*axes.lines, *axes.patches):
+            if number and artist not in known:
+                artist.set_label("_")  # the first log's legend is that of all
+        lines = [line for line in axes.lines if line not in known]
+        thick = [
+            line
+            for line in lines
+            if line.get_linewidth() > _THIN and line.get_linestyle() != "None"
+        ]
+        curves = curves or len(thick)
+        if curves <= 2:
+            for line in lines:
+                if line.get_linewidth() > _REFERENCE:
+                    line.set(color=palette.series(number))
+        if curves != 2:
+            for line in thick:
+                line.set_linestyle(_LOG_DASHES[number % len(_LOG_DASHES)])
+    left, right, low, high = zip(*spans, strict=True)
+    axes.set_xlim(min(left), max(right))
+    axes.set_ylim(min(low), max(high))
+    legend_below(axes)
+
+
+def _name_logs(figure: Figure, names: Sequence[str]) -> None:
+    """Add a legend that names the logs, above the panels, by what they do not share."""
+    words = [name.split(",") for name in names]
+    shared = sum(accumulate((len({*w}) == 1 for w in zip(*words, strict=False)), min))
+    names = [",".join(each[shared:] or each) for each in words]
+    samples = [
+        Line2D(
+            [], [], color=palette.series(k), linestyle=_LOG_DASHES[k % 4], label=name
+        )
+        for k, name in enumerate(map(literal_text, names))
+    ]
+    long = sum(map(len, names)) > 14 * figure.get_figwidth()
+    figure.legend(
+        handles=samples,
+        loc="outside upper left",
+        ncols=1 if long else len(names),
+        handlelength=3.0,
+    )
+
+
+def _names_of(runs: Sequence[Rollout]) -> list[str]:
+    names = [str(run.meta.get("name") or "run") for run in runs]
+    if len({*names}) == len(names):
+        return names
+    return [f"{name} ({k})" for k, name in enumerate(names, 1)]
 
 
 def _letter_titles(
@@ -236,6 +372,21 @@ def _add_title(figure: Figure, rollout: Rollout, title: str | None = None) -> No
 def _check(rollout: Rollout) -> None:
     if len(rollout) == 0:
         raise PlotError(f"the log has no rows to draw ({rollout.status})")
+
+
+_INCHES = {"mm": 1.0 / 25.4, "cm": 1.0 / 2.54, "in": 1.0}
+
+
+def _inches(width: str | float) -> float:
+    """Return a width in inches: of a text such as ``84mm``, or in metres."""
+    text = width if isinstance(width, str) else f"{1e3 * width}mm"
+    try:
+        found = float(text[:-2]) * _INCHES[text[-2:]]
+    except (KeyError, ValueError):
+        found = np.nan
+    if not 1.0 <= found <= 100.0:
+        raise PlotError(f"width is {width!r}; needs a length such as 84mm or 3.3in")
+    return found
 
 
 def save_figures(

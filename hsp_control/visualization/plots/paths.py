@@ -45,6 +45,7 @@ _DIGIT_WIDTH = 4.8  # width of a digit [pt]
 _NARROWEST = 115.0
 """Width or height, the larger one, of the smallest box in a figure [pt]."""
 _HEIGHT = 11.0  # height of a line of tick labels [pt]
+_CLEAR = 1.2  # labels are apart by so many of their widths and heights, added
 _WALLS = ((0, 0), (1, 1), (2, 0))
 """The sides behind the scene, (axis, side): low x, high y and the floor."""
 
@@ -82,13 +83,13 @@ def _apart(view: View, ends: Array, ticks: Array, axis: int) -> Array:
     page = np.column_stack(view.project(corners(*ends)))
     scale = _NARROWEST / float(np.ptp(page, axis=0).max())
     direction = scale * np.abs(view.rows[:, axis])  # [pt] on the page for each metre
-    wide = _DIGIT_WIDTH * max((len(f"{tick:g}") for tick in ticks), default=0)
-    for stride in range(1, max(len(ticks) - 1, 1)):
+    wide = _DIGIT_WIDTH * max((len(f"{tick:g}") for tick in ticks), default=1)
+    for stride in range(1, len(ticks)):
         kept = ticks[::stride]
-        across, up = direction * (kept[1] - kept[0]) if len(kept) > 1 else (wide, 0.0)
-        if across >= wide or up >= _HEIGHT:
+        across, up = direction * (kept[1] - kept[0])
+        if across / wide + up / _HEIGHT >= _CLEAR:
             return np.asarray(kept)
-    return np.asarray(ticks[:: max(len(ticks) - 1, 1)])
+    return np.asarray(ticks[:1])
 
 
 def _draw_wall(

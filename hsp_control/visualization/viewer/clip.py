@@ -6,13 +6,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hsp_control.common.arrays import Array
 from hsp_control.control.controller import Controller
 from hsp_control.null_space.fields import Clearance, NullSpaceField, SelfClearance
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.limit_excess import POSITION, VELOCITY
 from hsp_control.simulation.log_columns import logged_terms
-from hsp_control.simulation.log_series import FAR, OUT, Unreached, unreached
+from hsp_control.simulation.log_series import (
+    FAR,
+    LIMITED,
+    OUT,
+    Unreached,
+    spans_of,
+    unreached,
+)
 from hsp_control.visualization import palette
 from hsp_control.visualization.viewer.analysis import acts, from_the_start
 from hsp_control.visualization.viewer.commands import (
@@ -29,7 +35,6 @@ CLOSED_SHARE = 1 / 200
 """Gaps up to this share of the whole run are closed: nobody would see them."""
 _SAME = 0.9
 """Distances of which the smallest is this share of the largest are told as one."""
-_LIMITED = 2  # the log's status from which on a limit changes the motion
 
 
 class Band(NamedTuple):
@@ -55,29 +60,13 @@ def bands_of(
     return [band for band in bands if band.spans]
 
 
-def spans_of(
-    times: Array, active: NDArray[np.bool_], closed: float = 0.0
-) -> list[tuple[float, float]]:
-    """Return the intervals in which rows are active; each row lasts until the next."""
-    edges = np.diff(np.concatenate([[False], active, [False]]).astype(np.int8))
-    starts = times[np.flatnonzero(edges > 0)].tolist()
-    stops = times[np.flatnonzero(edges < 0).clip(max=len(times) - 1)].tolist()
-    spans: list[tuple[float, float]] = []
-    for start, stop in zip(starts, stops, strict=True):
-        if spans and start - spans[-1][1] <= closed:
-            spans[-1] = spans[-1][0], stop
-        else:
-            spans.append((start, stop))
-    return spans
-
-
 def _activities(
     rollout: Rollout, controller: Controller | None
 ) -> Iterator[tuple[Band, NDArray[np.bool_]]]:
     """Yield the bands without intervals, and in which rows each is active."""
     if "status" in rollout:
         limit = Band("limit active", "a limit is active", palette.DESIRED, [])
-        yield limit, rollout["status"] >= _LIMITED
+        yield limit, rollout["status"] >= LIMITED
     beyond = np.zeros(len(rollout), bool)
     for name in (POSITION, VELOCITY):
         if name in rollout:

@@ -12,6 +12,7 @@ from hsp_control.simulation import Rollout, log_series
 from hsp_control.simulation.log_series import (
     logged_distances,
     predicted_decay,
+    spans_of,
 )
 from hsp_control.simulation.log_writer import LogWriter, continuous_dofs
 from hsp_control.simulation.rollout import complete_columns
@@ -99,12 +100,16 @@ def panels_of(
     positions, what = log_series.joint_positions(rollout)
     curves, unit = _lines(positions, joints, log_series.position_units(rollout))
     yield Panel(what.capitalize() + "s", unit, curves, note=some)
-    manipulability = Series("det(J W⁻¹ Jᵀ)", rollout["manipulability"], palette.TASK)
-    yield Panel(
-        "Manipulability",
-        log_series.column_unit(rollout, "manipulability"),
-        [manipulability],
-    )
+    least = rollout["singular_values"]
+    if log_series.rows_compare(rollout):
+        values, of = rollout["manipulability"], "det(J W⁻¹ Jᵀ)"
+        unit = log_series.column_unit(rollout, "manipulability")
+        yield Panel("Determinant", unit, [Series(of, values, palette.TASK)])
+    elif least.size:
+        values = np.nanmin(least, axis=1)
+        unit = log_series.column_unit(rollout, "singular_values")
+        curves = [Series("smallest σ of J L⁻ᵀ", values, palette.TASK)]
+        yield Panel("Singular value", unit, curves)
     name = str(rollout.meta.get("field", "field")).replace("_", " ")
     value = Series(name, rollout["field.value"], palette.FIELD)
     unit = log_series.column_unit(rollout, "field.value")
@@ -181,21 +186,15 @@ def pack_panels(runs: Sequence[ComparedRun], arrays: ArrayTable) -> Json:
         "runs": [run.name for run in runs],
         "start": min(float(run.rollout.t[0]) for run in runs),
         "end": max(float(run.rollout.t[-1]) for run in runs),
-        "damped": [_damped(run.rollout) for run in runs],
+        "damped": [
+            spans_of(run.rollout.t, run.rollout["damped"] > 0.0) for run in runs
+        ],
         "panels": [_packed(panels[key], curves[key], arrays) for key in panels],
         "colors": {
             "contact": palette.OBSTACLE,
             "warning": palette.WARNING,
         },
     }
-
-
-def _damped(rollout: Rollout) -> list[list[float]]:
-    """Return the first and the last time of every damped part of a run [s]."""
-    damped = np.concatenate([[False], rollout["damped"] > 0.0, [False]])
-    edges = np.flatnonzero(np.diff(damped)).reshape(-1, 2)
-    times = rollout.t
-    return [[float(times[first]), float(times[stop - 1])] for first, stop in edges]
 
 
 def _packed(panel: Panel, curves: Sequence[_Curve], arrays: ArrayTable) -> Json:

@@ -12,6 +12,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ExportError, LogError, ViewerError
 from hsp_control.config.view_settings import ViewSettings
 from hsp_control.control.controller import Controller
+from hsp_control.declaration.language import check_kind
 from hsp_control.geometry.scene import Scene
 from hsp_control.robot import Robot, RobotState
 from hsp_control.simulation import Rollout
@@ -88,7 +89,7 @@ class Viewer:
             ViewerError: If a view has no such field, a value is not valid, Meshcat is
                 not installed, or the server cannot start.
         """
-        self.robot = robot
+        self.robot = check_kind("robot is", robot, Robot, ViewerError)
         self.view = ViewSettings(**view)
         self.drawing = RobotDrawing(robot)
         self._data = robot.model.createData()

@@ -23,13 +23,14 @@ from hsp_control.cli.options import companions
 
 MOVING = "paper/4_moving_obstacle"
 SHORT = ["--set", "simulation.duration=0.1"]
+LOG = "4_moving_obstacle,simulation.duration=0.1.npz"
 
 
 def test_run_leaves_a_log_that_numpy_alone_reads(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["run", MOVING, "--out", str(tmp_path), "--no-view", *SHORT]) == 0
-    log = tmp_path / "4_moving_obstacle.npz"
+    log = tmp_path / LOG
     assert f"Log: {log}" in capsys.readouterr().out
     with np.load(log, allow_pickle=False) as columns:
         assert {"t", "q", "v", "tau"} <= set(columns.files)
@@ -73,15 +74,24 @@ def test_check_tells_a_program_what_a_configuration_is(
 def test_a_log_is_not_replaced_by_its_repetition(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """It may be that of a robot."""
+    """It may be that of a robot; what else is set is in the name."""
     run = ["run", "--out", str(tmp_path), "--no-view", "--json"]
     assert main([*run, MOVING, *SHORT]) == 0
-    log = tmp_path / "4_moving_obstacle.npz"
+    log = tmp_path / LOG
     before = log.read_bytes()
     capsys.readouterr()
-    assert main([*run, str(log), "--set", "null_space.gain=20"]) == 0
+    shown = ["--set", "title=Once more", "--set", "view.speed=2"]
+    assert main([*run, str(log), *shown]) == 0
     told = json.loads(capsys.readouterr().out)
-    assert told["log"] == str(tmp_path / "4_moving_obstacle-again.npz")
+    again = tmp_path / "4_moving_obstacle,simulation.duration=0.1-again.npz"
+    assert told["log"] == str(again)
+    setting = f"description={'x' * 200}", f"tasks.tip.gains={{kp: 100, kv: {20:0130d}}}"
+    long = [word for each in setting for word in ("--set", each)]
+    assert main([*run, str(log), *long]) == 0
+    name = Path(json.loads(capsys.readouterr().out)["log"]).name
+    assert re.fullmatch(
+        r"4_.*0\.1,tasks\.tip\.gains=.kp:_100,_kv:_0+-[0-9a-f]{8}\.npz", name
+    )
     assert log.read_bytes() == before
     elsewhere = tmp_path / "elsewhere"
     assert main([*run[:2], str(elsewhere), *run[3:], str(log)]) == 0
@@ -207,7 +217,7 @@ def test_plot_draws_beside_the_log(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     main(["run", MOVING, "--out", str(tmp_path), *SHORT])
-    assert main(["plot", str(tmp_path / "4_moving_obstacle.npz")]) == 0
+    assert main(["plot", str(tmp_path / LOG)]) == 0
     figures = list(tmp_path.glob("*.png"))
     assert len(figures) >= 2
     printed = capsys.readouterr().out
@@ -307,7 +317,7 @@ def versions_without(package: str) -> Callable[[str], str]:
             ["run", MOVING, "--veiw"],
             "there is no '--veiw' here; did you mean '--view'?",
         ),
-        (["check", MOVING, "twice"], "there is no 'twice' here"),
+        (["check", MOVING, "twice"], "'twice' is one argument too many"),
         # Not taken for --strict.
         (["run", MOVING, "--st", "a=1"], "no '--st' here; did you mean '--set'?"),
     ],
@@ -379,7 +389,8 @@ def test_a_diverging_run_keeps_its_log(
     wild += ["--set", "simulation.check_rate=false"]
     assert main(["run", MOVING, "--out", str(tmp_path), *wild]) == 2
     assert "diverged" in capsys.readouterr().err
-    with np.load(tmp_path / "4_moving_obstacle.npz", allow_pickle=False) as columns:
+    (log,) = tmp_path.iterdir()
+    with np.load(log, allow_pickle=False) as columns:
         assert len(columns["t"]) > 1
         assert json.loads(str(columns["meta"]))["status"] == "diverged"
 
@@ -398,7 +409,7 @@ def test_ctrl_c_keeps_what_was_computed(
     long = ["--set", "simulation.duration=10000", "--set", "simulation.log_period=0.1"]
     assert main(["run", MOVING, "--out", str(tmp_path), *long]) == 130
     assert "stopped by the user at t = " in capsys.readouterr().err
-    log = Rollout.load(tmp_path / "4_moving_obstacle.npz")
+    log = Rollout.load(next(tmp_path.glob("*.npz")))
     assert log.status == "interrupted"
     assert 9 <= len(log) <= 12
 
@@ -425,7 +436,7 @@ def test_ctrl_c_does_not_wait_for_a_row_that_never_comes(
     ]
     assert main(["run", MOVING, "--out", str(tmp_path), *for_ever]) == 130
     assert "stopped by the user at t = 0 s" in capsys.readouterr().err
-    log = Rollout.load(tmp_path / "4_moving_obstacle.npz")
+    log = Rollout.load(next(tmp_path.glob("*.npz")))
     assert log.status == "interrupted"
     assert len(log) == 1
 

@@ -8,6 +8,7 @@ from scenario_document import GOOD, Gains, Scenario, message
 from hsp_control.common.exceptions import FrameNotFoundError
 from hsp_control.config.document import Document
 from hsp_control.config.validation import validate
+from hsp_control.declaration.language import in_yaml
 
 # --- overrides -----------------------------------------------------------------------
 
@@ -27,11 +28,11 @@ def test_overrides_change_values_and_their_origin() -> None:
     assert scenario.frames.root == {"tool.tip": [0.0, 0.0, 1.0]}
     assert scenario.steps == 3
     kp = ("tasks", "hand", "gains", "kp")
-    assert document.location(kp) == "--set tasks.hand.gains.kp=[1e2, 2]"
-    assert document.location((*kp, 1)) == "--set tasks.hand.gains.kp=[1e2, 2]"
+    assert document.location(kp) == "'tasks.hand.gains.kp=[1e2, 2]'"
+    assert document.location((*kp, 1)) == "'tasks.hand.gains.kp=[1e2, 2]'"
     assert document.mark(kp) is None
     assert document.location(kp[:-1]) == "panda.yaml:5"
-    assert document.location(("steps",)) == "--set steps=3"
+    assert document.location(("steps",)) == "'steps=3'"
 
 
 def test_overrides_create_mappings_and_fill_empty_ones() -> None:
@@ -39,7 +40,7 @@ def test_overrides_create_mappings_and_fill_empty_ones() -> None:
     document.override("a.b.c=")
     document.override("b.0.c=d")
     assert document.to_dict() == {"a": {"b": {"c": None}}, "b": [{"c": "d"}]}
-    assert document.location(("a", "b")) == "<string>:1"
+    assert document.location(("a", "b")) == "'a.b.c='"
 
 
 @pytest.mark.parametrize(
@@ -67,17 +68,17 @@ def test_overrides_create_mappings_and_fill_empty_ones() -> None:
     ],
 )  # fmt: skip
 def test_mistakes_in_overrides(override: str, expected: str) -> None:
-    origin = f"--set {' '.join(override.split())}"
-    if expected.startswith("tasks.foot"):  # the task was created, not written
-        origin = "panda.yaml:2"
-    assert message(GOOD, override) == f"{origin}: {expected}"
+    words = " ".join(override.split())
+    with in_yaml():
+        assert message(GOOD, override) == f"--set {words}: {expected}"
+    assert message(GOOD, override) == f"{words!r}: {expected}"
 
 
 def test_mistakes_of_overrides_come_last() -> None:
     assert message("robot: a\nview: 3", "steps=x") == (
         "panda.yaml:2: view: 3 is an integer; expected true or false\n"
         "and 1 more:\n"
-        "  --set steps=x: steps: 'x' is text; expected an integer"
+        "  'steps=x': steps: 'x' is text; expected an integer"
     )
 
 

@@ -49,7 +49,7 @@ INVALID = [
     ("robot: a\nfields: {type: centering}",
      "2: fields: {type: 'centering'} is a mapping; expected a list of mappings"),
     (TASK + "    gains: [" + "{a: [[1]]}, " * 20 + "]", "5: tasks.hand.gains: [{a: "
-     "[[...]]}, {a: [[...]]}, {a: [[..... is a list; expected a mapping"),
+     "[[...]]}, {a: [[...]]}, {a: [[..... is a list; expected a mapping of kp, kd"),
     ("robot: a\nframes: {tip: 3}",
      "2: frames.tip: 3 is an integer; expected a list of 3 numbers"),
     # numbers

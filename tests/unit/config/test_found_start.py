@@ -57,7 +57,7 @@ def test_an_orientation_counts_if_it_is_given() -> None:
             r"start\.pose\.frame: no frame 'tpi'",
         ),
         ({"pose": {"position": [1, 0, 0]}, "joints": "auto"}, "only one of joints and"),
-        ("auot", r"start: .* expected 'auto' or a mapping; did you mean 'auto'"),
+        ("auot", r"start: .* expected 'auto' or a dict; did you mean 'auto'"),
     ],
 )
 def test_mistakes_say_where(start: Any, message: str) -> None:

@@ -126,7 +126,7 @@ def test_limits_as_yaml_says_them() -> None:
 
 WRONG: dict[type[Part], list[tuple[str, Any, str]]] = {
     PointContact: [
-        ("frame", 3, "3 is an integer; expected text"),
+        ("frame", 3, "3 is an int; expected a str"),
         ("friction", 0.0, "must be greater than 0"),
         ("normal", [0, 0, 0], r"\[0.0, 0.0, 0.0\] has no direction; must not be zero"),
         ("normal", [1e300, 1e300, 0], "has no direction"),
@@ -142,11 +142,15 @@ WRONG: dict[type[Part], list[tuple[str, Any, str]]] = {
     ],
     Limits: [
         ("effort", -1.0, "-1.0 is negative; must be greater than 0"),
-        ("effort_rate", "URDF", "'URDF' is text; expected 'robot', 'none', a mapping"),
+        ("effort_rate", "URDF", "'URDF' is a str; expected 'robot', 'none', a dict"),
         ("velocity", {"factor": 1}, r"unknown key 'factor' \(allowed: scale, joints\)"),
-        ("acceleration", "robot", "'robot' is text; expected a number or a list of nu"),
+        (
+            "acceleration",
+            "robot",
+            "'robot' is a str; expected a number or a list of nu",
+        ),
         ("acceleration", [1.0, np.nan], "not a finite number"),
-        ("position", (0.0, 1.0), "expected 'robot', 'none' or a mapping"),
+        ("position", (0.0, 1.0), "expected 'robot', 'none' or a dict"),
         ("position", {"lower": 1.0}, "missing key 'upper'"),
         ("position", {"joint": [0, 1]}, r"'joint'; did you mean 'joints'\?"),
         ("position", {"least": 0}, r"'least' \(allowed: lower, upper, joints\)"),
@@ -171,11 +175,11 @@ WRONG: dict[type[Part], list[tuple[str, Any, str]]] = {
     ],
     PositionsByJoint: [
         ("joints", {"a": [1.0, 0.0]}, "joints.a: lower must be below upper; got 1.0"),
-        ("joints", {"a": [1.0, None]}, "a.1: nothing given; expected a number"),
+        ("joints", {"a": [1.0, None]}, "a.1: None; expected a number"),
     ],
     Scaled: [
         ("scale", {"a": -1.0}, "a: -1.0 is negative"),
-        ("scale", "half", "expected a number or a mapping"),
+        ("scale", "half", "expected a number or a dict"),
     ],
     SlidingContact: [
         ("force", None, "a sliding contact needs the normal force"),

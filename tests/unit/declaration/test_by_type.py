@@ -89,13 +89,13 @@ def test_data_are_as_short_as_can_be() -> None:
 WRONG: list[tuple[Any, str]] = [
     ({"dely": 1}, r"filters\.dely: unknown key 'dely'; did you mean 'delay'\?"),
     ({"delay": -1}, r"filters\.delay\.periods: -1 is negative; must be at least 0"),
-    ({"delay": "x"}, r"filters\.delay\.periods: 'x' is text; expected an integer"),
+    ({"delay": "x"}, r"filters\.delay\.periods: 'x' is a str; expected an int"),
     ({"delay": True}, r"filters\.delay: missing key 'periods'"),
     (
         {"noise": {"sdt": 1}},
         r"filters\.noise\.sdt: unknown key 'sdt'; did you mean 'st",
     ),
-    (3, "filters: 3 is an integer; expected a mapping"),
+    (3, "filters: 3 is an int; expected a list of Filter"),
     ([3], "filters: 3 is not one of the filters of a test"),
     ([Delay(1), Delay(2)], "filters: two are of the type Delay; give one"),
 ]

@@ -40,7 +40,7 @@ MISTAKES: list[tuple[Callable[[Path], Any], type[HspControlError], str]] = [
     (lambda _: ObstacleClearance([BALL], influence=0.0), FieldError,
      "ObstacleClearance: influence: 0.0 is too small; must be greater than 0"),
     (lambda _: SelfClearance(influence=float("nan")), FieldError,
-     "SelfClearance: influence: .nan is not a finite number"),
+     "SelfClearance: influence: nan is not a finite number"),
     (lambda _: on(load("panda"), ObstacleClearance([BALL], links=["panda_lnk3"])),
      FieldError, "links.0: link 'panda_lnk3' has no geometry; did "
      "you mean 'panda_link3'? (links with geometry: panda_link0, panda_link1, "),

@@ -103,9 +103,9 @@ ERRORS: dict[str, tuple[Callable[[], Any], type[HspControlError], str]] = {
      r"^JointCentering: weights: -1.0 is negative; must be at least 0$"),
     "centering, infinite weight": (
      lambda: JointCentering(weights=[1, 2, 3, np.inf, 5, 6, 7]), FieldError,
-     r"^JointCentering: weights.3: .inf is not a finite number$"),
+     r"^JointCentering: weights.3: inf is not a finite number$"),
     "posture, word": (lambda: TargetPosture("hom"),  # type: ignore
-     FieldError, r"^TargetPosture: target: 'hom' is text; expected 'start', 'home' or "
+     FieldError, r"^TargetPosture: target: 'hom' is a str; expected 'start', 'home' or "
      r"a list of numbers; did you mean 'home'\?"),
     "equal angles, one joint": (lambda: EqualJointAngles(["joint1"]), FieldError,
      r"^EqualJointAngles: joints: \['joint1'\] has 1 entry, needs at least 2$"),
@@ -113,7 +113,7 @@ ERRORS: dict[str, tuple[Callable[[], Any], type[HspControlError], str]] = {
      r"^PointDistance: frames: \[\] has 0 entries, needs at least 1$"),
     "clearance, obstacle": (lambda: ObstacleClearance([0.3]),  # type: ignore
      FieldError,
-     r"^ObstacleClearance: obstacles.0: 0.3 is a decimal number; expected text"),
+     r"^ObstacleClearance: obstacles.0: 0.3 is a float; expected a str"),
     "sum, empty": (lambda: FieldSum([]), FieldError,
      r"^FieldSum: a sum of fields needs at least one term$"),
     "sum, uncontrolled": (lambda: Uncontrolled() + Rest(), FieldError,

@@ -162,7 +162,7 @@ MISTAKES: list[tuple[type, dict[str, Any], type[HspControlError], str]] = [
     (Transmission, {"direction": [1, 0, 0], "axes": "xy"}, FieldError,
      "needs 2 numbers, one for each of the axes 'xy'"),
     (Transmission, {"direction": [1, np.nan, 0]}, FieldError,
-     "Transmission: direction.1: .nan is not a finite number"),
+     "Transmission: direction.1: nan is not a finite number"),
     (Transmission, UP | {"kind": "speed"}, FieldError,
      "Transmission: kind: unknown value 'speed' (allowed: velocity, force)"),
 ]  # fmt: skip

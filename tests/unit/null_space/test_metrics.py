@@ -70,11 +70,11 @@ def test_natural_gradient_descends_where_the_plain_one_need_not() -> None:
     ("W", "message"),
     [
         (np.ones((2, 3)), r"^ConstantMetric: the metric has shape \(2, 3\); needs"),
-        (2.0, r"^ConstantMetric: matrix: 2.0 is a decimal number; expected a list"),
+        (2.0, r"^ConstantMetric: matrix: 2.0 is a float; expected a list"),
         ([], r"^ConstantMetric: matrix: \[\] has 0 entries, needs at least 1$"),
         (np.ones((2, 2, 2)),
          "^ConstantMetric: matrix.0.0: .* is a list; expected a number$"),
-        ([1.0, np.nan], "^ConstantMetric: matrix.1: .nan is not a finite number$"),
+        ([1.0, np.nan], "^ConstantMetric: matrix.1: nan is not a finite number$"),
         ([[1.0, 2.0], [0.0, 1.0]], "^ConstantMetric: the metric is not symmetric$"),
         ([[1.0, 2.0], [0.0]], r"rows have different lengths \[1, 2\]; need the same$"),
         ([1.0, [2.0]], "^ConstantMetric: matrix: mixes numbers and rows; needs rows, "),

@@ -263,7 +263,7 @@ def test_the_log_tells_who_moves_the_arm() -> None:
 
 MISTAKES: list[tuple[Callable[[], Any], str]] = [
     (lambda: ConstantWeight(-1.0), "ConstantWeight: value: -1.0 is negative; must be "),
-    (lambda: ConstantWeight(np.nan), "ConstantWeight: value: .nan is not a finite num"),
+    (lambda: ConstantWeight(np.nan), "ConstantWeight: value: nan is not a finite num"),
     (lambda: Ramp(initial=-1.0, final=1.0, duration=1.0), "initial: -1.0 is negative"),
     (lambda: Ramp(final=1.0, duration=0.0),
      "Ramp: duration: 0.0 is too small; must be greater than 0"),
@@ -273,7 +273,7 @@ MISTAKES: list[tuple[Callable[[], Any], str]] = [
     (lambda: StateWeight(2.0), "StateWeight: function: "),  # type: ignore
     (lambda: -1.0 * JointCentering(), "JointCentering: weight: -1.0 is negative; must"),
     (lambda: JointCentering(weight="much"),  # type: ignore
-     "JointCentering: weight: 'much' is text; expected a number or a mapping"),
+     "JointCentering: weight: 'much' is a str; expected a number or a dict"),
     (lambda: -1.0 * JointCentering(weight=Ramp(final=1.0, duration=1.0)),
      "Ramp: final: -1.0 is negative; must be at least 0"),
     (lambda: -1.0 * JointCentering(weight=StateWeight(lambda s: 1.0)),

@@ -147,7 +147,7 @@ OPTIONS: list[tuple[dict[str, Any], type[Exception], str]] = [
     ({"locked": {"shoulder": 0.0, "elbow": 1.0}}, ModelError,
      "every joint is locked; at least one must be left to control"),
     ({"locked": {"elbow": float("nan")}}, ModelError,
-     "RobotDescription: locked.elbow: .nan is not a finite number"),
+     "RobotDescription: locked.elbow: nan is not a finite number"),
     ({"root": "free_flyer", "locked": {"root_joint": 0.0}}, ModelError,
      "cannot lock 'root_joint': it has 6 degrees of freedom, only joints with one can "
      "be locked; for a fixed base use root: fixed"),
@@ -157,7 +157,7 @@ OPTIONS: list[tuple[dict[str, Any], type[Exception], str]] = [
     ({"tool_frames": {"elbow": ToolFrame("lower")}}, ModelError,  # joints are frames
      "cannot add tool frame 'elbow': the model has a frame with this name"),
     ({"gravity": (0.0, -9.81)}, ModelError,
-     "RobotDescription: gravity: [0.0, -9.81] has 2 entries, needs 3"),
+     "RobotDescription: gravity: (0.0, -9.81) has 2 entries, needs 3"),
 ]  # fmt: skip
 
 

@@ -165,19 +165,19 @@ def test_a_point_and_an_orientation_are_held() -> None:
 Wrong = dict[str, list[tuple[Any, str]]]
 _WRONG_TASK: Wrong = {
     "priority": [(0, "priority: 0 is too small; must be at least 1"),
-     (1.5, "priority: 1.5 is a decimal number; expected an integer")],
-    "schedule": [([(0, 1)], "schedule: .* of type list; needs a Schedule"),
+     (1.5, "priority: 1.5 is a float; expected an int")],
+    "schedule": [([(0, 1)], "schedule: .* a list; needs a Schedule"),
      ({"intervals": [[0, 1]], "rmap": 1}, "schedule.rmap: unknown key 'rmap'; did")],
     "name": [(3, "name: 3 "), ("a b", "task name 'a b'")],
 }  # fmt: skip
 _WRONG_GAINS: Wrong = {
-    "gains": [(3.0, "gains: 3.0, of type float; needs a Gains"),
+    "gains": [(3.0, "gains: 3.0, a float; needs a Gains"),
      ({"kp": -1, "kv": 1}, "gains.kp: -1 is negative; must be greater than 0"),
      ({"Kp": 1}, "gains.Kp: unknown key 'Kp'; did you mean 'kp'")],
     "largest_error": [(0, "largest_error: 0 is too small; must be greater than 0"),
      ([0.1, -1], "largest_error.1: -1 is negative; must be greater than 0"),
-     (np.inf, "largest_error: .inf is not a finite number"),
-     ("robt", "largest_error: 'robt' is text; expected 'robot', 'none', a number")],
+     (np.inf, "largest_error: inf is not a finite number"),
+     ("robt", "largest_error: 'robt' is a str; expected 'robot', 'none', a number")],
 }  # fmt: skip
 _WRONG_TRACKING: Wrong = {
     **_WRONG_TASK,
@@ -186,21 +186,21 @@ _WRONG_TRACKING: Wrong = {
 }
 _WRONG_SPRING: Wrong = {
     "impedance": [
-        (100.0, "impedance: 100.0, of type float; needs an Imp"),
+        (100.0, "impedance: 100.0, a float; needs an Imp"),
         ({"damping": 3}, "impedance: missing key 'stiffness'"),
         ({"stiffness": -1}, "impedance.stiffness: -1 is negative; must be greater"),
     ]
 }
-_WRONG_FRAME: Wrong = {"frame": [(7, "frame: 7 is an integer; expected text")]}
+_WRONG_FRAME: Wrong = {"frame": [(7, "frame: 7 is an int; expected a str")]}
 _WRONG_POINT: list[tuple[Any, str]] = [
-    (SE3.Identity(), "trajectory: SE3.*; needs a Trajectory, one of hsp.trajectories"),
+    (SE3.Identity(), "trajectory: an SE3; needs a Trajectory: give its .translation"),
     ({"type": "hodl"}, "trajectory.type: unknown type 'hodl'; did you mean 'hold'"),
     ({"type": "circle", "radius": 1}, "trajectory: missing key 'angular_rate'"),
     (HoldPose([0, 0, 0], np.eye(3)), "trajectory: a HoldPose is not one of the traj"),
 ]
 _WRONG_TURN: list[tuple[Any, str]] = [
     (Hold([0, 0, 0]), "trajectory: a Hold is not one of the orientations"),
-    ("hold", r"'hold', of type str; .* did you mean hsp.trajectories.HoldOrientation"),
+    ("hold", r"'hold', a str; .* did you mean hsp.trajectories.HoldOrientation"),
 ]
 _WRONG_POSE: list[tuple[Any, str]] = [
     (HoldOrientation(), "trajectory: a HoldOrientation is not one of the poses or tr"),
@@ -208,11 +208,11 @@ _WRONG_POSE: list[tuple[Any, str]] = [
 ]
 _WRONG_AXES: list[tuple[Any, str]] = [
     ("xx", "axes: 'xx' must be distinct letters of x, y and z"),
-    (["x"], r"axes: \['x'\] is a list; expected text"),
+    (["x"], r"axes: \['x'\] is a list; expected a str"),
 ]
 WRONG: dict[type[Part], Wrong] = {
     AngularMomentum: {**_WRONG_TASK, "trajectory": _WRONG_POINT,
-     "rate": [(-1, "rate: -1 is negative"), (np.inf, "rate: .inf is not a finite")]},
+     "rate": [(-1, "rate: -1 is negative"), (np.inf, "rate: inf is not a finite")]},
     CenterOfMass: {**_WRONG_TRACKING, "trajectory": _WRONG_POINT, "axes": _WRONG_AXES},
     FrameOrientation: {**_WRONG_TRACKING, **_WRONG_SPRING, **_WRONG_FRAME,
      "trajectory": _WRONG_TURN},
@@ -221,11 +221,11 @@ WRONG: dict[type[Part], Wrong] = {
     FramePosition: {**_WRONG_TRACKING, **_WRONG_SPRING, **_WRONG_FRAME,
      "trajectory": _WRONG_POINT, "axes": _WRONG_AXES},
     Gains: {"kp": [(0, "kp: 0 is too small; must be greater than 0")],
-     "kv": [([1.0, np.nan], "kv.1: .nan is not a finite number")],
+     "kv": [([1.0, np.nan], "kv.1: nan is not a finite number")],
      "natural_frequency": [(1.0, "give either kp and kv, or natural_frequency and")],
      "damping_ratio": [(1.0, "give either kp and kv, or .* and damping_ratio")]},
     Impedance: {"stiffness": [(0, "stiffness: 0 is too small; must be greater than 0"),
-        ([1.0, np.nan], "stiffness.1: .nan is not a finite number"),
+        ([1.0, np.nan], "stiffness.1: nan is not a finite number"),
         ([[1, 0, 0], [0, 1, 0]], r"stiffness has shape \(2, 3\); a matrix gain"),
         ([[1, 0.2], [0.1, 1]], r"stiffness is .*; a matrix must be symmetric"),
         ([[1, 2], [2, 1]], "with the eigenvalue -1; a matrix must be positive def")],
@@ -235,24 +235,24 @@ WRONG: dict[type[Part], Wrong] = {
      "damping_ratio": [([1, 2], r"damping_ratio: \[1, 2\] is a list; expected")],
      "largest_error": [(0, "largest_error: 0 is too small; must be greater than 0"),
         ([[0.1]], r"largest_error.0: \[0.1\] is a list; expected"),
-        (np.inf, "largest_error: .inf is not a finite number")],
+        (np.inf, "largest_error: inf is not a finite number")],
      "largest_force": [(0, "largest_force: 0 is too small; must be greater than 0"),
         ([40, -1], "largest_force.1: -1 is negative; must be greater than 0"),
-        ("robt", "largest_force: 'robt' is text; expected 'robot', 'none', a")]},
+        ("robt", "largest_force: 'robt' is a str; expected 'robot', 'none', a")]},
     JointPosture: {**_WRONG_TASK, **_WRONG_SPRING, **_WRONG_GAINS, "reference": [
-        ("hom", "reference: 'hom' is text; expected 'start', 'home' or a list"),
+        ("hom", "reference: 'hom' is a str; expected 'start', 'home' or a list"),
         ([], "reference"),
-        ([0.0, np.nan], "reference.1: .nan is not a finite number")],
-     "joints": [("joint1", "joints: 'joint1'"), ([3], "joints.0: 3 is an integer")],
+        ([0.0, np.nan], "reference.1: nan is not a finite number")],
+     "joints": [("joint1", "joints: 'joint1'"), ([3], "joints.0: 3 is an int")],
      "displacement": [(Spin([0, 0, 1], 1), "displacement: a Spin is not one of")]},
     Pointing: {**_WRONG_TASK, **_WRONG_GAINS, **_WRONG_FRAME, "direction": [
         ([0, 0, 0], "direction must be non-zero"),
         ([1, 0], r"direction: \[1, 0\] has 2 entries, needs 3"),
         (None, "give one of direction and trajectory")],
-     "axis": [([0, 0, 0], "axis must be non-zero"), ("x", "axis: 'x' is text")],
+     "axis": [([0, 0, 0], "axis must be non-zero"), ("x", "axis: 'x' is a str")],
      "trajectory": [(HoldOrientation(), "give one of direction and trajectory")]},
     RelativePose: {**_WRONG_TRACKING, **_WRONG_FRAME, "trajectory": _WRONG_POSE,
-     "reference": [(None, "reference: .* expected text")]},
+     "reference": [(None, "reference: .* expected a str")]},
 }  # fmt: skip
 """For each field, wrong values and what is said about them."""
 

@@ -436,7 +436,7 @@ def test_the_plots_are_the_logs(panda: Rollout) -> None:
         "Null-space error ‖e_N‖",
         "Minimum distance",
         "Joint positions",
-        "Manipulability",
+        "Determinant",
         "Value of the field",
         "Efforts τ",
     ]
@@ -465,7 +465,7 @@ def test_where_the_law_is_bounded_the_plots_say_so(planar: Rollout) -> None:
     damped[-3:] = 1.0
     changed = Rollout({**planar.columns, "damped": damped}, planar.meta)
     t = planar.t
-    expected = [[t[10], t[12]], [t[50], t[50]], [t[-3], t[-1]]]
+    expected = [(t[10], t[13]), (t[50], t[51]), (t[-3], t[-1])]
     packed = pack_panels([logged(changed)], ArrayTable())
     assert packed["damped"] == [expected]
 
