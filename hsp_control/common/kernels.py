@@ -17,7 +17,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 KernelCall = tuple[Callable[..., Any], tuple[Any, ...]]
 """A kernel, or another function, with its first arguments: what a part's mathematics
-is. Who calls it adds the others. See `step_plan.planned` for what may be among them."""
+is. Who calls it adds the others. See `native.planned` for what may be among them."""
 
 PLAIN = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 """Whether kernels run as plain Python."""

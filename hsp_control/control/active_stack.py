@@ -6,10 +6,9 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import NonFiniteError
-from hsp_control.common.native import bind
-from hsp_control.common.step_plan import StepPlan, steps
+from hsp_control.common.native import StepPlan, bind, steps
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.contacts.contact import UnactuatedRows, unactuated_count
 from hsp_control.control.actuation.support import Support
@@ -43,14 +42,13 @@ class ActiveStack:
         support: Support,
         levels: Sequence[Sequence[PlannedTask]],
         feedback: Mapping[int, InForce],
-        base: Indices,
         metric: Metric,
         field: NullSpaceField,
         gain: Array,
         threshold: float,
     ) -> None:
         robot: Robot = state.robot  # its state says which base motions contacts permit
-        self.support = support  # contacts' forces and their bounds
+        self.support, base = support, support.base  # contacts' forces, their bounds
         self.contacts = support.contacts
         planned = [level for level in levels if level]
         self.levels = tuple(tuple(each.task for each in level) for level in planned)

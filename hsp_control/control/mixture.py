@@ -212,7 +212,6 @@ class Mixture:
                 support,
                 levels,
                 self._gains.feedback,
-                support.base,
                 self._setup.metric,
                 self.field,
                 self._gains.null_space,

@@ -22,9 +22,8 @@ import numpy as np
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.identity_cache import IdentityCache
 from hsp_control.common.kernels import kernel
-from hsp_control.common.native import bind
+from hsp_control.common.native import StepPlan, bind, stay
 from hsp_control.common.rotations import cross, rotate, rotate_back
-from hsp_control.common.step_plan import StepPlan, stay
 from hsp_control.geometry.links import LinkShape
 from hsp_control.geometry.scene import Obstacle
 from hsp_control.geometry.shapes import Box, Capsule, Cylinder, HalfSpace, Shape, Sphere

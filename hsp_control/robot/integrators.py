@@ -15,8 +15,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.entry_points import own_names
 from hsp_control.common.exceptions import HspControlError, SimulationError
 from hsp_control.common.kernels import kernel
-from hsp_control.common.native import NativeCall, are_native, bind
-from hsp_control.common.step_plan import in_order
+from hsp_control.common.native import NativeCall, are_native, bind, in_order
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Positive
 from hsp_control.robot.motion import Acceleration, number_of_steps
@@ -219,8 +218,8 @@ class Steps(ABC):
 
     def compute_at(self, fraction: float) -> Callable[[], object]:
         """Return the call that writes v' at this fraction of the step."""
-        compute, _, native = self.acceleration
-        return native or (lambda: compute(self._t + fraction * self.h[0]))
+        compute, _, timeless = self.acceleration
+        return timeless or (lambda: compute(self._t + fraction * self.h[0]))
 
 
 class _SemiImplicitEuler(Steps):

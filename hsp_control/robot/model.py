@@ -20,7 +20,6 @@ from hsp_control.common.exceptions import (
     SimulationError,
 )
 from hsp_control.common.kernels import kernel
-from hsp_control.common.native import NativeCall
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.robot.description.loading import moving_joints
 from hsp_control.robot.motion import Acceleration
@@ -453,8 +452,7 @@ class RobotModel:
         """Return `forward_dynamics` for what these arrays hold when it is computed."""
         if not self.mimics:
             call = bind_pinocchio("aba", self.model, self._data, q, v, tau)
-            native = call if isinstance(call, NativeCall) else None
-            return Acceleration(lambda t: call(), self._data.ddq, native)
+            return Acceleration(lambda t: call(), self._data.ddq, call)
         value = np.zeros(self.nv)
 
         def compute(t: float) -> None:

@@ -8,7 +8,6 @@ import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
-from hsp_control.common.native import NativeCall
 
 REFUSED = -1.0
 """What a move returns if it was refused; kernels' results are not negative."""
@@ -20,12 +19,12 @@ class Acceleration(NamedTuple):
     Attributes:
         compute: Writes `value` for a time [s].
         value: v', shape (nv,) [rad/s² or m/s²]; the next call overwrites it.
-        native: `compute` as a native call, where it does not depend on time; or None.
+        timeless: `compute` without the time, where it does not depend on it; or None.
     """
 
     compute: Callable[[float], object]
     value: Array
-    native: NativeCall | None = None
+    timeless: Callable[[], object] | None = None
 
 
 def number_of_steps(duration: float, step: float) -> int:

@@ -13,7 +13,7 @@ from pydantic import AfterValidator, BeforeValidator
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import HspControlError, TaskError
 from hsp_control.common.kernels import KernelCall, kernel
-from hsp_control.common.step_plan import StepPlan, planned, says
+from hsp_control.common.native import StepPlan, planned, says
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.quantities import Positive, PositiveCount, plain

@@ -15,7 +15,7 @@ from hsp_control.trajectories.orientation import (
     OrientationTrajectory,
 )
 from hsp_control.trajectories.pose import ComposedPose, PoseTrajectory
-from hsp_control.trajectories.timing import smooth_step
+from hsp_control.trajectories.schedule import smooth_step
 from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
 
 AnyReference = Trajectory | OrientationTrajectory | PoseTrajectory

@@ -3,8 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
-from hsp_control.common.native import bind
-from hsp_control.common.step_plan import one_call, says, stay, supplied
+from hsp_control.common.native import bind, one_call, says, stay, supplied
 
 Follower = Callable[[float], object]
 """A function of time [s] that writes the sample at that time into fixed memory."""

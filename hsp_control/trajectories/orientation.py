@@ -17,7 +17,7 @@ from hsp_control.declaration.quantities import Number, Vector, Vector3
 from hsp_control.declaration.rotation import Rotation, Rotations, matrix_of
 from hsp_control.trajectories import checks
 from hsp_control.trajectories.following import Follower, follow_sampled, sampled
-from hsp_control.trajectories.timing import smooth_step
+from hsp_control.trajectories.schedule import smooth_step
 
 
 class OrientationSample(NamedTuple):

@@ -21,7 +21,7 @@ from hsp_control.trajectories.orientation import (
     OrientationSample,
     OrientationTrajectory,
 )
-from hsp_control.trajectories.timing import smooth_step
+from hsp_control.trajectories.schedule import smooth_step
 from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
 
 

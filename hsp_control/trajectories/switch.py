@@ -7,8 +7,7 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.declaration.quantities import Flag, NonNegative
 from hsp_control.trajectories.remembering import Written
-from hsp_control.trajectories.schedule import Intervals, Schedule
-from hsp_control.trajectories.timing import smooth_step
+from hsp_control.trajectories.schedule import Intervals, Schedule, smooth_step
 
 
 class Switch(Written, Schedule):

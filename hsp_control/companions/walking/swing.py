@@ -6,7 +6,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.rotations import log3, turn
 from hsp_control.companions.walking.footsteps import Footstep
 from hsp_control.companions.walking.quintic import Motion, Quintic, at_rest, to_rest
-from hsp_control.trajectories.timing import smooth_step
+from hsp_control.trajectories.schedule import smooth_step
 
 APPROACH = 0.92
 """Share of the swing after which the foot is above its place, and only descends."""

@@ -21,8 +21,7 @@ import numpy as np
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
 from hsp_control.common.linalg import copy
-from hsp_control.common.native import bind
-from hsp_control.common.step_plan import in_order
+from hsp_control.common.native import bind, in_order
 from hsp_control.constraints.limits.acceleration_bounds import (
     EFFORT,
     MOTION,

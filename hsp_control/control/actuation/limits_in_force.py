@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.native import bind
-from hsp_control.common.step_plan import in_order
+from hsp_control.common.native import bind, in_order
 from hsp_control.constraints.limits import RobotLimits
 from hsp_control.constraints.limits.acceleration_bounds import Bounds, MotionLimits
 from hsp_control.control.actuation.sent_effort import SentEffort, effort_window

@@ -17,8 +17,7 @@ from hsp_control.common.linalg import (
     solve_lower,
     solve_lower_transposed,
 )
-from hsp_control.common.native import bind
-from hsp_control.common.step_plan import in_order
+from hsp_control.common.native import bind, in_order
 from hsp_control.constraints.contacts import Contact, SlidingContact
 from hsp_control.constraints.contacts.contact import NORMAL, WRENCH, shares
 from hsp_control.control.evolution import PlannedContact

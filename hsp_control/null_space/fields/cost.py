@@ -10,8 +10,7 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
 from hsp_control.common.kernels import KernelCall, kernel
-from hsp_control.common.native import bind
-from hsp_control.common.step_plan import StepPlan, planned, says
+from hsp_control.common.native import StepPlan, bind, planned, says
 from hsp_control.declaration.imported import AS_TEXT, NAMED
 from hsp_control.law import VARYING, FieldSample, MetricSample, raise_covector
 from hsp_control.null_space.differences import gradient, rate_along_flow

@@ -14,8 +14,7 @@ from pydantic import AfterValidator, InstanceOf
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
 from hsp_control.common.kernels import kernel
-from hsp_control.common.native import bind
-from hsp_control.common.step_plan import StepPlan, says
+from hsp_control.common.native import StepPlan, bind, says
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import NonNegative, OrInstance
 from hsp_control.geometry.start import Start

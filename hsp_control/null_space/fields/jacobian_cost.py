@@ -23,8 +23,7 @@ import numpy as np
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import FieldError
 from hsp_control.common.kernels import KernelCall, kernel
-from hsp_control.common.native import bind
-from hsp_control.common.step_plan import CallSequence, StepPlan
+from hsp_control.common.native import CallSequence, StepPlan, bind
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Axes
 from hsp_control.geometry.start import Start

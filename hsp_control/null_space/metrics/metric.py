@@ -13,7 +13,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import MetricError
 from hsp_control.common.kernels import KernelCall, kernel
 from hsp_control.common.linalg import cholesky
-from hsp_control.common.step_plan import StepPlan, planned, says
+from hsp_control.common.native import StepPlan, planned, says
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import (
     ArrayField,

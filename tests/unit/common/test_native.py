@@ -15,10 +15,14 @@ import hsp_control as hsp
 from hsp_control.common import adapters
 from hsp_control.common.arrays import Array
 from hsp_control.common.kernels import PLAIN, kernel
-from hsp_control.common.native import NativeCall, bind, once, only_if, sequence
-from hsp_control.common.step_plan import (
+from hsp_control.common.native import (
     CallSequence,
+    NativeCall,
     StepPlan,
+    bind,
+    once,
+    only_if,
+    sequence,
     steps,
 )
 

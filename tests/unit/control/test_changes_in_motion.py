@@ -21,7 +21,7 @@ from hsp_control.null_space.differences import rate_along_flow
 from hsp_control.null_space.fields import FieldSample
 from hsp_control.robot.integrators import Dop853
 from hsp_control.trajectories import HoldOrientation, Lissajous, Spin
-from hsp_control.trajectories.timing import smooth_step
+from hsp_control.trajectories.schedule import smooth_step
 
 K_N = 4.0
 START, RAMP = 0.2, 0.3
