@@ -345,19 +345,10 @@ class Controller:
             self._gains.wait(self.active_stack, self._state.t, period)
 
     def _while_free(self, advance: Callable[[FreeStep], int]) -> int:
-        """Let a compiled loop make steps, without Python in between.
-
-        Each of them is a `compute` that finds no limit violated, and an `applied` for
-        the period of the last one. The law is the same, to the last bit.
-
-        Args:
-            advance: Makes steps up to one that is not free (`is_free`), which is left
-                to `compute`; it returns how many it made.
-
-        Returns:
-            What it returned; 0 where there are no such steps: something changes, is
-            streamed, is no native call, or the last effort was not the law's own.
-        """
+        """Let a compiled loop make steps that are free; return how many it made."""
+        # Each is a `compute` that finds no limit violated, and an `applied` for the
+        # period of the last one. There are none where something changes, is streamed,
+        # is no native call, or the last effort was not the law's own.
         with self._lock:
             run, bound = self._run, self._run.bound
             if (
@@ -557,10 +548,7 @@ class Controller:
 
     @property
     def _settled(self) -> object:
-        """An object that stays the same while nothing changes; None while it does.
-
-        As long as it is the same, so are the tasks, the field and the limits.
-        """
+        """An object that stays the same while nothing changes; None while it does."""
         return self._run.bound
 
     @property
@@ -581,17 +569,8 @@ class Controller:
         return self._gains.feedback[self._setup.task(task).key].feedback
 
     def _linear_feedback(self, task: str, state: RobotState) -> dict[float, Feedback]:
-        """Return a task's feedback for small errors about a state, now and later.
-
-        With gains it is the one in force; an impedance gives other gains at each state.
-
-        Returns:
-            The feedback, by the time from which it is in force [s]: -inf for now, and
-            the ends of the changes that are open.
-
-        Raises:
-            ControllerError: If there is no such task.
-        """
+        """Return a task's feedback for small errors, by the time when it begins [s]."""
+        # That is -inf for the present one, and the ends of the changes that are open.
         planned = self._setup.present_task(task, self._latest)
         now = planned.task.linear_feedback(state, self._gains.feedback[planned.key])
         found = {-np.inf: now}
@@ -631,13 +610,7 @@ class Controller:
         return self._setup.contact(contact).weight(t)
 
     def _force_offset(self, contact: str) -> Array:
-        """Return what is added to the commanded normal force of a contact, (1,) [N].
-
-        Compensators write this array.
-
-        Raises:
-            ControllerError: If there is no such contact.
-        """
+        """Return what compensators add to a contact's commanded force, (1,) [N]."""
         return self._setup.contact(contact).force_offset
 
     def __repr__(self) -> str:

@@ -93,12 +93,11 @@ def _blend(
     duration: float,
     start_state: Array,
     desired: TrajectorySample,
-    position: Array,
-    velocity: Array,
-    acceleration: Array,
+    out: TrajectorySample,
     t: float,
 ) -> None:
     """Blend x_d with the line x0 + (t - t0) v0; ``start_state`` is x0 and v0."""
+    position, velocity, acceleration = out
     x_d, v_d, a_d = desired
     elapsed = t - start_time
     s, s_dot, s_ddot = smooth_step(elapsed, 0.0, duration)
@@ -215,15 +214,14 @@ def _blend_orientation(
     coefficients: Array,
     work: Array,
     desired: OrientationSample,
-    rotation: Array,
-    velocity: Array,
-    acceleration: Array,
+    out: OrientationSample,
     t: float,
 ) -> None:
     """Write R_d exp(y).
 
     ω = ω_d + R w and ω' = ω_d' + ω × R w + R w', where w = Jexp y' in the body frame.
     """
+    rotation, velocity, acceleration = out
     R_d, omega_d, omega_d_dot = desired
     elapsed = t - start_time
     for i in range(3):

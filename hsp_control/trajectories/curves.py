@@ -13,7 +13,7 @@ from hsp_control.common.exceptions import TrajectoryError
 from hsp_control.common.kernels import KernelCall, kernel
 from hsp_control.declaration.quantities import Matrix, Number, Positive, Vector, Vector3
 from hsp_control.trajectories import checks
-from hsp_control.trajectories.trajectory import Trajectory
+from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
 
 
 class Circle(Trajectory, type="circle"):
@@ -104,11 +104,10 @@ def _circle(
     phase: float,
     center: Array,
     radii: Array,
-    position: Array,
-    velocity: Array,
-    acceleration: Array,
+    out: TrajectorySample,
     t: float,
 ) -> None:
+    position, velocity, acceleration = out
     cosine, sine = cos(rate * t + phase), sin(rate * t + phase)
     for i in range(center.size):
         radial = cosine * radii[0, i] + sine * radii[1, i]
@@ -154,9 +153,8 @@ class Lissajous(Trajectory, type="lissajous"):
 
 
 @kernel
-def _lissajous(
-    parameters: Array, position: Array, velocity: Array, acceleration: Array, t: float
-) -> None:
+def _lissajous(parameters: Array, out: TrajectorySample, t: float) -> None:
+    position, velocity, acceleration = out
     for i in range(position.size):
         center, amplitude = parameters[0, i], parameters[1, i]
         rate, phase = parameters[2, i], parameters[3, i]
@@ -194,13 +192,9 @@ class UniformLine(Trajectory, type="uniform_line"):
 
 @kernel
 def _line(
-    start: Array,
-    constant_velocity: Array,
-    position: Array,
-    velocity: Array,
-    acceleration: Array,
-    t: float,
+    start: Array, constant_velocity: Array, out: TrajectorySample, t: float
 ) -> None:
+    position, velocity, acceleration = out
     for i in range(position.size):
         position[i] = start[i] + t * constant_velocity[i]
         velocity[i] = constant_velocity[i]

@@ -10,9 +10,12 @@ from hsp_control.common.exceptions import TrajectoryError
 from hsp_control.common.kernels import KernelCall, kernel
 from hsp_control.common.rotations import turn
 from hsp_control.declaration.quantities import PositiveCount
-from hsp_control.trajectories.orientation import OrientationTrajectory
+from hsp_control.trajectories.orientation import (
+    OrientationSample,
+    OrientationTrajectory,
+)
 from hsp_control.trajectories.remembering import Written
-from hsp_control.trajectories.trajectory import Trajectory
+from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
 
 
 class Fed(Written, Trajectory):
@@ -109,7 +112,8 @@ class FedOrientation(Written, OrientationTrajectory):
 
 
 @kernel
-def _go_on(memory: Array, x: Array, x_dot: Array, x_ddot: Array, t: float) -> None:
+def _go_on(memory: Array, out: TrajectorySample, t: float) -> None:
+    x, x_dot, x_ddot = out
     n, dt = x.shape[0], max(t - memory[0], 0.0)
     for i in range(n):
         x_ddot[i] = memory[1 + 2 * n + i]
@@ -118,9 +122,8 @@ def _go_on(memory: Array, x: Array, x_dot: Array, x_ddot: Array, t: float) -> No
 
 
 @kernel
-def _turn_on(
-    time: Array, rows: Array, R: Array, omega: Array, omega_dot: Array, t: float
-) -> None:
+def _turn_on(time: Array, rows: Array, out: OrientationSample, t: float) -> None:
+    R, omega, omega_dot = out
     dt = max(t - time[0], 0.0)
     for i in range(3):
         omega_dot[i] = rows[4, i]

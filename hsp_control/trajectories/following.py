@@ -13,7 +13,7 @@ def sampled(trajectory: Any, t: float, out: Any) -> Any:
     """Write a trajectory's sample at time t [s] with its kernel, and return it."""
     function, arguments = trajectory.kernel()
     given = [x.sample(t) if hasattr(x, "sample") else x for x in arguments]
-    function(*given, *out, float(t))
+    function(*given, out, float(t))
     return out
 
 
@@ -25,7 +25,7 @@ def follow_sampled(trajectory: Any, out: Any) -> Follower:
     if says(trajectory, "kernel", "sample") == "kernel":
         function, arguments = trajectory.kernel()
         given, follow, _ = supplied(arguments)
-        return follow_all(*follow, bind(function, *given, *out, timed=True))
+        return follow_all(*follow, bind(function, *given, out, timed=True))
     return follow_by(trajectory.sample, out)
 
 

@@ -145,14 +145,9 @@ class OrientationPath(OrientationTrajectory, type="path"):
 
 @kernel
 def _path(
-    times: Array,
-    rotations: Array,
-    turns: Array,
-    rotation: Array,
-    velocity: Array,
-    acceleration: Array,
-    t: float,
+    times: Array, rotations: Array, turns: Array, out: OrientationSample, t: float
 ) -> None:
+    rotation, velocity, acceleration = out
     last = times.size - 1
     i = 0
     while i < last - 1 and t >= times[i + 1]:
@@ -195,14 +190,8 @@ class Spin(OrientationTrajectory, type="spin"):
 
 
 @kernel
-def _spin(
-    omega: Array,
-    start: Array,
-    rotation: Array,
-    velocity: Array,
-    acceleration: Array,
-    t: float,
-) -> None:
+def _spin(omega: Array, start: Array, out: OrientationSample, t: float) -> None:
+    rotation, velocity, acceleration = out
     turn(start, omega, t, rotation)
     for i in range(3):
         velocity[i] = omega[i]

@@ -13,7 +13,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.kernels import KernelCall, kernel
 from hsp_control.declaration.quantities import Matrix, Number, Positive, Tensor, Vector
 from hsp_control.trajectories import checks
-from hsp_control.trajectories.trajectory import Trajectory
+from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
 
 # Row k maps (x, x', x'') at u = 0 and (x, x', x'') at u = 1 to the coefficient of u^k.
 QUINTIC: Array = np.array(
@@ -123,14 +123,9 @@ class PiecewisePolynomial(PolynomialTrajectory):
 
 @kernel
 def _evaluate(
-    times: Array,
-    waypoints: Array,
-    coefficients: Array,
-    position: Array,
-    velocity: Array,
-    acceleration: Array,
-    t: float,
+    times: Array, waypoints: Array, coefficients: Array, out: TrajectorySample, t: float
 ) -> None:
+    position, velocity, acceleration = out
     last = times.size - 1
     if t <= times[0] or t >= times[last]:
         end = 0 if t <= times[0] else last

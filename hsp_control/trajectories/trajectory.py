@@ -108,9 +108,9 @@ class Trajectory(Part, ABC, family="trajectories", error=TrajectoryError):
         """The number n of coordinates."""
 
     def kernel(self) -> KernelCall:
-        """Return a kernel and its first arguments; the sample's arrays and t follow.
+        """Return a kernel and its first arguments; the sample and t follow.
 
-        ``kernel(*arguments, *sample, t)`` writes what `sample` returns.
+        ``kernel(*arguments, out: TrajectorySample, t)`` writes what `sample` returns.
         """
         raise TypeError(f"{type(self).__name__} implements neither kernel nor sample")
 
