@@ -5,7 +5,7 @@ from copy import deepcopy
 from dataclasses import replace
 from math import isfinite
 from threading import RLock
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -204,26 +204,6 @@ class Controller:
             self._limits.write(t)
 
     # -- the step ---------------------------------------------------------------------
-
-    @overload
-    def compute(
-        self,
-        t: float,
-        q: ArrayLike,
-        v: ArrayLike,
-        *,
-        modifier: AccelerationModifier | None = None,
-        out: ControlOutput | None = None,
-    ) -> ControlOutput: ...
-
-    @overload
-    def compute(
-        self,
-        t: RobotState,
-        *,
-        modifier: AccelerationModifier | None = None,
-        out: ControlOutput | None = None,
-    ) -> ControlOutput: ...
 
     def compute(
         self,

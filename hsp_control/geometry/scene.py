@@ -23,8 +23,8 @@ from hsp_control.trajectories import (
     Trajectory,
     TrajectorySample,
 )
-from hsp_control.trajectories.following import Follower, follow_all
 from hsp_control.trajectories.streams.stream import Streamed
+from hsp_control.trajectories.trajectory import Follower, follow_all
 
 
 def _in_space(center: Trajectory) -> Trajectory:

@@ -16,8 +16,8 @@ from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Number, Vector, Vector3
 from hsp_control.declaration.rotation import Rotation, Rotations, matrix_of
 from hsp_control.trajectories import checks
-from hsp_control.trajectories.following import Follower, follow_sampled, sampled
 from hsp_control.trajectories.schedule import smooth_step
+from hsp_control.trajectories.trajectory import Follower, follow_sampled, sampled
 
 
 class OrientationSample(NamedTuple):

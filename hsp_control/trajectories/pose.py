@@ -15,14 +15,19 @@ from hsp_control.common.rotations import compose_back, jlog3, log3, stumpff, tur
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Number, Positive, Vector3, numbers
 from hsp_control.declaration.rotation import Rotation, matrix_of
-from hsp_control.trajectories.following import Follower, follow_all, follow_by
 from hsp_control.trajectories.hold import Hold, HoldOrientation
 from hsp_control.trajectories.orientation import (
     OrientationSample,
     OrientationTrajectory,
 )
 from hsp_control.trajectories.schedule import smooth_step
-from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
+from hsp_control.trajectories.trajectory import (
+    Follower,
+    Trajectory,
+    TrajectorySample,
+    follow_all,
+    follow_by,
+)
 
 
 class PoseSample(NamedTuple):
