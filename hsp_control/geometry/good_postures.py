@@ -7,6 +7,7 @@ the robot and what is asked.
 
 import logging
 from collections.abc import Iterator, Sequence
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -49,6 +50,9 @@ class Judgement(NamedTuple):
     clear: bool  # whether no links overlap, and no obstacle is near
     # distance from the middle: root mean square over the joints, 1 at the limits
     eccentricity: float
+
+
+_eccentricity = attrgetter("eccentricity")
 
 
 class PostureSearch:
@@ -244,10 +248,6 @@ def _halton(number: int, dimension: int) -> float:
         value += share * (number % base)
         number //= base
     return value
-
-
-def _eccentricity(judged: Judgement) -> float:
-    return judged.eccentricity
 
 
 def _nearest(seen: Sequence[Judgement], least: float) -> str:

@@ -80,11 +80,8 @@ def valid_measurement(raw: object, robot: Robot, period: float) -> Measurement:
 
 
 def _checked(raw: Measurement, robot: Robot, period: float) -> Measurement:
-    if not isinstance(raw.sequence, Integral):
-        raise HardwareError(
-            f"the state's sequence is of type {type(raw.sequence).__name__}; needs an "
-            "integer"
-        )
+    _check_type("sequence", raw.sequence, Integral, "an integer")
+    _check_type("fault", raw.fault, str, "a text")
     t, age = _number("time", raw.t), _number("age", raw.age)
     if ulp(t) > _RESOLUTION * period:
         raise HardwareError(
@@ -99,13 +96,9 @@ def _checked(raw: Measurement, robot: Robot, period: float) -> Measurement:
                 f"q[{start}:{start + size}] of the state has norm {norm:.6g}; needs "
                 "norm 1"
             )
-    applied: Array | None = None
-    if raw.applied is not None:
-        applied = _vector("applied", raw.applied, robot.nv, _LARGEST_EFFORT)
-    if not isinstance(raw.fault, str):
-        raise HardwareError(
-            f"the state's fault is of type {type(raw.fault).__name__}; needs a text"
-        )
+    applied = raw.applied
+    if applied is not None:
+        applied = _vector("applied", applied, robot.nv, _LARGEST_EFFORT)
     return Measurement(
         int(raw.sequence),
         t,
@@ -127,10 +120,7 @@ def _checked(raw: Measurement, robot: Robot, period: float) -> Measurement:
 def _inertial(raw: Any) -> Inertial | None:
     if raw is None:
         return None
-    if not isinstance(raw, Inertial):
-        raise HardwareError(
-            f"the state's inertial is of type {type(raw).__name__}; needs an Inertial"
-        )
+    _check_type("inertial", raw, Inertial, "an Inertial")
     return Inertial(
         raw.frame,
         _vector("angular velocity", raw.angular_velocity, 3, _LARGEST_SPEED),
@@ -139,15 +129,17 @@ def _inertial(raw: Any) -> Inertial | None:
 
 
 def _number(what: str, value: Any) -> float:
-    if type(value) is not float:
-        if not isinstance(value, Real):
-            raise HardwareError(
-                f"the state's {what} is of type {type(value).__name__}; needs a number"
-            )
-        value = float(value)
-    if not isfinite(value):
-        raise HardwareError(f"the state's {what} is {value}")
-    return float(value)
+    _check_type(what, value, Real, "a number")
+    number = float(value)
+    if not isfinite(number):
+        raise HardwareError(f"the state's {what} is {number}")
+    return number
+
+
+def _check_type(what: str, value: object, kind: type, needed: str) -> None:
+    if not isinstance(value, kind):
+        given = type(value).__name__
+        raise HardwareError(f"the state's {what} is of type {given}; needs {needed}")
 
 
 def _vector(name: str, value: Any, size: int, largest: float) -> Array:

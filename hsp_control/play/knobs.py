@@ -150,11 +150,14 @@ def _tune(name: str, ratio: float, at: Changes, frequency: float) -> None:
 
 
 def _stiffen(name: str, impedance: Impedance, at: Changes, factor: float) -> None:
-    """Change to a multiple of a stiffness, with the same ratio."""
+    at.impedance(name, _scaled(impedance, factor))
+
+
+def _scaled(impedance: Impedance, factor: float) -> Impedance:
+    """Return an impedance with a multiple of the stiffness, and the same ratio."""
     damping = impedance.damping
-    scaled = replace(
+    return replace(
         impedance,
         stiffness=factor * np.asarray(impedance.stiffness, dtype=float),
         damping=None if damping is None else np.sqrt(factor) * np.asarray(damping),
     )
-    at.impedance(name, scaled)

@@ -23,10 +23,6 @@ from hsp_control.companions.film import FilmStyle, export_film
 from hsp_control.companions.film.encoding import find_ffmpeg
 from hsp_control.visualization.viewer import LiveView, Viewer, export_html
 from hsp_control.visualization.viewer.commands import PLOTS, key_of
-from hsp_control.visualization.viewer.packing import (
-    ANGLE_BOUND,
-    POSITION_BOUND,
-)
 
 pytest.importorskip("playwright.sync_api")
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
@@ -178,9 +174,9 @@ def test_every_joint_is_where_pinocchio_has_it(
         for joint, name in enumerate(robot.model.names[1:], start=1):
             shown = pin.SE3(watched.matrix(f"/robot/{name}"))
             off = data.oMi[joint].actInv(shown)
-            assert np.linalg.norm(off.translation) <= POSITION_BOUND * 1.01
+            assert np.linalg.norm(off.translation) <= 2e-4
             turned = np.linalg.norm(pin.log3(off.rotation))
-            assert turned <= ANGLE_BOUND * 1.01
+            assert turned <= np.radians(0.1)
     meshes = watched.page.evaluate(
         """() => {
           const seen = [];

@@ -11,7 +11,7 @@ from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
 from hsp_control.visualization import palette
 from hsp_control.visualization.viewer.arrows import SelfMotionLayer
-from hsp_control.visualization.viewer.clip import Band, Clip, bands_of
+from hsp_control.visualization.viewer.clip import Clip, bands_of
 from hsp_control.visualization.viewer.commands import (
     LegendEntry,
     PageCommand,
@@ -82,7 +82,8 @@ class Comparison:
                 else all_layers(run.robot, motion, run.controller, root=root, dark=dark)
             )
             drawing = self._drawings[-1]
-            bands = _bands_named(run)
+            known = bands_of(run.rollout, run.controller)
+            bands = [band._replace(run=run.name) for band in known]
             self._runs.append(
                 RunDrawing(drawing, motion, layers, root=root, shown=shown, bands=bands)
             )
@@ -186,12 +187,6 @@ def run_parts(names: Sequence[str]) -> list[list[str]]:
     """Return the nodes of each run that together hold all that is drawn of it."""
     first = [f"/{name}" for name in ("robot", *LAYERS)]
     return [first, *([root] for root in run_roots(names)[1:])]
-
-
-def _bands_named(run: ComparedRun) -> list[Band]:
-    """Return a run's bands, with its name."""
-    bands = bands_of(run.rollout, run.controller)
-    return [band._replace(run=run.name) for band in bands]
 
 
 def ghost_color(number: int) -> str:

@@ -57,7 +57,7 @@ class LiveView:
         self._cost = 0.0  # s per drawn row
         self._next = self._next_plots = 0.0
         self._begin: float | None = None
-        self._size = viewer.set_stage(self._run, experiment.scenario.title)
+        viewer.set_stage(self._run, experiment.scenario.title)
 
     def on_row(self, recorder: LogWriter) -> None:
         """Send the rows computed since the last message, if the next one is due."""
@@ -83,12 +83,8 @@ class LiveView:
         """Replace the drawn rows by the whole run; the page keeps its time."""
         elapsed = time.perf_counter() - (self._begin or 0.0)
         rate = (rollout.t[-1] - rollout.t[0]) / max(elapsed, 1e-9)
-        self._viewer.replace_run(
-            rollout,
-            self._size,
-            self._experiment.controller,
-            status=f"computed at {_shown(rate)} × real time",
-        )
+        status = f"computed at {_shown(rate)} × real time"
+        self._viewer.replace_run(rollout, self._experiment.controller, status)
 
     def _send(self, recorder: LogWriter, now: float) -> None:
         rows = Rollout(recorder.rows(self._sent), self._meta)

@@ -58,8 +58,8 @@ class Track(NamedTuple):
     """The animation of one property of one node."""
 
     path: str
-    # ``position`` [m], ``quaternion`` (x, y, z, w), ``scale``, ``color``, ``opacity``,
-    # ``visible`` or ``length``; see ``page/player.js``.
+    # ``position`` [m], ``quaternion`` (x, y, z, w), ``scale``, ``color``, ``visible``
+    # or ``length``; see ``page/player.js``.
     property: str
     times: Array  # times [s], ascending, (n,)
     values: Array  # one row per time, (n, k)

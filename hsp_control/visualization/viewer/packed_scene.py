@@ -1,4 +1,4 @@
-"""Reduces the size of a recorded scene: packed meshes, few keyframes, small arrays."""
+"""Reduces the size of a recorded scene: packed meshes, and small arrays."""
 
 import base64
 import io

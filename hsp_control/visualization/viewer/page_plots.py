@@ -28,9 +28,7 @@ from hsp_control.visualization.viewer.comparison import ComparedRun
 from hsp_control.visualization.viewer.packing import (
     CLOCK_STEP,
     ArrayTable,
-    distance_error,
     keyframe_rows,
-    linear,
 )
 
 _MAX_CURVES, _SELECTED = 14, 7
@@ -211,9 +209,8 @@ def _packed(panel: Panel, curves: Sequence[_Curve], arrays: ArrayTable) -> Json:
                 shown = np.log10(shown)
         # All values outside the axis are clipped to one height beyond its end.
         shown = np.nan_to_num(shown, nan=low - span).clip(low - span, high + span)
-        shown = shown[:, None]
         rounded = step * np.rint(shown / step)
-        keys = keyframe_rows(times, shown, rounded, linear, distance_error(bound))
+        keys = keyframe_rows(times, shown, rounded, bound)
         numbers = {
             "times": arrays.numbers(times[keys], CLOCK_STEP, np.float64),
             "values": arrays.numbers(rounded[keys], step),

@@ -82,7 +82,6 @@ def view_logs(
     beside: bool | None = None,
     speed: float | None = None,
     loop: bool | None = None,
-    port: int | None = None,
     transport: SceneRecorder | None = None,
     strict: bool = False,
     allow: Sequence[str | PathLike[str]] = (),
@@ -96,7 +95,6 @@ def view_logs(
         beside: For several logs: see `Viewer.compare`.
         speed: Seconds of the run per second of real time; None: the log's setting.
         loop: Repeat the run; None: the log's setting.
-        port: See `Viewer`.
         transport: See `Viewer`.
         strict: For untrusted logs: see `load_experiment`.
         allow: Further folders for strict reading.
@@ -109,7 +107,7 @@ def view_logs(
     runs = load_runs(logs, access_for(logs, strict, allow))
     first = runs[0]
     view = (first.rollout.config or {}).get("view", {})
-    viewer = Viewer(first.robot, port=port, transport=transport, **view)
+    viewer = Viewer(first.robot, transport=transport, **view)
     try:
         if len(runs) == 1:
             viewer.play(

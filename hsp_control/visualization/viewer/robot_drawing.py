@@ -11,6 +11,7 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import ModelError, RobotNotFoundError
+from hsp_control.geometry.links import part_of
 from hsp_control.robot import Robot
 from hsp_control.robot.description.loading import RobotPart
 from hsp_control.robot.description.mesh_files import candidates, find_problem
@@ -30,7 +31,6 @@ from hsp_control.visualization.viewer.motion import RunMotion, Track, pose_track
 
 _GREY = (0.72, 0.74, 0.76, 1.0)
 _MESHES = {".dae", ".obj", ".stl"}  # formats that the page can read
-_NO_NUMBERS: tuple[float, ...] = ()
 _SIZES = {
     "box": ("size",),
     "cylinder": ("radius", "length"),
@@ -115,7 +115,7 @@ def _visual(
     shape = next(iter(element.find("geometry") or ()), None)
     if shape is None or shape.tag not in _SIZES:
         return None
-    size = sum((_numbers(shape.get(name)) for name in _SIZES[shape.tag]), _NO_NUMBERS)
+    size = tuple(x for n in _SIZES[shape.tag] for x in _numbers(shape.get(n)))
     return Visual(
         joint=frame.parentJoint,
         link=frame.name,
@@ -199,7 +199,8 @@ def _links(robot: Robot, joint: int) -> Iterator[tuple[Array, Array, float]]:
         child for child in range(1, model.njoints) if model.parents[child] == joint
     ]
     for child in children:
-        start = np.zeros(3) if joint else _base(robot, model.names[child])
+        own = part_of(robot, model.names[child]).placement.translation
+        start = np.zeros(3) if joint else own
         end = model.jointPlacements[child].translation
         yield start, end, _radius(robot, child)
     if joint and not children:
@@ -208,13 +209,6 @@ def _links(robot: Robot, joint: int) -> Iterator[tuple[Array, Array, float]]:
         if not np.any(tip):
             tip = model.inertias[joint].lever
         yield np.zeros(3), tip, _TAPER * _radius(robot, joint)
-
-
-def _base(robot: Robot, joint: str) -> Array:
-    """Return the base position [m] of the robot that a joint belongs to."""
-    part = next(part for part in robot.parts if joint.startswith(part.prefix))
-    place: Array = part.placement.translation
-    return place
 
 
 def _feet(robot: Robot, radius: float) -> list[Json]:

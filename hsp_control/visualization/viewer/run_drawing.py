@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from hsp_control.common.arrays import Array
+from hsp_control.config.view_settings import ShownItems
 from hsp_control.control.controller import Controller
 from hsp_control.robot import Robot
 from hsp_control.visualization import palette
@@ -32,18 +33,7 @@ from hsp_control.visualization.viewer.targets import (
     target_markers,
 )
 
-LAYERS = (
-    "paths",
-    "targets",
-    "obstacles",
-    "solids",
-    "influence",
-    "distances",
-    "capsules",
-    "ellipsoid",
-    "self_motion",
-    "contacts",
-)
+LAYERS = tuple(name for name in ShownItems().all_fields() if name != "grid")
 """The layers: nodes of the scene tree, and keys of ``view: show``, in their order."""
 
 
@@ -93,7 +83,7 @@ class RunDrawing:
         layers: dict[str, Layer],
         *,
         root: str = "",
-        shown: Mapping[str, bool] | None = None,
+        shown: Mapping[str, bool],
         bands: Sequence[Band] = (),
     ) -> None:
         """Compose the drawing."""
@@ -102,7 +92,7 @@ class RunDrawing:
         self._drawing = drawing
         self._root = root
         self._bands = bands
-        self._shown = dict.fromkeys(LAYERS, True) | dict(shown or {})
+        self._shown = shown
 
     def draw(self, size: float) -> Iterator[PageCommand]:
         """Yield the commands that draw the layers in a scene of the given size [m]."""

@@ -281,13 +281,12 @@ class Viewer:
 
     def set_stage(self, run: RunDrawing, title: str | None) -> float:
         """Clear the stage and fit it to a run; return the scene's size [m]."""
-        points = in_sight(self._subject(run.points()), run.obstacle_points())
         self._obstacles = None
         self.transport.send(self._stage(run, title))
-        return scene_size(points)
+        return self._size
 
     def replace_run(
-        self, rollout: Rollout, size: float, controller: Controller, status: str
+        self, rollout: Rollout, controller: Controller, status: str
     ) -> None:
         """Replace a partly drawn run by the complete one; the page keeps its time."""
         run = self._run(rollout, controller)
@@ -296,7 +295,7 @@ class Viewer:
         # Now also the layers that were not computed meanwhile have their switches.
         caption = self._caption(run, rollout.meta.get("title"))
         self.transport.send(
-            [*clear(), *run.draw(size), *clip, caption, set_status(status)]
+            [*clear(), *run.draw(self._size), *clip, caption, set_status(status)]
         )
         self._plot([ComparedRun("", self.robot, rollout, controller)])
 
@@ -356,12 +355,13 @@ class Viewer:
         subject = self._subject(scene.points())
         points = in_sight(subject, scene.obstacle_points())
         floor = min(0.0, float(subject[:, 2].min()))
+        self._size = scene_size(points)
         commands = [
             *([remove_plots()] if self._plotted else []),
             *clear(),
             *(delete(root) for root in self._others),
             *draw_stage(points, floor, view),
-            *scene.draw(scene_size(points)),
+            *scene.draw(self._size),
             look_at(self.robot, points, view.camera, view.target, fit=fit),
             self._caption(scene, title),
             set_time(""),

@@ -24,13 +24,7 @@ from hsp_control.visualization.viewer import ComparedRun, export_html, robot_of
 from hsp_control.visualization.viewer.export_page import write_page
 from hsp_control.visualization.viewer.packed_scene import VERTEX_STEP, read_mesh
 from hsp_control.visualization.viewer.packing import (
-    ANGLE_BOUND,
-    POSITION_BOUND,
     ArrayTable,
-    angle_error,
-    keyframe_rows,
-    linear,
-    slerp,
 )
 from hsp_control.visualization.viewer.page_plots import (
     CURVE_BOUND,
@@ -125,40 +119,6 @@ def test_equal_arrays_are_kept_once() -> None:
     entry = table.entries[whole["$array"]]
     assert entry["kind"] == "Uint8Array"
     np.testing.assert_array_equal(unpacked(entry).ravel(), [7, 0, 255])
-
-
-# -- keyframes ------------------------------------------------------------------------
-
-T = np.linspace(0.0, 10.0, 1001)
-
-
-def played(times: np.ndarray, keys: np.ndarray, rows: np.ndarray, how: Any) -> Any:
-    """What the page shows at each time."""
-    left = np.clip(np.searchsorted(times[keys], times, side="right") - 1, 0, None)
-    right = np.minimum(left + 1, len(keys) - 1)
-    span = times[keys[right]] - times[keys[left]]
-    fraction = (times - times[keys[left]]) / np.where(span > 0.0, span, 1.0)
-    return how(rows[keys[left]], rows[keys[right]], fraction[:, None])
-
-
-def test_turning_is_thinned_on_the_sphere() -> None:
-    steady = np.column_stack([0.0 * T, 0.0 * T, np.sin(1.5 * T), np.cos(1.5 * T)])
-    keys = keyframe_rows(T, steady, steady, slerp, angle_error(1e-5))
-    assert len(keys) < 20  # 30 rad in all; a short way is less than half a turn
-    rng = np.random.default_rng(5)
-    waves = np.cumsum(rng.standard_normal((3, 1001)), axis=1) * 0.002
-    turns = np.array([pin.Quaternion(pin.exp3(w)).coeffs() for w in waves.T])
-    keys = keyframe_rows(T, turns, turns, slerp, angle_error(ANGLE_BOUND))
-    shown = played(T, keys, turns, slerp)
-    for a, b in zip(shown, turns, strict=True):
-        off = pin.Quaternion(*a[[3, 0, 1, 2]]).angularDistance(
-            pin.Quaternion(*b[[3, 0, 1, 2]])
-        )
-        assert off <= ANGLE_BOUND * (1.0 + 1e-6)
-    assert len(keys) < 900
-    # The two quaternions of one orientation are one orientation.
-    flipped = turns * np.where(np.arange(1001) % 2, -1.0, 1.0)[:, None]
-    assert angle_error(1.0)(flipped, turns).max() < 1e-12
 
 
 # -- meshes ---------------------------------------------------------------------------
@@ -329,35 +289,28 @@ def test_every_joint_is_where_the_log_has_it(panda: Rollout, tmp_path: Path) -> 
     robot = Robot.load("panda")
     data = robot.model.createData()
     at = {}
-    keyframes = 0
     for joint in robot.model.names[1:]:
         times, positions = tracks[f"/robot/{joint}", "position"]
         clock, turns = tracks[f"/robot/{joint}", "quaternion"]
-        keyframes += len(times)
-        at[joint] = (
-            sampled(times, positions, panda.t, linear),
-            sampled(clock, turns, panda.t, slerp),
-        )
-    assert keyframes < 0.5 * len(panda) * (robot.model.njoints - 1)
+        at[joint] = rows_at(times, positions, panda.t), rows_at(clock, turns, panda.t)
     for row, q in enumerate(panda.q):
         pin.forwardKinematics(robot.model, data, q)
         for joint, (positions, turns) in at.items():
             placement = data.oMi[robot.model.getJointId(joint)]
             off = np.linalg.norm(positions[row] - placement.translation)
-            assert off <= POSITION_BOUND * 1.001
+            assert off <= 3e-5
             shown = pin.Quaternion(*turns[row][[3, 0, 1, 2]])
             turned = shown.normalized().angularDistance(
                 pin.Quaternion(placement.rotation)
             )
-            assert turned <= ANGLE_BOUND * 1.001
+            assert turned <= 1e-4
 
 
-def sampled(times: np.ndarray, values: np.ndarray, t: np.ndarray, how: Any) -> Any:
-    left = np.clip(np.searchsorted(times, t, side="right") - 1, 0, None)
-    right = np.minimum(left + 1, len(times) - 1)
-    span = times[right] - times[left]
-    fraction = ((t - times[left]) / np.where(span > 0, span, 1.0)).clip(0.0, 1.0)
-    return how(values[left], values[right], fraction[:, None])
+def rows_at(times: np.ndarray, values: np.ndarray, t: np.ndarray) -> Any:
+    """The rows of a track at the times of a log; one that stays has one row."""
+    rows = np.abs(times[:, None] - t).argmin(axis=0)
+    assert len(times) == 1 or np.abs(times[rows] - t).max() <= 1e-6
+    return values[rows]
 
 
 @pytest.mark.slow

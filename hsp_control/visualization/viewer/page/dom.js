@@ -47,4 +47,9 @@ function onKey(actionOf) {
   });
 }
 
+// Call a function for each of some kinds of events of an element.
+function on(element, kinds, act, options) {
+  for (const kind of kinds.split(" ")) element.addEventListener(kind, act, options);
+}
+
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);

@@ -9,14 +9,13 @@ class PlayHand {
 
   constructor(play, viewer) {
     Object.assign(this, {play, viewer, grip: null, hover: null, pane: viewer.dom_element});
-    const on = (type, act) => this.pane.addEventListener(type, act, {capture: true});
-    on("pointerdown", (event) => this.down(event));
-    on("pointermove", (event) => this.move(event));
-    on("pointerup", (event) => this.up(event));
-    for (const type of ["pointercancel", "lostpointercapture"]) {
-      on(type, ({pointerId}) => { if (pointerId === this.grip?.pointer) this.end(); });
-    }
-    on("pointerleave", () => this.setHover(null));
+    const first = {capture: true}, {pane} = this;
+    on(pane, "pointerdown", (event) => this.down(event), first);
+    on(pane, "pointermove", (event) => this.move(event), first);
+    on(pane, "pointerup", (event) => this.up(event), first);
+    on(pane, "pointercancel lostpointercapture",
+       ({pointerId}) => { if (pointerId === this.grip?.pointer) this.end(); }, first);
+    on(pane, "pointerleave", () => this.setHover(null), first);
     whenAway(() => this.end());
   }
 
@@ -158,8 +157,7 @@ class PlayHand {
 
 // Call a function when the user looks away: nothing stays held.
 function whenAway(act) {
-  addEventListener("blur", act);
-  addEventListener("pagehide", act);
+  on(window, "blur pagehide", act);
   document.addEventListener("visibilitychange", () => { if (document.hidden) act(); });
 }
 

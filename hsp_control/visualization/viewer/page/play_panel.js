@@ -76,9 +76,7 @@ class PlayHold {
       this.button.setPointerCapture(pointerId);
       this.set(true);
     });
-    for (const kind of ["pointerup", "pointercancel", "lostpointercapture"]) {
-      this.button.addEventListener(kind, () => this.set(false));
-    }
+    on(this.button, "pointerup pointercancel lostpointercapture", () => this.set(false));
     this.button.addEventListener("contextmenu", (event) => event.preventDefault());
     whenAway(() => this.set(false));
   }
@@ -202,12 +200,10 @@ class PlayPanel {
       this.set(id, next);
     };
     input.onpointerdown = () => { held = true; };
-    for (const type of ["pointerup", "pointercancel", "change", "blur"]) {
-      input.addEventListener(type, () => {
-        held = false;
-        if (reported !== null) show(reported);
-      });
-    }
+    on(input, "pointerup pointercancel change blur", () => {
+      held = false;
+      if (reported !== null) show(reported);
+    });
     this.setters.set(id, (x) => {
       reported = x;
       if (!held) show(x);

@@ -41,12 +41,8 @@ class PlayerBar {
       player.pause();
       addEventListener("pointerup", () => { if (resume) player.play(); }, {once: true});
     };
-    for (const kind of ["pointerover", "focusin"]) {
-      this.bands.addEventListener(kind, ({target}) => this.nameBand(target));
-    }
-    for (const kind of ["pointerout", "focusout"]) {
-      this.bands.addEventListener(kind, () => this.nameBand(document.activeElement));
-    }
+    on(this.bands, "pointerover focusin", ({target}) => this.nameBand(target));
+    on(this.bands, "pointerout focusout", () => this.nameBand(document.activeElement));
     onKey((event) => this.actionOf(event));
     player.addEventListener("time", () => this.showTime());
     player.addEventListener("state", () => this.showState());

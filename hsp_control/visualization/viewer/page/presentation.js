@@ -22,7 +22,7 @@ class Presentation {
       this.at = [clientX, clientY];
       this.wake();
     });
-    for (const kind of ["pointerdown", "focusin"]) addEventListener(kind, () => this.wake());
+    on(window, "pointerdown focusin", () => this.wake());
     document.addEventListener("fullscreenchange", () => {
       if (document.fullscreenElement && !this.on) this.leaveFullScreen();  // it came too late
       else if (document.fullscreenElement) this.full = true;
@@ -74,9 +74,7 @@ class Presentation {
     const {camera, controls, dom_element: pane} = viewer, home = camera.position.clone();
     const begin = performance.now(), arm = home.clone().sub(controls.target);
     let taken = false;
-    for (const kind of ["pointerdown", "wheel"]) {
-      pane.addEventListener(kind, () => { taken = true; }, {capture: true, once: true});
-    }
+    on(pane, "pointerdown wheel", () => { taken = true; }, {capture: true, once: true});
     const step = (now) => {
       this.swaying = this.on && !taken && viewer.controls === controls;
       const t = (now - begin) / 1000, angle = 0.3 * Math.sin(0.25 * t) * (1 - Math.exp(-t / 3));

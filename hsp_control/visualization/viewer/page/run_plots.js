@@ -282,17 +282,15 @@ class RunPlot extends Plot {
   listen() {
     const {figure, side} = this;
     // A click of the mouse must not take the keyboard from the player.
-    figure.addEventListener("mousedown", (event) => event.preventDefault());
     // Nor must a finger leave a pointer behind, where the browser plays a mouse after a tap.
-    figure.addEventListener("touchend", (event) => event.preventDefault());
-    figure.addEventListener("pointerdown", (event) => this.press(event));
-    figure.addEventListener("pointermove", (event) => this.move(event));
-    figure.addEventListener("pointerup", (event) => this.release(event));
-    figure.addEventListener("pointercancel", (event) => this.release(event, true));
-    figure.addEventListener("dblclick", () => side.reset());
-    figure.addEventListener("wheel", (event) => this.wheel(event), {passive: false});
-    figure.addEventListener("keydown", (event) => this.key(event));
-    figure.addEventListener("focus", () => this.showValues());
+    on(figure, "mousedown touchend", (event) => event.preventDefault());
+    on(figure, "pointerdown", (event) => this.press(event));
+    on(figure, "pointermove", (event) => this.move(event));
+    on(figure, "pointerup pointercancel", (event) => this.release(event));
+    on(figure, "dblclick", () => side.reset());
+    on(figure, "wheel", (event) => this.wheel(event), {passive: false});
+    on(figure, "keydown", (event) => this.key(event));
+    on(figure, "focus", () => this.showValues());
   }
 
   // Where the curves are on the screen, and the time at a place there.
@@ -356,11 +354,11 @@ class RunPlot extends Plot {
     this.side.zoom(from, from + rate * width);
   }
 
-  release(event, cancelled = false) {
-    if (!this.fingers.delete(event.pointerId) || this.fingers.size) return;
+  release({pointerId, type}) {
+    if (!this.fingers.delete(pointerId) || this.fingers.size) return;
     const {side, drag} = this;
     this.stop();
-    if (cancelled || !drag) return;
+    if (type === "pointercancel" || !drag) return;
     if (drag.kind === "click") side.player.seek(this.timeAt(drag.x));
     if (drag.kind === "span" && drag.to > drag.from) side.zoom(drag.from, drag.to);
   }
