@@ -6,6 +6,7 @@ No display is needed: figures have an Agg canvas, and pyplot is not imported.
 import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from io import BytesIO
 from itertools import accumulate
 from pathlib import Path
@@ -215,6 +216,7 @@ def diagnostics_figure(
     names: Sequence[str] = (),
     panels: Sequence[str] = (),
     width: str | float | None = None,
+    absolute: bool = True,
 ) -> Figure:
     """Return a figure that compares runs with the law's predictions.
 
@@ -225,6 +227,7 @@ def diagnostics_figure(
         panels: The names of the panels, of `PANELS`; by default most of them.
         width: The width for a paper, such as ``84mm``, or in metres: without heading
             and foot. By default it is that of a page.
+        absolute: Whether angles of joints are absolute where the robot has such.
 
     Raises:
         PlotError: If a log has no rows, or there is no such panel.
@@ -251,7 +254,10 @@ def diagnostics_figure(
             _name_logs(figure, names or own)
         axes = figure.subplots(rows, columns, squeeze=False).ravel().tolist()
         for one, name in zip(axes, chosen, strict=False):
-            _draw_together(one, PANELS[name][0], runs)
+            draw = PANELS[name][0]
+            if name == "joints":
+                draw = partial(draw_joint_positions, absolute=absolute)
+            _draw_together(one, draw, runs)
         for unused in axes[len(chosen) :]:
             unused.set_axis_off()
         _letter_titles(axes, [PANELS[name][1] for name in chosen])
@@ -297,13 +303,11 @@ def _draw_together(
             if line.get_linewidth() > _THIN and line.get_linestyle() != "None"
         ]
         curves = curves or len(thick)
-        if curves <= 2:
-            for line in lines:
-                if line.get_linewidth() > _REFERENCE:
-                    line.set(color=palette.series(number))
-        if curves != 2:
-            for line in thick:
-                line.set_linestyle(_LOG_DASHES[number % len(_LOG_DASHES)])
+        for line in lines:
+            if curves <= 2 and line.get_linewidth() > _REFERENCE:
+                line.set(color=palette.series(number))
+            if curves != 2 and line in thick:
+                line.set(linestyle=_LOG_DASHES[number % 4])
     left, right, low, high = zip(*spans, strict=True)
     axes.set_xlim(min(left), max(right))
     axes.set_ylim(min(low), max(high))
