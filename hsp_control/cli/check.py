@@ -62,7 +62,7 @@ def _checked(
 ) -> dict[str, Any]:
     """Return what a configuration is made of, and its numbers at the start."""
     robot, controller = experiment.robot, experiment.controller
-    values = diagnostics.singular_values
+    values, efforts = diagnostics.singular_values, np.abs(output.tau)
     rank = int(np.sum(values > ROUNDING * values.max(initial=0.0)))
     held = controller.active_stack.first_task_row  # by contacts, or without motors
     tasks = {}
@@ -73,6 +73,7 @@ def _checked(
             "type": type(task).__name__,
             "rows": task.rows,
             "error": None if error is None else float(error),
+            "unit": ", ".join(dict.fromkeys(part.unit for part in task.error_parts)),
         }
     return {
         "robot": {"name": robot.name, "nq": robot.nq, "nv": robot.nv},
@@ -86,7 +87,8 @@ def _checked(
         "limits": "none" if controller.limits is None else output.status.name.lower(),
         "effort_rate": _rates(controller),
         "singular_values": list(map(float, values)),
-        "largest_effort": float(np.abs(output.tau).max()),
+        "largest_effort": float(efforts.max()),
+        "effort_unit": "N" if robot.units[efforts.argmax()] == "m" else "N·m",
     }
 
 
@@ -105,7 +107,8 @@ def _check_table(found: dict[str, Any]) -> Table:
     for name, task in found["tasks"].items():
         error = "not yet active"
         if task["error"] is not None:
-            error = f"|e| = {task['error']:.3g}"
+            unit = f"({task['unit']})" if "," in task["unit"] else task["unit"]
+            error = f"|e| = {task['error']:.3g} {unit}"
         table.add_row(
             f"task {name}", f"{task['type']}, {task['rows']} rows, {error} at the start"
         )
@@ -121,7 +124,8 @@ def _check_table(found: dict[str, Any]) -> Table:
         table.add_row("change of an effort", f"at most {most} N·m or N in 1 ms")
     values = ", ".join(f"{value:.3g}" for value in found["singular_values"])
     table.add_row("singular values", f"{values} at the start")
-    table.add_row("largest effort", f"{found['largest_effort']:.3g} at the start")
+    largest = f"{found['largest_effort']:.3g} {found['effort_unit']}"
+    table.add_row("largest effort", f"{largest} at the start")
     return table
 
 

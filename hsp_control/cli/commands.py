@@ -173,28 +173,27 @@ def plot(options: argparse.Namespace) -> int:
     others = entry_points("plots")
     if other := others.get(first.suffix.removeprefix(".")):
         return int(other.load()(options))
-    from hsp_control.visualization.plots import (
-        diagnostics_figure,
-        save_figure,
-        save_figures,
-    )
+    from hsp_control.visualization import plots
 
     runs = [Rollout.load(log) for log in options.logs]
     folder, formats = options.out or first.parent, options.formats or ["png"]
-    panels = [name.strip() for name in options.panels.split(",") if name.strip()]
+    names = [log.stem for log in options.logs]
+    panels, absolute = re.findall(r"[^,\s]+", options.panels), not options.relative
     with working("Drawing"):
-        if len(runs) == 1 and not panels and not options.width:
-            absolute = not options.relative
-            files = save_figures(
-                runs[0], folder, first.stem, formats, absolute=absolute
-            )
-        else:
-            names = [log.stem for log in options.logs]
-            figure = diagnostics_figure(
-                *runs, names=names, panels=panels, width=options.width
+        if runs[1:] or panels or options.width:
+            figure = plots.diagnostics_figure(
+                *runs,
+                names=names,
+                panels=panels,
+                width=options.width,
+                absolute=absolute,
             )
             stem = f"{'+'.join(names)}-{'-'.join(panels) or 'diagnostics'}"
-            files = save_figure(figure, folder / file_name(stem), formats)
+            files = plots.save_figure(figure, folder / file_name(stem), formats)
+        else:
+            files = plots.save_figures(
+                runs[0], folder, names[0], formats, absolute=absolute
+            )
     for file in files:
         _out.print(f"Figure: {file}")
     return 0

@@ -11,12 +11,10 @@ from hsp_control.simulation.limit_excess import POSITION, VELOCITY
 from hsp_control.simulation.log_series import (
     FAR,
     OUT,
-    ErrorPart,
     effort_units,
     rate_unit,
     rows_compare,
     task_errors,
-    task_names,
     unreached,
 )
 
@@ -28,12 +26,9 @@ def summary(rollout: Rollout) -> Table:
         "run", f"{len(rollout)} rows to t = {rollout.t[-1]:g} s, {rollout.status}"
     )
     tasks = rollout.meta["tasks"]
-    parts: dict[str, list[ErrorPart]] = {task: [] for task in tasks}
-    for part in task_errors(rollout):
-        parts[task_names(rollout)[part.task]].append(part)
     away = {each.task: each for each in unreached(rollout.columns, tasks)}
-    for task in tasks:
-        for part in parts[task]:
+    for k, task in enumerate(tasks):
+        for part in (each for each in task_errors(rollout) if each.task == k):
             tracked = part.norm[np.isfinite(part.norm)]  # it may be off for a while
             if not len(tracked):
                 table.add_row(f"task {part.label}", "was never active")
@@ -60,15 +55,9 @@ def summary(rollout: Rollout) -> Table:
         table.add_row("det(J W⁻¹ Jᵀ)", least)
     else:  # determinants of different sizes do not compare
         table.add_row("J L⁻ᵀ", smallest)
-    largest, units = np.abs(rollout.tau).max(axis=0), np.array(effort_units(rollout))
-    acts = (
-        largest > 0.0 if largest.any() else largest == 0.0
-    )  # a floating base has none
-    most = [
-        f"{largest[units == unit].max():.3g} {unit}"
-        for unit in dict.fromkeys(units[acts].tolist())
-    ]
-    table.add_row("effort", f"largest {' and '.join(most)}")
+    largest = np.abs(rollout.tau).max(axis=0)
+    unit = effort_units(rollout)[largest.argmax()]
+    table.add_row("effort", f"largest {largest.max():.3g} {unit}")
     for row in limit_rows(rollout):
         table.add_row("limits", row)
     if damped := int((rollout["damped"] > 0.0).sum()):

@@ -157,13 +157,6 @@ class Document:
         self._origins[path] = origin
         return path
 
-    def beside(self, path: KeyPath) -> list[str]:
-        """Return the other keys of the mapping that has the last key of a path."""
-        holder: Any = self._data
-        for part in path[:-1]:
-            holder = holder[part]
-        return [key for key in holder if key != path[-1]]
-
     def __contains__(self, path: KeyPath) -> bool:
         value: Any = self._data
         for part in path:

@@ -15,6 +15,7 @@ from hsp_control.config.experiment import controller_data
 from hsp_control.config.loaded_scenario import load_scenario
 from hsp_control.control.controller import Controller
 from hsp_control.control.output import ControlOutput
+from hsp_control.declaration.language import check_kind
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.log_writer import LogWriter
@@ -55,6 +56,7 @@ class Recorder:
         Raises:
             LogError: If the period is not positive, or the file cannot be written.
         """
+        check_kind("controller is", controller, Controller, LogError)
         if not 0.0 < log_period < inf:
             raise LogError(f"log_period is {log_period} s; must be positive")
         self.path = None if path is None else Path(path)

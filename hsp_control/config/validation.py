@@ -1,5 +1,7 @@
 """Check a document against its schema, and report all mistakes in one error."""
 
+from functools import reduce
+from operator import getitem
 from typing import TypeVar
 
 from pydantic import TypeAdapter, ValidationError
@@ -43,9 +45,10 @@ def _error(document: Document, finding: Finding) -> HspControlError:
     """Return the error of a finding; one that a part raised keeps its class."""
     own = domain_error(finding.error)
     if own is None:
-        message = explained(finding)
-        if finding.kind == "union_tag_not_found" and isinstance(finding.path[-1], str):
-            message += did_you_mean(finding.path[-1], document.beside(finding.path))
+        message, (*holder, key) = explained(finding), finding.path or ("",)
+        if finding.kind == "union_tag_not_found" and isinstance(key, str):
+            beside = reduce(getitem, holder, document.to_dict())  # type: ignore[arg-type]
+            message += did_you_mean(key, [name for name in beside if name != key])
         return document.error(finding.path, message)
     path = (*finding.path, *own.path)
     error = type(own)(own.bare_message)

@@ -358,6 +358,10 @@ def _word(option: Any, bounds: tuple[int, int | None], *, many: bool) -> str:
     container = get_origin(option) or option
     if not isinstance(container, type):
         return ""
+    named = [each for each in get_args(option)[1:] if hasattr(each, "family")]
+    if named and issubclass(container, Mapping) and not many:  # parts by their names
+        part = named[0].__name__
+        return spoken("a mapping", f"several, such as [{part}(...)]")
     if is_model(container) or issubclass(container, Mapping):
         one, several = spoken("a mapping", "a dict"), spoken("mappings", "dicts")
         return several if many else one

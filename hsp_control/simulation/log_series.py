@@ -160,6 +160,18 @@ def rows_compare(rollout: Rollout) -> bool:
     return len(np.unique(sizes)) == 1
 
 
+MAX_NAMED, SELECTED = 14, 7
+"""Of more than 14 curves, only the 7 that vary most get a colour and a name."""
+
+
+def lively(values: Array) -> list[int]:
+    """Return the columns that get a name, of shape (N, k)."""
+    if values.shape[1] <= MAX_NAMED:
+        return [*range(values.shape[1])]
+    spread = np.ptp(np.nan_to_num(values, posinf=0.0, neginf=0.0), axis=0)
+    return sorted(np.argsort(-spread, kind="stable")[:SELECTED].tolist())
+
+
 def spans_of(
     times: Array, active: NDArray[np.bool_], closed: float = 0.0
 ) -> list[tuple[float, float]]:

@@ -242,18 +242,7 @@ def _count_rows(
         )
     if control_period is None:
         return rows, 0
-    try:
-        periods = _whole(log_period, control_period, "log_period", "control_period")
-    except SimulationError:
-        if log_period != LOG_PERIOD or not 0.0 < control_period < np.inf:
-            raise
-        fitting = max(round(LOG_PERIOD / control_period), 1) * control_period
-        with within("control_period"):
-            raise SimulationError(
-                f"a row is logged every {LOG_PERIOD:g} s unless log_period says "
-                f"otherwise, which is not a whole multiple of {control_period:g} s; "
-                f"give log_period, too, for example {fitting:g}"
-            ) from None
+    periods = _whole(log_period, control_period, "log_period", "control_period")
     check_steps(duration, control_period, "control_period")
     return rows, periods
 
@@ -279,6 +268,13 @@ def _whole(total: float, part: float, total_name: str, part_name: str) -> int:
             f"{part_name} = {part:g} s; at most {MAX_STEPS:.0e} times"
         )
     if abs(ratio - round(ratio)) > 1e-6 * max(1.0, ratio) or round(ratio) < 1:
+        if (total, total_name) == (LOG_PERIOD, "log_period"):  # nobody has written it
+            with within(part_name):
+                raise SimulationError(
+                    f"a row is logged every {total:g} s unless log_period says "
+                    f"otherwise, which is not a whole multiple of {part:g} s; give "
+                    f"log_period, too, for example {max(round(ratio), 1) * part:g}"
+                )
         raise SimulationError(
             f"{total_name} = {total:g} s is not a whole multiple of "
             f"{part_name} = {part:g} s"

@@ -10,6 +10,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.log_series import (
     LIMITED,
+    MAX_NAMED,
     column_unit,
     effort_units,
     field_terms,
@@ -17,11 +18,11 @@ from hsp_control.simulation.log_series import (
     joint_names,
     joint_positions,
     limit,
+    lively,
     logged_distances,
     position_units,
     predicted_decay,
     rate_unit,
-    rows_compare,
     spans_of,
     task_errors,
 )
@@ -77,8 +78,6 @@ def _fitting(axes: Axes, labels: Sequence[str]) -> int:
     return 1
 
 
-MAX_NAMED, SELECTED = 14, 7
-"""Of more than 14 lines, only the 7 that vary most get a colour and a name."""
 _DASHES = ("-", "--", ":", "-.")  # neighbours differ without their colours, too
 _NEAR = 0.2  # a limit is near within this share of a joint's own range
 
@@ -98,14 +97,11 @@ def draw_lines(
     line is drawn if it comes near. Shapes: t (N,), values (N, k), limits (k,) each.
     """
     units = list(units or [""] * len(names))
-    named, others = list(range(len(names))), []
-    if len(names) > MAX_NAMED:
-        spread = np.ptp(np.nan_to_num(values, posinf=0.0, neginf=0.0), axis=0)
-        named = sorted(np.argsort(-spread, kind="stable")[:SELECTED].tolist())
-        shown = {units[k] for k in named}
-        others = [k for k in range(len(names)) if k not in named and units[k] in shown]
-        for k in others:
-            axes.plot(t, values[:, k], color=palette.MUTED, linewidth=0.6, alpha=0.5)
+    named = lively(values)
+    shown = {units[k] for k in named}
+    others = [k for k in range(len(names)) if k not in named and units[k] in shown]
+    for k in others:
+        axes.plot(t, values[:, k], color=palette.MUTED, linewidth=0.6, alpha=0.5)
     kinds = list(dict.fromkeys(units[k] for k in named))
     for place, k in enumerate(named):
         name = literal_text(names[k])
@@ -120,18 +116,13 @@ def draw_lines(
     if others:
         note(axes, f"{len(others)} others (grey)")
     label: str | None = "limits"
-    lower, upper = limits or (np.full(len(names), np.nan),) * 2
     for place, k in enumerate(named):
-        low, high = lower[k], upper[k]
-        room = _NEAR * (high - low) if np.isfinite([low, high]).all() else -1.0
-        for edge in (low, high):
-            if np.nanmin(np.abs(values[:, k] - edge)) <= room:
+        low, high = (each[k] for each in limits) if limits else (-np.inf, np.inf)
+        for edge in (low, high) if high < np.inf else ():
+            if np.abs(values[:, k] - edge).min() <= _NEAR * (high - low):
+                color, dotted = palette.series(place), (0, (1, 1.5))
                 axes.axhline(
-                    edge,
-                    color=palette.series(place),
-                    linewidth=0.9,
-                    linestyle=(0, (1, 1.5)),
-                    label=label,
+                    edge, color=color, linewidth=0.9, linestyle=dotted, label=label
                 )
                 label = None
     return ", ".join(kinds)
@@ -142,9 +133,11 @@ def point_marker(t: Array) -> str:
     return "o" if len(t) == 1 else ""
 
 
-def finish_time_axis(axes: Axes, t: Array) -> None:
-    """Label the time axis, fit it to the log, and add the legend."""
-    axes.set_xlabel("time [s]")
+def finish(axes: Axes, rollout: Rollout, label: str) -> None:
+    """Mark steps, label both axes, fit that of time to the log, and add the legend."""
+    t = rollout.t
+    mark_steps(axes, rollout)
+    axes.set(xlabel="time [s]", ylabel=label)
     if t[-1] > t[0]:
         axes.set_xlim(float(t[0]), float(t[-1]))
     legend_below(axes)
@@ -209,12 +202,10 @@ def draw_task_errors(axes: Axes, rollout: Rollout) -> None:
             marker=point_marker(t),
             label=literal_text(f"{part.label} [{part.unit}]"),
         )
-    mark_steps(axes, rollout)
     norms = [np.zeros(0), *(part.norm for part in parts)]
     log_scale(axes, np.concatenate(norms), top=1e-6)
     units = ", ".join(dict.fromkeys(part.unit for part in parts))
-    axes.set_ylabel(rf"task error $\Vert e \Vert$ [{units}]")
-    finish_time_axis(axes, t)
+    finish(axes, rollout, rf"task error $\Vert e \Vert$ [{units}]")
 
 
 def draw_joint_positions(
@@ -222,52 +213,45 @@ def draw_joint_positions(
 ) -> None:
     """Draw the joint positions, unwrapped: not limited to one turn."""
     positions, what = joint_positions(rollout, absolute=absolute)
-    names, units = joint_names(rollout), position_units(rollout)
-    both = limit(rollout, "lower"), limit(rollout, "upper")
     own = "absolute" not in what  # limits are those of the joints
-    unit = draw_lines(axes, rollout.t, positions, names, units, both if own else None)
-    mark_steps(axes, rollout)
-    axes.set_ylabel(f"{what} [{unit}]")
-    finish_time_axis(axes, rollout.t)
+    limits = (limit(rollout, "lower"), limit(rollout, "upper")) if own else None
+    _draw_joints(axes, rollout, what, positions, position_units(rollout), limits)
 
 
 def draw_speeds(axes: Axes, rollout: Rollout) -> None:
     """Draw the joints' speeds, with the limits that they come near."""
-    most = limit(rollout, "velocity")
-    units = [f"{unit}/s" for unit in position_units(rollout)]
-    names = joint_names(rollout)
-    unit = draw_lines(axes, rollout.t, rollout.v, names, units, (-most, most))
-    mark_steps(axes, rollout)
-    axes.set_ylabel(f"joint speed [{unit}]")
-    finish_time_axis(axes, rollout.t)
+    units, most = position_units(rollout), limit(rollout, "velocity")
+    units = [f"{unit}/s" for unit in units]
+    _draw_joints(axes, rollout, "joint speed", rollout.v, units, (-most, most))
 
 
 def draw_efforts(axes: Axes, rollout: Rollout) -> None:
     """Draw the joints' efforts tau, with the limits that they come near."""
-    names, units = joint_names(rollout), effort_units(rollout)
-    most = limit(rollout, "effort")
-    unit = draw_lines(axes, rollout.t, rollout.tau, names, units, (-most, most))
-    mark_steps(axes, rollout)
-    axes.set_ylabel(f"effort τ [{unit}]")
-    finish_time_axis(axes, rollout.t)
+    units, most = effort_units(rollout), limit(rollout, "effort")
+    _draw_joints(axes, rollout, "effort τ", rollout.tau, units, (-most, most))
+
+
+def _draw_joints(
+    axes: Axes,
+    rollout: Rollout,
+    what: str,
+    values: Array,
+    units: Sequence[str],
+    limits: tuple[Array, Array] | None,
+) -> None:
+    names = joint_names(rollout)
+    unit = draw_lines(axes, rollout.t, values, names, units, limits)
+    finish(axes, rollout, f"{what} [{unit}]")
 
 
 _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
 
 def draw_determinant(axes: Axes, rollout: Rollout) -> None:
-    """Draw det(J W⁻¹ Jᵀ), the square of Yoshikawa's measure, and mark its minimum.
-
-    Where the tasks' rows change in number, as of a robot that walks, determinants do
-    not compare, and the smallest singular value is drawn.
-    """
-    t, values, what = rollout.t, rollout["manipulability"], "manipulability"
-    name = r"$\det(J\,W^{-1}J^{\mathsf{T}})$"
-    if not rows_compare(rollout):
-        what, name = "singular_values", r"smallest $\sigma$ of $J\,L^{-\mathsf{T}}$"
-        values = np.nanmin(rollout[what], axis=1)
+    """Draw det(J W⁻¹ Jᵀ), the square of Yoshikawa's measure, and mark its minimum."""
+    t, values = rollout.t, rollout["manipulability"]
     axes.plot(t, values, color=palette.TASK, marker=point_marker(t))
-    minimum = int(np.nanargmin(values))
+    minimum = int(np.argmin(values))
     axes.plot(
         t[minimum],
         values[minimum],
@@ -281,11 +265,10 @@ def draw_determinant(axes: Axes, rollout: Rollout) -> None:
         zorder=3,
         label=f"minimum {values[minimum]:.3g} at {t[minimum]:.2f} s",
     )
-    mark_steps(axes, rollout)
     maximum = float(values[np.isfinite(values)].max(initial=1e-12))
     axes.set_ylim(0.0, 1.08 * maximum)
-    axes.set_ylabel(f"{name} [{column_unit(rollout, what)}]")
-    finish_time_axis(axes, t)
+    unit = column_unit(rollout, "manipulability")
+    finish(axes, rollout, rf"$\det(J\,W^{{-1}}J^{{\mathsf{{T}}}})$ [{unit}]")
 
 
 def draw_singular_values(axes: Axes, rollout: Rollout) -> None:
@@ -293,14 +276,12 @@ def draw_singular_values(axes: Axes, rollout: Rollout) -> None:
     values = rollout["singular_values"]
     names = [f"σ{k + 1}".translate(_SUBSCRIPTS) for k in range(values.shape[1])]
     draw_lines(axes, rollout.t, values, names)
-    mark_steps(axes, rollout)
     if float(np.nanmin(values)) < 0.05 * float(np.nanmax(values)):
         log_scale(axes, values)
     else:
         axes.set_ylim(bottom=0.0)
     unit = column_unit(rollout, "singular_values")
-    axes.set_ylabel(rf"singular values of $J\,L^{{-\mathsf{{T}}}}$ [{unit}]")
-    finish_time_axis(axes, rollout.t)
+    finish(axes, rollout, rf"singular values of $J\,L^{{-\mathsf{{T}}}}$ [{unit}]")
 
 
 def draw_null_space_error(axes: Axes, rollout: Rollout) -> None:
@@ -340,10 +321,8 @@ def draw_null_space_error(axes: Axes, rollout: Rollout) -> None:
         note(axes, decay.why_not)
     if period := held_period(rollout):
         note(axes, f"effort held for {1e3 * period:g} ms")
-    mark_steps(axes, rollout)
     log_scale(axes, norm, top=1e-6)
-    axes.set_ylabel(rf"$\Vert e_N \Vert_W$ [{rate_unit(rollout)}]")
-    finish_time_axis(axes, t)
+    finish(axes, rollout, rf"$\Vert e_N \Vert_W$ [{rate_unit(rollout)}]")
 
 
 def draw_field_value(axes: Axes, rollout: Rollout) -> None:
@@ -355,8 +334,7 @@ def draw_field_value(axes: Axes, rollout: Rollout) -> None:
     if float(np.ptp(values)) == 0.0:
         axes.set_ylim(float(values[0]) - 0.5, float(values[0]) + 0.5)
     unit = column_unit(rollout, "field.value")
-    axes.set_ylabel(f"field value [{unit}]")
-    finish_time_axis(axes, t)
+    finish(axes, rollout, f"field value [{unit}]")
 
 
 def draw_field_terms(axes: Axes, rollout: Rollout) -> None:
@@ -365,8 +343,7 @@ def draw_field_terms(axes: Axes, rollout: Rollout) -> None:
     norms = [np.linalg.norm(rollout[f"field.{name}.g"], axis=1) for name in names]
     draw_lines(axes, rollout.t, np.column_stack(norms), names)
     axes.set_ylim(bottom=0.0)
-    axes.set_ylabel(rf"contribution $\Vert g_k \Vert$ [{rate_unit(rollout)}]")
-    finish_time_axis(axes, rollout.t)
+    finish(axes, rollout, rf"contribution $\Vert g_k \Vert$ [{rate_unit(rollout)}]")
 
 
 def draw_distances(axes: Axes, rollout: Rollout) -> None:
@@ -383,5 +360,4 @@ def draw_distances(axes: Axes, rollout: Rollout) -> None:
                 zorder=1.0,
                 label=name or None,
             )
-    axes.set_ylabel("minimum distance [m]")
-    finish_time_axis(axes, rollout.t)
+    finish(axes, rollout, "minimum distance [m]")

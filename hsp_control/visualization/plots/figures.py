@@ -6,6 +6,7 @@ No display is needed: figures have an Agg canvas, and pyplot is not imported.
 import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from io import BytesIO
 from itertools import accumulate
 from pathlib import Path
@@ -168,7 +169,10 @@ def paper_figure(
         draw_end_effector(a, rollout)
         a.set_anchor("NW")
         draw_joint_positions(b, rollout, absolute=absolute)
-        draw_determinant(c, rollout)
+        third, title = PANELS[
+            "determinant" if rows_compare(rollout) else "singular_values"
+        ]
+        third(c, rollout)
         strip, together = lower.subfigures(1, 2, width_ratios=(1.9, 1.0))
         columns = columns_for(rollout, len(rows), 6.8, 2.7)
         cells = strip.subplots(-(-len(rows) // columns), columns, squeeze=False)
@@ -180,15 +184,11 @@ def paper_figure(
         draw_superimposed(e, rollout, rows)
         e.set_anchor("N")
         together.suptitle("(e)  Frames together", **_HEADING)
-        titles = ["End effector", "Joints", _determinant(rollout)]
+        titles = ["End effector", "Joints", title]
         _letter_titles([a, b, c], titles, pad=18.0)  # space for the frames' numbers
         for over_time in (b, c):
             mark_frames(over_time, rollout.t[rows])
     return figure
-
-
-def _determinant(rollout: Rollout) -> str:
-    return "Determinant" if rows_compare(rollout) else "Smallest singular value"
 
 
 PANELS: dict[str, tuple[Callable[[Axes, Rollout], None], str]] = {
@@ -216,6 +216,7 @@ def diagnostics_figure(
     names: Sequence[str] = (),
     panels: Sequence[str] = (),
     width: str | float | None = None,
+    absolute: bool = True,
 ) -> Figure:
     """Return a figure that compares runs with the law's predictions.
 
@@ -226,6 +227,7 @@ def diagnostics_figure(
         panels: The names of the panels, of `PANELS`; by default most of them.
         width: The width for a paper, such as ``84mm``, or in metres: without heading
             and foot. By default it is that of a page.
+        absolute: Whether angles of joints are absolute where the robot has such.
 
     Raises:
         PlotError: If a log has no rows, or there is no such panel.
@@ -234,48 +236,49 @@ def diagnostics_figure(
     for each in runs:
         _check(each)
     chosen = _chosen_panels(runs, panels)
-    inches = None if width is None else _inches(width)
-    rows = 2 if len(chosen) > 3 else 1
-    columns = -(-len(chosen) // rows)
-    if inches is not None:
-        columns = min(max(round(inches / 3.0), 1), len(chosen))
-        rows = -(-len(chosen) // columns)
-    wide = 3.6 * columns if inches is None else inches
-    high = rows * (_SHAPE[0] * wide / columns + _SHAPE[1])
+    if width is None:
+        columns = -(-len(chosen) // (1 if len(chosen) <= 3 else 2))
+        wide, more = 3.6 * columns, 0.6
+    else:
+        wide, more = _inches(width), 0.0
+        columns = min(max(round(wide / 3.0), 1), len(chosen))
+    rows = -(-len(chosen) // columns)
+    high = rows * (_SHAPE[0] * wide / columns + _SHAPE[1]) + more
     with styled():
-        figure = new_figure(wide, high if inches else high + 0.6)
-        if inches is None:
+        figure = new_figure(wide, high)
+        if width is None:
             _add_title(figure, rollout)
         if others:
             figure.suptitle("")  # the names of the logs stand there
-            _name_logs(figure, names or _names_of(runs))
+            own = [f"{k} {run.meta.get('name', '')}" for k, run in enumerate(runs, 1)]
+            _name_logs(figure, names or own)
         axes = figure.subplots(rows, columns, squeeze=False).ravel().tolist()
         for one, name in zip(axes, chosen, strict=False):
-            _draw_together(one, PANELS[name][0], runs)
+            draw = PANELS[name][0]
+            if name == "joints":
+                draw = partial(draw_joint_positions, absolute=absolute)
+            _draw_together(one, draw, runs)
         for unused in axes[len(chosen) :]:
             unused.set_axis_off()
-        titles = [PANELS[name][1] for name in chosen]
-        if "determinant" in chosen:
-            titles[chosen.index("determinant")] = _determinant(rollout)
-        _letter_titles(axes, titles)
+        _letter_titles(axes, [PANELS[name][1] for name in chosen])
     return figure
 
 
 def _chosen_panels(runs: Sequence[Rollout], panels: Sequence[str]) -> list[str]:
-    """Return the panels that are asked for and can be drawn of all runs."""
-    absent = {"distances"} if not all(map(distances, runs)) else set()
-    if not all(len(field_terms(run)) > 1 for run in runs):
-        absent.add("terms")
-    own = [*PANELS][:8]
-    if not all(map(rows_compare, runs)):
-        own.remove("determinant")
+    """Return the panels that are asked for, or all that can be drawn of all runs."""
+    can = {
+        "determinant": all(map(rows_compare, runs)),
+        "distances": all(map(distances, runs)),
+        "terms": all(len(field_terms(run)) > 1 for run in runs),
+    }
     for name in panels:
         if name not in PANELS:
             near = f"{did_you_mean(name, PANELS)} (there are {listing(PANELS)})"
             raise PlotError(f"no panel {name!r}{near}")
-        if name in absent:
-            raise PlotError(f"the log has no {name} to draw")
-    return [*dict.fromkeys(panels)] or [name for name in own if name not in absent]
+        if not can.get(name, True):
+            raise PlotError(f"there are no {name} to draw, or none that compare")
+    usual = [name for name in PANELS if name not in ("joints", "speeds")]
+    return [*dict.fromkeys(panels)] or [name for name in usual if can.get(name, True)]
 
 
 def _draw_together(
@@ -300,13 +303,11 @@ def _draw_together(
             if line.get_linewidth() > _THIN and line.get_linestyle() != "None"
         ]
         curves = curves or len(thick)
-        if curves <= 2:
-            for line in lines:
-                if line.get_linewidth() > _REFERENCE:
-                    line.set(color=palette.series(number))
-        if curves != 2:
-            for line in thick:
-                line.set_linestyle(_LOG_DASHES[number % len(_LOG_DASHES)])
+        for line in lines:
+            if curves <= 2 and line.get_linewidth() > _REFERENCE:
+                line.set(color=palette.series(number))
+            if curves != 2 and line in thick:
+                line.set(linestyle=_LOG_DASHES[number % 4])
     left, right, low, high = zip(*spans, strict=True)
     axes.set_xlim(min(left), max(right))
     axes.set_ylim(min(low), max(high))
@@ -331,13 +332,6 @@ def _name_logs(figure: Figure, names: Sequence[str]) -> None:
         ncols=1 if long else len(names),
         handlelength=3.0,
     )
-
-
-def _names_of(runs: Sequence[Rollout]) -> list[str]:
-    names = [str(run.meta.get("name") or "run") for run in runs]
-    if len({*names}) == len(names):
-        return names
-    return [f"{name} ({k})" for k, name in enumerate(names, 1)]
 
 
 def _letter_titles(

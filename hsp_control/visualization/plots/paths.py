@@ -1,6 +1,5 @@
 """Desired and actual path of the end effector, in a plane or in a box."""
 
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +15,7 @@ from hsp_control.visualization.plots.world import (
     View,
     best_plane,
     center_points,
+    corners,
     draw_obstacle,
     enclosing_points,
     end_points,
@@ -147,11 +147,6 @@ def _draw_tick_labels(
         va="center" if upright else "top",
         rotation=90.0 if upright else 0.0,
     )
-
-
-def corners(lower: Array, upper: Array) -> Array:
-    """Return the corners of a box, shape (8, 3)."""
-    return np.array(list(product(*np.stack([lower, upper]).T)))
 
 
 NEARLY_FLAT = 0.05  # depth over width below which a path is drawn in one plane

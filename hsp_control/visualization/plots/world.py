@@ -112,8 +112,8 @@ class LoggedObstacle(NamedTuple):
     def enclosing_points(self) -> Array:
         """Return points that enclose it at all rows [m], shape (M, 3)."""
         low, high = self.points.min(axis=0), self.points.max(axis=0)
-        corners = _corners(low, high) if len(self.points) > 8 else self.points
-        rotated = corners @ np.swapaxes(self.rotation, 1, 2)  # (N, K, 3)
+        extreme = corners(low, high) if len(self.points) > 8 else self.points
+        rotated = extreme @ np.swapaxes(self.rotation, 1, 2)  # (N, K, 3)
         placed = (rotated + self.center[:, None]).reshape(-1, 3)
         return np.concatenate([placed - self.radius, placed + self.radius])
 
@@ -156,7 +156,8 @@ def _logged_obstacle(
     )
 
 
-def _corners(low: Array, high: Array) -> Array:
+def corners(low: Array, high: Array) -> Array:
+    """Return the corners of a box, shape (8, 3)."""
     return np.array(list(product(*np.stack([low, high]).T)))
 
 
@@ -173,14 +174,14 @@ def _cylinder(about: Mapping[str, Any]) -> tuple[Array, float]:
 
 def _box(about: Mapping[str, Any]) -> tuple[Array, float]:
     half = 0.5 * np.asarray(about["size"], dtype=float)
-    return _corners(-half, half), 0.0
+    return corners(-half, half), 0.0
 
 
 def _height_field(about: Mapping[str, Any]) -> tuple[Array, float]:
     heights = np.asarray(about["heights"], dtype=float)
     half = 0.5 * np.asarray(about["size"], dtype=float)
     low = np.array([*-half, heights.min()])
-    return _corners(low, np.array([*half, heights.max()])), 0.0
+    return corners(low, np.array([*half, heights.max()])), 0.0
 
 
 _POINTS_OF_SHAPE: dict[str, Callable[[Mapping[str, Any]], tuple[Array, float]]] = {

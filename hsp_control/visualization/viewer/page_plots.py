@@ -10,6 +10,9 @@ from hsp_control.control.controller import Controller
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout, log_series
 from hsp_control.simulation.log_series import (
+    MAX_NAMED,
+    SELECTED,
+    lively,
     logged_distances,
     predicted_decay,
     spans_of,
@@ -30,9 +33,6 @@ from hsp_control.visualization.viewer.packing import (
     ArrayTable,
     keyframe_rows,
 )
-
-_MAX_CURVES, _SELECTED = 14, 7
-"""Of more than 14 curves, only the 7 that vary most are shown."""
 
 
 class Series(NamedTuple):
@@ -94,20 +94,14 @@ def panels_of(
         )
         yield Panel("Minimum distance", "m", curves, edges=list(edges))
     joints = log_series.joint_names(rollout)
-    some = f"{_SELECTED} of {len(joints)}" if len(joints) > _MAX_CURVES else ""
+    some = f"{SELECTED} of {len(joints)}" if len(joints) > MAX_NAMED else ""
     positions, what = log_series.joint_positions(rollout)
     curves, unit = _lines(positions, joints, log_series.position_units(rollout))
     yield Panel(what.capitalize() + "s", unit, curves, note=some)
-    least = rollout["singular_values"]
     if log_series.rows_compare(rollout):
-        values, of = rollout["manipulability"], "det(J W⁻¹ Jᵀ)"
         unit = log_series.column_unit(rollout, "manipulability")
-        yield Panel("Determinant", unit, [Series(of, values, palette.TASK)])
-    elif least.size:
-        values = np.nanmin(least, axis=1)
-        unit = log_series.column_unit(rollout, "singular_values")
-        curves = [Series("smallest σ of J L⁻ᵀ", values, palette.TASK)]
-        yield Panel("Singular value", unit, curves)
+        curves = [Series("det(J W⁻¹ Jᵀ)", rollout["manipulability"], palette.TASK)]
+        yield Panel("Determinant", unit, curves)
     name = str(rollout.meta.get("field", "field")).replace("_", " ")
     value = Series(name, rollout["field.value"], palette.FIELD)
     unit = log_series.column_unit(rollout, "field.value")
@@ -136,10 +130,9 @@ def _lines(
     values: Array, names: Sequence[str], units: Sequence[str] | None = None
 ) -> tuple[list[Series], str]:
     """Return one curve per column (of many, those that vary most), and units."""
-    count = len(names) if len(names) <= _MAX_CURVES else _SELECTED
-    order = np.argsort(-np.ptp(values, axis=0), kind="stable")[:count]
+    chosen = lively(values)
     units = list(units or [""] * len(names))
-    kinds = list(dict.fromkeys(units[column] for column in sorted(order.tolist())))
+    kinds = list(dict.fromkeys(units[column] for column in chosen))
     mixed = len(kinds) > 1
     curves = [
         Series(
@@ -148,7 +141,7 @@ def _lines(
             palette.series(place),
             place >= len(palette.SERIES),
         )
-        for place, column in enumerate(sorted(order.tolist()))
+        for place, column in enumerate(chosen)
     ]
     return curves, ", ".join(kinds)
 

@@ -13,6 +13,7 @@ from hsp_control.config.loaded_scenario import load_robot
 from hsp_control.config.scenario import Scenario
 from hsp_control.config.validation import validate
 from hsp_control.control.controller import Controller
+from hsp_control.declaration.language import check_kind
 from hsp_control.robot import Robot
 from hsp_control.robot.description.access import ANYWHERE, Access, only_within
 from hsp_control.robot.description.sources import packaged_folders
@@ -146,6 +147,7 @@ def show(
             robot, a view has no such field, or a value is not valid.
         ExportError: If a mesh cannot be read, or the library for it is not installed.
     """
+    check_kind("rollout is", rollout, Rollout, ViewerError)
     if robot is None:
         _, robot, _, controller = rebuild_run(rollout, "the log")
     recorder = SceneRecorder()

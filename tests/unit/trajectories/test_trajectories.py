@@ -270,7 +270,7 @@ def test_a_trajectory_of_ones_own() -> None:
     )
     with pytest.raises(ImmutableError, match=r"^Fall.height cannot be assigned"):
         Fall(2.0).height = 3.0
-    with pytest.raises(TrajectoryError, match=r"^Fall: height: 'high' is text"):
+    with pytest.raises(TrajectoryError, match=r"^Fall: height: 'high' is a str"):
         Fall("high")
 
 
