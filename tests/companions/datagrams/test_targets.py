@@ -9,11 +9,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from places import ROOT
 
 import hsp_control as hsp
 from hsp_control import Stream
+from hsp_control.cli.live_experiment import of_a_robot
 from hsp_control.common.exceptions import StreamError
 from hsp_control.companions.datagrams.targets import _Part
+from hsp_control.config.source import read_document
 
 
 def free_port() -> int:
@@ -90,6 +93,18 @@ def test_a_port_is_free_again_when_its_streams_are_gone(port: int) -> None:
     for _ in range(2):
         both = listening(port, "/left"), listening(port, "/right")
         del both
+
+
+def test_a_robot_alone_leaves_the_port_to_its_loop(port: int) -> None:
+    source = f"tasks.hand.trajectory.source=udp://127.0.0.1:{port}"
+    document = read_document(ROOT / "examples/stream/panda.yaml")
+    document.override(source)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as loop:
+        loop.bind(("127.0.0.1", port))
+        experiment = of_a_robot(document)
+        with pytest.raises(StreamError, match="cannot listen there"):
+            hsp.load_experiment(ROOT / "examples/stream/panda.yaml", source)
+    assert isinstance(experiment.controller.tasks[0].trajectory, hsp.StreamPose)
 
 
 def test_each_stream_of_a_port_hears_its_part_or_nobody_does(
