@@ -22,7 +22,7 @@ def main() -> int:
     command = [sys.executable, "-m", "pip", "install", "--quiet", LEROBOT]
     command += ["--editable", str(PLUGIN), "pytest>=8", "pytest-timeout"]
     subprocess.run(command, check=True, env=own)
-    tests = [sys.executable, "-m", "pytest", "--rootdir", str(PLUGIN), str(PLUGIN)]
+    tests = [sys.executable, "-m", "pytest", "--rootdir", str(PLUGIN)]
     return subprocess.run([*tests, *sys.argv[1:]], cwd=PLUGIN, check=False).returncode
 
 

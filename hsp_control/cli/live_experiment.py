@@ -12,6 +12,9 @@ from hsp_control.cli.loading import load
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HardwareError
 from hsp_control.config import Experiment
+from hsp_control.config.document import Document
+from hsp_control.config.loaded_scenario import load_scenario
+from hsp_control.config.streams import deaf
 from hsp_control.declaration import within
 from hsp_control.live import SimulatedRobot
 from hsp_control.live.settings import check_held
@@ -19,6 +22,12 @@ from hsp_control.live.simulated_robot import sampled
 
 FINAL_HOLD = 0.5
 """Time for which a simulated robot is held after its stop, before it ends [s]."""
+
+
+def of_a_robot(document: Document) -> Experiment:
+    """Return the experiment of a robot, which leaves to its loop what that hears."""
+    loaded = load_scenario(document)
+    return Experiment.of(loaded._replace(scenario=deaf(loaded.scenario)))
 
 
 def live_period(experiment: Experiment) -> float:

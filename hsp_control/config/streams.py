@@ -1,6 +1,6 @@
 """Streams of a configuration: recordings that it names, and those in a log."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
@@ -24,12 +24,23 @@ def with_messages(scenario: Scenario, folder: Path, access: Access) -> Scenario:
                 _check_listening(stream, access)
             return stream.recorded_in(folder, lambda p: access.check(p, "recording"))
 
+    return _with_streams(scenario, located)
+
+
+def deaf(scenario: Scenario) -> Scenario:
+    """Return a scenario whose streams hear nothing: their references stay."""
+    return _with_streams(scenario, lambda stream: replace(stream, source=None))
+
+
+def _with_streams(
+    scenario: Scenario, change: Callable[[Streamed], Streamed]
+) -> Scenario:
     given = {
         "tasks": scenario.tasks,
         "changes": scenario.changes,
         "plan": scenario.plan,
     }
-    found = with_parts_replaced(given, Streamed, located)
+    found = with_parts_replaced(given, Streamed, change)
     return scenario if found is given else replace(scenario, **found)
 
 

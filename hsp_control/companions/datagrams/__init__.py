@@ -1,3 +1,3 @@
-"""A loop's state as JSON datagrams: ``hsp live CONFIG --publish udp://HOST:PORT``."""
+"""Targets and states as JSON datagrams, ``udp://HOST:PORT``, for any language."""
 
 from .telling import publish as publish

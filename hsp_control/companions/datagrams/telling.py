@@ -13,12 +13,12 @@ from hsp_control.common.addresses import name_and_options
 from hsp_control.common.exceptions import HardwareError
 from hsp_control.common.rotations import quaternion_from_rotation
 from hsp_control.common.suggestions import did_you_mean
+from hsp_control.companions.datagrams.targets import address_of
 from hsp_control.declaration.nested import parts_within
 from hsp_control.robot import RobotState
 from hsp_control.simulation.control_chain import EffortSource
 from hsp_control.tasks import JointPosture
 from hsp_control.trajectories.streams.stream import Streamed
-from hsp_control.trajectories.streams.udp_listener import host_and_port
 
 _RATE = 100.0
 """Datagrams in a second of the controller's time by default [1/s]."""
@@ -49,8 +49,8 @@ def publish(address: str, source: EffortSource) -> "Teller":
                 f"{where}: there is no option {key!r}{did_you_mean(key, ['rate'])} "
                 "(known: rate)"
             )
-    host, port = host_and_port(f"udp://{name}") or ("", 0)
-    if not port:
+    to = address_of(f"udp://{name}")
+    if to is None or to.part:
         raise HardwareError(
             f"{where}: needs udp://HOST:PORT, for example udp://127.0.0.1:5006"
         )
@@ -65,7 +65,7 @@ def publish(address: str, source: EffortSource) -> "Teller":
             f"{_FASTEST:g} Hz"
         )
     try:
-        found = socket.getaddrinfo(host, port, socket.AF_INET, socket.SOCK_DGRAM)
+        found = socket.getaddrinfo(*to[:2], socket.AF_INET, socket.SOCK_DGRAM)
     except OSError as error:
         raise HardwareError(f"{where}: {error.strerror or error}") from None
     return Teller(found[0][4], rate, source)
@@ -124,7 +124,7 @@ class Teller:
         """Return what a policy needs, as JSON data."""
         source = self._source
         state, output, controller = source.state, source.output, source.controller
-        streams: dict[str, dict[str, Any]] = {}
+        streams: dict[str, Any] = {}
         for task in controller.tasks:
             for stream in parts_within(task, Streamed) if task.remembers else ():
                 told = {**stream.counts(), "reason": stream.last_rejection}

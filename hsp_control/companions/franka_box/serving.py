@@ -5,12 +5,14 @@ import sys
 from collections.abc import Callable
 from contextlib import nullcontext
 
+from hsp_control.cli.live_experiment import of_a_robot
 from hsp_control.cli.loading import robot_access
 from hsp_control.common.exceptions import LiveError
 from hsp_control.companions.franka.layouts import PERIOD, PORT, VERSION
 from hsp_control.companions.franka_box import Arm, Box, Server
 from hsp_control.companions.franka_box.log import BoxLog
-from hsp_control.config import Experiment, load_experiment
+from hsp_control.config import Experiment
+from hsp_control.config.source import read_document
 from hsp_control.live import OperatorRequests
 from hsp_control.live.operator_requests import stop_signals
 from hsp_control.live.real_time import real_time_priority
@@ -84,9 +86,10 @@ def _experiment(options: argparse.Namespace) -> Experiment:
         }
     strict = options.strict or bool(options.allow)
     period = f"simulation.control_period={PERIOD}"  # whatever another loop's is
-    experiment = load_experiment(
-        source, *options.overrides, period, strict=strict, allow=options.allow
-    )
+    document = read_document(source, strict=strict, allow=options.allow)
+    for assignment in (*options.overrides, period):
+        document.override(assignment)
+    experiment = of_a_robot(document)
     if experiment.v0.any():
         raise LiveError("start: the box holds the arm at rest; leave out its velocity")
     return experiment

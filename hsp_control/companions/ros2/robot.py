@@ -8,10 +8,10 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from hsp_control.cli.live_experiment import simulated_robot
+from hsp_control.cli.live_experiment import of_a_robot, simulated_robot
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.companions.ros2.installed import check_installed
-from hsp_control.config import load_experiment
+from hsp_control.config.source import read_document
 from hsp_control.live import OperatorRequests
 from hsp_control.live.operator_requests import stop_signals
 
@@ -48,7 +48,10 @@ def _run(options: argparse.Namespace, requests: OperatorRequests) -> str:
     check_installed()
     from hsp_control.companions.ros2.simulated import RobotTopics, serve
 
-    experiment = load_experiment(options.config, *options.overrides)
+    document = read_document(options.config)
+    for assignment in options.overrides:
+        document.override(assignment)
+    experiment = of_a_robot(document)
     robot = simulated_robot(experiment)
     topics = RobotTopics(options.address, experiment.robot)
     print(f"{topics.states}, {topics.commands}: ready", flush=True)

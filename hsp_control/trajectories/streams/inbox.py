@@ -5,8 +5,7 @@ from collections.abc import Iterable
 from threading import Lock
 from typing import Any, NamedTuple
 
-from hsp_control.common.exceptions import StreamError
-from hsp_control.trajectories.streams.message import Message, Space, decoded, message_of
+from hsp_control.trajectories.streams.message import Message, Space, message_of
 
 MOST = 5_000_000
 """Most numbers that are recorded: poses at 60 Hz for three hours, 0.1 GB."""
@@ -57,14 +56,10 @@ class Inbox:
 
     def put(self, **data: Any) -> None:
         """Add a message, given by its entries; see `message_of`."""
-        self._add(message_of(data, self.space))
-
-    def put_text(self, text: bytes) -> None:
-        """Add a message that came as JSON; an invalid one is counted and dropped."""
-        try:
-            self._add(decoded(text, self.space))
-        except StreamError as error:
-            self.reject(str(error))
+        message = message_of(data, self.space)
+        with self._lock:
+            self.count += 1
+            self._waiting.append(Received(self.count, message))
 
     def reject(self, reason: str) -> None:
         """Count an invalid message."""
@@ -87,11 +82,6 @@ class Inbox:
         """Begin without messages."""
         self.__init__(saved["space"])  # type: ignore[misc]
         self.count = self.taken = saved["count"]
-
-    def _add(self, message: Message) -> None:
-        with self._lock:
-            self.count += 1
-            self._waiting.append(Received(self.count, message))
 
 
 class InboxReader:

@@ -8,7 +8,6 @@ from weakref import WeakValueDictionary, ref
 
 from hsp_control.common.entry_points import entry_points
 from hsp_control.common.exceptions import StreamError
-from hsp_control.trajectories.streams import udp_listener
 from hsp_control.trajectories.streams.inbox import Inbox, InboxReader, Record
 from hsp_control.trajectories.streams.message import Message, Space, message_of, parsed
 
@@ -71,16 +70,14 @@ def listening_inbox(source: str, space: Space) -> Inbox:
 
 
 def _kind(source: str) -> Kind:
-    if source.startswith(udp_listener.SCHEME):
-        return udp_listener
-    others = entry_points("targets")
-    if found := others.get(source.partition("://")[0]):
+    kinds = entry_points("targets")
+    if found := kinds.get(source.partition("://")[0]):
         kind: Kind = found.load()
         return kind
-    schemes = [udp_listener.SCHEME, *(f"{name}://" for name in others)]
+    schemes = " or ".join(f"{name}://" for name in sorted(kinds)) or "none"
     raise StreamError(
-        f"source is {source!r}; an address begins with {' or '.join(schemes)}, and the "
-        "path of a recording contains no '://'"
+        f"source is {source!r}; an address begins with {schemes}, and the path of a "
+        "recording contains no '://'"
     )
 
 

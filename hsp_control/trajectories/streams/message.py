@@ -111,15 +111,6 @@ def message_of(data: Any, space: Space) -> Message:
     )
 
 
-def decoded(text: bytes, space: Space) -> Message:
-    """Return the message in a JSON text."""
-    try:
-        data = parsed(text)
-    except (ValueError, RecursionError) as error:
-        raise StreamError(f"a message is not JSON: {error}") from None
-    return message_of(data, space)
-
-
 def parsed(text: str | bytes) -> Any:
     """Return what a JSON text says; NaN and Infinity are no JSON."""
     return json.loads(text, parse_constant=_refuse_constant)

@@ -73,9 +73,9 @@ class Streamed(Remembering, error=TrajectoryError):
 
     _: KW_ONLY
     source: str | None = None
-    """Where messages come from: ``udp://HOST:PORT`` for JSON datagrams, ``ros2://TOPIC``
-    for poses of ROS 2, or the path of a recording, of JSON lines with a time ``at``
-    [-]; by default `send`."""
+    """Where messages come from: ``udp://HOST:PORT`` for JSON datagrams, or
+    ``udp://HOST:PORT/PART`` of a shared port; ``ros2://TOPIC`` for poses of ROS 2; or
+    the path of a recording, of JSON lines with a time ``at`` [-]; by default `send`."""
     messages: Annotated[Sequence[Mapping[str, Any]], AfterValidator(tuple)] | None = (
         None
     )

@@ -22,6 +22,9 @@ PATIENT = {  # a machine that runs tests is late
     "live.velocity_margin": 2,
     "simulation.control_period": 0.005,
     "simulation.integrator.step": 0.005,
+    "tasks.hand.gains.natural_frequency": 4,
+    "tasks.fingers.gains.natural_frequency": 4,
+    "null_space.gain": 2,
 }
 
 

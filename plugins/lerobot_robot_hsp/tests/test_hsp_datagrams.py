@@ -1,4 +1,4 @@
-"""The client of LeRobot's plugin, which needs Python alone, beside a loop of ours."""
+"""The plugin's client, which needs Python alone, beside a loop: part of `make test`."""
 
 import json
 import socket

@@ -1,0 +1,217 @@
+"""Targets by datagrams: a port, who sends there, and streams that share it."""
+
+import json
+import logging
+import socket
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from places import ROOT
+
+import hsp_control as hsp
+from hsp_control import Stream
+from hsp_control.cli.live_experiment import of_a_robot
+from hsp_control.common.exceptions import StreamError
+from hsp_control.companions.datagrams.targets import _Part
+from hsp_control.config.source import read_document
+
+
+def free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@pytest.fixture
+def port() -> int:
+    return free_port()
+
+
+@pytest.fixture
+def sender() -> Iterator[socket.socket]:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as opened:
+        yield opened
+
+
+def wait_until(done: Callable[[], bool]) -> None:
+    """Wait until something has happened in another thread."""
+    for _ in range(6000):
+        if done():
+            return
+        time.sleep(0.01)
+    raise AssertionError("it did not happen")
+
+
+def listening(port: int, part: str = "") -> Stream:
+    stream = Stream([0.0], source=f"udp://127.0.0.1:{port}{part}").anchored(None)
+    stream.sample(0.0)  # it listens from here on
+    return stream
+
+
+def test_datagrams_arrive_and_bad_ones_are_counted(
+    port: int, sender: socket.socket, caplog: pytest.LogCaptureFixture
+) -> None:
+    stream = listening(port)
+    inbox = stream._mailbox.inbox
+    bad = ("{", '{"value": [NaN]}', '{"value": [0.1, 0.2]}', "[]", "1" * 9000)
+    for text in bad:
+        sender.sendto(text.encode(), ("127.0.0.1", port))
+    sender.sendto(b'{"value": [0.1], "t": 3.5}', ("127.0.0.1", port))
+    wait_until(lambda: inbox.count == 1)
+    assert caplog.text == ""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as second:
+        for one in (second, sender, second):
+            one.sendto(b"0", ("127.0.0.1", port))
+            time.sleep(0.01)
+        wait_until(lambda: inbox.rejected == 8)
+    assert caplog.text.count("two senders take turns, 127.0.0.1:") == 1
+    last = [stream.sample(t).position[0] for t in np.arange(0.0, 1.0, 0.01)][-1]
+    assert last == pytest.approx(0.1, abs=1e-9)
+    assert stream.counts()["rejected"] == 8
+    assert "a message is 0; needs a mapping" in stream.last_rejection
+
+
+def test_a_port_in_use_is_told_and_streams_of_one_process_share_it(port: int) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("127.0.0.1", port))
+        with pytest.raises(StreamError, match="cannot listen there: Address already"):
+            listening(port)
+    one, two = listening(port), listening(port)
+    assert one._mailbox.inbox is two._mailbox.inbox
+    with pytest.raises(StreamError, match="already carries 1 numbers; this stream"):
+        Stream([0.0] * 2, source=f"udp://127.0.0.1:{port}").anchored(None).sample(0.0)
+    with pytest.raises(StreamError, match="another stream of this process hears all"):
+        listening(port, "/left")
+
+
+def test_a_port_is_free_again_when_its_streams_are_gone(port: int) -> None:
+    for _ in range(3):
+        listening(port)
+    for _ in range(2):
+        both = listening(port, "/left"), listening(port, "/right")
+        del both
+
+
+def test_a_robot_alone_leaves_the_port_to_its_loop(port: int) -> None:
+    source = f"tasks.hand.trajectory.source=udp://127.0.0.1:{port}"
+    document = read_document(ROOT / "examples/stream/panda.yaml")
+    document.override(source)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as loop:
+        loop.bind(("127.0.0.1", port))
+        experiment = of_a_robot(document)
+        with pytest.raises(StreamError, match="cannot listen there"):
+            hsp.load_experiment(ROOT / "examples/stream/panda.yaml", source)
+    assert isinstance(experiment.controller.tasks[0].trajectory, hsp.StreamPose)
+
+
+def test_each_stream_of_a_port_hears_its_part_or_nobody_does(
+    port: int, sender: socket.socket
+) -> None:
+    left, right = listening(port, "/left"), listening(port, "/right")
+    one, other = left._mailbox.inbox, right._mailbox.inbox
+    for text, reason in (
+        (
+            {"left": {"value": [0.1]}, "right": {"value": [0.1, 0.2]}},
+            "right: value has 2 numbers; this stream needs 1",
+        ),
+        ({"left": {"value": [0.1]}, "rihgt": {}}, "'rihgt'; did you mean 'right'?"),
+        ({"left": 0.1}, "left: a message is 0.1; needs a mapping"),
+        ([0.1], "a message to several streams needs a mapping"),
+    ):
+        before = other.rejected
+        sender.sendto(json.dumps(text).encode(), ("127.0.0.1", port))
+        wait_until(lambda before=before: other.rejected > before)  # type: ignore[misc]
+        assert reason in left.last_rejection
+        assert reason in right.last_rejection
+    assert (one.count, other.count) == (0, 0)
+    sender.sendto(b'{"t": 2, "left": {"value": [0.1]}}', ("127.0.0.1", port))
+    wait_until(lambda: one.count == 1)
+    ((_, message),) = one.after(0, take=False)
+    assert (message.t, other.count) == (2.0, 0)
+
+
+def test_one_stream_of_two_poses_leads_two_hands(
+    port: int, sender: socket.socket
+) -> None:
+    sides = {"left": 0.33, "right": -0.33}
+    parts = {
+        each: {"name": "panda", "position": [0, y, 0]} for each, y in sides.items()
+    }
+    source = f"udp://127.0.0.1:{port}"
+    tasks = {
+        each: {
+            "type": "frame_pose",
+            "frame": f"{each}_panda_tcp",
+            "trajectory": {"type": "stream", "source": f"{source}/{each}"},
+        }
+        for each in sides
+    }
+    simulation = {"duration": 1.0, "control_period": 0.002, "log_period": 0.002}
+    experiment = hsp.load_experiment(
+        {"robot": {"parts": parts}, "tasks": tasks, "simulation": simulation}
+    )
+    controller, goals = experiment.controller, {}
+
+    def lead(*_: Any) -> None:
+        streams = [each.trajectory for each in controller.tasks]
+        if controller.state.t < 0.1 or goals:
+            return
+        for task in controller.tasks:
+            goals[task.name] = task.measure(controller.state)[1].tolist()
+            goals[task.name][2] += 0.05
+        text = {"t": 7.0, **{name: {"value": each} for name, each in goals.items()}}
+        sender.sendto(json.dumps(text).encode(), ("127.0.0.1", port))
+        wait_until(lambda: all(each._mailbox.inbox.count for each in streams))
+
+    run = experiment.run(on_row=lead)
+    for name in sides:
+        np.testing.assert_allclose(
+            run[f"task.{name}.actual"][-1], goals[name], atol=1e-5
+        )
+        assert np.abs(run[f"task.{name}.error"]).max() < 5e-4
+    heights = (run[f"task.{name}.reference"][:, 2] for name in sides)
+    np.testing.assert_allclose(*heights, atol=1e-12)  # at the same times
+
+
+@pytest.mark.parametrize(
+    ("clock", "said"),
+    [
+        (lambda k: 0.05 * k, []),
+        (lambda k: 0.05 * k - 1e-3 * (k % 2) - 0.9 * (k == 7), []),  # late ones
+        (lambda k: 0.05 * k - 5.0 * (k > 5), ["jumps back by 4.95 s"]),
+        (lambda k: 0.05 * k + 3.0 * (k > 5), ["jumps ahead by 3 s"]),
+        (lambda k: None, []),
+    ],
+)
+def test_a_clock_that_jumps_is_said_once(
+    clock: Callable[[int], float | None],
+    said: list[str],
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    now = [0.0]
+    monkeypatch.setattr(
+        "hsp_control.companions.datagrams.targets.monotonic", lambda: now[0]
+    )
+    caplog.set_level(logging.WARNING)
+    heard = _Part("udp://127.0.0.1:5005")
+    for k in range(12):
+        now[0] = 100.0 + 0.05 * k
+        heard.hear(("127.0.0.1", 1), clock(k))
+    assert [each.removeprefix("udp://127.0.0.1:5005: the sender's clock ")
+            for each in caplog.messages] == said  # fmt: skip
+
+
+def test_a_policy_that_starts_again_is_no_second_sender_and_has_its_own_clock(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(
+        "hsp_control.companions.datagrams.targets.monotonic", lambda: 100.0
+    )
+    heard = _Part("udp://127.0.0.1:5005")
+    for sender, t in ((1, 50.0), (1, 50.1), (2, 0.0), (2, 0.1)):
+        heard.hear(("127.0.0.1", sender), t)
+    assert caplog.messages == []
