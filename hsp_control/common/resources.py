@@ -1,4 +1,4 @@
-"""Find the bundled robots and configurations, in a checkout or in a wheel."""
+"""Find the bundled robots and configurations, and say what a path leads to."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -29,3 +29,19 @@ def _urdf_files() -> Iterator[Path]:
         urdf = folder / f"{folder.name}.urdf"
         if urdf.is_file():
             yield urdf
+
+
+def is_file(path: Path) -> bool:
+    """Return whether a path leads to a file; False if it can be none."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # too long for a path, or with a null character
+        return False
+
+
+def is_folder(path: Path) -> bool:
+    """Return whether a path leads to a folder; False if it can be none."""
+    try:
+        return path.is_dir()
+    except (OSError, ValueError):
+        return False

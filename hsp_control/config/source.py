@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from hsp_control.common.exceptions import ConfigError
-from hsp_control.common.files import is_file
-from hsp_control.common.resources import bundled_configs
+from hsp_control.common.resources import bundled_configs, is_file
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.config.document import Document
 from hsp_control.config.streams import with_recordings

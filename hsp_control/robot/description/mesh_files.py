@@ -10,7 +10,7 @@ from pathlib import Path
 from urllib.parse import unquote
 
 from hsp_control.common.exceptions import AccessError
-from hsp_control.common.files import is_file
+from hsp_control.common.resources import is_file
 from hsp_control.robot.description.access import (
     Access,
     XmlError,

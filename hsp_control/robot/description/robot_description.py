@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated, Self, get_args
 
 from hsp_control.common.exceptions import ModelError
-from hsp_control.common.files import is_file
+from hsp_control.common.resources import is_file
 from hsp_control.common.suggestions import did_you_mean
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import (

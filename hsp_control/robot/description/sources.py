@@ -18,8 +18,7 @@ import yaml
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import AccessError, ModelError, RobotNotFoundError
-from hsp_control.common.files import is_folder
-from hsp_control.common.resources import bundled_robots
+from hsp_control.common.resources import bundled_robots, is_folder
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.robot.description.access import ANYWHERE, Access
 from hsp_control.robot.description.xacro_files import expand, is_xacro
