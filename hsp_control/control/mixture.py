@@ -19,7 +19,7 @@ from hsp_control.control.actuation.support import Support
 from hsp_control.control.evolution import PlannedContact
 from hsp_control.control.gains_in_force import GainsInForce
 from hsp_control.control.setup import PlannedTask, Setup, levels_of
-from hsp_control.law.outcome import BEYOND_ANY_LEVEL, DAMPED, NOT_FINITE
+from hsp_control.law.resolution import BEYOND_ANY_LEVEL, DAMPED, NOT_FINITE
 from hsp_control.robot import RobotState
 from hsp_control.robot.robot import Move
 

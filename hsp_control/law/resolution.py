@@ -1,6 +1,7 @@
 """The law with its buffers: from tasks and a field to one acceleration."""
 
 from collections.abc import Callable, Sequence
+from enum import IntEnum
 from math import isqrt
 from typing import NamedTuple
 
@@ -17,11 +18,40 @@ from hsp_control.common.linalg import (
 from hsp_control.common.native import bind
 from hsp_control.law.hierarchy import LevelScratch, resolve_levels
 from hsp_control.law.law import acceleration, null_space_command
-from hsp_control.law.outcome import BEYOND_ANY_LEVEL, Outcome, outcome_of
 from hsp_control.law.problem import Problem
 from hsp_control.law.pseudo_inverse import weighted_pseudo_inverse, whiten
 from hsp_control.law.samples import FieldSample, MetricSample, TaskSample
 from hsp_control.law.threshold import NOT, Following, write_thresholds
+
+
+class Outcome(IntEnum):
+    """Whether the law's equations hold."""
+
+    EXACT = 0
+    """They hold: all singular values are above the threshold."""
+    DAMPED = 1
+    """A singular value is below the threshold: the inverse was bounded instead."""
+    NOT_FINITE = 2
+    """The acceleration contains NaN or inf."""
+
+
+EXACT, DAMPED, NOT_FINITE = tuple(Outcome)
+"""By name, for the step: up to Python 3.11 `Outcome.EXACT` takes 80 ns."""
+
+BEYOND_ANY_LEVEL = 1_000_000
+"""What kernels return if the acceleration is not finite."""
+
+
+def outcome_of(code: float) -> Outcome:
+    """Return the outcome that a kernel's number means.
+
+    Args:
+        code: 0: exact; from 1 on, the first level with a bounded inverse; or
+            `BEYOND_ANY_LEVEL`.
+    """
+    if code == 0.0:
+        return EXACT
+    return DAMPED if code < BEYOND_ANY_LEVEL else NOT_FINITE
 
 
 class Resolved(NamedTuple):

@@ -13,7 +13,7 @@ from hsp_control import Cost, Robot
 from hsp_control.common.arrays import Array
 from hsp_control.common.resources import bundled_robots
 from hsp_control.geometry import LinkShape
-from hsp_control.null_space.fields.barrier import barrier
+from hsp_control.null_space.fields.cost import barrier
 from hsp_control.trajectories import Lissajous
 
 

@@ -42,7 +42,7 @@ from hsp_control.control.actuation.limited_step import (
 from hsp_control.control.actuation.limits_in_force import Held, LimitSet, observe
 from hsp_control.control.actuation.support import Support
 from hsp_control.law import Resolution
-from hsp_control.law.outcome import BEYOND_ANY_LEVEL
+from hsp_control.law.resolution import BEYOND_ANY_LEVEL
 from hsp_control.robot import RobotState
 
 LOOK = 2.0

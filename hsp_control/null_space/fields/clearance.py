@@ -20,8 +20,7 @@ from hsp_control.geometry.scene import Obstacle
 from hsp_control.geometry.start import Start
 from hsp_control.law import FieldSample, MetricSample
 from hsp_control.null_space.differences import rate_along_flow
-from hsp_control.null_space.fields.barrier import barrier
-from hsp_control.null_space.fields.cost import Cost, descend
+from hsp_control.null_space.fields.cost import Cost, barrier, descend
 from hsp_control.robot import Robot, RobotState
 
 

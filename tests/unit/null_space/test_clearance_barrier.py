@@ -14,7 +14,7 @@ from hsp_control import Cost, Obstacle, load_experiment
 from hsp_control.geometry.closed_form import ClosedFormDistances
 from hsp_control.geometry.shapes import Sphere
 from hsp_control.null_space.fields import FieldSample, ObstacleClearance
-from hsp_control.null_space.fields.barrier import CORE
+from hsp_control.null_space.fields.cost import CORE
 from hsp_control.null_space.metrics import IdentityMetric, MetricSample
 from hsp_control.trajectories import Hold, UniformLine
 
