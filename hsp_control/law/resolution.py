@@ -154,14 +154,13 @@ class Resolution:
     def compile(self, v: Array, *, controls: bool) -> Callable[[], float]:
         """Return the call that `resolve` makes; it returns what `outcome_of` takes."""
         problem = self.problem
-        alone = self.alone
-        return bind(
-            _resolve_at_once if alone else _resolve_levels,
+        step = Step(
             *(problem.task, problem.field, problem.metric, self.form),
             *(v, problem.gain, self.threshold, self._following, controls),
             *(self.ends, problem.asked, problem.bounded, self.thresholds),
             *(self._scratch, self.null_space_error, self.acceleration, self.code),
         )
+        return bind(_resolve_at_once if self.alone else _resolve_levels, step)
 
     def diagnose(self, first: int = 0) -> tuple[float, float, bytes]:
         """Return what tells how near the last `resolve` was to singular and to rest.
@@ -198,121 +197,99 @@ def singular_values(triangle: bytes) -> Array:
     return values
 
 
+class Step(NamedTuple):
+    """What the law's kernels read and write in each step; see `Resolution`."""
+
+    task: TaskSample
+    field: FieldSample
+    metric: MetricSample
+    form: int
+    v: Array
+    K_N: Array
+    threshold: float
+    following: Following
+    controls: bool
+    ends: Indices
+    asked: Array
+    bounded: Array
+    thresholds: Array
+    scratch: Scratch
+    e_N: Array
+    a: Array
+    code: Indices
+
+
 @kernel
-def _resolve_at_once(
-    task: TaskSample,
-    field: FieldSample,
-    metric: MetricSample,
-    form: int,
-    v: Array,
-    K_N: Array,
-    threshold: float,
-    following: Following,
-    controls: bool,
-    ends: Indices,
-    asked: Array,
-    bounded: Array,
-    thresholds: Array,
-    scratch: Scratch,
-    e_N: Array,
-    a: Array,
-    code: Indices,
-) -> int:
+def _resolve_at_once(step: Step) -> int:
     """Write e_N and a of all tasks at once; write and return the code of `outcome_of`.
 
     If the tasks of several levels are exact together, they are exact one after the
     other: this is the same then.
     """
-    n = task.jacobian.shape[1]
-    (Q, X), rows = scratch.factors, scratch.rows
-    u = rows[6, :n]
-    largest = write_thresholds(asked, bounded, ends, threshold, following, thresholds)
-    damped = int(
-        weighted_pseudo_inverse(
-            task.jacobian, metric.L, form, largest, scratch.wide, Q, X
-        )
-    )
-    null_space_command(task, field, metric, form, Q, X, v, K_N, rows, e_N, u)
-    if not controls:
-        for i in range(n):
+    task, field, metric, form, v = step.task, step.field, step.metric, step.form, step.v
+    (Q, X), rows = step.scratch.factors, step.scratch.rows
+    J, L, e_N, a = task.jacobian, metric.L, step.e_N, step.a
+    u = rows[6, : J.shape[1]]
+    largest = _write_thresholds(step)
+    damped = int(weighted_pseudo_inverse(J, L, form, largest, step.scratch.wide, Q, X))
+    null_space_command(task, field, metric, form, Q, X, v, step.K_N, rows, e_N, u)
+    if not step.controls:
+        for i in range(u.shape[0]):
             u[i] = 0.0
-    acceleration(task, metric.L, form, Q, X, v, u, rows, a)
-    code[0] = damped if _all_finite(a) else BEYOND_ANY_LEVEL
-    return int(code[0])
+    acceleration(task, L, form, Q, X, v, u, rows, a)
+    step.code[0] = damped if _all_finite(a) else BEYOND_ANY_LEVEL
+    return int(step.code[0])
 
 
 @kernel
-def _resolve_levels(
-    task: TaskSample,
-    field: FieldSample,
-    metric: MetricSample,
-    form: int,
-    v: Array,
-    K_N: Array,
-    threshold: float,
-    following: Following,
-    controls: bool,
-    ends: Indices,
-    asked: Array,
-    bounded: Array,
-    thresholds: Array,
-    scratch: Scratch,
-    e_N: Array,
-    a: Array,
-    code: Indices,
-) -> int:
+def _resolve_levels(step: Step) -> int:
     """Write e_N and a: of all levels at once, or level by level if they conflict.
 
     The code of `outcome_of` is written and returned.
     """
-    damped = 1
+    task, scratch, damped = step.task, step.scratch, 1
     if task.jacobian.shape[0] <= task.jacobian.shape[1]:
-        damped = _resolve_at_once(
-            task,
-            field,
-            metric,
-            form,
-            v,
-            K_N,
-            threshold,
-            following,
-            controls,
-            ends,
-            asked,
-            bounded,
-            thresholds,
-            scratch,
-            e_N,
-            a,
-            code,
-        )
+        damped = _resolve_at_once(step)
     else:
-        write_thresholds(asked, bounded, ends, threshold, following, thresholds)
+        _write_thresholds(step)
     if damped > 0:
         levels = LevelScratch(
             scratch.inner, scratch.tall, scratch.square[2], scratch.square, scratch.rows
         )
         damped = resolve_levels(
             task,
-            field,
-            metric,
-            form,
-            v,
-            K_N,
-            threshold,
-            following,
-            asked,
-            thresholds,
-            controls,
-            ends,
+            step.field,
+            step.metric,
+            step.form,
+            step.v,
+            step.K_N,
+            step.threshold,
+            step.following,
+            step.asked,
+            step.thresholds,
+            step.controls,
+            step.ends,
             levels,
-            e_N,
-            a,
+            step.e_N,
+            step.a,
         )
-        if not _all_finite(a):
+        if not _all_finite(step.a):
             damped = BEYOND_ANY_LEVEL
-        code[0] = damped
+        step.code[0] = damped
     return damped
+
+
+@kernel
+def _write_thresholds(step: Step) -> float:
+    """Write ε of each level, and return the largest."""
+    asked, bounded, ends, threshold = (
+        step.asked,
+        step.bounded,
+        step.ends,
+        step.threshold,
+    )
+    follows, out = step.following, step.thresholds
+    return write_thresholds(asked, bounded, ends, threshold, follows, out)
 
 
 @kernel
