@@ -120,47 +120,49 @@ class Result(NamedTuple):
     forces: Array
 
 
+class Step(NamedTuple):
+    """All that `solve_step` reads and writes."""
+
+    wanted: Wanted
+    forces: Forces
+    directions: Directions
+    bounds: Bounds
+    places: Places
+    programmes: Programmes
+    result: Result
+    # the `Status`, shape (1,); or `UNSOLVED`, and then there is no result
+    status: Indices
+
+
 @kernel
-def solve_step(
-    what: int,
-    wanted: Wanted,
-    forces: Forces,
-    directions: Directions,
-    bounds: Bounds,
-    places: Places,
-    programmes: Programmes,
-    result: Result,
-    status: Indices,
-) -> int:
+def solve_step(what: int, step: Step) -> int:
     """Assemble the QP, solve it, and write what is delivered; return the `Status`."""
-    # Or `UNSOLVED`, and then nothing is written to ``result``. It is written to
-    # ``status``, shape (1,), too.
-    qp, x = programmes, programmes.x
+    qp, forces, status = step.programmes, step.forces, step.status
+    x = qp.x
     status[0] = UNSOLVED
     if what == LEAST_VIOLATION:
         code = minimise(qp.soft, False, x, qp.soft_memory)
-        if code == SOLVED and _write_result(wanted, forces, bounds, places, x, result):
+        if code == SOLVED and _write_result(step):
             status[0] = Status.RELAXED
         return int(status[0])
     if what != NEAREST_AGAIN:
-        _write_rows(wanted, forces, bounds, places, qp.nearest)
+        _write_rows(step)
         if what == FORCES:
             _start(forces, x)
             _write_force_factor(forces, 1.0, qp.forces)
             code = minimise(qp.forces, True, x, qp.force_memory)
-            if code == SOLVED and _write_result(
-                wanted, forces, bounds, places, x, result
-            ):
+            if code == SOLVED and _write_result(step):
                 status[0] = Status.REDISTRIBUTED
                 return int(status[0])
-        write_directions(directions)
+        write_directions(step.directions)
     _start(forces, x)
     contacts_held = what != NEAREST_AGAIN and forces.first.shape[0] > 0
-    count = write_inverse_root(directions, 1 if contacts_held else 0, qp.nearest.JT)
+    standing = 1 if contacts_held else 0
+    count = write_inverse_root(step.directions, standing, qp.nearest.JT)
     _write_force_factor(forces, _FORCE_COST, qp.nearest)
     problem, warm = _moving(qp.nearest, count), what != NEAREST_AGAIN
     code = minimise(problem, warm, x, qp.memory)
-    if code == SOLVED and _write_result(wanted, forces, bounds, places, x, result):
+    if code == SOLVED and _write_result(step):
         status[0] = Status.LIMITED
     return int(status[0])
 
@@ -191,12 +193,11 @@ def _moving(problem: Problem, count: int) -> Problem:
 
 
 @kernel
-def _write_rows(
-    wanted: Wanted, forces: Forces, bounds: Bounds, places: Places, rows: Problem
-) -> None:
+def _write_rows(step: Step) -> None:
     """Write the rows of base and efforts, and the bounds of x."""
-    M, a, effort = wanted
-    F, _, f_lower, f_upper, _, weight = forces
+    bounds, places, rows = step.bounds, step.places, step.programmes.nearest
+    M, a, effort = step.wanted
+    F, _, f_lower, f_upper, _, weight = step.forces
     A, lower, upper = rows.A, rows.lower, rows.upper
     n, p = F.shape
     for r in range(places.dofs.shape[0]):
@@ -217,17 +218,11 @@ def _write_rows(
 
 
 @kernel
-def _write_result(
-    wanted: Wanted,
-    forces: Forces,
-    bounds: Bounds,
-    places: Places,
-    x: Array,
-    result: Result,
-) -> bool:
+def _write_result(step: Step) -> bool:
     """Write the result without the solver's violations; return whether it is finite."""
-    M, a, effort = wanted
-    F, _, f_lower, f_upper, _, weight = forces
+    bounds, places, result = step.bounds, step.places, step.result
+    x, (M, a, effort) = step.programmes.x, step.wanted
+    F, _, f_lower, f_upper, _, weight = step.forces
     n, p = F.shape
     for j in range(p):
         result.forces[j] = min(max(x[n + j] * weight, f_lower[j]), f_upper[j])
@@ -320,7 +315,7 @@ class LimitedStep:
         # Effort, acceleration and forces of the last step
         self.result = Result(zeros(n), zeros(n), zeros(p))
         self._wanted = wanted
-        arguments = (
+        step = Step(
             wanted,
             Forces(
                 support.map,
@@ -338,10 +333,10 @@ class LimitedStep:
             status,
         )
         self._write_mass_matrix = state.inertia.compute
-        self._again = bind(solve_step, NEAREST_AGAIN, *arguments)
-        self._least_violation = bind(solve_step, LEAST_VIOLATION, *arguments)
-        self._nearest = bind(solve_step, NEAREST, *arguments)
-        forces = bind(solve_step, FORCES, *arguments)
+        self._again = bind(solve_step, NEAREST_AGAIN, step)
+        self._least_violation = bind(solve_step, LEAST_VIOLATION, step)
+        self._nearest = bind(solve_step, NEAREST, step)
+        forces = bind(solve_step, FORCES, step)
         self._find_forces = one_call([self._write_mass_matrix, forces], 0.0)
         nearest = [self._write_mass_matrix, self._nearest]
         self._find_nearest = one_call(nearest, 0.0)
