@@ -5,7 +5,7 @@ import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
@@ -13,6 +13,12 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from hsp_control.cli.consoles import errors, out, working
 from hsp_control.cli.options.companions import export_formats
 from hsp_control.common.exceptions import ExportError
+
+if TYPE_CHECKING:
+    from hsp_control.visualization.viewer.comparison import ComparedRun
+
+_LONGEST = 24
+"""Longest title that is a name in the switch between runs."""
 
 
 def export(options: argparse.Namespace) -> int:
@@ -35,7 +41,7 @@ def export(options: argparse.Namespace) -> int:
             )
     strict = options.strict or bool(options.allow)
     access = access_for(options.logs, strict, options.allow)
-    runs = load_runs(options.logs, access)
+    runs = _titled(load_runs(options.logs, access))
 
     def page(path: Path) -> Path:
         with working(f"Writing {path.name}"):
@@ -47,6 +53,18 @@ def export(options: argparse.Namespace) -> int:
 
     wanted = [(path, partial(added, ending)) for ending, path in asked.items()]
     return _write([*([(options.html, page)] if options.html else []), *wanted])
+
+
+def _titled(runs: list["ComparedRun"]) -> list["ComparedRun"]:
+    """Return several runs by the titles of their logs, if those can be their names."""
+    # They cannot if two have the same one, as runs of one configuration have, or if one
+    # is too long for a switch.
+    titles = [str(run.rollout.meta.get("title") or "") for run in runs]
+    if len(set(titles)) < len(titles):
+        return runs
+    if not all(0 < len(title) <= _LONGEST for title in titles):
+        return runs
+    return [run._replace(name=title) for run, title in zip(runs, titles, strict=True)]
 
 
 def _write(wanted: list[tuple[Path, Callable[[Path], Path]]]) -> int:

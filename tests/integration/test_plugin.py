@@ -96,4 +96,4 @@ def test_its_robot_is_reached_by_name(installed: Path, tmp_path: Path) -> None:
     assert ran.returncode == 0, ran.stderr
     ran = hsp(installed, "live", DEMO, "--robot", "exmaple://x", where=tmp_path)
     assert ran.returncode == 2
-    assert "did you mean 'example'?" in ran.stderr
+    assert "did you mean example://ADDRESS?" in ran.stderr

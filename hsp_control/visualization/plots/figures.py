@@ -25,29 +25,9 @@ from matplotlib.lines import Line2D
 
 from hsp_control.common.exceptions import PlotError
 from hsp_control.common.suggestions import did_you_mean, listing
-from hsp_control.simulation import Rollout
-from hsp_control.simulation.log_series import (
-    chosen_rows,
-    distances,
-    field_terms,
-    rows_compare,
-)
+from hsp_control.simulation import Rollout, log_series
 from hsp_control.visualization import palette
-from hsp_control.visualization.plots.curves import (
-    draw_determinant,
-    draw_distances,
-    draw_efforts,
-    draw_field_terms,
-    draw_field_value,
-    draw_joint_positions,
-    draw_null_space_error,
-    draw_singular_values,
-    draw_speeds,
-    draw_task_errors,
-    legend_below,
-    literal_text,
-    mark_frames,
-)
+from hsp_control.visualization.plots import curves
 from hsp_control.visualization.plots.frames import (
     columns_for,
     draw_frames,
@@ -156,7 +136,7 @@ def paper_figure(
 ) -> Figure:
     """Return the paper's five panels: path, joints, determinant, frames twice."""
     _check(rollout)
-    rows = chosen_rows(rollout, frames, times)
+    rows = log_series.chosen_rows(rollout, frames, times)
     if not rows:
         raise PlotError("no frame is requested; needs at least 1")
     with styled():
@@ -168,9 +148,9 @@ def paper_figure(
         a, b, c = (upper.add_subplot(grid[k]) for k in range(3))
         draw_end_effector(a, rollout)
         a.set_anchor("NW")
-        draw_joint_positions(b, rollout, absolute=absolute)
+        curves.draw_joint_positions(b, rollout, absolute=absolute)
         third, title = PANELS[
-            "determinant" if rows_compare(rollout) else "singular_values"
+            "determinant" if log_series.rows_compare(rollout) else "singular_values"
         ]
         third(c, rollout)
         strip, together = lower.subfigures(1, 2, width_ratios=(1.9, 1.0))
@@ -187,21 +167,21 @@ def paper_figure(
         titles = ["End effector", "Joints", title]
         _letter_titles([a, b, c], titles, pad=18.0)  # space for the frames' numbers
         for over_time in (b, c):
-            mark_frames(over_time, rollout.t[rows])
+            curves.mark_frames(over_time, rollout.t[rows])
     return figure
 
 
 PANELS: dict[str, tuple[Callable[[Axes, Rollout], None], str]] = {
-    "errors": (draw_task_errors, "Task error"),
-    "null_space": (draw_null_space_error, "Null-space error"),
-    "field": (draw_field_value, "Null-space field"),
-    "efforts": (draw_efforts, "Efforts"),
-    "singular_values": (draw_singular_values, "Singular values"),
-    "determinant": (draw_determinant, "Determinant"),
-    "distances": (draw_distances, "Distances"),
-    "terms": (draw_field_terms, "The field's terms"),
-    "joints": (draw_joint_positions, "Joints"),
-    "speeds": (draw_speeds, "Joint speeds"),
+    "errors": (curves.draw_task_errors, "Task error"),
+    "null_space": (curves.draw_null_space_error, "Null-space error"),
+    "field": (curves.draw_field_value, "Null-space field"),
+    "efforts": (curves.draw_efforts, "Efforts"),
+    "singular_values": (curves.draw_singular_values, "Singular values"),
+    "determinant": (curves.draw_determinant, "Determinant"),
+    "distances": (curves.draw_distances, "Distances"),
+    "terms": (curves.draw_field_terms, "The field's terms"),
+    "joints": (curves.draw_joint_positions, "Joints"),
+    "speeds": (curves.draw_speeds, "Joint speeds"),
 }
 """The panels of `diagnostics_figure`, by name: what draws each, and its title."""
 _SHAPE = 0.72, 0.55  # height of a panel over its width, and its legend's [inches]
@@ -256,7 +236,7 @@ def diagnostics_figure(
         for one, name in zip(axes, chosen, strict=False):
             draw = PANELS[name][0]
             if name == "joints":
-                draw = partial(draw_joint_positions, absolute=absolute)
+                draw = partial(curves.draw_joint_positions, absolute=absolute)
             _draw_together(one, draw, runs)
         for unused in axes[len(chosen) :]:
             unused.set_axis_off()
@@ -267,9 +247,9 @@ def diagnostics_figure(
 def _chosen_panels(runs: Sequence[Rollout], panels: Sequence[str]) -> list[str]:
     """Return the panels that are asked for, or all that can be drawn of all runs."""
     can = {
-        "determinant": all(map(rows_compare, runs)),
-        "distances": all(map(distances, runs)),
-        "terms": all(len(field_terms(run)) > 1 for run in runs),
+        "determinant": all(map(log_series.rows_compare, runs)),
+        "distances": all(map(log_series.distances, runs)),
+        "terms": all(len(log_series.field_terms(run)) > 1 for run in runs),
     }
     for name in panels:
         if name not in PANELS:
@@ -285,7 +265,7 @@ def _draw_together(
     axes: Axes, draw: Callable[[Axes, Rollout], None], runs: Sequence[Rollout]
 ) -> None:
     """Draw runs in one panel: one or two curves by colour, more of them by dashes."""
-    spans, curves = [], 0
+    spans, count = [], 0
     for number, run in enumerate(runs):
         known: set[Artist] = {*axes.lines, *axes.patches}
         axes.autoscale(axis="y")
@@ -302,16 +282,16 @@ def _draw_together(
             for line in lines
             if line.get_linewidth() > _THIN and line.get_linestyle() != "None"
         ]
-        curves = curves or len(thick)
+        count = count or len(thick)
         for line in lines:
-            if curves <= 2 and line.get_linewidth() > _REFERENCE:
+            if count <= 2 and line.get_linewidth() > _REFERENCE:
                 line.set(color=palette.series(number))
-            if curves != 2 and line in thick:
+            if count != 2 and line in thick:
                 line.set(linestyle=_LOG_DASHES[number % 4])
     left, right, low, high = zip(*spans, strict=True)
     axes.set_xlim(min(left), max(right))
     axes.set_ylim(min(low), max(high))
-    legend_below(axes)
+    curves.legend_below(axes)
 
 
 def _name_logs(figure: Figure, names: Sequence[str]) -> None:
@@ -323,7 +303,7 @@ def _name_logs(figure: Figure, names: Sequence[str]) -> None:
         Line2D(
             [], [], color=palette.series(k), linestyle=_LOG_DASHES[k % 4], label=name
         )
-        for k, name in enumerate(map(literal_text, names))
+        for k, name in enumerate(map(curves.literal_text, names))
     ]
     long = sum(map(len, names)) > 14 * figure.get_figwidth()
     figure.legend(
@@ -348,14 +328,14 @@ def _add_title(figure: Figure, rollout: Rollout, title: str | None = None) -> No
     robot, field = meta["robot"]["name"], meta.get("field", "")
     named = (title, config.get("title"), meta.get("title"), meta.get("name"))
     shown = next(filter(None, named), f"{robot}, field: {field}")
-    figure.suptitle(literal_text(textwrap.fill(str(shown), 100)))
+    figure.suptitle(curves.literal_text(textwrap.fill(str(shown), 100)))
     version = meta.get("versions", {}).get("hsp_control", "")
     parts = [f"robot {robot}", f"field {field}", f"metric {meta.get('metric', '')}"]
     parts += [f"hsp_control {version}"] if version else []
     if rollout.status != "completed":
         parts.insert(0, f"{rollout.status}: {meta.get('message', '')}")
     figure.supxlabel(
-        literal_text(textwrap.fill("  ·  ".join(parts), 180)),
+        curves.literal_text(textwrap.fill("  ·  ".join(parts), 180)),
         fontsize=7.5,
         color=palette.MUTED if rollout.status == "completed" else palette.WARNING,
         x=0.01,

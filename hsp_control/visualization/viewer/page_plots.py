@@ -9,14 +9,6 @@ from hsp_control.common.arrays import Array, Indices
 from hsp_control.control.controller import Controller
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout, log_series
-from hsp_control.simulation.log_series import (
-    MAX_NAMED,
-    SELECTED,
-    lively,
-    logged_distances,
-    predicted_decay,
-    spans_of,
-)
 from hsp_control.simulation.log_writer import LogWriter, continuous_dofs
 from hsp_control.simulation.rollout import complete_columns
 from hsp_control.visualization import palette
@@ -85,7 +77,7 @@ def panels_of(
         logarithmic=True,
         note=f"effort held for {1e3 * period:g} ms" if period else "",
     )
-    watched = logged_distances(rollout)
+    watched = log_series.logged_distances(rollout)
     if watched:
         values = np.column_stack([each.values for each in watched])
         curves, unit = _lines(values, [each.label for each in watched])
@@ -94,7 +86,8 @@ def panels_of(
         )
         yield Panel("Minimum distance", "m", curves, edges=list(edges))
     joints = log_series.joint_names(rollout)
-    some = f"{SELECTED} of {len(joints)}" if len(joints) > MAX_NAMED else ""
+    named = len(log_series.lively(rollout.tau))
+    some = f"{named} of {len(joints)}" if named < len(joints) else ""
     positions, what = log_series.joint_positions(rollout)
     curves, unit = _lines(positions, joints, log_series.position_units(rollout))
     yield Panel(what.capitalize() + "s", unit, curves, note=some)
@@ -112,7 +105,7 @@ def panels_of(
 
 
 def _null_space(rollout: Rollout, controller: Controller | None) -> Iterator[Series]:
-    decay = predicted_decay(rollout)
+    decay = log_series.predicted_decay(rollout)
     for predicted, gain in zip((decay.slow, decay.fast), decay.gains, strict=True):
         if predicted is not None:
             name = f"predicted: exp(−{gain:g} t)"
@@ -130,7 +123,7 @@ def _lines(
     values: Array, names: Sequence[str], units: Sequence[str] | None = None
 ) -> tuple[list[Series], str]:
     """Return one curve per column (of many, those that vary most), and units."""
-    chosen = lively(values)
+    chosen = log_series.lively(values)
     units = list(units or [""] * len(names))
     kinds = list(dict.fromkeys(units[column] for column in chosen))
     mixed = len(kinds) > 1
@@ -178,7 +171,8 @@ def pack_panels(runs: Sequence[ComparedRun], arrays: ArrayTable) -> Json:
         "start": min(float(run.rollout.t[0]) for run in runs),
         "end": max(float(run.rollout.t[-1]) for run in runs),
         "damped": [
-            spans_of(run.rollout.t, run.rollout["damped"] > 0.0) for run in runs
+            log_series.spans_of(run.rollout.t, run.rollout["damped"] > 0.0)
+            for run in runs
         ],
         "panels": [_packed(panels[key], curves[key], arrays) for key in panels],
         "colors": {
