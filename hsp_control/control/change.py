@@ -29,7 +29,6 @@ from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields import FieldSum, NullSpaceField, Rest
 from hsp_control.tasks import Gains, Impedance, Task
 from hsp_control.tasks.compliant_task import impedance_of
-from hsp_control.tasks.impedance import check_bounded, parts_of
 from hsp_control.trajectories import (
     Crossfade,
     OrientationTrajectory,
@@ -313,11 +312,6 @@ class ChangeImpedance(Change, type="impedance"):
         with within("impedance"):
             target = self.impedance.numbers(planned.task.error_parts)
             numbers = planned.gains.then(self.at, self.ramp, target)
-            values = [numbers.initial, *(each.target for each in numbers.transitions)]
-            # In between, the stiffness of one meets the bounds of another.
-            if any(parts_of(each)[3].any() for each in values):
-                for each in values:
-                    check_bounded(parts_of(each)[0])
         return setup.with_task(planned, gains=numbers)
 
 

@@ -109,12 +109,11 @@ class CompliantTask(SecondOrderTask):
         return self._at(state, self.in_force().numbers)
 
     def linear_feedback(self, state: RobotState, in_force: InForce) -> Feedback:
-        """Return the feedback for small errors: no spring is at its largest error."""
+        """Return the feedback for small errors: no spring is at its largest force."""
         if self.impedance is None:
             return super().linear_feedback(state, in_force)
         numbers = in_force.numbers.copy()
-        for inverse in parts_of(numbers)[3:]:
-            inverse[:] = 0.0
+        parts_of(numbers)[3][:] = 0.0
         return self._at(state, numbers)
 
     def _at(self, state: RobotState, numbers: Array) -> Feedback:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import GainError
 from hsp_control.declaration import Part, within
-from hsp_control.declaration.quantities import Gain, Positive, PositiveNumbers
+from hsp_control.declaration.quantities import Gain, Positive
 from hsp_control.robot import Robot
 from hsp_control.tasks.gains import as_gain, as_matrix
 from hsp_control.tasks.task import ErrorPart, LargestError, each_part
@@ -19,7 +19,7 @@ from hsp_control.tasks.task import ErrorPart, LargestError, each_part
 class Impedance(Part, error=GainError):
     """Λ e'' + (½ Λ' + D) e' + s(e) = -f: a spring and a damper at a task.
 
-    s(e) = K e, up to the spring's largest force or largest error.
+    s(e) = K e, up to the spring's largest force.
 
     Λ(q) = (J M⁻¹ Jᵀ)⁻¹ is the inertia that the robot has at the task, and f the
     external force there. The robot's own inertia is kept, so no force has to be
@@ -37,26 +37,19 @@ class Impedance(Part, error=GainError):
     damping_ratio: Positive | None = None
     """ζ of every mode of the task's inertia and K [-]; 1, critical damping, by default.
     D then follows the inertia."""
-    largest_error: PositiveNumbers | None = None
-    """Error at which the spring's force stops growing [m or rad], a number or one for
-    each row, instead of `largest_force`; it needs a diagonal stiffness. None by
-    default."""
     largest_force: LargestError = "robot"
     """Largest force and moment of the spring [N or N·m]: it yields to more as if it
     slipped, so that a target far away, or out of reach, does not pull with more. One
-    number, or one for each part of the error; "none": no bound. By default, without a
-    `largest_error`, the robot's (`Robot.spring_force`), and none for joints."""
+    number, or one for each part of the error; "none": no bound. By default the
+    robot's (`Robot.spring_force`), and none for joints."""
 
     def __post_init__(self) -> None:
         """Check that the damping is given one way, and that energies are positive."""
         if self.damping is not None and self.damping_ratio is not None:
             raise GainError("give either damping or damping_ratio")
-        stiffness = _definite(self.stiffness, "stiffness")
+        _definite(self.stiffness, "stiffness")
         if self.damping is not None:
             _definite(self.damping, "damping")
-        if self.largest_error is not None:
-            as_gain(self.largest_error, "largest_error")
-            check_bounded(stiffness)
 
     def placed(self, parts: Sequence[ErrorPart], robot: Robot) -> Self:
         """Return the impedance with its largest force in numbers.
@@ -64,31 +57,26 @@ class Impedance(Part, error=GainError):
         Raises:
             GainError: If there is neither one number nor one for each part.
         """
-        own, declared = dict.fromkeys(("m", "rad"), np.inf), self.largest_force
-        if self.largest_error is None:
-            own["m"], own["rad"] = robot.spring_force
+        own = dict(zip(("m", "rad"), robot.spring_force, strict=True))
         with within("largest_force"):
-            found = each_part(declared, parts, own, GainError)
+            found = each_part(self.largest_force, parts, own, GainError)
         changes: dict[str, Any] = {"largest_force": found}
         return replace(self, **changes)
 
     def numbers(self, parts: Sequence[ErrorPart]) -> Array:
-        """Return K, D, ζ, 1/largest error and 1/largest force in one array.
+        """Return K, D, ζ and 1/largest force in one array.
 
         Numbers between those of two impedances are those of an impedance as well, so
         that one may change into the other. `parts_of` takes it apart.
         """
         rows = sum(part.size for part in parts)
-        out = np.zeros((2 * rows + 3, rows))
-        K, D, ratio, inverse_bound, inverse_force = parts_of(out)
+        out = np.zeros((2 * rows + 2, rows))
+        K, D, ratio, inverse_force = parts_of(out)
         K[:] = as_matrix(as_gain(self.stiffness, "stiffness"), rows, "stiffness")
         if self.damping is not None:
             D[:] = as_matrix(as_gain(self.damping, "damping"), rows, "damping")
         else:
             ratio[:] = 1.0 if self.damping_ratio is None else self.damping_ratio
-        if self.largest_error is not None:
-            bound = as_gain(self.largest_error, "largest_error")
-            inverse_bound[:] = 1.0 / np.diag(as_matrix(bound, rows, "largest_error"))
         if isinstance(self.largest_force, tuple):  # before it is placed it has no bound
             sizes = [part.size for part in parts]
             each = [
@@ -98,26 +86,11 @@ class Impedance(Part, error=GainError):
         return out
 
 
-def parts_of(numbers: Array) -> tuple[Array, Array, Array, Array, Array]:
-    """Return views: K, D (m, m), and ζ, 1/largest error, 1/largest force (m,)."""
+def parts_of(numbers: Array) -> tuple[Array, Array, Array, Array]:
+    """Return views: K, D (m, m), and ζ, 1/largest force (m,)."""
     m = numbers.shape[1]
     K, D, rest = numbers[:m], numbers[m : 2 * m], numbers[2 * m :]
-    return K, D, rest[0], rest[1], rest[2]
-
-
-def check_bounded(stiffness: Array) -> None:
-    """Check that a stiffness may have a largest error.
-
-    Otherwise its force would be the gradient of no energy.
-
-    Raises:
-        GainError: If it is a matrix that is not diagonal.
-    """
-    if stiffness.ndim == 2 and np.any(stiffness != np.diag(np.diag(stiffness))):
-        raise GainError(
-            "largest_error needs a diagonal stiffness: with "
-            f"{stiffness.tolist()} the bounded force would have no energy"
-        )
+    return K, D, rest[0], rest[1]
 
 
 def _definite(value: ArrayLike, name: str) -> Array:

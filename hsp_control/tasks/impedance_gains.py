@@ -58,7 +58,7 @@ class Scratch(NamedTuple):
     square: Array  # (10, m, m)
     turning: Array  # (4, 3, 3)
     vectors: Array  # (2, 3)
-    rows: Array  # (4, m)
+    rows: Array  # (3, m)
 
     @classmethod
     def allocate(cls, rows: int, nv: int) -> "Scratch":
@@ -69,7 +69,7 @@ class Scratch(NamedTuple):
             np.zeros((10, rows, rows)),
             np.zeros((4, 3, 3)),
             np.zeros((2, 3)),
-            np.zeros((4, rows)),
+            np.zeros((3, rows)),
         )
 
 

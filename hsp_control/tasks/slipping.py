@@ -26,7 +26,7 @@ _STEPS = 40  # of Newton, and sweeps over the groups where K couples them
 def spring_force(numbers: Array, ends: Indices, e: Array) -> Array:
     """Return s(e), shape (m,) [N or N·m]; arguments as of `bounded_stiffness`."""
     m = len(e)
-    S, square, vectors = numbers[:m].copy(), np.zeros((3, m, m)), np.zeros((4, m))
+    S, square, vectors = numbers[:m].copy(), np.zeros((3, m, m)), np.zeros((3, m))
     bounded_stiffness(numbers, ends, e, square, vectors, S)
     return np.asarray(S @ e)
 
@@ -38,7 +38,7 @@ def slipped(numbers: Array, ends: Indices, e: Array) -> float:
         Its length [m or rad]; 0 if the force is K e.
     """
     force, away = numbers[: len(e)] @ e, 0.0
-    for g in range(len(ends) + len(e)):
+    for g in range(len(ends)):
         first, end, most = group_of(g, ends, numbers)
         if length(force, first, end) > most:
             away = max(away, length(e, first, end))
@@ -47,18 +47,10 @@ def slipped(numbers: Array, ends: Indices, e: Array) -> float:
 
 @kernel
 def group_of(g: int, ends: Indices, numbers: Array) -> tuple[int, int, float]:
-    """Return a group's first row, the row after its last, and F_g; inf for no bound.
-
-    The parts of the error come first, then each row by itself, for its largest error.
-    """
-    m, parts = numbers.shape[1], ends.shape[0]
-    if g < parts:
-        first = 0 if g == 0 else ends[g - 1]
-        inverse = numbers[2 * m + 2, first]
-        return first, ends[g], 1.0 / inverse if inverse > 0.0 else np.inf
-    row = g - parts
-    inverse = numbers[2 * m + 1, row]
-    return row, row + 1, numbers[row, row] / inverse if inverse > 0.0 else np.inf
+    """Return a group's first row, the row after its last, and F_g; inf for no bound."""
+    first = 0 if g == 0 else ends[g - 1]
+    inverse = numbers[2 * numbers.shape[1] + 1, first]
+    return first, ends[g], 1.0 / inverse if inverse > 0.0 else np.inf
 
 
 @kernel
@@ -77,15 +69,15 @@ def bounded_stiffness(
     """Write S where a bound acts; return whether one does, else S is K.
 
     Args:
-        numbers: As of `Impedance.numbers`, shape (2 m + 3, m).
+        numbers: As of `Impedance.numbers`, shape (2 m + 2, m).
         ends: Where each part of the error ends, shape (parts,).
         e: The error, shape (m,).
         square: Scratch, shape (3, m, m).
-        vectors: Scratch, shape (4, m).
+        vectors: Scratch, shape (3, m).
         S: Shape (m, m).
     """
     m = e.shape[0]
-    groups = ends.shape[0] + m
+    groups = ends.shape[0]
     K, force = numbers[:m], vectors[0]
     for i in range(m):
         force[i] = 0.0
@@ -101,39 +93,35 @@ def bounded_stiffness(
     if not cholesky(K, L):
         return False
     _write_inverse(L, inverse)
-    part, row = vectors[2], vectors[3]  # c of the groups
-    part[:] = 0.0
-    row[:] = 0.0
+    c = vectors[2]  # of the groups
+    c[:] = 0.0
     for _ in range(_STEPS):
         settled = True
         for g in range(groups):
             first, end, most = group_of(g, ends, numbers)
             if most == np.inf:
                 continue
-            c, at = (part, g) if g < ends.shape[0] else (row, first)
             for _step in range(_STEPS):
-                _factorise(inverse, ends, part, row, square[2], L)
+                _factorise(inverse, ends, c, square[2], L)
                 n = _solve(L, e, force, vectors[1], first, end)
                 if n <= most * (1.0 + _TOLERANCE) and (
-                    c[at] == 0.0 or n >= most * (1.0 - _TOLERANCE)
+                    c[g] == 0.0 or n >= most * (1.0 - _TOLERANCE)
                 ):
                     break
                 settled = False
                 slope = 0.0
                 for i in range(first, end):
                     slope += force[i] * vectors[1, i]
-                c[at] = max(c[at] + (n / most - 1.0) * n * n / slope, 0.0)
+                c[g] = max(c[g] + (n / most - 1.0) * n * n / slope, 0.0)
         if settled:
             break
-    _factorise(inverse, ends, part, row, square[2], L)
+    _factorise(inverse, ends, c, square[2], L)
     _write_inverse(L, S)
     return True
 
 
 @kernel
-def _factorise(
-    inverse: Array, ends: Indices, part: Array, row: Array, A: Array, L: Array
-) -> None:
+def _factorise(inverse: Array, ends: Indices, c: Array, A: Array, L: Array) -> None:
     """Write the Cholesky factor of A = K⁻¹ + diag(c)."""
     m, first = inverse.shape[0], 0
     for i in range(m):
@@ -141,7 +129,7 @@ def _factorise(
             A[i, j] = inverse[i, j]
     for p in range(ends.shape[0]):
         for i in range(first, ends[p]):
-            A[i, i] += part[p] + row[i]
+            A[i, i] += c[p]
         first = ends[p]
     cholesky(A, L)
 

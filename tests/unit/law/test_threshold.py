@@ -8,7 +8,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from task_cases import FRAMES, load, unit
 
-from hsp_control import Controller, FramePosition, Gains, Hold, Robot
+from hsp_control import (
+    Controller,
+    FrameOrientation,
+    FramePosition,
+    Gains,
+    Hold,
+    JointPosture,
+    Robot,
+    TargetPosture,
+)
 from hsp_control.common.arrays import Array
 from hsp_control.law.threshold import (
     MODEST,
@@ -158,3 +167,67 @@ def drawn(name: str, seed: int) -> Slopes:
 def test_the_law_is_nowhere_steep(name: str, seed: int) -> None:
     found, bound = drawn(name, seed)
     assert found <= bound * (1.0 + 1e-5)
+
+
+def slope_in_v(controller: Controller, q: Array, v: Array) -> Array:
+    """Return ∂a/∂v, exact but for rounding: a has no higher power of v than v²."""
+    size = 1e-2 * (1.0 + float(np.linalg.norm(v)))
+
+    def a(v: Array) -> Array:
+        return controller.compute(0.0, q, v).acceleration.copy()
+
+    steps = size * np.eye(len(v))
+    return np.array([a(v + d) - a(v - d) for d in steps]).T / (2.0 * size)
+
+
+@pytest.mark.parametrize("name", ["planar3r", "panda", "ur5"])
+@given(seeds)
+@settings(max_examples=25)
+def test_no_target_makes_it_steep_in_v(name: str, seed: int) -> None:
+    """At any speed; the parts J#J and P have eigenvalues in [0, 1]."""
+    robot, rng = load(name), np.random.default_rng(seed)
+    q, lost = near_singular(robot, rng)
+    target = 10.0 ** rng.uniform(-3.0, 3.0) * unit(rng, len(lost))
+    hand = FramePosition(FRAMES[name], Hold(target), axes="xyz"[: len(lost)])
+    Kv, K_N = 20.0, rng.uniform(1.0, 40.0)
+    field = TargetPosture(robot.random_configuration(rng))
+    controller = Controller(robot, [hand], field, null_space_gain=K_N, limits=None)
+    v = 10.0 ** rng.uniform(-3.0, 1.0) * unit(rng, robot.nv)
+    g = controller.compute(0.0, q, v).field.g
+    _, tensor = position_jacobian(robot, q, FRAMES[name])
+    bends = np.linalg.norm(tensor.reshape(robot.nv, -1), 2)
+    (epsilon,) = controller.active_stack.resolution.thresholds
+    speeds = 3.0 * np.linalg.norm(v) + np.linalg.norm(g - v)
+    bound = max(Kv, K_N) + 1.0 + 1.09 * speeds * bends / epsilon  # ∂g/∂q = -1
+    assert np.linalg.norm(slope_in_v(controller, q, v), 2) <= bound * (1.0 + 1e-6)
+
+
+@pytest.mark.parametrize("name", ["panda", "ur5"])
+@given(seeds)
+@settings(max_examples=25)
+def test_levels_share_one_damping_wherever_their_targets_are(
+    name: str, seed: int
+) -> None:
+    """At rest, g = 0: ∂a/∂v = -Kv (1 - P) - K_N P², with 0 ≤ P ≤ 1."""
+    robot, rng = load(name), np.random.default_rng(seed)
+    q, _ = near_singular(robot, rng)
+    Kv, K_N, rest = 20.0, rng.uniform(1.0, 40.0), np.zeros(robot.nv)
+    here = robot.state(0.0, q, rest).position(FRAMES[name])
+    target = Hold(here + 10.0 ** rng.uniform(-4.0, 3.0) * unit(rng, 3))
+    near = robot.integrate(q, 10.0 ** rng.uniform(-4.0, 0.0) * unit(rng, robot.nv))
+    tasks = [
+        FramePosition(FRAMES[name], target, priority=1),
+        FrameOrientation(FRAMES[name], priority=2),
+        JointPosture(near, joints=robot.joint_names[:2], priority=3),
+    ]
+    controller = Controller(
+        robot, tasks, Rest(), null_space_gain=K_N, limits=None, start=near
+    )
+    found = slope_in_v(controller, q, rest)
+    scale = max(Kv, K_N)
+    np.testing.assert_allclose(found, found.T, atol=1e-6 * scale)
+    # K_N P² + Kv (1 - P) has its least where 2 K_N P = Kv.
+    least = Kv - Kv**2 / (4.0 * K_N) if Kv < 2.0 * K_N else K_N
+    rates = -np.linalg.eigvalsh(found)
+    assert rates.min() >= least - 1e-6 * scale
+    assert rates.max() <= scale * (1.0 + 1e-6)

@@ -76,7 +76,7 @@ def impedance(kind: str, rows: int, rng: np.random.Generator) -> Impedance:
     if kind == "matrices":
         stiffness, damping = definite(rng, rows, 150.0), definite(rng, rows, 20.0)
         return Impedance(stiffness, damping=damping, largest_force="none")
-    return Impedance(each, damping=30.0, largest_error=0.2)
+    return Impedance(each, damping=30.0, largest_force="none")
 
 
 def mass_matrix(robot: hsp.Robot, q: Array) -> Array:
@@ -160,8 +160,7 @@ def test_the_equation_holds_whatever_the_force_and_the_metric(
             D = np.array(spring.damping) * np.eye(rows)
             if np.ndim(spring.damping) == 2:
                 D = np.array(spring.damping)
-        bound = np.inf if spring.largest_error is None else 0.2
-        force = K @ np.clip(e(0.0), -bound, bound)
+        force = K @ e(0.0)
         residual = inertia @ e_ddot + (0.5 * inertia_rate + D) @ e_dot + force + f
         scale = np.abs(force).max() + np.abs(inertia @ e_ddot).max()
         assert np.abs(residual).max() < 1e-7 * scale
@@ -174,7 +173,9 @@ def test_gains_at_a_state_are_those_of_the_step(case: Case) -> None:
     robot = motion.robot
     plain = case.family.build(robot, motion, 0.3, GAINS, 4)
     bare = replace(plain, gains=Gains(natural_frequency=10.0), name="hand")
-    task = replace(bare, impedance=Impedance(300.0, damping=20.0, largest_error=0.1))
+    most = [30.0] * len(bare.error_parts)
+    spring = Impedance(300.0, damping=20.0, largest_force=most)
+    task = replace(bare, impedance=spring)
     controller = Controller(robot, [task], limits=None)
     output = controller.compute(TIME, motion.q, motion.v)
     state = robot.state(TIME, motion.q, motion.v)
@@ -189,7 +190,9 @@ def test_gains_at_a_state_are_those_of_the_step(case: Case) -> None:
     np.testing.assert_allclose(again.acceleration, own.acceleration, rtol=1e-12)
     # For small errors the spring is not at its bound.
     soft = controller._linear_feedback("hand", state)[-np.inf]
-    kept = np.minimum(1.0, 0.1 / np.abs(own.error))
+    parts = np.split(own.error, np.cumsum([part.size for part in task.error_parts]))
+    sizes = [np.full(len(part), np.linalg.norm(part)) for part in parts]
+    kept = np.minimum(1.0, 0.1 / np.concatenate(sizes))
     np.testing.assert_allclose(soft.Kp * kept, Kp, rtol=1e-12)
     assert (kept < 1.0).any()
 
@@ -256,7 +259,7 @@ def panda_hand(**fields: Any) -> Controller:
 def test_stiffness_changes_without_a_jump() -> None:
     """Stiffness, kind of damping and bound: the effort is continuous, and arrives."""
     soft = Impedance([200, 300, 400], damping_ratio=0.7)
-    hard = Impedance(2000.0, damping=150.0, largest_error=0.01)
+    hard = Impedance(2000.0, damping=150.0, largest_force=20.0)
     controller = panda_hand(impedance=soft)
     robot = controller.robot
     controller.at(1.0).ramp(0.5).impedance("hand", hard)
@@ -284,20 +287,14 @@ def later(first: Impedance) -> Any:
     return panda_hand(impedance=first).at(1.0)
 
 
-COUPLED = [[200.0, 50.0, 0.0], [50.0, 200.0, 0.0], [0.0, 0.0, 100.0]]
 REFUSED: dict[str, tuple[Callable[[], Any], type[Exception], str]] = {
     "two dampings": (lambda: Impedance(1.0, damping=1.0, damping_ratio=1.0), GainError,
      "give either damping or damping_ratio"),
-    "bounded matrix": (lambda: Impedance(COUPLED, largest_error=0.1), GainError,
-     "largest_error needs a diagonal stiffness: with .* would have no energy"),
     "gains and impedance": (
      lambda: FramePosition(gains=Gains(1.0, 2.0), impedance=Impedance(1.0)), GainError,
      r"give either gains \[1/s², 1/s\] or impedance \[N/m, N·s/m\], not both"),
     "rows": (lambda: panda_hand(impedance=Impedance([1.0, 2.0])), GainError,
      r"tasks.hand.impedance: stiffness has shape \(2,\); needs a number, 3 numbers"),
-    "rows of a bound": (
-     lambda: panda_hand(impedance=Impedance(1.0, largest_error=[1.0, 2.0])), GainError,
-     r"tasks.hand.impedance: largest_error has shape \(2,\); needs a number, 3"),
     "another task": (lambda: hsp.CenterOfMass(impedance=Impedance(1.0)),  # type: ignore[call-arg]
      TaskError, "impedance"),
     "gains of a spring": (
@@ -310,10 +307,6 @@ REFUSED: dict[str, tuple[Callable[[], Any], type[Exception], str]] = {
     "rows of a change": (
      lambda: later(Impedance(1.0)).impedance("hand", Impedance([1.0, 2.0])), GainError,
      r"impedance: stiffness has shape \(2,\); needs a number, 3 numbers"),
-    "bounds beside a matrix": (
-     lambda: later(Impedance(COUPLED)).impedance("hand", Impedance(1.0))
-     .impedance("hand", Impedance(1.0, largest_error=0.1)),
-     GainError, "impedance: largest_error needs a diagonal stiffness"),
     "integral action": (
      lambda: Compensation(integral_action=IntegralAction(1.0)).check(
          hsp.Robot.load("panda"), panda_hand(impedance=Impedance(1.0)).tasks),
