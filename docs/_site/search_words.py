@@ -34,7 +34,7 @@ WORDS: dict[str, str] = {
     "latency": "latency, jitter, real time, deadline",
     "plants": "plant, simulation, friction, noise, delay, payload",
     "robustness": "robustness, compensation, friction, payload, observer",
-    "companions/sweeps": "sweep, cluster, dask, sensitivity, parameters",
+    "companions/sweeps": "sweep, sensitivity, parameters",
     "trust": "security, untrusted files",
     "view": "view, viewer, compare runs, meshcat, rerun, notebook, jupyter",
     "export": "export, film, video, gif",

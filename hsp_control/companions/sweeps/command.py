@@ -48,11 +48,6 @@ def _add_options(sweep: argparse.ArgumentParser) -> None:
         "--workers", type=int, metavar="N", help="processes; default: one per core"
     )
     sweep.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="use the workers of this Dask scheduler, such as tcp://host:8786",
-    )
-    sweep.add_argument(
         "--plot", action="store_true", help="draw what was found, beside the file"
     )
 

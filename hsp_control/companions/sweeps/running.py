@@ -1,21 +1,16 @@
-"""Run one task, in any process or machine: text in, text out."""
+"""Run one task, in any process: text in, text out."""
 
 import json
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cache
-from threading import current_thread, main_thread
 from time import perf_counter
-
-import numpy as np
 
 from hsp_control.common.exceptions import HspControlError, SimulationError
 from hsp_control.companions.sweeps.plan import document
 from hsp_control.companions.sweeps.row import CRASHED, TIMED_OUT, Row
 from hsp_control.config.experiment import build
 from hsp_control.simulation import Rollout
-from hsp_control.simulation.log_writer import versions
 from hsp_control.simulation.measures import Measure, measures
 
 
@@ -38,7 +33,6 @@ def run_task(task: str) -> str:
             "message": message,
             "measures": {name: list(measure) for name, measure in found.items()},
             "wall_time": perf_counter() - start,
-            "versions": _versions(),
         }
     )
 
@@ -48,8 +42,8 @@ def crashed(reason: str) -> str:
     return json.dumps({"status": CRASHED, "message": reason})
 
 
-def read_result(run: int, text: str) -> tuple[Row, dict[str, Measure], dict[str, str]]:
-    """Return a result's row, its measures, and the package versions of its worker."""
+def read_result(run: int, text: str) -> tuple[Row, dict[str, Measure]]:
+    """Return a result's row and its measures."""
     result = json.loads(text)
     found = {k: Measure(*measure) for k, measure in result.get("measures", {}).items()}
     metrics = {name: measure.value for name, measure in found.items()}
@@ -60,14 +54,14 @@ def read_result(run: int, text: str) -> tuple[Row, dict[str, Measure], dict[str,
         metrics,
         result.get("wall_time", 0.0),
     )
-    return row, found, result.get("versions", {})
+    return row, found
 
 
 def _run(task: str) -> tuple[str, str, Rollout | None]:
     limit = json.loads(task).get("time_limit")
     try:
-        with _at_most(limit) as check:
-            rollout = build(document(task)).run(on_row=check)
+        with _at_most(limit):
+            rollout = build(document(task)).run()
     except _TooLongError:
         return TIMED_OUT, f"took longer than {limit:g} s", None
     except SimulationError as error:
@@ -84,32 +78,19 @@ class _TooLongError(BaseException):
 
 
 @contextmanager
-def _at_most(seconds: float | None) -> Iterator[Callable[[object], None]]:
-    """Raise where the block takes longer, at once in a process's main thread.
-
-    In another thread, such as Dask's, it is what is yielded that raises: at each row.
-    """
-    end = np.inf if seconds is None else perf_counter() + seconds
-    timed = seconds is not None and current_thread() is main_thread()
-
-    def check(recorder: object) -> None:
-        if perf_counter() > end:
-            raise _TooLongError
+def _at_most(seconds: float | None) -> Iterator[None]:
+    """Raise where the block takes longer, in a process's main thread."""
 
     def stop(signal_number: int, frame: object) -> None:
         raise _TooLongError
 
-    before = signal.signal(signal.SIGALRM, stop) if timed else None
+    if seconds is None:
+        yield
+        return
+    before = signal.signal(signal.SIGALRM, stop)
     try:
-        if timed:
-            signal.setitimer(signal.ITIMER_REAL, seconds or 0.0)
-        yield check
+        signal.setitimer(signal.ITIMER_REAL, seconds)
+        yield
     finally:
-        if timed:
-            signal.setitimer(signal.ITIMER_REAL, 0.0)
-            signal.signal(signal.SIGALRM, before)
-
-
-@cache
-def _versions() -> dict[str, str]:
-    return versions()
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)

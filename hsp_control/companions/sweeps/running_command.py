@@ -64,7 +64,6 @@ def sweep(options: argparse.Namespace) -> int:
             out=file,
             overrides=options.overrides,
             workers=options.workers,
-            scheduler=options.scheduler,
             fresh=options.fresh,
             time_limit=options.time_limit,
             on_progress=show,

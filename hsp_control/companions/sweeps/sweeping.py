@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from hsp_control.common.exceptions import HspControlError, SweepError
-from hsp_control.companions.sweeps.dask_workers import DaskWorkers
 from hsp_control.companions.sweeps.design import chosen_design, points
 from hsp_control.companions.sweeps.factor import factors
 from hsp_control.companions.sweeps.local_workers import LocalWorkers
@@ -20,7 +19,6 @@ from hsp_control.companions.sweeps.running import read_result
 from hsp_control.companions.sweeps.store import Store
 from hsp_control.config.experiment import build
 from hsp_control.config.source import read_document
-from hsp_control.simulation.log_writer import versions
 
 
 def sweep(
@@ -33,7 +31,6 @@ def sweep(
     out: str | PathLike[str] | None = None,
     overrides: Iterable[str] = (),
     workers: int | None = None,
-    scheduler: str | None = None,
     fresh: bool = False,
     time_limit: float | None = None,
     on_progress: Callable[[int, int, int], None] | None = None,
@@ -57,7 +54,6 @@ def sweep(
             not computed again. None: nothing is written.
         overrides: Values to change in all runs, each ``key.path=value``.
         workers: The number of processes; None: one per core.
-        scheduler: Address of a Dask scheduler, whose workers are used instead.
         fresh: Start again, and overwrite ``out``.
         time_limit: The longest computation of a run [s]; None: any. A run that takes
             longer has the status ``timed out``, and is repeated when the sweep resumes.
@@ -107,7 +103,8 @@ def sweep(
     path = None if out is None else Path(out)
     if path is not None and path.suffix != ".parquet":
         raise SweepError(f"{path}: the name of a sweep's file must end with .parquet")
-    with _workers(workers, scheduler) as pool:
+    count = len(os.sched_getaffinity(0)) if workers is None else workers
+    with LocalWorkers(count) as pool:
         store = Store(plan, identity, path, fresh=fresh)
         try:
             with suppress(KeyboardInterrupt):
@@ -118,16 +115,6 @@ def sweep(
             store.close()
             raise
         return store.close()
-
-
-def _workers(count: int | None, scheduler: str | None) -> LocalWorkers | DaskWorkers:
-    if scheduler is not None:
-        if count is not None:
-            raise SweepError("the scheduler has its own workers; remove --workers")
-        return DaskWorkers(scheduler)
-    if count is None:
-        count = len(os.sched_getaffinity(0))
-    return LocalWorkers(count)
 
 
 def _compile(plan: Plan, run: int) -> None:
@@ -143,21 +130,14 @@ def _compile(plan: Plan, run: int) -> None:
 def _run_pending(
     plan: Plan,
     store: Store,
-    pool: LocalWorkers | DaskWorkers,
+    pool: LocalWorkers,
     on_progress: Callable[[int, int, int], None] | None,
 ) -> None:
-    own = versions()
     failures = sum(row.status != "completed" for row in store.rows.values())
     if on_progress is not None:
         on_progress(len(store.rows), len(plan), failures)
     for run, text in pool.map((run, plan.task(run)) for run in store.pending):
-        row, found, others = read_result(run, text)
-        if others and others != own:
-            name = next(name for name in own if others.get(name) != own[name])
-            raise SweepError(
-                f"a worker has {name} {others.get(name)}, here is {own[name]}: "
-                "they must be equal"
-            )
+        row, found = read_result(run, text)
         store.add(row, found)
         failures += row.status != "completed"
         if on_progress is not None:

@@ -1,10 +1,7 @@
 """Check the sweep command: its mistakes, what it tells, and what it draws."""
 
-import json
 import sys
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from sweep_runs import MOVING, OVER, QUICK
@@ -12,11 +9,6 @@ from sweep_runs import MOVING, OVER, QUICK
 import hsp_control as hsp
 from hsp_control.cli import main
 from hsp_control.common.exceptions import SweepError
-from hsp_control.companions.sweeps import (
-    Sweep,
-    local_workers,
-    sweeping,
-)
 
 pytestmark = pytest.mark.process
 
@@ -125,21 +117,3 @@ def test_a_stream_from_another_process_cannot_be_swept() -> None:
     heard = "tasks.tip.trajectory={type: stream, source: 'udp://127.0.0.1:5005'}"
     with pytest.raises(SweepError, match=r"hears udp://127.0.0.1:5005, which only one"):
         hsp.sweeps.sweep(MOVING, OVER, overrides=[*QUICK, heard])
-
-
-def test_a_worker_with_other_versions_is_an_error_that_loses_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    class Mixed(local_workers.LocalWorkers):
-        def map(self, tasks: Any) -> Iterator[tuple[int, str]]:
-            for run, text in super().map(tasks):
-                result = json.loads(text)
-                if run == 1:
-                    result["versions"]["pin"] = "3.0"
-                yield run, json.dumps(result)
-
-    monkeypatch.setattr(sweeping, "LocalWorkers", Mixed)
-    out, over = tmp_path / "mixed.parquet", {"null_space.gain": [1.0, 2.0, 3.0]}
-    with pytest.raises(SweepError, match=r"a worker has pin 3.0, here is"):
-        hsp.sweeps.sweep(MOVING, over, overrides=QUICK, out=out, workers=1)
-    assert Sweep.load(out)["run"].tolist() == [0]

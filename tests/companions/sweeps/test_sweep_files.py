@@ -1,12 +1,11 @@
 """Check that sweeps give the same bits however computed, lost or done twice."""
 
 import json
-import os
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -61,38 +60,6 @@ def swept(file: Path) -> Sweep:
 @pytest.fixture(scope="module")
 def whole() -> Sweep:
     return hsp.sweeps.sweep(MOVING, {"null_space.gain": "1:20:20"}, overrides=SLOWER)
-
-
-@pytest.fixture
-def cluster(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
-    """A scheduler and two workers, processes of their own, on the loopback alone."""
-    pytest.importorskip("distributed")
-    file = tmp_path / "scheduler.json"
-    dask = [sys.executable, "-m", "distributed.cli"]
-    host = ["--host", "127.0.0.1", "--no-dashboard"]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    environment |= {"DASK_DISTRIBUTED__WORKER__DAEMON": "False"}
-    quiet: dict[str, Any] = {
-        "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL,
-        "env": environment, "cwd": tmp_path,
-    }  # fmt: skip
-    processes = []
-
-    def start(module: str, *arguments: str) -> None:
-        command = [*dask[:2], f"{dask[2]}.{module}", *host, *arguments]
-        processes.append(subprocess.Popen(command, **quiet))
-
-    start("dask_scheduler", "--port", "0", "--scheduler-file", str(file))
-    try:
-        until(lambda: file.is_file() and bool(file.read_text()))
-        address = json.loads(file.read_text())["address"]
-        for _ in range(2):
-            start("dask_worker", address, "--nthreads", "1", "--no-nanny")
-        yield address, processes[1:]
-    finally:
-        for process in processes:
-            process.kill()
-            process.wait()
 
 
 # --- what is in it -------------------------------------------------------------------
@@ -375,59 +342,9 @@ def test_another_program_s_parquet_is_refused(tmp_path: Path) -> None:
         Sweep.load(tmp_path / "b.parquet")
 
 
-# --- Dask ----------------------------------------------------------------------------
-
-
-def test_a_dask_cluster_gives_the_same_bits_though_a_worker_dies(
-    cluster: tuple[str, list[subprocess.Popen[bytes]]], tmp_path: Path, whole: Sweep
-) -> None:
-    import distributed
-
-    address, workers = cluster
-    with distributed.Client(address, set_as_default=False) as client:
-        client.wait_for_workers(2, timeout=60)
-    seen = []
-
-    def kill_one(done: int, total: int, failures: int) -> None:
-        seen.append(done)
-        if done == 5:
-            workers[0].kill()
-
-    out = tmp_path / "dask.parquet"
-    found = hsp.sweeps.sweep(
-        MOVING,
-        {"null_space.gain": "1:20:20"},
-        overrides=SLOWER,
-        out=out,
-        scheduler=address,
-        on_progress=kill_one,
-    )
-    assert workers[0].wait() == -signal.SIGKILL
-    assert seen == list(range(21))  # every run came once
-    same(found, whole)
-    same(Sweep.load(out), whole)
-
-
-def test_no_scheduler_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    from hsp_control.companions.sweeps import dask_workers
-
-    monkeypatch.setattr(dask_workers, "PATIENCE", 0.5)
-    with pytest.raises(SweepError, match="no Dask scheduler answers at"):
-        hsp.sweeps.sweep(MOVING, OVER, overrides=QUICK, scheduler="tcp://127.0.0.1:9")
-    with pytest.raises(SweepError, match="remove --workers"):
-        hsp.sweeps.sweep(
-            MOVING, OVER, overrides=QUICK, scheduler="tcp://x:1", workers=2
-        )
-    monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(SweepError, match=r"pip install 'hsp_control\[dask\]'"):
-        hsp.sweeps.sweep(MOVING, OVER, overrides=QUICK, scheduler="tcp://127.0.0.1:9")
-
-
 def test_a_bad_key_is_found_before_any_worker_is_asked() -> None:
     with pytest.raises(ConfigError, match=r"null_space.gian"):
-        hsp.sweeps.sweep(
-            MOVING, {"null_space.gian": [1]}, scheduler="tcp://127.0.0.1:9"
-        )
-    with pytest.raises(HspControlError, match="--set x"):
+        hsp.sweeps.sweep(MOVING, {"null_space.gian": [1]})
+    with pytest.raises(HspControlError, match="'x': needs the form key=value"):
         hsp.sweeps.sweep(MOVING, OVER, overrides=["x"])
     assert Choices((1,)).levels() == (1,)
