@@ -154,13 +154,14 @@ class Resolution:
     def compile(self, v: Array, *, controls: bool) -> Callable[[], float]:
         """Return the call that `resolve` makes; it returns what `outcome_of` takes."""
         problem = self.problem
-        step = Step(
+        step = (
             *(problem.task, problem.field, problem.metric, self.form),
             *(v, problem.gain, self.threshold, self._following, controls),
             *(self.ends, problem.asked, problem.bounded, self.thresholds),
             *(self._scratch, self.null_space_error, self.acceleration, self.code),
         )
-        return bind(_resolve_at_once if self.alone else _resolve_levels, step)
+        resolve = _resolve_at_once if self.alone else _resolve_levels
+        return bind(resolve, Step._make(step))
 
     def diagnose(self, first: int = 0) -> tuple[float, float, bytes]:
         """Return what tells how near the last `resolve` was to singular and to rest.
