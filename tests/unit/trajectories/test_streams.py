@@ -423,7 +423,7 @@ def test_only_a_stream_that_begins_somewhere_counts(kind: Any) -> None:
 
 
 def test_a_stream_that_hears_something_else_cannot_be_sent_to() -> None:
-    with pytest.raises(StreamError, match="hears goals.jsonl; only"):
+    with pytest.raises(StreamError, match=r"hears goals\.jsonl; only"):
         Stream(source="goals.jsonl").send([0.0])
 
 
