@@ -235,7 +235,7 @@ class HspRobot(Uncalibrated, Robot):
 
         Args:
             actions: One after another, each as for `send_action`.
-            times: When, from now, increasing [s].
+            times: When, from now, increasing [s]; of an old chunk the first are past.
         """
         rows = [self.arm.values(each) for each in actions]
         self.arm.loop.send_chunk(self.config.targets, rows, times)

@@ -2,6 +2,7 @@
 
 import json
 import logging
+import re
 import socket
 import time
 from collections.abc import Callable, Iterator
@@ -72,6 +73,12 @@ def test_datagrams_arrive_and_bad_ones_are_counted(
     assert last == pytest.approx(0.1, abs=1e-9)
     assert stream.counts()["rejected"] == 8
     assert "a message is 0; needs a mapping" in stream.last_rejection
+
+
+@pytest.mark.parametrize("source", ["udp://5005", "udp://a:5005/x/y", "udp://a:5/?"])
+def test_a_wrong_address_is_named(source: str) -> None:
+    with pytest.raises(StreamError, match=re.escape(f"{source!r}; needs udp://HOST")):
+        Stream(source=source)
 
 
 def test_a_port_in_use_is_told_and_streams_of_one_process_share_it(port: int) -> None:
