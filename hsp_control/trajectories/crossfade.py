@@ -112,12 +112,12 @@ class CrossfadeOrientation(OrientationTrajectory, type="crossfade"):
         out = self._output(out)
         if t < self.start_time:
             return self.before.sample(t, out)
+        if t >= self.start_time + self.duration:  # a stream may know R_0 no more
+            return self.after.sample(t, out)
         return self._blend.sample(t, out)
 
     @cached_property
-    def _blend(self) -> OrientationTrajectory:
-        if self.duration == 0.0:
-            return self.after
+    def _blend(self) -> BlendOrientation:
         R, omega, omega_dot = self.before.sample(self.start_time)
         return BlendOrientation(
             self.after,
