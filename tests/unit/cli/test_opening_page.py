@@ -1,15 +1,24 @@
 """When a page opens, and what it says before all is ready."""
 
+import sys
 from argparse import Namespace
 from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+import hsp_control as hsp
+from hsp_control.cli import steering
 from hsp_control.cli.pages import OpeningPage, draw_before
+from hsp_control.cli.steering import PageProcess, SteeringPage
 from hsp_control.common import adapters, kernels
-from hsp_control.common.exceptions import SimulationError
+from hsp_control.common.exceptions import SimulationError, ViewerError
 from hsp_control.config.loaded_scenario import load_scenario
 from hsp_control.config.source import read_document
+from hsp_control.live import OperatorRequests
+from hsp_control.play.live_loop import channel_pair
+from hsp_control.play.playable import playable
 from hsp_control.visualization.viewer import SceneRecorder, Viewer, transport
 from hsp_control.visualization.viewer.commands import unpack
 
@@ -97,3 +106,40 @@ def test_the_robot_is_drawn_at_its_start_before_any_kernel_is_compiled(
     moved = {path for path in drawn if drawn[path] != home[path]}
     assert "/robot/panda_joint5" in moved
     assert "/robot/panda_joint3" not in moved
+
+
+@pytest.fixture(scope="module")
+def experiment() -> hsp.Experiment:
+    return playable("planar3r")
+
+
+def test_a_page_that_says_nothing_ends_the_wait(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    silent = tmp_path / "python"
+    silent.write_text("#!/bin/sh\nexec sleep 600\n")
+    silent.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(silent))
+    monkeypatch.setattr(steering, "START", 0.05)
+    page = PageProcess(port=None, host="127.0.0.1", held=True)
+    with pytest.raises(ViewerError, match=r"did not start within 0\.05 s"):
+        page.__enter__()
+    assert page._process.poll() is not None
+
+
+def test_a_page_that_dies_before_its_key_was_held(
+    experiment: hsp.Experiment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing has moved, and nobody has stopped it: that is an error."""
+    channel, there = channel_pair()
+    process = SimpleNamespace(
+        channel=channel, held=True, begin=lambda *_: there.close()
+    )
+    ready: list[bool] = []
+    opening = SimpleNamespace(ready=lambda: ready.append(True))
+    page = SteeringPage(process, opening)  # type: ignore[arg-type]
+    monkeypatch.setattr(steering, "_rehearse", lambda *_: None)
+    with pytest.raises(ViewerError, match="before anybody held its key"):
+        steering.let_steer(page, experiment, OperatorRequests(), tmp_path / "journal")
+    assert ready == [True]  # it was open
+    channel.close()

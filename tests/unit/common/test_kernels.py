@@ -351,51 +351,6 @@ VECTOR = 8 * JOINTS
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", tasks(Robot.load("panda"), "panda_tcp"))
-def test_no_allocation_in_a_task(name: str, chain: Robot) -> None:
-    robot = chain
-    task = tasks(robot, f"link{JOINTS}")[name]
-    state = robot.state(0.1, robot.home() + 0.1, np.full(JOINTS, 0.1))
-    out, feedback = TaskSample.allocate(task.rows, JOINTS), task.feedback()
-
-    def step() -> None:
-        state.stamp_array[0] += 1  # the frame anew, too
-        task.evaluate(state, out, feedback)
-
-    peak, left = allocated(step, 2000)
-    assert peak < VECTOR, name
-    assert left < 50
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "name", [*fields(Robot.load("panda"), "panda_tcp"), *SHAPES, "self"]
-)
-def test_no_allocation_in_a_field(name: str, chain: Robot) -> None:
-    robot = chain
-    frame = f"link{JOINTS}"
-    field: NullSpaceField
-    if name in SHAPES:
-        field = ObstacleClearance([obstacle(SHAPES[name])], influence=9.0)
-    elif name == "self":
-        field = SelfClearance(influence=0.5)
-    else:
-        field = fields(robot, frame)[name]
-    field = field.placed(start_of(robot))
-    state = robot.state(0.1, robot.home() + 0.1, np.full(JOINTS, 0.1))
-    metric, out = MetricSample.allocate(JOINTS), FieldSample.allocate(JOINTS)
-    plan = field.compile(state, metric, 0, out)
-
-    def step() -> None:
-        state.stamp_array[0] += 1
-        plan.run(state.t)
-
-    peak, left = allocated(step, 200 if name in SHAPES or name == "self" else 2000)
-    assert peak < VECTOR, name
-    assert left < 50
-
-
-@pytest.mark.slow
 def test_a_step_allocates_nothing(chain: Robot) -> None:
     """Neither the law nor Pinocchio, which is called without its Python bindings."""
     name, q, v = f"link{JOINTS}", chain.home() + 0.1, np.full(JOINTS, 1e-3)

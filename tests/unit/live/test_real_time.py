@@ -1,14 +1,94 @@
-"""What a live loop asks of its process, and how its times are told."""
+"""What a loop in real time needs: kernels before it begins, priority, no collector."""
 
 import gc
 import os
+from collections.abc import Callable
+from math import inf
 from typing import Any
 
+import numpy as np
 import pytest
 
 import hsp_control as hsp
+from hsp_control.common import adapters, native
 from hsp_control.common.exceptions import SimulationError
+from hsp_control.live import loop
+from hsp_control.live.loop import rehearse
 from hsp_control.live.real_time import no_garbage_collection, real_time_priority
+
+CONFIG = {
+    "robot": {"name": "panda"},
+    "tasks": {"tip": {"type": "frame_position"}, "turn": {"type": "frame_orientation",
+        "schedule": {"intervals": [[1.0, 2.0]], "ramp": 0.2}}},
+    "changes": [{"type": "null_space_gain", "at": 5.0, "gain": 3.0}],
+}  # fmt: skip
+LATER = 0.1, 1.1, 1.5, 1.9, 3.0, 5.1, 6.0
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> set[Any]:
+    """Which machine code is asked for: by kernel, and the types of its arguments."""
+    asked: set[Any] = set()
+    adapter: Callable[..., int] = adapters.adapter
+
+    def noted(function: Any, kinds: tuple[Any, ...], timed: bool) -> int:
+        asked.add((function.__name__, str(kinds), timed))
+        return adapter(function, kinds, timed)
+
+    monkeypatch.setattr(adapters, "adapter", noted)
+    return asked
+
+
+def needed(
+    asked: set[Any], end: float, prepare: Callable[..., None]
+) -> tuple[set[Any], set[Any]]:
+    """Return what is asked for before the loop, and what only in it."""
+    experiment = hsp.load_experiment(CONFIG)
+    controller, q, v = experiment.controller, experiment.q0, experiment.v0
+    controller.compute(0.0, q, v)
+    prepare(controller, 0.0, end, q, v)
+    before = set(asked)
+    for t in LATER:
+        controller.compute(t, q, v)
+    return before, asked - before
+
+
+@pytest.mark.skipif(
+    not native.is_compiled(adapters.run), reason="plain runs compile nothing"
+)
+def test_nothing_new_is_asked_for_in_the_loop(asked: set[Any]) -> None:
+    _, late = needed(asked, inf, lambda *_: None)
+    assert late  # without a rehearsal there is something
+    asked.clear()
+    _, late = needed(asked, inf, rehearse)
+    assert not late
+
+
+def test_it_evaluates_a_copy_within_the_loop_and_no_more_often_than_allowed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    experiment = hsp.load_experiment(CONFIG)
+    controller, q, v = experiment.controller, experiment.q0, experiment.v0
+    controller.compute(0.0, q, v)
+    times: list[float] = []
+    compute = type(controller).compute
+
+    def noted(self: Any, t: float, *state: Any) -> Any:
+        assert self is not controller
+        times.append(t)
+        return compute(self, t, *state)
+
+    monkeypatch.setattr(type(controller), "compute", noted)
+    rehearse(controller, 1.0, 5.0, q, v)
+    assert np.allclose(times, [1.1, 1.2, 1.9, 2.0, 5.0], rtol=0.0, atol=1e-12)
+    assert controller.state.t == 0.0
+    times.clear()
+    monkeypatch.setattr(loop, "_MOST", 2)
+    rehearse(controller, 1.0, 5.0, q, v)
+    assert len(times) == 2
+    times.clear()
+    rehearse(controller, 7.0, inf, q, v)
+    assert times == []
 
 
 def test_the_collector_is_away_and_comes_back() -> None:
