@@ -97,13 +97,14 @@ def test_a_run_that_cannot_be_saved_is_saved_elsewhere(
     from hsp_control.cli import main
 
     (tmp_path / "out").mkdir()
-    (tmp_path / "out" / ".2_rest.npz.part").symlink_to("/dev/full")
+    name = "2_rest,simulation.duration=0.02.npz"
+    (tmp_path / "out" / f".{name}.part").symlink_to("/dev/full")
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     short = ["--set", "simulation.duration=0.02"]
     command = ["run", "paper/2_rest", "--out", str(tmp_path / "out"), *short]
     assert main(command) == 2
     captured = capsys.readouterr()
     assert "No space left on device; the log is saved elsewhere" in captured.err
-    (elsewhere,) = tmp_path.glob("hsp-*/2_rest.npz")
+    (elsewhere,) = tmp_path.glob(f"hsp-*/{name}")
     assert f"Log: {elsewhere}" in captured.out
     assert len(Rollout.load(elsewhere)) == 3

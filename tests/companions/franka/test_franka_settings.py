@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hsp_control.cli import main
 from hsp_control.common.exceptions import LiveError
 from hsp_control.companions.franka import FrankaSettings, Load
 from hsp_control.companions.franka.reflexes import MODES, REFLEXES, explained
@@ -89,3 +90,10 @@ def test_an_exception_is_told_with_its_names() -> None:
     assert "stop button was pressed" in explained("ControlException", stopped)
     other = explained("ValueError", "something new\nand more")
     assert other == "ValueError: something new; and more"
+
+
+def test_a_robot_without_an_address_says_what_is_missing(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["live", "panda_obstacle", "--robot", "franka"]) == 2
+    assert "mean franka://ADDRESS?" in capsys.readouterr().err

@@ -318,7 +318,8 @@ def test_what_a_killed_hsp_run_leaves_is_a_log_for_all_commands(
         [sys.executable, "-m", "hsp_control", "run", "paper/2_rest", *options],
         stderr=subprocess.DEVNULL,
     )
-    path, end = tmp_path / "2_rest.journal", time.monotonic() + 60
+    path = tmp_path / "2_rest,simulation.duration=1000.journal"
+    end = time.monotonic() + 60
     try:
         while not (path.exists() and path.stat().st_size > 100_000):
             assert time.monotonic() < end
@@ -330,14 +331,14 @@ def test_what_a_killed_hsp_run_leaves_is_a_log_for_all_commands(
     assert read.status == "interrupted"
     assert len(read) > 50
     assert main(["plot", str(path), "--out", str(tmp_path)]) == 0
-    assert (tmp_path / "2_rest-paper.png").is_file()
+    assert path.with_name(f"{path.stem}-paper.png").is_file()
     assert main(["export", str(path), "--html", str(tmp_path / "a.html")]) == 0
     assert main(["check", str(path)]) == 0
     capsys.readouterr()
     # One that is not killed leaves an `.npz` alone.
     short = ["--no-view", "--out", str(tmp_path), "--set", "simulation.duration=0.02"]
     assert main(["run", "paper/2_rest", *short]) == 0
-    assert not path.exists()
-    with np.load(tmp_path / "2_rest.npz") as log:
+    assert len(list(tmp_path.glob("*.journal"))) == 1
+    with np.load(tmp_path / "2_rest,simulation.duration=0.02.npz") as log:
         assert len(log["t"]) == 3
     capsys.readouterr()
