@@ -114,10 +114,10 @@ def _lights(
         studio.key * strength,
         castShadow=True,
         shadow={
-            "radius": 9.0,
+            "radius": 4.5,
             "bias": -2e-4,
             "normalBias": 4e-3 * around,
-            "mapSize": [2048, 2048],
+            "mapSize": [1024, 1024],
             "camera": {
                 "uuid": threejs.unique_name(),
                 "type": "OrthographicCamera",
