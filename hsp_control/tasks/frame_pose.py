@@ -38,11 +38,9 @@ from hsp_control.trajectories import (
     HoldOrientation,
     OrientationSample,
     OrientationTrajectory,
-    PoseSample,
     PoseTrajectory,
     Trajectory,
 )
-from hsp_control.trajectories.trajectory import Follower
 
 ORIENTATION_SCRATCH = 12
 """Rows of the scratch array of `orientation_error` and `orientation_acceleration`."""
@@ -89,11 +87,12 @@ class FrameOrientation(
 
     def reference_rate(self, state: RobotState) -> Array:
         """Return the desired angular velocity w_d in world axes, shape (3,) [rad/s]."""
-        return self.trajectory.sample(state.t).angular_velocity
+        turning: Array = self._reference_at(state).angular_velocity.copy()
+        return turning
 
     def measure(self, state: RobotState) -> tuple[Array, Array]:
         """Return desired and actual orientation, quaternions (x, y, z, w)."""
-        desired = self.trajectory.sample(state.t).rotation
+        desired = self._reference_at(state).rotation
         return _quaternions(desired, state.frame(self.frame_name).rotation)
 
 
@@ -213,28 +212,17 @@ class PoseTask(TrackingTask):
 
     def reference_rate(self, state: RobotState) -> Array:
         """Return x_d' and w_d in the reference's axes, shape (6,) [m/s, rad/s]."""
-        sample = self._desired(state)
+        sample = self._reference_at(state)
         velocity, turning = sample.position.velocity, sample.orientation
         return np.concatenate([velocity, turning.angular_velocity])
 
     def measure(self, state: RobotState) -> tuple[Array, Array]:
         """Return desired and actual pose: x, y, z [m], quaternion (x, y, z, w)."""
-        sample, (position, rotation) = self._desired(state), self.actual(state)
+        sample, (position, rotation) = self._reference_at(state), self.actual(state)
         desired, actual = np.empty((2, 7))
         desired[:3], actual[:3] = sample.position.position, position
         desired[3:], actual[3:] = _quaternions(sample.orientation.rotation, rotation)
         return desired, actual
-
-    def _desired(self, state: RobotState) -> PoseSample:
-        """Return the reference at the state's time; a row of the log asks for it."""
-
-        def make() -> tuple[PoseSample, Follower]:
-            sample = PoseSample.over(np.zeros((8, 3)))
-            return sample, self.followed.follow(sample)
-
-        sample, follow = state.made(self, "reference", make)
-        follow(state.t)
-        return sample
 
 
 class FramePose(FrameTask, PoseTask, CompliantTask, type="frame_pose"):

@@ -48,11 +48,10 @@ class FramePosition(FrameTask, TrackingTask, CompliantTask, type="frame_position
 
     def reference_rate(self, state: RobotState) -> Array:
         """Return x_d', shape (m,) [m/s]."""
-        return self.trajectory.sample(state.t).velocity
+        velocity: Array = self._reference_at(state).velocity.copy()
+        return velocity
 
     def measure(self, state: RobotState) -> tuple[Array, Array]:
         """Return x_d and x along the tracked axes, shape (m,) each [m]."""
-        desired = self.trajectory.sample(state.t)
-        return desired.position, state.position(self.frame_name)[
-            axis_indices(self.axes)
-        ]
+        desired = self._reference_at(state).position.copy()
+        return desired, state.position(self.frame_name)[axis_indices(self.axes)]

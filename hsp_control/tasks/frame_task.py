@@ -12,7 +12,7 @@ from hsp_control.common.exceptions import TaskError
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Positive
 from hsp_control.geometry.start import Start
-from hsp_control.robot import Robot
+from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.tasks.task import SecondOrderTask, default_name
 from hsp_control.trajectories import (
@@ -77,6 +77,18 @@ class TrackingTask(SecondOrderTask):
     blend: Positive | None = None
     """Duration of the transition from where the robot starts to the trajectory [s];
     none by default."""
+
+    def _reference_at(self, state: RobotState) -> Any:
+        """Return the reference at the state's time, which keeps the sample's memory."""
+
+        def make() -> tuple[Any, Any]:
+            followed: Any = self.followed
+            sample = followed.sample(state.t)
+            return sample, followed.follow(sample)
+
+        sample, follow = state.made(self, "reference", make)
+        follow(state.t)
+        return sample
 
 
 class FrameTask(SecondOrderTask):
