@@ -13,11 +13,12 @@ from scipy.optimize import nnls
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
+from hsp_control.companions.mujoco import Ground
+from hsp_control.companions.mujoco.plant import Mujoco, MujocoPlant
 from hsp_control.constraints.contacts import SurfaceContact
 from hsp_control.geometry.shapes import Box
 from hsp_control.robot.integrators import Rk4
-from hsp_control.simulation.plants import ContactPlant, Ground, RigidContact
-from hsp_control.simulation.plants.mujoco_plant import Mujoco, MujocoPlant
+from hsp_control.simulation.plants import ContactPlant, RigidContact
 from hsp_control.trajectories import Blend, HoldOrientation
 
 COM, HAND, TRUNK = "center_of_mass", "hand", "trunk"
@@ -185,7 +186,7 @@ class Standing:
         """Return MuJoCo, with boxes as soles."""
         x, y, z = self.body.center
         shapes = [
-            hsp.plants.ContactShape(name, Box((*self.body.size, THICKNESS)), at)
+            hsp.mujoco.ContactShape(name, Box((*self.body.size, THICKNESS)), at)
             for name in self.body.soles
             for at in [(x, y, z + 0.5 * THICKNESS)]
         ]

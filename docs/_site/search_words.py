@@ -23,7 +23,7 @@ WORDS: dict[str, str] = {
     "compliance": "impedance, compliance, stiffness, spring, push",
     "streams": "stream, teleoperation, policy, waypoints, target",
     "forces": "force, force control, pressing, wiping",
-    "mujoco": "mujoco, mjcf",
+    "companions/mujoco": "mujoco, mjcf",
     "companions/franka": "franka, panda, fr3, real arm, hardware, gripper",
     "companions/franka_box": "libfranka, control box",
     "companions/ros2": "ros, ros 2, dds",

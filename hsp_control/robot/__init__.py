@@ -10,7 +10,6 @@ from .integrators import Dop853 as Dop853
 from .integrators import Integrator as Integrator
 from .integrators import Rk4 as Rk4
 from .integrators import SemiImplicitEuler as SemiImplicitEuler
-from .mujoco_coordinates import MujocoCoordinates as MujocoCoordinates
 from .robot import Robot as Robot
 from .robot import RobotState as RobotState
 

@@ -16,6 +16,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array, Indices, matrix_view
+from hsp_control.common.entry_points import entry_points
 from hsp_control.common.exceptions import (
     ImmutableError,
     ModelError,
@@ -46,8 +47,6 @@ from hsp_control.robot.kinematics import (
 )
 from hsp_control.robot.model import RobotModel
 from hsp_control.robot.motion import REFUSED, copy_valid
-from hsp_control.robot.mujoco.loading import load_mjcf, load_selection
-from hsp_control.robot.mujoco.scene import select
 from hsp_control.robot.pinocchio_calls import bind_pinocchio
 
 Made = TypeVar("Made")
@@ -187,8 +186,8 @@ class Robot(RobotModel):
             FrameNotFoundError: If the root or a tool frame's parent does not exist.
             JointNotFoundError: If a joint does not exist or is not below the root.
         """
-        selection = select(model, root, joints, qpos, keyframe, locked)
-        return cls(*load_selection(selection, tool_frames or {}))
+        read = _reader("mujoco")
+        return cls(*read(model, root, joints, qpos, keyframe, locked, tool_frames))
 
     @classmethod
     def from_pinocchio(
@@ -234,7 +233,7 @@ class Robot(RobotModel):
         """Return the robot of a description."""
         gravity = description.gravity
         if description.mjcf is not None:
-            return cls(*load_mjcf(description, access), description=description)
+            return cls(*_reader("mjcf")(description, access), description=description)
         if description.parts is None:
             source = description.find(access)
             model = load_model(source, description, gravity)
@@ -323,6 +322,15 @@ class Robot(RobotModel):
         return RobotState(self).update(
             t, self.check_configuration(q), self.check_tangent(v, "velocity v")
         )
+
+
+def _reader(kind: str) -> Callable[..., tuple[pin.Model, RobotSource]]:
+    """Return what reads a kind of model that a companion knows."""
+    entry = entry_points("robots").get(kind)
+    if entry is None:
+        raise ModelError(f"the companion that reads {kind} models is not here")
+    reader: Callable[..., tuple[pin.Model, RobotSource]] = entry.load()
+    return reader
 
 
 class RobotState:

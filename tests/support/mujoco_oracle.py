@@ -7,8 +7,8 @@ import mujoco
 import numpy as np
 
 from hsp_control import Robot, RobotState
-from hsp_control.robot import MujocoCoordinates
-from hsp_control.robot.mujoco.scene import Names
+from hsp_control.companions.mujoco import MujocoCoordinates
+from hsp_control.companions.mujoco.scene import Names
 
 
 @dataclass

@@ -13,11 +13,11 @@ from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ControllerError, ShapeError
+from hsp_control.companions.mujoco.plant import import_mujoco
+from hsp_control.companions.mujoco.scene_plant import MujocoScenePlant
 from hsp_control.companions.simulators.hand_control import HandControl
 from hsp_control.companions.simulators.hand_settings import Source
 from hsp_control.companions.simulators.mujoco_arm import arm_of
-from hsp_control.simulation.plants.mujoco_plant import import_mujoco
-from hsp_control.simulation.plants.mujoco_scene import MujocoScenePlant
 from hsp_control.tasks import Gains
 
 try:

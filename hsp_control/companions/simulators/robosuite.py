@@ -19,11 +19,11 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ControllerError, GainError
+from hsp_control.companions.mujoco import MujocoCoordinates
+from hsp_control.companions.mujoco.scene import Names, joint_actuators, motor
 from hsp_control.companions.simulators.hand_control import HandControl
 from hsp_control.companions.simulators.mujoco_arm import arm_of
 from hsp_control.declaration import within
-from hsp_control.robot import MujocoCoordinates
-from hsp_control.robot.mujoco.scene import Names, joint_actuators, motor
 from hsp_control.tasks import Gains
 
 try:

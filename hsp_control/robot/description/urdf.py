@@ -54,9 +54,7 @@ _SINGLE = {
     "joint": {"origin", "parent", "child", "axis", "limit", "mimic", "dynamics"},
 }
 """Elements of which others may contain one; parsers use one of several, silently."""
-_OF_MJCF = (
-    "; an MJCF's robot is robot: {mjcf: FILE} in a configuration (docs/mujoco.md)"
-)
+_OF_MJCF = "; an MJCF's robot is robot: {mjcf: FILE} in a configuration"
 _WITH_AXIS = {"revolute", "continuous", "prismatic"}
 
 

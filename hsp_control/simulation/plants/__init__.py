@@ -10,14 +10,8 @@ from .drives import EffortNoise as EffortNoise
 from .drives import Jitter as Jitter
 from .drives import Saturation as Saturation
 from .imperfect_plant import ImperfectPlant as ImperfectPlant
-from .mjcf import ContactShape as ContactShape
-from .mjcf import Ground as Ground
-from .mjcf import Solid as Solid
 from .model_changes import Inertias as Inertias
 from .model_changes import Payload as Payload
-from .mujoco_plant import Mujoco as Mujoco
-from .mujoco_scene import MujocoScene as MujocoScene
-from .mujoco_scene import MujocoScenePlant as MujocoScenePlant
 from .plant import ContinuousPlant as ContinuousPlant
 from .plant import IntegratedPlant as IntegratedPlant
 from .plant import Plant as Plant

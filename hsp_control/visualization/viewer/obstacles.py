@@ -1,6 +1,6 @@
 """Draws obstacles, those of a scene or of a log, and the solids of a plant."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -10,12 +10,12 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import SceneError
+from hsp_control.declaration.rotation import matrix_of
 from hsp_control.geometry import shapes
 from hsp_control.geometry.enclosing import hull_corners
 from hsp_control.geometry.scene import Scene
 from hsp_control.geometry.shapes import Shape, shape_from_log
 from hsp_control.simulation import Rollout
-from hsp_control.simulation.plants.mjcf import Solid
 from hsp_control.visualization.palette import MUTED, OBSTACLE, SOLID
 from hsp_control.visualization.viewer import threejs
 from hsp_control.visualization.viewer.commands import (
@@ -270,7 +270,7 @@ def solid_layer(motion: RunMotion, root: str) -> Layer:
                     yield Track(_node(each.name, root), what, motion.times, rows)
 
     def legend() -> list[LegendEntry]:
-        names = [solid.name for solid in solids_of(motion.rows.meta)]
+        names = [solid["name"] for solid in _solids(motion.rows.meta)]
         word = "solid" if len(names) == 1 else "solids"
         entry = LegendEntry(f"{word} {', '.join(names)}", SOLID, (root,))
         return [entry] if names else []
@@ -279,30 +279,25 @@ def solid_layer(motion: RunMotion, root: str) -> Layer:
 
 
 def _logged_solids(rollout: Rollout) -> list[_DrawnSolid]:
-    return [
-        _DrawnSolid(
-            geom,
-            solid.shape,
-            placed.placement,
-            f"plant.solid.{solid.name}" + (f"_{k + 1}" if k else ""),
-        )
-        for solid in solids_of(rollout.meta)
-        for k, (geom, placed) in enumerate(solid.geoms())
-    ]
-
-
-def solids_of(meta: Mapping[str, Any]) -> list[Solid]:
-    """Return the solids of a log's plant."""
     found = []
-    for entry in (meta.get("plant") or {}).get("solids", ()):
-        given = {key: entry[key] for key in _FIELDS if key in entry}
-        shape = dict(given["shape"])
-        given["shape"] = shape_from_log(shape.pop("type"), shape)
-        found.append(Solid(**given))
+    for solid in _solids(rollout.meta):
+        name, kind = solid["name"], dict(solid["shape"])
+        shape = shape_from_log(kind.pop("type"), kind)
+        place, step = (np.array(solid.get(k, _ZERO)) for k in ("position", "spacing"))
+        rotation = matrix_of(solid.get("rotation", _ZERO))
+        for k in range(solid.get("copies", 1) if shape is not None else 0):
+            column = f"plant.solid.{name}" + (f"_{k + 1}" if k else "")
+            placed = pin.SE3(rotation, place + k * step)
+            found.append(_DrawnSolid(f"solid/{name}/{k}", shape, placed, column))
     return found
 
 
-_FIELDS = ("name", "shape", "position", "rotation", "mass", "copies", "spacing")
+_ZERO = (0.0, 0.0, 0.0)
+
+
+def _solids(meta: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
+    """Return the solids that a log's plant has, as the log tells them."""
+    return tuple((meta.get("plant") or {}).get("solids", ()))
 
 
 def points_around(rollout: Rollout) -> Array:

@@ -14,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mjcf_texts import CELL
 
 from hsp_control import Rollout, __version__
 from hsp_control.cli import doctor, main
@@ -444,23 +443,6 @@ def test_ctrl_c_does_not_wait_for_a_row_that_never_comes(
 def test_help_is_printed_without_a_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert main([]) == 0
     assert "COMMAND" in capsys.readouterr().out
-
-
-def test_check_takes_a_robot_of_a_mujoco_model(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    pytest.importorskip("mujoco")
-    (tmp_path / "cell.xml").write_text(CELL)
-    file = tmp_path / "cell.yaml"
-    file.write_text(
-        "robot: {mjcf: cell.xml, root: base, joints: [j1, j2, j3, j4]}\n"
-        "start: {configuration: [0, 0.5, 0, 1]}\n"
-        "tasks: {hand: {type: frame_position, frame: tip}}\n"
-        "plant: mujoco_scene\n"
-        "simulation: {duration: 1, control_period: 0.001}\n"
-    )
-    assert main(["check", str(file)]) == 0
-    assert f"{file}: OK" in capsys.readouterr().out
 
 
 def test_a_package_whose_command_is_broken_stops_no_other(

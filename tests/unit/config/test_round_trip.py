@@ -68,8 +68,8 @@ EVERYTHING: dict[str, Any] = {
      {"type": "null_space_gain", "at": 5, "gain": 3},
      {"type": "remove_task", "at": 6, "task": "hand"},
      {"type": "contact", "at": 7, "contact": "sole", "bears": False}],
-    "plant": {"type": "mujoco", "contacts": {
-        "panda_hand": {"shape": {"type": "sphere", "radius": 0.01}}}},
+    "plant": {"type": "rigid_contacts", "contacts": {
+        "panda_hand": {"kind": "point", "on": [[1, 2]]}}},
     "compensation": {"predictor": {}, "momentum_observer": {"clip": [1, None]},
      "friction_feed_forward": "urdf",
      "integral_action": {"ki": {"hand": [[9, 0], [0, 9]]}, "tasks": ["hand"]}},

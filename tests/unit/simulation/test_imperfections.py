@@ -359,10 +359,9 @@ def test_a_push_gives_its_impulse_whatever_the_plant(kind: str) -> None:
     elif kind == "sticking":
         plant = StickingPlant(robot, JointFriction.of(robot), pushes=[push])
     else:
-        pytest.importorskip("mujoco")
-        from hsp_control.simulation.plants.mujoco_plant import Mujoco, MujocoPlant
+        engine = pytest.importorskip("hsp_control.companions.mujoco.plant")
 
-        plant = MujocoPlant(robot, Mujoco(pushes=[push]))
+        plant = engine.MujocoPlant(robot, engine.Mujoco(pushes=[push]))
     # In the stages of RK4 an edge may count for a third of a step more or less.
     exact = 1e-9 if kind != "ideal" else 1e-3
     assert moved(plant, 0.0, 1.0, 0.0)[1] == pytest.approx(0.75, rel=exact)

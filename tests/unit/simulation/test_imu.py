@@ -83,7 +83,7 @@ def test_a_body_at_rest_feels_its_weight():
 
 
 def test_in_mujoco_a_body_that_falls_freely_feels_nothing():
-    pytest.importorskip("mujoco")
+    pytest.importorskip("hsp_control.companions.mujoco")
     experiment = load_experiment(
         "whole_body/solo12_trunk", "plant.sensors={imu: base_link}"
     )

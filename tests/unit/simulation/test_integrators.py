@@ -23,7 +23,7 @@ from hsp_control.common.exceptions import LogError, SimulationError
 from hsp_control.common.kernels import PLAIN
 from hsp_control.robot import integrators
 from hsp_control.robot.integrators import Dop853, Rk4, SemiImplicitEuler
-from hsp_control.simulation.plants import Mujoco, RigidBody, RigidBodyPlant
+from hsp_control.simulation.plants import RigidBody, RigidBodyPlant
 from hsp_control.simulation.simulate import default_integrator
 
 Array = NDArray[np.float64]
@@ -239,7 +239,8 @@ def test_held_efforts_move_rigid_bodies_by_rk4_unless_it_is_said() -> None:
     for plant in (None, RigidBody(), RigidBodyPlant(robot)):
         assert default_integrator(plant, 0.01) == Rk4(1e-3)
         assert default_integrator(plant, None) == Dop853()
-    assert default_integrator(Mujoco(), 0.001) == Dop853()
+    mujoco = pytest.importorskip("hsp_control.companions.mujoco")
+    assert default_integrator(mujoco.Mujoco(), 0.001) == Dop853()
     task = hsp.FramePose(trajectory=hsp.Circle(0.1, 3.0), blend=0.5, name="hand")
     parts: Any = robot, [task], hsp.JointCentering()
     how: Any = {"duration": 1.0, "control_period": 0.01}

@@ -84,7 +84,7 @@ def momentum_balance(plant, tolerance):
 
 
 def test_mujoco_measures_the_forces_of_the_period_that_ends():
-    pytest.importorskip("mujoco")
+    pytest.importorskip("hsp_control.companions.mujoco")
     plan = momentum_balance(load_experiment("whole_body/solo12_trunk").plant, 1e-5)
     up = np.array([0.0, 0.0, 1.0])
     last = plan.heard[-1]

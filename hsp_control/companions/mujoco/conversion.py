@@ -26,8 +26,7 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import ModelError
-from hsp_control.robot.description.sources import BodyShape, ShapeKind
-from hsp_control.robot.mujoco.scene import (
+from hsp_control.companions.mujoco.scene import (
     Selection,
     constants,
     dofs_of,
@@ -35,6 +34,7 @@ from hsp_control.robot.mujoco.scene import (
     is_scalar,
     joint_total,
 )
+from hsp_control.robot.description.sources import BodyShape, ShapeKind
 
 _AXES = np.eye(3)
 _HINGES = pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ

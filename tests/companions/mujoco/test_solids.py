@@ -8,9 +8,9 @@ import pytest
 
 from hsp_control import Robot
 from hsp_control.common.exceptions import SimulationError
+from hsp_control.companions.mujoco import ContactShape, Solid
+from hsp_control.companions.mujoco.plant import Mujoco, MujocoPlant
 from hsp_control.geometry.shapes import Box, HalfSpace, Sphere
-from hsp_control.simulation.plants import ContactShape, Solid
-from hsp_control.simulation.plants.mujoco_plant import Mujoco, MujocoPlant
 
 mujoco = pytest.importorskip("mujoco")
 TIP = "panda_tcp"

@@ -10,6 +10,7 @@ from mjcf_texts import CELL
 from places import ROOT
 
 from hsp_control import Robot, load_experiment
+from hsp_control.cli.main import main
 from hsp_control.common.exceptions import (
     AccessError,
     FrameNotFoundError,
@@ -19,9 +20,9 @@ from hsp_control.common.exceptions import (
     RobotNotFoundError,
     SimulationError,
 )
+from hsp_control.companions.mujoco import MujocoScenePlant
 from hsp_control.robot import RobotDescription
 from hsp_control.robot.description.access import only_within
-from hsp_control.simulation.plants import MujocoScenePlant
 
 pytest.importorskip("mujoco")
 
@@ -82,7 +83,7 @@ def test_the_plant_may_be_another_mjcf_or_no_mjcf(folder: Path) -> None:
 def test_the_examples_of_the_documentation_run(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    text = (ROOT / "docs" / "mujoco.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs/companions/mujoco.md").read_text(encoding="utf-8")
     (folder / "scene.xml").write_text(CELL)
     monkeypatch.chdir(folder)
     blocks = re.findall(r"```(python|yaml)\n(.*?)```", text, flags=re.DOTALL)
@@ -224,3 +225,19 @@ def test_strict_reading_loads_no_plugins_and_ends(folder: Path) -> None:
     elsewhere = only_within([folder / "other"])
     with pytest.raises(AccessError, match=r"mjcf: mjcf .* outside the folders"):
         Robot.load(RobotDescription(mjcf=path), access=elsewhere)
+
+
+def test_check_takes_a_robot_of_a_mujoco_model(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "cell.xml").write_text(CELL)
+    file = tmp_path / "cell.yaml"
+    file.write_text(
+        "robot: {mjcf: cell.xml, root: base, joints: [j1, j2, j3, j4]}\n"
+        "start: {configuration: [0, 0.5, 0, 1]}\n"
+        "tasks: {hand: {type: frame_position, frame: tip}}\n"
+        "plant: mujoco_scene\n"
+        "simulation: {duration: 1, control_period: 0.001}\n"
+    )
+    assert main(["check", str(file)]) == 0
+    assert f"{file}: OK" in capsys.readouterr().out

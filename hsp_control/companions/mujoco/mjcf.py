@@ -13,6 +13,15 @@ from pydantic import AfterValidator, Field
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
+from hsp_control.companions.mujoco.coordinates import (
+    CONTINUOUS,
+    FREE,
+    HINGE,
+    PLANAR,
+    SLIDE,
+    SPHERICAL,
+    Joint,
+)
 from hsp_control.declaration import Part
 from hsp_control.declaration.named import BY_FRAME, BY_NAME, stored, stored_by_frame
 from hsp_control.declaration.quantities import (
@@ -31,15 +40,6 @@ from hsp_control.geometry.enclosing import enclosing_capsule, hull_corners
 from hsp_control.geometry.shapes import Box, Capsule, Cylinder, Shape, Sphere
 from hsp_control.robot import Robot
 from hsp_control.robot.friction import JointFriction
-from hsp_control.robot.mujoco_coordinates import (
-    CONTINUOUS,
-    FREE,
-    HINGE,
-    PLANAR,
-    SLIDE,
-    SPHERICAL,
-    Joint,
-)
 
 
 class Ground(Part, error=SimulationError):

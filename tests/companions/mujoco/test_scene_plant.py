@@ -13,11 +13,9 @@ from hsp_control.common.exceptions import (
     JointNotFoundError,
     SimulationError,
 )
-from hsp_control.simulation.plants import (
-    MujocoScenePlant,
-    Push,
-)
-from hsp_control.simulation.plants.mujoco_plant import Mujoco, MujocoPlant
+from hsp_control.companions.mujoco import MujocoScenePlant
+from hsp_control.companions.mujoco.plant import Mujoco, MujocoPlant
+from hsp_control.simulation.plants import Push
 from hsp_control.trajectories import Circle
 
 mujoco = pytest.importorskip("mujoco")

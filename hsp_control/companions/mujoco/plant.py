@@ -11,21 +11,21 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import ModelError, SimulationError
 from hsp_control.common.kernels import kernel
-from hsp_control.control.measurement import LogChannel
-from hsp_control.declaration import within
-from hsp_control.declaration.quantities import Flag, Positive
-from hsp_control.robot import Robot
-from hsp_control.robot.integrators import Integrator
-from hsp_control.robot.motion import number_of_steps
-from hsp_control.robot.mujoco import scene
-from hsp_control.robot.mujoco_coordinates import MujocoCoordinates, joints_of
-from hsp_control.simulation.plants.mjcf import (
+from hsp_control.companions.mujoco import scene
+from hsp_control.companions.mujoco.coordinates import MujocoCoordinates, joints_of
+from hsp_control.companions.mujoco.mjcf import (
     ContactShapes,
     Ground,
     Solids,
     geoms_of,
     write_mjcf,
 )
+from hsp_control.control.measurement import LogChannel
+from hsp_control.declaration import within
+from hsp_control.declaration.quantities import Flag, Positive
+from hsp_control.robot import Robot
+from hsp_control.robot.integrators import Integrator
+from hsp_control.robot.motion import number_of_steps
 from hsp_control.simulation.plants.plant import (
     FloatingRoots,
     SampledPlant,

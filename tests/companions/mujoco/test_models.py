@@ -17,9 +17,9 @@ from hsp_control.common.exceptions import (
     JointNotFoundError,
     ModelError,
 )
-from hsp_control.robot import JointFriction, MujocoCoordinates, ToolFrame
-from hsp_control.robot.mujoco import loading
-from hsp_control.robot.mujoco.scene import Names
+from hsp_control.companions.mujoco import MujocoCoordinates, loading
+from hsp_control.companions.mujoco.scene import Names
+from hsp_control.robot import JointFriction, ToolFrame
 
 mujoco = pytest.importorskip("mujoco")
 from mujoco_oracle import differences, velocity_map  # noqa: E402

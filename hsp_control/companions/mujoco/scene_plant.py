@@ -16,15 +16,16 @@ import numpy as np
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import FrameNotFoundError, SimulationError
 from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.companions.mujoco.coordinates import MujocoCoordinates
+from hsp_control.companions.mujoco.loading import compile_mjcf
+from hsp_control.companions.mujoco.plant import MujocoEngine, import_mujoco
+from hsp_control.companions.mujoco.scene import Motor, Names, joint_actuators, motor
 from hsp_control.control.measurement import LogChannel
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Flag
 from hsp_control.declaration.quantities import Names as NameList
-from hsp_control.robot import MujocoCoordinates, Robot
+from hsp_control.robot import Robot
 from hsp_control.robot.integrators import Integrator
-from hsp_control.robot.mujoco.loading import compile_mjcf
-from hsp_control.robot.mujoco.scene import Motor, Names, joint_actuators, motor
-from hsp_control.simulation.plants.mujoco_plant import MujocoEngine, import_mujoco
 from hsp_control.simulation.plants.plant import contact_channels
 from hsp_control.simulation.plants.plant_part import PlantPart
 from hsp_control.simulation.plants.push import Push

@@ -18,12 +18,13 @@ from hsp_control.common.exceptions import (
     SimulationError,
 )
 from hsp_control.common.resources import bundled_robots
+from hsp_control.companions.mujoco import ContactShape, Ground
+from hsp_control.companions.mujoco.plant import Mujoco, MujocoPlant
 from hsp_control.geometry.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere
 from hsp_control.robot.description.loading import load_model
 from hsp_control.robot.description.sources import find_robot
 from hsp_control.robot.friction import Friction
-from hsp_control.simulation.plants import ContactShape, Ground, Push
-from hsp_control.simulation.plants.mujoco_plant import Mujoco, MujocoPlant
+from hsp_control.simulation.plants import Push
 
 mujoco = pytest.importorskip("mujoco")
 from mujoco_oracle import mass_matrix  # noqa: E402

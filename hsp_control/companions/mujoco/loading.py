@@ -5,7 +5,7 @@ else that acts on its bodies is named here, so that nothing is silently left out
 """
 
 import logging
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,23 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import AccessError, ModelError, RobotNotFoundError
 from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.companions.mujoco.conversion import (
+    body_shapes,
+    build_model,
+    excluded_pairs,
+    shapeless_geoms,
+)
+from hsp_control.companions.mujoco.scene import (
+    Selection,
+    constants,
+    effort_range,
+    import_mujoco,
+    is_scalar,
+    joint_actuators,
+    joint_total,
+    motor,
+    select,
+)
 from hsp_control.declaration import within
 from hsp_control.robot.description.access import (
     ANYWHERE,
@@ -29,23 +46,6 @@ from hsp_control.robot.description.loading import completed
 from hsp_control.robot.description.robot_description import RobotDescription, ToolFrame
 from hsp_control.robot.description.sources import RobotSource
 from hsp_control.robot.description.urdf import MAX_DOFS, MAX_LINKS
-from hsp_control.robot.mujoco.conversion import (
-    body_shapes,
-    build_model,
-    excluded_pairs,
-    shapeless_geoms,
-)
-from hsp_control.robot.mujoco.scene import (
-    Selection,
-    constants,
-    effort_range,
-    import_mujoco,
-    is_scalar,
-    joint_actuators,
-    joint_total,
-    motor,
-    select,
-)
 
 _FOLDERS = "meshdir", "texturedir", "assetdir"
 _REFUSED = "plugin", "replicate", "composite", "flexcomp"
@@ -127,6 +127,20 @@ def _places(main: Path, own: Path, root: Element, name: str) -> set[Path]:
 
 
 _log = logging.getLogger(__name__)
+
+
+def load_compiled(
+    model: Any,
+    root: str | None,
+    joints: Sequence[str] | None,
+    qpos: ArrayLike | None,
+    keyframe: str | None,
+    locked: Mapping[str, float] | None,
+    tool_frames: Mapping[str, ToolFrame] | None,
+) -> tuple[pin.Model, RobotSource]:
+    """Return the Pinocchio model of a robot in a compiled model; see `from_mujoco`."""
+    selection = select(model, root, joints, qpos, keyframe, locked)
+    return load_selection(selection, tool_frames or {})
 
 
 def load_mjcf(
