@@ -285,7 +285,8 @@ def _logged_solids(rollout: Rollout) -> list[_DrawnSolid]:
         shape = shape_from_log(kind.pop("type"), kind)
         place, step = (np.array(solid.get(k, _ZERO)) for k in ("position", "spacing"))
         rotation = matrix_of(solid.get("rotation", _ZERO))
-        for k in range(solid.get("copies", 1) if shape is not None else 0):
+        assert shape is not None  # all shapes of solids are known
+        for k in range(solid.get("copies", 1)):
             column = f"plant.solid.{name}" + (f"_{k + 1}" if k else "")
             placed = pin.SE3(rotation, place + k * step)
             found.append(_DrawnSolid(f"solid/{name}/{k}", shape, placed, column))
