@@ -23,7 +23,15 @@ def without_companions(folder: str, names: list[str]) -> set[str]:
     """Of a folder called companions only what makes it a package remains."""
     if Path(folder).name == "companions":
         return set(names) - {"__init__.py"}
-    return COMPANIONS & set(names) if Path(folder).name == "configs" else set()
+    if "configs" not in Path(folder).parts:
+        return set()
+    files = {each.name for each in Path(folder).glob("*.yaml") if needs_mujoco(each)}
+    return (COMPANIONS | files) & set(names)
+
+
+def needs_mujoco(configuration: Path) -> bool:
+    """Say whether a configuration's plant is a companion's."""
+    return "mujoco" in configuration.read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="module")

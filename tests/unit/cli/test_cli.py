@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from places import ON_MUJOCO
 
 from hsp_control import Rollout, __version__
 from hsp_control.cli import doctor, main
@@ -100,7 +101,8 @@ def test_a_log_is_not_replaced_by_its_repetition(
 @pytest.mark.parametrize(
     ("config", "freedom"),
     [
-        (["whole_body/solo12_trunk"], 18 - 12 - 6),  # four feet hold three rows each
+        # four feet hold three rows each
+        pytest.param(["whole_body/solo12_trunk"], 18 - 12 - 6, marks=ON_MUJOCO),
         ([MOVING, "--set", "start.coordinates=[0, 0, 0]"], 3 - 1),  # stretched
         ([MOVING, "--set", "tasks.tip.schedule={intervals: [[1, null]]}"], 3),
     ],
@@ -188,17 +190,19 @@ def test_check_tells_before_the_run_what_is_out_of_reach(
             "{type: hold, point: [0, 4]}}}",
             "reach by 1 m, at the start",
         ),
-        (  # its feet stay where they are
+        pytest.param(  # its feet stay where they are
             "whole_body/talos_circle",
             "{hand: {type: frame_position, frame: gripper_right_base_link, trajectory: "
             "{type: hold, point: [4, 0, 1]}}}",
             r"reach by 2(\.\d)? m, at the start",
+            marks=ON_MUJOCO,
         ),
-        (
+        pytest.param(
             "whole_body/talos_circle",
             "{hand: {type: frame_position, frame: gripper_right_base_link, trajectory: "
             "{type: hold, origin: start, point: [0.2, 0, 0]}}}",
             None,
+            marks=ON_MUJOCO,
         ),
     ],
 )

@@ -166,7 +166,7 @@ def test_an_experiment_of_parts_goes_to_yaml_and_back(tmp_path: Path) -> None:
     [
         ({"simulation": {"duraton": 1}},
          r"^experiment: simulation\.duraton: unknown key 'duraton'; did you mean"),
-        ({"plant": "mujco"}, r"^experiment: plant\.type: unknown type 'mujco'; did"),
+        ({"plant": "rigidbody"}, r"^experiment: plant\.type: unknown type 'rigidb"),
         ({"name": "mine", "start": {"joints": [1]}},
          r"^mine: start\.joints: joints has shape \(1,\)"),
     ],
