@@ -21,7 +21,7 @@ from hsp_control.config import Experiment, load_experiment
 from hsp_control.config.streams import without_sources
 from hsp_control.control.measurement import LogChannel
 from hsp_control.control.output import ControlOutput
-from hsp_control.live.link import Faults, Kind, Link
+from hsp_control.live.link import Faults, Link, PacketKind
 from hsp_control.live.live_log import DueRows, live_channels
 from hsp_control.live.settings import LiveSettings
 from hsp_control.live.simulated_robot import SimulatedRobot
@@ -205,7 +205,9 @@ def _run(settings: dict[str, Any], stop_reason: Any) -> dict[str, Any]:
     served = serve(
         robot, link, stop_reason=stop_reason, on_row=log.row if log else None
     )
-    link.send(Kind.BYE)  # its sequence number tells the loop how many packets it lost
+    link.send(
+        PacketKind.BYE
+    )  # its sequence number tells the loop how many packets it lost
     reason = robot.reason or "no effort arrived"
     report: dict[str, Any] = {
         "phase": robot.phase.name.lower(),

@@ -51,7 +51,7 @@ NO_URDF = "has no URDF (only SDF, which is not read)"
 
 
 @dataclass(frozen=True)
-class Row:
+class RobotRow:
     """A robot in the table."""
 
     name: str
@@ -77,7 +77,7 @@ def _sources() -> dict[str, RobotSource]:
     return sources | {k: v for k, v in example_robots().items() if k not in sources}
 
 
-def rows() -> Iterator[Row]:
+def rows() -> Iterator[RobotRow]:
     """Yield every robot: bundled ones, usable ones, then the others."""
     sources = _sources()
     for floating in (False, True):
@@ -85,10 +85,10 @@ def rows() -> Iterator[Row]:
             if (source.root == "free_flyer") == floating:
                 yield _row(name, source)
     for name in examples_without_urdf():
-        yield Row(name, "example-robot-data", "-", note=NO_URDF)
+        yield RobotRow(name, "example-robot-data", "-", note=NO_URDF)
 
 
-def text(found: Sequence[Row]) -> Iterator[str]:
+def text(found: Sequence[RobotRow]) -> Iterator[str]:
     """Yield the table's lines, of at most 80 characters."""
     headings = ("nv", "end effector", "position", "pose")
     for origin in dict.fromkeys(row.origin for row in found):
@@ -109,7 +109,7 @@ def _line(name: str, nv: str, end_effector: str, position: str, pose: str) -> st
     return f"{name:27} {nv:>2}  {end_effector:29} {position:8}  {pose}".rstrip()
 
 
-def task(row: Row, rank: int, full: int) -> str:
+def task(row: RobotRow, rank: int, full: int) -> str:
     """Return rank and redundancy of a task, such as ``3 + 4``; ``-`` if impossible."""
     # A position task may omit axes, so any rank is enough; a pose task needs rank 6.
     if rank == 0 or (full == 6 and rank < full):
@@ -117,7 +117,7 @@ def task(row: Row, rank: int, full: int) -> str:
     return f"{rank} + {row.joints - rank}"
 
 
-def _row(name: str, source: RobotSource) -> Row:
+def _row(name: str, source: RobotSource) -> RobotRow:
     notes = [REMARKS[name]] if name in REMARKS else []
     if source.root == "free_flyer":
         notes.insert(0, FLOATING)
@@ -128,14 +128,14 @@ def _row(name: str, source: RobotSource) -> Row:
         reason = reason.removeprefix("Pinocchio cannot build a model: ")
         notes.append(reason.split("; ")[0].split(", so that")[0])
         if name not in LOAD_OPTIONS:
-            return Row(name, source.origin, source.root, note="; ".join(notes))
+            return RobotRow(name, source.origin, source.root, note="; ".join(notes))
     if name in LOAD_OPTIONS:
         notes.append(f"load it with {_options(name)}")
         robot = Robot.load(name, **LOAD_OPTIONS[name])
     found: dict[str, Any] = {"end_effector": robot.end_effector}
     if source.root != "free_flyer":
         found |= abilities(robot)
-    return Row(
+    return RobotRow(
         *(name, source.origin, source.root),
         *(robot.nq, robot.nv, len(robot.frame_names)),
         note="; ".join(notes),

@@ -22,7 +22,7 @@ _implementations: dict[tuple[Any, ...], Any] = {}
 are to live as long."""
 
 
-class _Builder(cast("Any", llvm).IRBuilder):  # type: ignore[misc]
+class _InstructionBuilder(cast("Any", llvm).IRBuilder):  # type: ignore[misc]
     """Writes instructions, but none to read what is known.
 
     A record's fields are arguments of a function, put together where it begins and
@@ -87,7 +87,7 @@ class _KernelLower(cast("Any", lowering).Lower):  # type: ignore[misc]
     def setup_function(self, fndesc: Any) -> None:
         """Begin the function."""
         super().setup_function(fndesc)
-        self.builder = _Builder(self.entry_block)
+        self.builder = _InstructionBuilder(self.entry_block)
         self.call_helper = self.call_conv.init_call_helper(self.builder)
 
     def lower_normal_function(self, fndesc: Any) -> None:

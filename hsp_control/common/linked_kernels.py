@@ -156,7 +156,7 @@ def _typing() -> _Typing:
     return cast("_Typing", context)
 
 
-class _Entry:
+class _AddressStandIn:
     """Stands for a kernel's address, which it does not have."""
 
 
@@ -216,7 +216,7 @@ def linked(function: Callable[..., Any], options: dict[str, Any]) -> Any:
             pipeline_class=KernelCompiler,
         )
         # What calls it looks it up by this object.
-        result = result._replace(entry_point=_Entry())
+        result = result._replace(entry_point=_AddressStandIn())
         target.insert_user_function(result.entry_point, result.fndesc, [result.library])
         return result
 

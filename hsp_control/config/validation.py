@@ -12,7 +12,7 @@ from hsp_control.config.document import Document
 from hsp_control.declaration import Part
 from hsp_control.declaration.located import locate
 from hsp_control.declaration.mistakes import (
-    Finding,
+    Mistake,
     domain_error,
     explained,
     findings,
@@ -35,13 +35,13 @@ def validate(document: Document, part: type[Value]) -> Value:
         raise _summary(document, sorted(found, key=lambda f: _order(document, f)))
 
 
-def _order(document: Document, finding: Finding) -> tuple[bool, tuple[int, ...]]:
+def _order(document: Document, finding: Mistake) -> tuple[bool, tuple[int, ...]]:
     """Return the sort key of a finding: its place in the file, overrides last."""
     mark = document.mark(finding.path)
     return mark is None, tuple(mark or ())
 
 
-def _error(document: Document, finding: Finding) -> HspControlError:
+def _error(document: Document, finding: Mistake) -> HspControlError:
     """Return the error of a finding; one that a part raised keeps its class."""
     own = domain_error(finding.error)
     if own is None:
@@ -56,7 +56,7 @@ def _error(document: Document, finding: Finding) -> HspControlError:
     return error
 
 
-def _summary(document: Document, found: list[Finding]) -> HspControlError:
+def _summary(document: Document, found: list[Mistake]) -> HspControlError:
     errors = [_error(document, finding) for finding in found]
     messages = list(dict.fromkeys(str(error) for error in errors))
     first, others = errors[0], messages[1:]

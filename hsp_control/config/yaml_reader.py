@@ -101,7 +101,7 @@ def read_yaml(text: str) -> tuple[Any, dict[KeyPath, Mark]]:
     root = _compose(text)
     if root is None:
         return None, {(): Mark(1, 1)}
-    builder = _Builder()
+    builder = _DataBuilder()
     builder.marks[()] = _mark(root)
     return builder.build(root, ()), builder.marks
 
@@ -161,7 +161,7 @@ def _syntax_error(error: yaml.MarkedYAMLError) -> YamlError:
     return YamlError(line, f"not YAML: {what}")
 
 
-class _Builder:
+class _DataBuilder:
     """Turns nodes into plain data, a copy for every alias, and collects the marks."""
 
     def __init__(self) -> None:

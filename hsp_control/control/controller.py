@@ -32,7 +32,7 @@ from hsp_control.control.mixture import (
     Mixture,
 )
 from hsp_control.control.output import ControlOutput, Diagnostics
-from hsp_control.control.setup import Base, Declared
+from hsp_control.control.setup import Base, DeclaredController
 from hsp_control.control.targets import RAMP, followed_stream, new_stream, target_of
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.start import Start
@@ -115,7 +115,7 @@ class Controller:
             HspControlError: If a part does not fit the robot; the message contains its
                 key path.
         """
-        self._declared = Declared(
+        self._declared = DeclaredController(
             robot,
             tasks,
             field,

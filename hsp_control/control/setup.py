@@ -349,7 +349,7 @@ def levels_of(
     return tuple(tuple(levels[priority]) for priority in sorted(levels))
 
 
-class Declared:
+class DeclaredController:
     """What a controller is made of before anything relative in it is placed."""
 
     def __init__(
@@ -439,7 +439,7 @@ class Declared:
             len(tasks),
         )
 
-    def preview(self) -> "Declared":
+    def preview(self) -> "DeclaredController":
         """Return the same parts with streams that begin anew."""
         other = copy(self)
         other.tasks = tuple(

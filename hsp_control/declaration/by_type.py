@@ -41,7 +41,7 @@ class ByType:
         assert self.base.family is not None
         members = self.base.family.members
         if self._model is None or list(self._model.model_fields) != list(members):
-            entries = {name: _Entry(each).field() for name, each in members.items()}
+            entries = {name: _AfterType(each).field() for name, each in members.items()}
             self._model = create_model(
                 self.base.family.name.title(),
                 __config__=ConfigDict(extra="forbid", arbitrary_types_allowed=True),
@@ -100,7 +100,7 @@ def as_entry(part: Declared) -> Any:
     return given
 
 
-class _Entry:
+class _AfterType:
     """What YAML may say after a type."""
 
     def __init__(self, member: type[Declared]) -> None:

@@ -23,7 +23,7 @@ from hsp_control.declaration.keys import KeyPath, written
 from hsp_control.declaration.language import joined, kind, misfit, shown, spoken
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.declaration.schema import (
-    Shape,
+    ValueTypes,
     entry,
     is_model,
     keys,
@@ -42,7 +42,7 @@ _KINDS = {
 }
 
 
-class Source(Protocol):
+class CheckedSource(Protocol):
     """Where the checked data come from."""
 
     def __contains__(self, path: KeyPath) -> bool:
@@ -52,7 +52,7 @@ class Source(Protocol):
         """Return the place of a key path in the text, None if there is no text."""
 
 
-class Finding(NamedTuple):
+class Mistake(NamedTuple):
     """One mistake."""
 
     # the key path that the user wrote; for a missing key, that of the mapping without
@@ -62,13 +62,16 @@ class Finding(NamedTuple):
     # otherwise pydantic's name for the error
     kind: str
     value: Any  # the wrong value or key; for missing keys, their list
-    expected: Shape  # the allowed types there; for keys, those of their mapping
+    expected: ValueTypes  # the allowed types there; for keys, those of their mapping
     error: ErrorDetails  # pydantic's own error
 
 
 def findings(
-    document: Source, expected: Shape, errors: Sequence[Pending], path: KeyPath = ()
-) -> list[Finding]:
+    document: CheckedSource,
+    expected: ValueTypes,
+    errors: Sequence[Pending],
+    path: KeyPath = (),
+) -> list[Mistake]:
     """Return one finding for each mistake at ``path`` or below it."""
     found = [_here(path, expected, error) for ahead, error in errors if not ahead]
     below: dict[str | int, list[Pending]] = defaultdict(list)
@@ -96,7 +99,7 @@ def findings(
     return found + (_most_likely(document, tries, path) if tries else [])
 
 
-def _here(path: KeyPath, expected: Shape, error: ErrorDetails) -> Finding:
+def _here(path: KeyPath, expected: ValueTypes, error: ErrorDetails) -> Mistake:
     """Return the finding for an error of the value at ``path`` itself."""
     kind, value = error["type"], error["input"]
     if kind.endswith(("_type", "_parsing", "_from_float")) or _not_a_list(error):
@@ -110,7 +113,7 @@ def _here(path: KeyPath, expected: Shape, error: ErrorDetails) -> Finding:
             path, value = (*path, tag), value[tag]
         elif kind == "union_tag_not_found" and (misspelt := nearest(tag, unknown)):
             path, kind, value = (*path, misspelt), "misspelt_tag", misspelt
-    return Finding(path, kind, value, expected, error)
+    return Mistake(path, kind, value, expected, error)
 
 
 def _not_a_list(error: ErrorDetails) -> bool:
@@ -120,36 +123,36 @@ def _not_a_list(error: ErrorDetails) -> bool:
 
 
 def _at_key(
-    document: Source,
-    holder: Shape,
+    document: CheckedSource,
+    holder: ValueTypes,
     errors: Sequence[Pending],
     path: KeyPath,
     key: str | int,
-) -> list[Finding]:
+) -> list[Mistake]:
     """Return the findings at one key of the value at ``path``, which is not a union."""
-    found: list[Finding] = []
+    found: list[Mistake] = []
     deeper: list[Pending] = []
     for ahead, error in errors:
         kind = _KINDS.get(error["type"], error["type"])
         if ahead == ("[key]",):
-            found.append(Finding((*path, key), "key", key, shape(Any), error))
+            found.append(Mistake((*path, key), "key", key, shape(Any), error))
         elif ahead or kind not in ("extra_forbidden", "missing"):
             deeper.append((ahead, error))
         elif kind == "extra_forbidden":
-            found.append(Finding((*path, key), kind, key, holder, error))
+            found.append(Mistake((*path, key), kind, key, holder, error))
         elif isinstance(key, int):  # a tuple without its last entries
-            found.append(Finding(path, "too_short", error["input"], holder, error))
+            found.append(Mistake(path, "too_short", error["input"], holder, error))
         else:
-            found.append(Finding(path, kind, [key], holder, error))
+            found.append(Mistake(path, kind, [key], holder, error))
     if path and getattr(holder.options[0], "yaml_key", None) == key:  # the key itself
-        return found + [Finding(path, "key", path[-1], holder, e) for _, e in deeper]
+        return found + [Mistake(path, "key", path[-1], holder, e) for _, e in deeper]
     within = entry(holder.options[0], key)
     if within is None and (*path, key) not in document:  # a label of pydantic
         return found + findings(document, shape(Any), deeper, path)
     return found + findings(document, within or shape(Any), deeper, (*path, key))
 
 
-def _gathered(found: list[Finding], path: KeyPath) -> list[Finding]:
+def _gathered(found: list[Mistake], path: KeyPath) -> list[Mistake]:
     """Join the keys missing at ``path`` in one finding, without misspelt ones."""
     missing = [f for f in found if f.kind == "missing" and f.path == path]
     others = [f for f in found if f.kind != "missing" or f.path != path]
@@ -160,8 +163,8 @@ def _gathered(found: list[Finding], path: KeyPath) -> list[Finding]:
 
 
 def _most_likely(
-    document: Source, tries: list[list[Finding]], path: KeyPath
-) -> list[Finding]:
+    document: CheckedSource, tries: list[list[Mistake]], path: KeyPath
+) -> list[Mistake]:
     """Return the findings of the alternative that the user most likely meant.
 
     It is the alternative whose outer type is right, with the fewest mistakes inside. If
@@ -170,7 +173,7 @@ def _most_likely(
     types; if at the same key, none of them has it.
     """
 
-    def unlikeliness(found: list[Finding]) -> tuple[bool, int]:
+    def unlikeliness(found: list[Mistake]) -> tuple[bool, int]:
         return any(f.path == path and _misfit(f) for f in found), len(found)
 
     lowest = min(map(unlikeliness, tries))
@@ -179,13 +182,13 @@ def _most_likely(
     options = tuple(o for found in likely for o in found[0].expected.options)
     if len(likely) > 1 and all(found[0].path == first.path for found in likely):
         if all(found[0].kind == "extra_forbidden" for found in likely):
-            return [first._replace(expected=Shape(options))]
+            return [first._replace(expected=ValueTypes(options))]
         if all(len(found) == 1 and _misfit(found[0]) for found in likely):
-            return [first._replace(kind="mismatch", expected=Shape(options))]
+            return [first._replace(kind="mismatch", expected=ValueTypes(options))]
     return max(likely, key=lambda found: document.mark(found[0].path) or (0, 0))
 
 
-def _misfit(finding: Finding) -> bool:
+def _misfit(finding: Mistake) -> bool:
     return finding.kind in ("mismatch", "literal_error", "enum")
 
 
@@ -206,7 +209,7 @@ _ENTRIES = ("entry", "entries")
 _LONG_LIST = 40
 
 
-def explained(finding: Finding, key: str = "key") -> str:
+def explained(finding: Mistake, key: str = "key") -> str:
     """Return the message for a finding, without its location.
 
     What is missing or unknown is called ``key``.
@@ -254,7 +257,7 @@ def _missing(key: str, names: list[str], required: list[str]) -> str:
     return f"missing {key}{plural} {listing(map(repr, names), _LONG_LIST)}{among}"
 
 
-def _tags(expected: Shape, key: str) -> str:
+def _tags(expected: ValueTypes, key: str) -> str:
     tags = map(str, tagged(expected.options, key))
     return f"{key} is one of: {listing(tags, _LONG_LIST)}"
 
@@ -267,7 +270,7 @@ def _near(value: Any, options: Iterable[Any]) -> str:
     return did_you_mean(value, map(str, options))
 
 
-def _mismatch(value: Any, words: str, expected: Shape) -> str:
+def _mismatch(value: Any, words: str, expected: ValueTypes) -> str:
     if value is None:
         given = spoken("nothing given", "None")
     else:
@@ -275,7 +278,7 @@ def _mismatch(value: Any, words: str, expected: Shape) -> str:
     return f"{given}; expected {words}{_inside(expected)}{_meant(value, expected)}"
 
 
-def _inside(expected: Shape) -> str:
+def _inside(expected: ValueTypes) -> str:
     """Return which keys the mapping has that is expected, if it is one part's."""
     (option, *others) = expected.options
     if others or not is_model(option) or expected.discriminator:
@@ -283,7 +286,7 @@ def _inside(expected: Shape) -> str:
     return f" of {listing(keys(expected), 6)}"
 
 
-def _meant(value: Any, expected: Shape) -> str:
+def _meant(value: Any, expected: ValueTypes) -> str:
     """Return the mapping that the user meant by a type's name, or by a bare value."""
     choices = literals(expected.options)
     if (tag := expected.discriminator) is None:
@@ -302,7 +305,7 @@ def _meant(value: Any, expected: Shape) -> str:
     return ""
 
 
-def _wrong_length(finding: Finding) -> str:
+def _wrong_length(finding: Mistake) -> str:
     value, (fewest, most) = finding.value, finding.expected.bounds()
     count = len(value)
     units = ("character", "characters") if isinstance(value, str) else _ENTRIES
@@ -317,7 +320,7 @@ def _wrong_length(finding: Finding) -> str:
     return f"{shown(value)} has {count} {units[count != 1]}, needs {needs}"
 
 
-def _out_of_bounds(finding: Finding) -> str:
+def _out_of_bounds(finding: Mistake) -> str:
     symbol, words = _COMPARISONS[finding.kind]
     bound = finding.error["ctx"][symbol]
     low = symbol in ("gt", "ge")
@@ -328,14 +331,14 @@ def _out_of_bounds(finding: Finding) -> str:
     return f"{shown(finding.value)} is {wrong}; must be {words} {limit}"
 
 
-def _message_of_pydantic(finding: Finding) -> str:
+def _message_of_pydantic(finding: Mistake) -> str:
     """Return pydantic's message, with the value instead of its word "Input"."""
     value, message = shown(finding.value), finding.error["msg"]
     sentence = re.sub(r"^\w+ (?=should )", f"{value} ".replace("\\", r"\\"), message)
     return sentence if sentence != message else f"{value}: {message}"
 
 
-def _words(expected: Shape, *, many: bool = False) -> list[str]:
+def _words(expected: ValueTypes, *, many: bool = False) -> list[str]:
     """Return the types in plain words; an empty list if a type has no plain word."""
     found: list[str] = []
     for option in expected.options:
@@ -403,7 +406,7 @@ def argument_error(cls: type[Declared], error: ValidationError) -> HspControlErr
     return as_error(found[0], cls)
 
 
-def as_error(finding: Finding, cls: type[Declared]) -> HspControlError:
+def as_error(finding: Mistake, cls: type[Declared]) -> HspControlError:
     """Return the error of a finding about an argument of a part."""
     where = ": ".join(part for part in (cls.__name__, written(finding.path)) if part)
     own = domain_error(finding.error)
@@ -414,7 +417,7 @@ def as_error(finding: Finding, cls: type[Declared]) -> HspControlError:
     return kind(f"{where}: {_in_python(finding) or explained(finding)}")
 
 
-def _in_python(finding: Finding) -> str:
+def _in_python(finding: Mistake) -> str:
     """Return the message where Python gave something that is no part; or nothing."""
     options = finding.expected.options
     wanted = all(isinstance(o, type) and issubclass(o, Declared) for o in options)

@@ -20,7 +20,7 @@ _BY_TYPE = _Discriminator("type")
 """The members of a family of parts are told apart by this key."""
 
 
-class Shape(NamedTuple):
+class ValueTypes(NamedTuple):
     """The types that a value may have."""
 
     options: tuple[Any, ...]  # the types; ``Any`` for a type whose inside is not known
@@ -45,42 +45,42 @@ class Shape(NamedTuple):
         return fewest or 0, most
 
 
-def shape(annotation: Any, *metadata: Any) -> Shape:
+def shape(annotation: Any, *metadata: Any) -> ValueTypes:
     """Return the shape of an annotation: its types without ``Annotated`` or aliases."""
     known = tuple(_flat(metadata))
     for each in known:  # pydantic keeps the marker of a field here
         if isinstance(each, ArrayField):
             return shape(each.items)
         if isinstance(each, AnyOf):
-            return Shape(tuple(each.members.values()), (_BY_TYPE,))
+            return ValueTypes(tuple(each.members.values()), (_BY_TYPE,))
         if isinstance(each, ByType):
-            return Shape((each.model,))
+            return ValueTypes((each.model,))
     if get_origin(annotation) is Annotated:
         inner, *more = get_args(annotation)
         for each in more:
             if isinstance(each, ArrayField):
                 return shape(each.items, *known)
             if isinstance(each, AnyOf):
-                return Shape(tuple(each.members.values()), (*known, _BY_TYPE))
+                return ValueTypes(tuple(each.members.values()), (*known, _BY_TYPE))
             if isinstance(each, ByType):
-                return Shape((each.model,), known)
+                return ValueTypes((each.model,), known)
         return shape(inner, *more, *known)
     if hasattr(annotation, "__value__"):  # an alias: type Gain = float | list[float]
         return shape(annotation.__value__, *known)
     if get_origin(annotation) in (Union, UnionType):
         options = [o for o in get_args(annotation) if o is not type(None)]
         if len(options) > 1:
-            return Shape(tuple(options), known)
+            return ValueTypes(tuple(options), known)
         return shape(options[0], *known)
     family = getattr(annotation, "family", None)
     if family is not None and family.base is annotation:
-        return Shape(tuple(family.members.values()), (*known, _BY_TYPE))
+        return ValueTypes(tuple(family.members.values()), (*known, _BY_TYPE))
     if isinstance(annotation, type) and issubclass(annotation, RootModel):
         return field_shape(annotation.model_fields["root"])
-    return Shape((annotation,), known)
+    return ValueTypes((annotation,), known)
 
 
-def field_shape(field: FieldInfo) -> Shape:
+def field_shape(field: FieldInfo) -> ValueTypes:
     """Return the shape of a model's field."""
     for each in field.metadata:  # what pydantic took out of ``Annotated``
         if isinstance(each, ArrayField | AnyOf | ByType):
@@ -109,7 +109,7 @@ def _fields(option: Any) -> dict[str, FieldInfo]:
     return found
 
 
-def keys(expected: Shape, *, required: bool = False) -> list[str]:
+def keys(expected: ValueTypes, *, required: bool = False) -> list[str]:
     """Return the keys (or only the required ones) that a mapping of this shape has."""
     found: dict[str, FieldInfo] = {}
     for option in expected.options:
@@ -144,7 +144,7 @@ def literals(options: Iterable[Any]) -> list[Any]:
     return values
 
 
-def entry(option: Any, key: str | int) -> Shape | None:
+def entry(option: Any, key: str | int) -> ValueTypes | None:
     """Return the shape of the value at ``key`` in a value of this type."""
     if is_model(option):
         field = fields(option).get(str(key))

@@ -161,7 +161,7 @@ class Resolution:
             *(self._scratch, self.null_space_error, self.acceleration, self.code),
         )
         resolve = _resolve_at_once if self.alone else _resolve_levels
-        return bind(resolve, Step._make(step))
+        return bind(resolve, LawStep._make(step))
 
     def diagnose(self, first: int = 0) -> tuple[float, float, bytes]:
         """Return what tells how near the last `resolve` was to singular and to rest.
@@ -198,7 +198,7 @@ def singular_values(triangle: bytes) -> Array:
     return values
 
 
-class Step(NamedTuple):
+class LawStep(NamedTuple):
     """What the law's kernels read and write in each step; see `Resolution`."""
 
     task: TaskSample
@@ -221,7 +221,7 @@ class Step(NamedTuple):
 
 
 @kernel
-def _resolve_at_once(step: Step) -> int:
+def _resolve_at_once(step: LawStep) -> int:
     """Write e_N and a of all tasks at once; write and return the code of `outcome_of`.
 
     If the tasks of several levels are exact together, they are exact one after the
@@ -243,7 +243,7 @@ def _resolve_at_once(step: Step) -> int:
 
 
 @kernel
-def _resolve_levels(step: Step) -> int:
+def _resolve_levels(step: LawStep) -> int:
     """Write e_N and a: of all levels at once, or level by level if they conflict.
 
     The code of `outcome_of` is written and returned.
@@ -281,7 +281,7 @@ def _resolve_levels(step: Step) -> int:
 
 
 @kernel
-def _write_thresholds(step: Step) -> float:
+def _write_thresholds(step: LawStep) -> float:
     """Write ε of each level, and return the largest."""
     asked, bounded, ends, threshold = (
         step.asked,

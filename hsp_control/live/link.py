@@ -41,7 +41,7 @@ _HEAD = struct.Struct("<4sBBBxIQQQqd")
 _CHECK = struct.Struct("<I")
 
 
-class Kind(IntEnum):
+class PacketKind(IntEnum):
     """Kind of a packet: a state, an effort, or the end of the session."""
 
     STATE = 1
@@ -52,7 +52,7 @@ class Kind(IntEnum):
 class Packet(NamedTuple):
     """The content of a datagram."""
 
-    kind: Kind  # state, effort or end of the session
+    kind: PacketKind  # state, effort or end of the session
     phase: int  # the robot's phase
     session: int  # number of the session
     sequence: int  # number of the packet at its sender
@@ -96,10 +96,10 @@ def decode(data: bytes) -> Packet | None:
         return None
     session, sequence, acks, stamp, t = head[5:]
     payload = np.frombuffer(body, "<f8", offset=_HEAD.size)
-    return Packet(Kind(kind), phase, session, sequence, acks, stamp, t, payload)
+    return Packet(PacketKind(kind), phase, session, sequence, acks, stamp, t, payload)
 
 
-_PACKET_KINDS = frozenset(Kind)
+_PACKET_KINDS = frozenset(PacketKind)
 
 
 @dataclass(frozen=True)
@@ -263,7 +263,12 @@ class Link:
         return max(0, self.newest - valid - self.counts["corrupted"])
 
     def send(
-        self, kind: Kind, payload: Array = _NOTHING, *, t: float = 0.0, phase: int = 0
+        self,
+        kind: PacketKind,
+        payload: Array = _NOTHING,
+        *,
+        t: float = 0.0,
+        phase: int = 0,
     ) -> None:
         """Send a packet; if the other end has closed, nothing happens."""
         if self.peer is None:
@@ -281,7 +286,7 @@ class Link:
             payload,
         )
         # A BYE must arrive: faults are injected only into packets that repeat.
-        if kind is Kind.BYE:
+        if kind is PacketKind.BYE:
             sent = [*self._faults.flush(), encode(packet)]
         else:
             sent = self._faults.apply(encode(packet))

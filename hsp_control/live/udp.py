@@ -11,7 +11,14 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.measurement import Inertial, Measurement
-from hsp_control.live.link import LOOPBACK, Address, AgeEstimator, Faults, Kind, Link
+from hsp_control.live.link import (
+    LOOPBACK,
+    Address,
+    AgeEstimator,
+    Faults,
+    Link,
+    PacketKind,
+)
 from hsp_control.live.real_time import no_garbage_collection
 from hsp_control.live.safe_stop import Phase
 from hsp_control.live.simulated_robot import SimulatedRobot
@@ -132,7 +139,7 @@ class UdpHardware:
 
     def read(self, timeout: float) -> Measurement | None:
         """Return the newest state; see `Hardware.read`."""
-        states = [p for p in self.link.receive(timeout) if p.kind is Kind.STATE]
+        states = [p for p in self.link.receive(timeout) if p.kind is PacketKind.STATE]
         for packet in states:
             age = self._age_estimator.age(monotonic(), 1e-9 * packet.stamp)
         if not states:
@@ -147,13 +154,13 @@ class UdpHardware:
 
     def write(self, effort: Array) -> None:
         """Send an effort; see `Hardware.write`."""
-        self.link.send(Kind.EFFORT, effort)
+        self.link.send(PacketKind.EFFORT, effort)
 
     def close(self) -> None:
         """Send the end of the session; packets that still arrive can be counted."""
         if not self.closed and self.link.peer is not None:
             for _ in range(_BYES):
-                self.link.send(Kind.BYE)
+                self.link.send(PacketKind.BYE)
         self.closed = True
 
     def drain(self) -> None:
@@ -227,9 +234,9 @@ def serve(
                 begin = now
             efforts = []
             for packet in link.receive(0.0):
-                if packet.kind is Kind.BYE:
+                if packet.kind is PacketKind.BYE:
                     robot.halt(CLOSED_BY_LOOP)
-                elif packet.kind is Kind.EFFORT and len(packet.payload) == nv:
+                elif packet.kind is PacketKind.EFFORT and len(packet.payload) == nv:
                     if state_sequence - packet.acks > robot.watchdog:
                         report.outdated += 1
                     else:
@@ -245,7 +252,7 @@ def serve(
             robot.advance(efforts)
             state = sensors.pack(robot.measured())
             with suppress(OSError):  # a line that fails loses packets
-                link.send(Kind.STATE, state, t=robot.t, phase=int(robot.phase))
+                link.send(PacketKind.STATE, state, t=robot.t, phase=int(robot.phase))
             state_sequence = link.counts["sent"]
             done = robot.done
             if on_row is not None and robot.t > t:

@@ -48,7 +48,7 @@ class Curve(NamedTuple):
     rows: slice = slice(0, 1)  # which components, of which the norm is shown
 
 
-class Plot(NamedTuple):
+class LivePlot(NamedTuple):
     """One plot."""
 
     title: str
@@ -225,7 +225,7 @@ def _values(rows: dict[str, Array], curve: Curve) -> Array:
     return part[:, 0] if part.shape[1] == 1 else np.linalg.norm(part, axis=1)
 
 
-def _plots(session: Played) -> Iterator[Plot]:
+def _plots(session: Played) -> Iterator[LivePlot]:
     """Yield the plots of a session, what tells most first."""
     controller = session.controller
     rows, meta = session.recorder.rows(0), session.meta
@@ -234,17 +234,17 @@ def _plots(session: Played) -> Iterator[Plot]:
         norm = Curve("‖e_N‖", "null_space_norm")
         unit = ", ".join(f"{unit}/s" for unit in dict.fromkeys(controller.robot.units))
         note = "Of the free joints' motion; K_N makes it decay."
-        yield Plot("Null-space error ‖e_N‖", note, unit, True, [norm])
+        yield LivePlot("Null-space error ‖e_N‖", note, unit, True, [norm])
     names = [name for name in rows if name.startswith("distance.")]
     if names:
         labels = [distance_label(meta, n.removeprefix("distance.")) for n in names]
         curves = [Curve(*each) for each in zip(labels, names, strict=True)]
         note = "To obstacles; below 0 is a collision."
-        yield Plot("Clearance", note, "m", False, curves)
+        yield LivePlot("Clearance", note, "m", False, curves)
     curves = [Curve("‖τ‖", "tau", slice(0, len(dofs)))]
     if len(dofs) <= _JOINTS:
         curves = [Curve(n, "tau", slice(k, k + 1)) for k, n in enumerate(dofs)]
-    yield Plot("Efforts τ", "Of the motors.", "N·m", False, curves)
+    yield LivePlot("Efforts τ", "Of the motors.", "N·m", False, curves)
     errors: dict[str, list[Curve]] = {}
     for task in controller.tasks:
         first = 0
@@ -257,4 +257,4 @@ def _plots(session: Played) -> Iterator[Plot]:
             first += part.size
     for unit, curves in errors.items():
         note = "From each target."
-        yield Plot("Task error", note, unit, True, curves)
+        yield LivePlot("Task error", note, unit, True, curves)

@@ -31,7 +31,7 @@ CHART_RADIUS = 1.0
 """A new chart starts when a root has rotated by this [rad]; charts end at 2π."""
 
 
-class Chart:
+class TangentChart:
     """Coordinates y = (δ, v), shape (2 nv,), with q = base ⊕ δ."""
 
     def __init__(self, robot: Robot, base: Array) -> None:
@@ -243,7 +243,7 @@ class _Rk4(Steps):
         robot = self.robot
         self._D, A = np.zeros((2, 4, robot.nv))
         self._delta, v0 = np.zeros((2, robot.nv))
-        self._chart = Chart(robot, self.q)
+        self._chart = TangentChart(robot, self.q)
         self._base = self._chart.base
         base, q = self._base, self.q
         begin = bind(_begin, q, self.v, base, v0, self._D)
@@ -356,7 +356,7 @@ class Dop853(Integrator, type="dop853"):
         from scipy.integrate import DOP853  # here: SciPy takes long to import
 
         while t < end:
-            chart = Chart(robot, q)
+            chart = TangentChart(robot, q)
             trial = _Trial(chart.equation(dynamics))
             solver = DOP853(
                 trial,

@@ -18,7 +18,7 @@ from hsp_control.simulation import Rollout
 _EFFORT_UNITS = {"rad": "N·m", "m": "N"}
 
 
-class ErrorPart(NamedTuple):
+class LoggedErrorPart(NamedTuple):
     """The components of a task's error that have the same unit."""
 
     # the task's name, and the name of the part if there are several, or if it has no
@@ -45,7 +45,7 @@ def task_names(rollout: Rollout) -> list[str]:
     return list(rollout.meta.get("tasks", {}))
 
 
-def task_errors(rollout: Rollout) -> list[ErrorPart]:
+def task_errors(rollout: Rollout) -> list[LoggedErrorPart]:
     """Return the norms of all tasks' errors, with metres and radians separate."""
     found = []
     for index, name in enumerate(task_names(rollout)):
@@ -58,7 +58,7 @@ def task_errors(rollout: Rollout) -> list[ErrorPart]:
             )
             label = f"{name} {part}" if len(parts) > 1 or unit == "–" else name
             norm = np.linalg.norm(error[:, first : first + size], axis=1)
-            found.append(ErrorPart(label.strip(), unit, index, norm))
+            found.append(LoggedErrorPart(label.strip(), unit, index, norm))
             first += size
     return found
 

@@ -13,7 +13,11 @@ from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.gains import Gains
 from hsp_control.tasks.impedance import Impedance, parts_of
-from hsp_control.tasks.impedance_gains import Rotating, Scratch, impedance_gains
+from hsp_control.tasks.impedance_gains import (
+    ImpedanceScratch,
+    Rotating,
+    impedance_gains,
+)
 from hsp_control.tasks.task import Feedback, InForce, SecondOrderTask, Task
 
 _NO_GAINS = Gains(natural_frequency=10.0)
@@ -92,7 +96,7 @@ class CompliantTask(SecondOrderTask):
             return task
         inertia = state.inertia, state.inertia_rate
         numbers = in_force.numbers, self.part_ends()
-        scratch = Scratch.allocate(self.rows, state.robot.nv)
+        scratch = ImpedanceScratch.allocate(self.rows, state.robot.nv)
         gains = planned(
             (
                 impedance_gains,

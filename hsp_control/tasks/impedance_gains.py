@@ -50,7 +50,7 @@ class Rotating(NamedTuple):
     angular_velocity: Array  # of the frame, in world axes, (3,) [rad/s]
 
 
-class Scratch(NamedTuple):
+class ImpedanceScratch(NamedTuple):
     """Memory of `impedance_gains`."""
 
     factor: Array  # (nv, nv)
@@ -61,7 +61,7 @@ class Scratch(NamedTuple):
     rows: Array  # (3, m)
 
     @classmethod
-    def allocate(cls, rows: int, nv: int) -> "Scratch":
+    def allocate(cls, rows: int, nv: int) -> "ImpedanceScratch":
         """Return zeros."""
         return cls(
             np.zeros((nv, nv)),
@@ -81,7 +81,7 @@ def impedance_gains(
     numbers: Array,
     ends: Indices,
     sample: TaskSample,
-    scratch: Scratch,
+    scratch: ImpedanceScratch,
     mobility: Array,
     feedback: Feedback,
 ) -> None:

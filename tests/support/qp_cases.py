@@ -11,7 +11,7 @@ import daqp
 import numpy as np
 from numpy.typing import NDArray
 
-from hsp_control.control.actuation.dual_active_set import Problem, Workspace, minimise
+from hsp_control.control.actuation.dual_active_set import QP, Workspace, minimise
 
 Array = NDArray[np.float64]
 Generator = np.random.Generator
@@ -225,7 +225,7 @@ def spans(A: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return begin, end
 
 
-def packed(case: Case, softness: Array | None = None) -> Problem:
+def packed(case: Case, softness: Array | None = None) -> QP:
     """Return the kernel's argument; J's last columns with one entry are apart."""
     soft = np.zeros(0) if softness is None else softness
     A, (nz, n) = np.ascontiguousarray(case.A), case.JT.shape
@@ -235,7 +235,7 @@ def packed(case: Case, softness: Array | None = None) -> Problem:
     JT = np.ascontiguousarray(case.JT[: nz - own, : n - own])
     rest = np.diag(case.JT[nz - own :, n - own :]).copy()
     ends = case.lower, case.upper, soft, case.equalities
-    return Problem(JT, rest, A, *spans(A), *ends)
+    return QP(JT, rest, A, *spans(A), *ends)
 
 
 def _is_alone(JT: Array, row: int, column: int) -> bool:

@@ -50,10 +50,10 @@ def pose(position: Array, wxyz: Array) -> pin.SE3:
 
 def build_model(selection: Selection) -> pin.Model:
     """Return the Pinocchio model, with a frame for each body, joint and site."""
-    return _Builder(selection).model
+    return _ModelBuilder(selection).model
 
 
-class _Builder:
+class _ModelBuilder:
     """Adds the bodies of a scene to a model, from the world outwards."""
 
     def __init__(self, selection: Selection) -> None:

@@ -14,7 +14,7 @@ _NAME = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 _LARGEST_DOMAIN = 232  # beyond, RTPS has no ports for it
 
 
-class Address(NamedTuple):
+class TopicAddress(NamedTuple):
     """What an address says.
 
     Attributes:
@@ -28,7 +28,7 @@ class Address(NamedTuple):
     options: dict[str, str]
 
 
-def parse(address: str, options: Collection[str] = ()) -> Address:
+def parse(address: str, options: Collection[str] = ()) -> TopicAddress:
     """Return what an address says; the domain is ``ROS_DOMAIN_ID``'s, or else 0."""
     address = address.removeprefix(SCHEME)
     where = SCHEME + address
@@ -50,7 +50,7 @@ def parse(address: str, options: Collection[str] = ()) -> Address:
         raise HardwareError(
             f"{where}: the domain is {domain!r}; needs 0 to {_LARGEST_DOMAIN}"
         )
-    return Address(checked_name(name), int(domain), found)
+    return TopicAddress(checked_name(name), int(domain), found)
 
 
 def checked_name(name: str) -> str:

@@ -14,7 +14,7 @@ from hsp_control.companions.ros2.messages import (
     JointState,
     MultiArrayLayout,
 )
-from hsp_control.companions.ros2.node import Node, Received
+from hsp_control.companions.ros2.node import Node, ReceivedMessage
 from hsp_control.companions.ros2.stamps import Stamps
 from hsp_control.live.hardware import Measurement
 from hsp_control.live.link import AgeEstimator
@@ -136,7 +136,7 @@ class Ros2Hardware:
             self._closed = True
             del self._subscription, self._publisher
 
-    def _measurement(self, received: Received[JointState]) -> Measurement | None:
+    def _measurement(self, received: ReceivedMessage[JointState]) -> Measurement | None:
         """Return what a message says; None if it is old, or about other joints."""
         try:
             state = self._joints.state(received.message, self.states)

@@ -47,7 +47,7 @@ _ENDPOINTS = 10_000
 """Most publishers that are looked through to explain why one is missing."""
 
 
-class Received(NamedTuple, Generic[M]):
+class ReceivedMessage(NamedTuple, Generic[M]):
     """A message that arrived.
 
     Attributes:
@@ -72,9 +72,9 @@ class Node:
         with _explained(f"cannot join the DDS domain {domain}"):
             self._participant = DomainParticipant(domain)
 
-    def publisher(self, topic: str, kind: type[M]) -> "Publisher[M]":
+    def publisher(self, topic: str, kind: type[M]) -> "TopicPublisher[M]":
         """Return a publisher of a topic; reliable, as ROS 2's are by default."""
-        return Publisher(self._participant, topic, kind)
+        return TopicPublisher(self._participant, topic, kind)
 
     def subscription(self, topic: str, kind: type[M]) -> "Subscription[M]":
         """Return a subscription of a topic; best effort, so that it fits every one.
@@ -128,7 +128,7 @@ class _End(Generic[M]):
         )
 
 
-class Publisher(_End[M]):
+class TopicPublisher(_End[M]):
     """Publishes messages on a topic."""
 
     def __init__(
@@ -207,13 +207,13 @@ class Subscription(_End[M]):
             if left <= _SLICE:
                 return False
 
-    def take(self) -> list[Received[M]]:
+    def take(self) -> list[ReceivedMessage[M]]:
         """Return the messages that wait, oldest first; at most as many as may wait.
 
         One with a text that is not UTF-8 is counted and dropped. Other bytes that are
         no message of the type do not get so far: Cyclone DDS drops them.
         """
-        found: list[Received[M]] = []
+        found: list[ReceivedMessage[M]] = []
         for _ in range(_DEPTH):
             try:
                 taken = self._reader.take(1)
@@ -226,7 +226,7 @@ class Subscription(_End[M]):
                 break
             if not isinstance(taken[0], InvalidSample):  # those say: a publisher left
                 info: SampleInfo = taken[0].sample_info  # type: ignore[attr-defined]
-                found.append(Received(taken[0], info.publication_handle))
+                found.append(ReceivedMessage(taken[0], info.publication_handle))
         return found
 
 

@@ -7,7 +7,7 @@ from weakref import ref
 
 from hsp_control.common.exceptions import HardwareError, StreamError
 from hsp_control.companions.ros2.address import SCHEME as SCHEME
-from hsp_control.companions.ros2.address import Address, parse
+from hsp_control.companions.ros2.address import TopicAddress, parse
 from hsp_control.companions.ros2.installed import check_installed
 from hsp_control.trajectories.streams.inbox import Inbox
 from hsp_control.trajectories.streams.message import Space
@@ -21,7 +21,7 @@ _POLL = 0.2
 _WORLD = "world"
 
 
-def check_address(source: str) -> Address:
+def check_address(source: str) -> TopicAddress:
     """Return what an address ``ros2://TOPIC?frame=NAME&domain=N`` says."""
     try:
         return parse(source, ("frame",))

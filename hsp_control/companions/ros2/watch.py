@@ -15,7 +15,7 @@ from hsp_control.companions.ros2.messages import (
     Quaternion,
     Time,
 )
-from hsp_control.companions.ros2.node import Node, Publisher
+from hsp_control.companions.ros2.node import Node, TopicPublisher
 from hsp_control.simulation.control_chain import EffortSource
 from hsp_control.tasks import Task
 
@@ -51,7 +51,7 @@ class Watched:
         self._frame = robot.model.frames[1].name  # 0 is Pinocchio's universe
         self._node = Node(domain)
         self._states = self._node.publisher(f"{self._prefix}/joint_states", JointState)
-        self._poses: dict[str, Publisher[PoseStamped]] = {}
+        self._poses: dict[str, TopicPublisher[PoseStamped]] = {}
         for task in effort_source.controller.tasks:
             if task.drawn in {_POSITION, _POSE}:
                 for what in ("reference", "actual"):
@@ -82,7 +82,7 @@ class Watched:
     def ended(self, ended: str, reason: str) -> None:
         """Do nothing: the topics have no words."""
 
-    def _pose(self, task: Task, what: str) -> Publisher[PoseStamped]:
+    def _pose(self, task: Task, what: str) -> TopicPublisher[PoseStamped]:
         """Return a publisher; a task may be added while the loop runs."""
         name = task.name.replace("-", "_")  # which ROS 2 does not allow
         topic = checked_name(f"{self._prefix}/{name}/{what}")

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from hsp_control.common.exceptions import SweepError
-from hsp_control.companions.sweeps.row import Row
+from hsp_control.companions.sweeps.row import SweepRow
 from hsp_control.simulation.measures import Measure
 
 
@@ -38,7 +38,7 @@ class Journal:
         """Open a journal, or create one."""
         self.path = path
         self.identity: dict[str, Any] | None = None
-        self.rows: list[Row] = []
+        self.rows: list[SweepRow] = []
         self.described: dict[str, Measure] = {}
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -69,7 +69,7 @@ class Journal:
         self.identity, self.rows, self.described = identity, [], {}
         self._write({"sweep": identity})
 
-    def add(self, row: Row, found: dict[str, Measure]) -> None:
+    def add(self, row: SweepRow, found: dict[str, Measure]) -> None:
         """Append a row; when this returns, the operating system has the data."""
         new = {name: m for name, m in found.items() if name not in self.described}
         if new:
@@ -105,7 +105,7 @@ class Journal:
                 for name, (unit, meaning) in entry["described"].items():
                     self.described[name] = Measure(0.0, unit, meaning)
             else:
-                self.rows.append(Row(**entry["row"]))
+                self.rows.append(SweepRow(**entry["row"]))
         beginning = '{"sweep": '
         if not whole and not beginning.startswith(text[: len(beginning)]):
             raise ValueError("its first line has another format")

@@ -18,7 +18,7 @@ _TRIALS = 20  # if so many runs cannot be built, the sweep itself is wrong
 
 
 @dataclass(frozen=True)
-class Plan:
+class SweepPlan:
     """Every run of a sweep.
 
     Attributes:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from hsp_control.common.exceptions import SweepError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.companions.sweeps.parquet import read_parquet, write_parquet
-from hsp_control.companions.sweeps.plan import Plan, document
-from hsp_control.companions.sweeps.row import Row
+from hsp_control.companions.sweeps.plan import SweepPlan, document
+from hsp_control.companions.sweeps.row import SweepRow
 from hsp_control.simulation.measures import Measure
 
 FORMAT = "hsp_control sweep 1"
@@ -42,9 +42,9 @@ class Sweep:
     @classmethod
     def collect(
         cls,
-        plan: Plan,
+        plan: SweepPlan,
         identity: dict[str, Any],
-        rows: Iterable[Row],
+        rows: Iterable[SweepRow],
         described: Mapping[str, Measure],
     ) -> Self:
         """Return the sweep of a plan's finished runs, in the plan's order."""
@@ -147,11 +147,11 @@ class Sweep:
         task = {"name": self.meta["name"], "data": data, "changes": changes}
         return document(json.dumps(task)).to_dict()
 
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[SweepRow]:
         """Return the runs as rows, without the parameters, which are in the plan."""
         names = self.metrics
         return [
-            Row(
+            SweepRow(
                 int(self["run"][i]),
                 str(self["status"][i]),
                 str(self["message"][i]),

@@ -8,7 +8,7 @@ when the sweep resumes."""
 
 
 @dataclass(frozen=True)
-class Row:
+class SweepRow:
     """One run of a sweep.
 
     Attributes:

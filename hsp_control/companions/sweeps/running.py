@@ -8,7 +8,7 @@ from time import perf_counter
 
 from hsp_control.common.exceptions import HspControlError, SimulationError
 from hsp_control.companions.sweeps.plan import document
-from hsp_control.companions.sweeps.row import CRASHED, TIMED_OUT, Row
+from hsp_control.companions.sweeps.row import CRASHED, TIMED_OUT, SweepRow
 from hsp_control.config.experiment import build
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.measures import Measure, measures
@@ -42,12 +42,12 @@ def crashed(reason: str) -> str:
     return json.dumps({"status": CRASHED, "message": reason})
 
 
-def read_result(run: int, text: str) -> tuple[Row, dict[str, Measure]]:
+def read_result(run: int, text: str) -> tuple[SweepRow, dict[str, Measure]]:
     """Return a result's row and its measures."""
     result = json.loads(text)
     found = {k: Measure(*measure) for k, measure in result.get("measures", {}).items()}
     metrics = {name: measure.value for name, measure in found.items()}
-    row = Row(
+    row = SweepRow(
         run,
         result["status"],
         result["message"],

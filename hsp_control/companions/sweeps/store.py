@@ -7,9 +7,9 @@ from typing import Any
 from hsp_control.common.exceptions import SweepError
 from hsp_control.companions.sweeps.journal import Journal, journal_of
 from hsp_control.companions.sweeps.parquet import require_parquet
-from hsp_control.companions.sweeps.plan import Plan
+from hsp_control.companions.sweeps.plan import SweepPlan
 from hsp_control.companions.sweeps.results import Sweep
-from hsp_control.companions.sweeps.row import CRASHED, TIMED_OUT, Row
+from hsp_control.companions.sweeps.row import CRASHED, TIMED_OUT, SweepRow
 from hsp_control.declaration.language import shown
 from hsp_control.simulation.measures import Measure
 
@@ -22,10 +22,15 @@ class Store:
     """
 
     def __init__(
-        self, plan: Plan, identity: dict[str, Any], out: Path | None, *, fresh: bool
+        self,
+        plan: SweepPlan,
+        identity: dict[str, Any],
+        out: Path | None,
+        *,
+        fresh: bool,
     ) -> None:
         """Read the rows that the files already contain."""
-        self.rows: dict[int, Row] = {}
+        self.rows: dict[int, SweepRow] = {}
         self._described: dict[str, Measure] = {}
         self._plan, self._identity, self._out = plan, identity, out
         self._journal: Journal | None = None
@@ -49,7 +54,7 @@ class Store:
         """The runs that are not finished."""
         return [run for run in range(len(self._plan)) if run not in self.rows]
 
-    def add(self, row: Row, found: dict[str, Measure]) -> None:
+    def add(self, row: SweepRow, found: dict[str, Measure]) -> None:
         """Store a row; after that, it survives even if the process is killed."""
         self.rows[row.run] = row
         self._described = {**found, **self._described}
@@ -73,7 +78,7 @@ class Store:
     def _resume(self, out: Path, journal: Journal) -> None:
         if journal.identity is not None:
             self._compare(journal.path, journal.identity)
-        earlier: list[Row] = []
+        earlier: list[SweepRow] = []
         if out.exists():
             sweep = Sweep.load(out)
             self._compare(out, sweep.meta["identity"])

@@ -13,7 +13,7 @@ from hsp_control.common.exceptions import HspControlError, SweepError
 from hsp_control.companions.sweeps.design import chosen_design, points
 from hsp_control.companions.sweeps.factor import factors
 from hsp_control.companions.sweeps.local_workers import LocalWorkers
-from hsp_control.companions.sweeps.plan import Plan, document, insert
+from hsp_control.companions.sweeps.plan import SweepPlan, document, insert
 from hsp_control.companions.sweeps.results import Sweep
 from hsp_control.companions.sweeps.running import read_result
 from hsp_control.companions.sweeps.store import Store
@@ -77,7 +77,7 @@ def sweep(
     base = read_document(source)
     for assignment in overrides:
         base.override(assignment)
-    plan = Plan(
+    plan = SweepPlan(
         name=base.name,
         data=base.to_dict(),
         factors=varied,
@@ -117,7 +117,7 @@ def sweep(
         return store.close()
 
 
-def _compile(plan: Plan, run: int) -> None:
+def _compile(plan: SweepPlan, run: int) -> None:
     """Simulate one log period of a run: workers then find compiled kernels."""
     period = plan.experiment(run).scenario.simulation.log_period
     short = document(plan.task(run))
@@ -128,7 +128,7 @@ def _compile(plan: Plan, run: int) -> None:
 
 
 def _run_pending(
-    plan: Plan,
+    plan: SweepPlan,
     store: Store,
     pool: LocalWorkers,
     on_progress: Callable[[int, int, int], None] | None,

@@ -35,7 +35,7 @@ _DURATIONS = 201
 """How many durations of a phase are compared."""
 
 
-class Phase(NamedTuple):
+class DcmPhase(NamedTuple):
     """A time in which the repellent point moves on a line at constant speed.
 
     Attributes:
@@ -75,7 +75,7 @@ def dcm_of(position: Array, velocity: Array, frequency: float) -> Array:
     return np.asarray(position[:2] + velocity[:2] / frequency)
 
 
-def plan_dcm(phases: Sequence[Phase], frequency: float) -> list[Array]:
+def plan_dcm(phases: Sequence[DcmPhase], frequency: float) -> list[Array]:
     """Return ξ at the start of each phase; at the end of the last ξ is p, at rest."""
     last, starts = phases[-1].end, list[Array]()
     for phase in reversed(phases):
@@ -85,8 +85,12 @@ def plan_dcm(phases: Sequence[Phase], frequency: float) -> list[Array]:
 
 
 def in_step(
-    phase: Phase, last: Array, dcm: Array, frequency: float, bounds: tuple[float, float]
-) -> Phase:
+    phase: DcmPhase,
+    last: Array,
+    dcm: Array,
+    frequency: float,
+    bounds: tuple[float, float],
+) -> DcmPhase:
     """Return a phase with the duration that fits where the DCM is when it begins.
 
     A foot that lands early or late leaves the DCM beside its plan, but on its way: by

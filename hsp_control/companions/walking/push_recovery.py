@@ -14,7 +14,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.companions.walking.biped import BipedPlan
 from hsp_control.companions.walking.foot import Foot
 from hsp_control.companions.walking.footsteps import Footstep, Stance
-from hsp_control.companions.walking.pendulum import Phase, error_after
+from hsp_control.companions.walking.pendulum import DcmPhase, error_after
 from hsp_control.companions.walking.polygon import nearest_inside
 from hsp_control.companions.walking.step_adjustment import (
     Adjustment,
@@ -52,7 +52,7 @@ class PlannedSwing(NamedTuple):
     standing: Foot
     swinging: Foot
     target: Footstep
-    phase: Phase
+    phase: DcmPhase
     first: Array
     since: float
     wanted: Array

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 
 
-class Motion(NamedTuple):
+class FootMotion(NamedTuple):
     """Position, velocity and acceleration, shape (n,) each [m, m/s, m/s²]."""
 
     position: Array
@@ -34,16 +34,16 @@ class Quintic(NamedTuple):
         """When it comes to rest [s]."""
         return self.start + self.duration
 
-    def sample(self, t: float) -> Motion:
+    def sample(self, t: float) -> FootMotion:
         """Return x, x' and x'' at time t [s]."""
         c = self.coefficients
         s = min(max(t - self.start, 0.0), self.duration)
         x = c[0] + s * (c[1] + s * (c[2] + s * (c[3] + s * (c[4] + s * c[5]))))
         if t >= self.end:
-            return Motion(x, np.zeros_like(x), np.zeros_like(x))
+            return FootMotion(x, np.zeros_like(x), np.zeros_like(x))
         x_dot = c[1] + s * (2 * c[2] + s * (3 * c[3] + s * (4 * c[4] + 5 * s * c[5])))
         x_ddot = 2 * c[2] + s * (6 * c[3] + s * (12 * c[4] + s * 20 * c[5]))
-        return Motion(x, x_dot, x_ddot)
+        return FootMotion(x, x_dot, x_ddot)
 
     def accelerations(self, times: Array) -> Array:
         """Return x'' at many times, shape (m,) [s], as shape (m, n)."""
@@ -52,7 +52,9 @@ class Quintic(NamedTuple):
         return np.asarray(np.where((s >= 0.0) & (s < self.duration), x_ddot, 0.0))
 
 
-def to_rest(now: Motion, target: ArrayLike, start: float, duration: float) -> Quintic:
+def to_rest(
+    now: FootMotion, target: ArrayLike, start: float, duration: float
+) -> Quintic:
     """Return the quintic from a motion to rest at a target, C² at its start."""
     T = duration
     x, v, a = (np.asarray(each, dtype=float) for each in now)
@@ -66,7 +68,7 @@ def to_rest(now: Motion, target: ArrayLike, start: float, duration: float) -> Qu
     return Quintic(start, T, rows)
 
 
-def at_rest(position: ArrayLike) -> Motion:
+def at_rest(position: ArrayLike) -> FootMotion:
     """Return a motion at rest."""
     x = np.array(position, dtype=float)
-    return Motion(x, np.zeros_like(x), np.zeros_like(x))
+    return FootMotion(x, np.zeros_like(x), np.zeros_like(x))

@@ -12,7 +12,7 @@ from hsp_control.companions.walking.biped import BipedPlan
 from hsp_control.companions.walking.foot import Foot
 from hsp_control.companions.walking.footsteps import Footstep, Stance, Velocity, between
 from hsp_control.companions.walking.legs import hip_height, leg_length
-from hsp_control.companions.walking.pendulum import Phase
+from hsp_control.companions.walking.pendulum import DcmPhase
 from hsp_control.robot import RobotState
 
 PREVIEW = 4
@@ -35,7 +35,7 @@ class Preview(NamedTuple):
         target: Where the next step goes; None if there is none.
     """
 
-    phases: list[Phase]
+    phases: list[DcmPhase]
     swings: list[bool]
     velocity: Velocity
     target: Footstep | None
@@ -93,7 +93,7 @@ class StepPlanner:
     ) -> Preview:
         """Return what is to come, from a phase on two feet on."""
         walk, places = self._walk, dict(places)
-        phases, swings = list[Phase](), list[bool]()
+        phases, swings = list[DcmPhase](), list[bool]()
         first: Next | None = None
         for k in range(PREVIEW):
             step = self._next(velocity, t, taken + k, side, places)
@@ -104,8 +104,8 @@ class StepPlanner:
             center = places[-side].point
             beside = lead(side, places, target)
             phases += [
-                Phase(shift, point, center),
-                Phase(walk.swing, center, center, beside),
+                DcmPhase(shift, point, center),
+                DcmPhase(walk.swing, center, center, beside),
             ]
             swings += [False, True]
             places[side] = target
@@ -113,8 +113,8 @@ class StepPlanner:
         assert first is not None
         middle = between(places[1.0], places[-1.0]).point
         phases += [
-            Phase(LAST_SHIFT * walk.double_support, point, middle),
-            Phase(1.0, middle, middle),
+            DcmPhase(LAST_SHIFT * walk.double_support, point, middle),
+            DcmPhase(1.0, middle, middle),
         ]
         return Preview(phases, [*swings, False, False], *first)
 

@@ -5,7 +5,7 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.rotations import log3, turn
 from hsp_control.companions.walking.footsteps import Footstep
-from hsp_control.companions.walking.quintic import Motion, Quintic, at_rest, to_rest
+from hsp_control.companions.walking.quintic import FootMotion, Quintic, at_rest, to_rest
 from hsp_control.trajectories.schedule import smooth_step
 
 APPROACH = 0.92
@@ -56,7 +56,7 @@ class Swing:
         """Where the foot is to stand, and that it has then turned: x, y, 1."""
         return np.array([self.target.x, self.target.y, 1.0])
 
-    def _descending(self, now: Motion, t: float) -> Quintic:
+    def _descending(self, now: FootMotion, t: float) -> Quintic:
         return to_rest(now, [self._height], t, max(self.end - t, 1e-3))
 
     def share(self, t: float) -> float:
@@ -79,10 +79,10 @@ class Swing:
             self._up = Quintic(t, 0.0, np.zeros((6, 1)))  # it is over
             self._down = self._descending(vertical, t)
 
-    def position(self, t: float) -> Motion:
+    def position(self, t: float) -> FootMotion:
         """Return x, x' and x'' of the foot's frame, shape (3,) each."""
         along, vertical = self._along.sample(t), self._vertical(t)
-        return Motion(
+        return FootMotion(
             *(np.append(a[:2], z) for a, z in zip(along, vertical, strict=True))
         )
 
@@ -94,14 +94,14 @@ class Swing:
         )
         return np.hstack([self._along.accelerations(times)[:, :2], vertical])
 
-    def orientation(self, t: float) -> Motion:
+    def orientation(self, t: float) -> FootMotion:
         """Return R, ω and ω', shapes (3, 3), (3,) and (3,)."""
         s, s_dot, s_ddot = (float(each[2]) for each in self._along.sample(t))
         rotation = np.zeros((3, 3))
         turn(self._rotation, self._axis, s, rotation)
-        return Motion(rotation, s_dot * self._axis, s_ddot * self._axis)
+        return FootMotion(rotation, s_dot * self._axis, s_ddot * self._axis)
 
-    def _vertical(self, t: float) -> Motion:
+    def _vertical(self, t: float) -> FootMotion:
         """Return z, z' and z'', shape (1,) each."""
         if t < self._up.end:
             return self._up.sample(t)
@@ -112,7 +112,7 @@ class Swing:
         u = min(late / _SETTLING, 1.0)
         # The integral of the smooth step.
         fallen = u**4 * (2.5 + u * (u - 3.0)) * _SETTLING + max(late - _SETTLING, 0.0)
-        return Motion(
+        return FootMotion(
             np.array([self._height - self._descent * fallen]),
             np.array([-self._descent * s]),
             np.array([-self._descent * s_dot]),

@@ -14,7 +14,7 @@ from hsp_control.companions.walking.given_steps import GivenSteps
 from hsp_control.companions.walking.leg_reaction import LegReaction
 from hsp_control.companions.walking.pendulum import (
     GRAVITY,
-    Phase,
+    DcmPhase,
     dcm_of,
     in_step,
     plan_dcm,
@@ -258,7 +258,7 @@ class RunningWalk(RunningPlan):
     def _stand(self, t: float) -> None:
         self._mode = "standing"
         middle = self._middle()
-        self._follow(t, [Phase(1.0, middle, middle)], [False])
+        self._follow(t, [DcmPhase(1.0, middle, middle)], [False])
 
     def _set_out(self, t: float) -> None:
         """Shift the weight for the first step."""
@@ -268,7 +268,7 @@ class RunningWalk(RunningPlan):
         ready, shift = FIRST_SHIFT
         middle = self._middle()
         self._mode = "double"
-        self._plan(t, [Phase(ready, middle, middle)], shift, middle)
+        self._plan(t, [DcmPhase(ready, middle, middle)], shift, middle)
         self._feet[self._side].unload(t + ready, shift)
 
     def _hold(self, t: float) -> None:
@@ -291,7 +291,7 @@ class RunningWalk(RunningPlan):
         self._swing.redirect(t, foot.origin_of(place), end, rises=False)
         self._react(t)
         rest = standing.place.point
-        self._follow(t, [Phase(1.0, rest, rest)], [True])
+        self._follow(t, [DcmPhase(1.0, rest, rest)], [True])
         self._hull = standing.corners(_HELD)
 
     def _is_calm(self) -> bool:
@@ -352,7 +352,9 @@ class RunningWalk(RunningPlan):
         if any(self._swings):
             self._feet[self._side].unload(t, self._phases[0].duration)
 
-    def _plan(self, t: float, before: list[Phase], shift: float, point: Array) -> None:
+    def _plan(
+        self, t: float, before: list[DcmPhase], shift: float, point: Array
+    ) -> None:
         """Plan the steps to come, from a phase on two feet on, until it stands.
 
         Args:
@@ -396,7 +398,7 @@ class RunningWalk(RunningPlan):
         standing = self._feet[-self._side].place
         self._reaction = self._legs.of(self._swing, t, self._side, standing)
 
-    def _follow(self, t: float, phases: list[Phase], swings: list[bool]) -> None:
+    def _follow(self, t: float, phases: list[DcmPhase], swings: list[bool]) -> None:
         """Follow phases from now on."""
         self._phases, self._swings = phases, swings
         self._dcm_starts = plan_dcm(phases, self._frequency)

@@ -63,7 +63,7 @@ _ITERATIONS = 10
 benchmarks/qp.py; Talos with all efforts at their limits 5."""
 
 
-class Problem(NamedTuple):
+class QP(NamedTuple):
     """A QP with k rows lower ≤ A x ≤ upper; bounds on x count as k, k + 1, ...
 
     The cost couples the first n₁ unknowns; of the others, each has a cost of its own:
@@ -127,7 +127,7 @@ class Workspace(NamedTuple):
 
 
 @kernel
-def minimise(problem: Problem, warm: bool, x: Array, work: Workspace) -> int:
+def minimise(problem: QP, warm: bool, x: Array, work: Workspace) -> int:
     """Overwrite x0 with the optimum x; return `SOLVED`, `INFEASIBLE` or `EXHAUSTED`.
 
     The last thing computed is the optimum of the active constraints in their order, so
@@ -159,7 +159,7 @@ def minimise(problem: Problem, warm: bool, x: Array, work: Workspace) -> int:
 
 
 @kernel
-def _begin(problem: Problem, x: Array, work: Workspace) -> bool:
+def _begin(problem: QP, x: Array, work: Workspace) -> bool:
     """Hold the marked constraints, in their order, and make x their optimum."""
     # Not all can be held where one depends on others, or has the wrong sign: False.
     count = 0
@@ -179,7 +179,7 @@ def _begin(problem: Problem, x: Array, work: Workspace) -> bool:
 
 
 @kernel
-def _prepare(problem: Problem, warm: bool, x: Array, work: Workspace) -> bool:
+def _prepare(problem: QP, warm: bool, x: Array, work: Workspace) -> bool:
     """Begin at x0, mark what to hold; return whether each constraint can be kept alone.
 
     NaN makes each comparison false, and so the result. NaN in A is found by
@@ -210,7 +210,7 @@ def _prepare(problem: Problem, warm: bool, x: Array, work: Workspace) -> bool:
 
 
 @kernel
-def _norm(i: int, problem: Problem) -> float:
+def _norm(i: int, problem: QP) -> float:
     """Return ‖a‖ of constraint i, and 1 for a row of zeros."""
     if i >= problem.A.shape[0]:
         return 1.0
@@ -219,14 +219,14 @@ def _norm(i: int, problem: Problem) -> float:
 
 
 @kernel
-def _negligible(i: int, problem: Problem, work: Workspace) -> float:
+def _negligible(i: int, problem: QP, work: Workspace) -> float:
     """Return the square of a remainder of Jᵀ a that is rounding."""
     norm = _norm(i, problem)
     return float(work.rounding[0] * norm * norm)
 
 
 @kernel
-def _settle(problem: Problem, x: Array, work: Workspace) -> None:
+def _settle(problem: QP, x: Array, work: Workspace) -> None:
     """Make y and x the optimum of the active constraints, without rounding of steps.
 
     L w = b - A x is what the active constraints lack; the multipliers grow by L⁻ᵀ w.
@@ -261,7 +261,7 @@ def _settle(problem: Problem, x: Array, work: Workspace) -> None:
 
 
 @kernel
-def _lack(problem: Problem, x: Array, w: Array, work: Workspace) -> None:
+def _lack(problem: QP, x: Array, w: Array, work: Workspace) -> None:
     """Write w = L⁻¹ (b - A x) of the active constraints."""
     for c in range(w.shape[0]):
         i = work.active[c]
@@ -271,7 +271,7 @@ def _lack(problem: Problem, x: Array, w: Array, work: Workspace) -> None:
 
 
 @kernel
-def _move(problem: Problem, x: Array, work: Workspace) -> None:
+def _move(problem: QP, x: Array, work: Workspace) -> None:
     """Write x = x0 + J y."""
     JT, own, y = problem.JT, problem.own, work.vectors[0]
     nz, n = JT.shape
@@ -283,7 +283,7 @@ def _move(problem: Problem, x: Array, work: Workspace) -> None:
 
 
 @kernel
-def _value(i: int, problem: Problem, x: Array, y: Array) -> float:
+def _value(i: int, problem: QP, x: Array, y: Array) -> float:
     """Return a_i·x, and the slack if constraint i is soft."""
     A, softness, k = problem.A, problem.softness, problem.A.shape[0]
     total = 0.0
@@ -302,7 +302,7 @@ def _value(i: int, problem: Problem, x: Array, y: Array) -> float:
 
 @kernel
 def _most_violated(
-    tolerance: float, problem: Problem, x: Array, work: Workspace
+    tolerance: float, problem: QP, x: Array, work: Workspace
 ) -> tuple[int, float]:
     """Return the constraint that x is farthest from, marked as held, and its violation.
 
@@ -332,7 +332,7 @@ def _most_violated(
 
 
 @kernel
-def _enter(entering: int, violation: float, problem: Problem, work: Workspace) -> bool:
+def _enter(entering: int, violation: float, problem: QP, work: Workspace) -> bool:
     """Make a violated constraint active; return False if that is impossible.
 
     Steps 2 and 3 of the method. Its multiplier grows from zero and y moves with it,
@@ -381,7 +381,7 @@ def _enter(entering: int, violation: float, problem: Problem, work: Workspace) -
 
 
 @kernel
-def _remainder(i: int, problem: Problem, work: Workspace) -> float:
+def _remainder(i: int, problem: QP, work: Workspace) -> float:
     """Write b = Jᵀ a of constraint i, Q b, and what remains of b; return its square."""
     # b goes to the row of B after the active ones. If nine tenths of the length cancel,
     # the components are subtracted a second time ("twice is enough", Giraud et al.
@@ -409,7 +409,7 @@ def _remainder(i: int, problem: Problem, work: Workspace) -> float:
 
 
 @kernel
-def _write_row(i: int, problem: Problem, b: Array) -> None:
+def _write_row(i: int, problem: QP, b: Array) -> None:
     """Write b = Jᵀ a of constraint i, and its softness."""
     JT, own, A = problem.JT, problem.own, problem.A
     nz, n = JT.shape

@@ -30,8 +30,8 @@ from hsp_control.control.actuation.deviation_cost import (
     write_inverse_root,
 )
 from hsp_control.control.actuation.dual_active_set import (
+    QP,
     SOLVED,
-    Problem,
     Workspace,
     minimise,
 )
@@ -103,9 +103,9 @@ class Places(NamedTuple):
 class Programmes(NamedTuple):
     """The QPs of a step, on the same rows and unknowns, and their memories."""
 
-    forces: Problem  # of the forces alone
-    nearest: Problem  # of deviation and forces, at the law's cost
-    soft: Problem  # of deviation and forces, all at the same cost, with soft rows
+    forces: QP  # of the forces alone
+    nearest: QP  # of deviation and forces, at the law's cost
+    soft: QP  # of deviation and forces, all at the same cost, with soft rows
     x: Array  # unknowns, shape (nv + p,)
     force_memory: Workspace  # of the first
     memory: Workspace  # of the second
@@ -120,7 +120,7 @@ class Result(NamedTuple):
     forces: Array
 
 
-class Step(NamedTuple):
+class StepMemory(NamedTuple):
     """All that `solve_step` reads and writes."""
 
     wanted: Wanted
@@ -135,7 +135,7 @@ class Step(NamedTuple):
 
 
 @kernel
-def solve_step(what: int, step: Step) -> int:
+def solve_step(what: int, step: StepMemory) -> int:
     """Assemble the QP, solve it, and write what is delivered; return the `Status`."""
     qp, forces, status = step.programmes, step.forces, step.status
     x = qp.x
@@ -178,7 +178,7 @@ def _start(forces: Forces, x: Array) -> None:
 
 
 @kernel
-def _write_force_factor(forces: Forces, cost: float, problem: Problem) -> None:
+def _write_force_factor(forces: Forces, cost: float, problem: QP) -> None:
     """Write the forces' part of J."""
     for j in range(problem.own.shape[0]):
         inverse_cost = max(forces.inverse_cost[j], _LEAST_INVERSE_COST)
@@ -186,14 +186,14 @@ def _write_force_factor(forces: Forces, cost: float, problem: Problem) -> None:
 
 
 @kernel
-def _moving(problem: Problem, count: int) -> Problem:
+def _moving(problem: QP, count: int) -> QP:
     """Return a QP in which only the first rows of Jᵀ move."""
     JT, own, A, begin, end, lower, upper, softness, equalities = problem
-    return Problem(JT[:count], own, A, begin, end, lower, upper, softness, equalities)
+    return QP(JT[:count], own, A, begin, end, lower, upper, softness, equalities)
 
 
 @kernel
-def _write_rows(step: Step) -> None:
+def _write_rows(step: StepMemory) -> None:
     """Write the rows of base and efforts, and the bounds of x."""
     bounds, places, rows = step.bounds, step.places, step.programmes.nearest
     M, a, effort = step.wanted
@@ -218,7 +218,7 @@ def _write_rows(step: Step) -> None:
 
 
 @kernel
-def _write_result(step: Step) -> bool:
+def _write_result(step: StepMemory) -> bool:
     """Write the result without the solver's violations; return whether it is finite."""
     bounds, places, result = step.bounds, step.places, step.result
     x, (M, a, effort) = step.programmes.x, step.wanted
@@ -299,13 +299,13 @@ class LimitedStep:
         alike = np.full(width, _REGULARISATION**-0.5)
         self._soft, none = zeros(k + width), zeros(0)
         shared = lower, upper, none, len(base)
-        self._rows = Problem(zeros((n, n)), zeros(p), A, begin, end, *shared)
+        self._rows = QP(zeros((n, n)), zeros(p), A, begin, end, *shared)
         fixed = zeros((0, n))
         softened = lower, upper, self._soft, len(base)
         programmes = Programmes(
-            forces=Problem(fixed, zeros(p), A, force_begin, force_end, *shared),
+            forces=QP(fixed, zeros(p), A, force_begin, force_end, *shared),
             nearest=self._rows,
-            soft=Problem(zeros((0, 0)), alike, A, begin, end, *softened),
+            soft=QP(zeros((0, 0)), alike, A, begin, end, *softened),
             x=zeros(width),
             force_memory=Workspace.of(width, k),
             memory=Workspace.of(width, k),
@@ -315,7 +315,7 @@ class LimitedStep:
         # Effort, acceleration and forces of the last step
         self.result = Result(zeros(n), zeros(n), zeros(p))
         self._wanted = wanted
-        step = Step(
+        step = StepMemory(
             wanted,
             Forces(
                 support.map,

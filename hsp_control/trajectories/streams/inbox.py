@@ -11,7 +11,7 @@ MOST = 5_000_000
 """Most numbers that are recorded: poses at 60 Hz for three hours, 0.1 GB."""
 
 
-class Record:
+class InboxRecord:
     """Messages and the controller's times at which they were taken."""
 
     def __init__(self) -> None:
@@ -87,7 +87,7 @@ class Inbox:
 class InboxReader:
     """A reader of an inbox in one run; it begins with what nobody took before."""
 
-    def __init__(self, inbox: Inbox, record: Record) -> None:
+    def __init__(self, inbox: Inbox, record: InboxRecord) -> None:
         """Begin to read, and to record what is taken."""
         self._inbox, self._record = inbox, record
         self._number = inbox.taken
@@ -106,7 +106,7 @@ class InboxReader:
 
     def copy(self) -> "InboxReader":
         """Return a reader that goes on from here, with a record of its own."""
-        other = InboxReader(self._inbox, Record())
+        other = InboxReader(self._inbox, InboxRecord())
         other._number, other._previews = self._number, True
         return other
 

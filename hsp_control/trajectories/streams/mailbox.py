@@ -8,14 +8,14 @@ from weakref import WeakValueDictionary, ref
 
 from hsp_control.common.entry_points import entry_points
 from hsp_control.common.exceptions import StreamError
-from hsp_control.trajectories.streams.inbox import Inbox, InboxReader, Record
+from hsp_control.trajectories.streams.inbox import Inbox, InboxReader, InboxRecord
 from hsp_control.trajectories.streams.message import Message, Space, message_of, parsed
 
 Listen = Callable[["ref[Inbox]"], None]
 """Puts what it hears into an inbox for as long as that is there."""
 
 
-class Kind(Protocol):
+class AddressKind(Protocol):
     """A kind of address: a module, an entry point of ``hsp_control.targets``."""
 
     def check_address(self, source: str) -> object:
@@ -69,10 +69,10 @@ def listening_inbox(source: str, space: Space) -> Inbox:
     return inbox
 
 
-def _kind(source: str) -> Kind:
+def _kind(source: str) -> AddressKind:
     kinds = entry_points("targets")
     if found := kinds.get(source.partition("://")[0]):
-        kind: Kind = found.load()
+        kind: AddressKind = found.load()
         return kind
     schemes = " or ".join(f"{name}://" for name in sorted(kinds)) or "none"
     raise StreamError(
@@ -88,7 +88,7 @@ class Recording:
     """Recorded messages as a source; the same run takes them at the same times."""
 
     def __init__(
-        self, entries: Iterable[tuple[float, Message]], record: Record
+        self, entries: Iterable[tuple[float, Message]], record: InboxRecord
     ) -> None:
         """Begin at the first message, and record what is taken."""
         self._entries, self._record = list(entries), record
@@ -106,7 +106,7 @@ class Recording:
 
     def copy(self) -> "Recording":
         """Return a source that goes on from here, with a record of its own."""
-        other = Recording(self._entries, Record())
+        other = Recording(self._entries, InboxRecord())
         other._next = self._next
         return other
 
@@ -163,7 +163,7 @@ class Mailbox:
         """Begin without messages."""
         self._hears = hears
         self.inbox = Inbox(space)
-        self.record = Record()
+        self.record = InboxRecord()
 
     def put(self, **data: Any) -> None:
         """Add a message; see `message_of`."""
@@ -185,8 +185,8 @@ class Mailbox:
             )
         self.inbox.space = space
         if not kept:
-            return InboxReader(self.inbox, Record()).copy()
-        self.record = Record()
+            return InboxReader(self.inbox, InboxRecord()).copy()
+        self.record = InboxRecord()
         return InboxReader(self.inbox, self.record)
 
     def recording(
@@ -194,6 +194,6 @@ class Mailbox:
     ) -> Recording:
         """Return recorded messages, see `recorded`, as the source of a new run."""
         if not kept:
-            return Recording(entries, Record())
-        self.record = Record()
+            return Recording(entries, InboxRecord())
+        self.record = InboxRecord()
         return Recording(entries, self.record)

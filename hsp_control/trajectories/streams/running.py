@@ -24,7 +24,7 @@ from hsp_control.trajectories.streams.segments import (
     Goal,
     Joiner,
     MotionBounds,
-    Quintic,
+    QuinticSegment,
     Segment,
 )
 
@@ -213,13 +213,13 @@ class Policy(NamedTuple):
     stop_after: float
 
 
-class Source(Protocol):
+class MessageSource(Protocol):
     """What messages come from: an `Inbox`, or a recording."""
 
     def take(self, t: float) -> Sequence[tuple[float, Message]]:
         """Return the messages up to a time that were not taken, and their times [s]."""
 
-    def copy(self) -> "Source":
+    def copy(self) -> "MessageSource":
         """Return a source that goes on from here, without the other's knowledge."""
 
 
@@ -231,7 +231,7 @@ class RunningStream:
         chart: Chart,
         bounds: MotionBounds,
         policy: Policy,
-        source: Source,
+        source: MessageSource,
         start: State,
     ) -> None:
         """Begin at rest."""
@@ -256,7 +256,7 @@ class RunningStream:
         chart.local(values[:1], start.base)  # to Numba a single row has another layout
         chart.local_rate(start.x, zeros, start.base)
         chart.rebased(start)
-        Quintic(0.0, 1.0, start.base, np.zeros((6, chart.size))).state(0.5)
+        QuinticSegment(0.0, 1.0, start.base, np.zeros((6, chart.size))).state(0.5)
 
     @property
     def age(self) -> float:

@@ -176,7 +176,7 @@ class Coast(Segment):
         return State(moved, self._rate.copy(), self._still.copy(), self.base)
 
 
-class Quintic(Segment):
+class QuinticSegment(Segment):
     """x is a polynomial of fifth degree: the smoothest motion between two states."""
 
     def __init__(self, start: float, end: float, base: Array, ends: Array) -> None:
@@ -298,7 +298,7 @@ class Joiner:
         self.bounds, self._linear = bounds, linear
         self._zero = np.zeros(len(bounds.speed))
 
-    def smooth(self, t: float, state: State, goal: Goal) -> Quintic | None:
+    def smooth(self, t: float, state: State, goal: Goal) -> QuinticSegment | None:
         """Return the quintic that reaches a goal in time, if the bounds permit."""
         T = goal.time - t
         if T < _SHORTEST:
@@ -311,7 +311,7 @@ class Joiner:
         )
         if not self.bounds.keep(ends, T):
             return None
-        return Quintic(t, goal.time, state.base, ends)
+        return QuinticSegment(t, goal.time, state.base, ends)
 
     def fastest(self, t: float, state: State, goal: Goal) -> Segment:
         """Return the fastest way to a goal, which keeps moving at its velocity.

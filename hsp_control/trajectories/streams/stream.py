@@ -36,7 +36,11 @@ from hsp_control.trajectories.streams.mailbox import (
     recorded,
 )
 from hsp_control.trajectories.streams.message import ORIENTATION, POSE, Space
-from hsp_control.trajectories.streams.running import Policy, RunningStream, Source
+from hsp_control.trajectories.streams.running import (
+    MessageSource,
+    Policy,
+    RunningStream,
+)
 from hsp_control.trajectories.streams.segments import (
     MotionBounds,
     angular_bounds,
@@ -268,7 +272,7 @@ class Streamed(Remembering, error=TrajectoryError):
         source = self._opened(space)
         return RunningStream(chart, self._bounds(), policy, source, start)
 
-    def _opened(self, space: Space) -> Source:
+    def _opened(self, space: Space) -> MessageSource:
         kept = not vars(self).get("_previews", False)
         messages: Sequence[Mapping[str, Any]] | None = self.messages
         if self.source is not None and not is_address(self.source):

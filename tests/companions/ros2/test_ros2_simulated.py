@@ -10,7 +10,7 @@ from ros2_rigs import DOMAIN, fresh
 
 from hsp_control.companions.ros2.hardware import Ros2Hardware
 from hsp_control.companions.ros2.messages import Float64MultiArray, MultiArrayLayout
-from hsp_control.companions.ros2.node import Node, Publisher
+from hsp_control.companions.ros2.node import Node, TopicPublisher
 from hsp_control.companions.ros2.simulated import RobotTopics, serve
 from hsp_control.live import LiveSettings, Phase, SimulatedRobot, run_loop
 
@@ -36,7 +36,7 @@ class Served:
         )
         self._thread.start()
 
-    def sender(self) -> Publisher[Float64MultiArray]:
+    def sender(self) -> TopicPublisher[Float64MultiArray]:
         made = Node(DOMAIN).publisher(f"{self.controller}/commands", Float64MultiArray)
         assert made.matched == 1
         return made

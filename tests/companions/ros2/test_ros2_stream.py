@@ -18,7 +18,7 @@ from hsp_control.companions.ros2.messages import (
     Quaternion,
     Time,
 )
-from hsp_control.companions.ros2.node import Node, Publisher
+from hsp_control.companions.ros2.node import Node, TopicPublisher
 from hsp_control.trajectories.streams.inbox import Inbox
 from hsp_control.trajectories.streams.mailbox import listening_inbox
 from hsp_control.trajectories.streams.message import ORIENTATION, POSE, Space
@@ -35,7 +35,9 @@ def pose(
     return PoseStamped(Header(Time.of(stamp), frame), where)
 
 
-def opened(space: Space, options: str = "") -> tuple[Inbox, Publisher[PoseStamped]]:
+def opened(
+    space: Space, options: str = ""
+) -> tuple[Inbox, TopicPublisher[PoseStamped]]:
     topic, _, _ = fresh()
     inbox = listening_inbox(f"ros2:/{topic}?domain={DOMAIN}{options}", space)
     publisher = Node(DOMAIN).publisher(topic, PoseStamped)

@@ -12,7 +12,7 @@ from threading import Event, Thread
 from live_rigs import panda, start
 
 from hsp_control.companions.ros2.messages import BILLION, Header, JointState, Time
-from hsp_control.companions.ros2.node import Node, Publisher
+from hsp_control.companions.ros2.node import Node, TopicPublisher
 
 LOOPBACK = (
     "<CycloneDDS><Domain><General><Interfaces>"
@@ -76,7 +76,7 @@ class Broadcaster:
     def __init__(
         self, states: str, *, step: int = MILLISECOND, **message: object
     ) -> None:
-        self.publisher: Publisher[JointState]
+        self.publisher: TopicPublisher[JointState]
         self.publisher = Node(DOMAIN).publisher(states, JointState)
         self.stamp, self._step, self._message = BILLION, step, message
         self._still = Event()

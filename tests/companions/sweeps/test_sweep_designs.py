@@ -20,8 +20,8 @@ from hsp_control.companions.sweeps import (
 )
 from hsp_control.companions.sweeps.design import chosen_design, points
 from hsp_control.companions.sweeps.factor import factors
-from hsp_control.companions.sweeps.plan import Plan
-from hsp_control.companions.sweeps.row import Row
+from hsp_control.companions.sweeps.plan import SweepPlan
+from hsp_control.companions.sweeps.row import SweepRow
 from hsp_control.companions.sweeps.spelling import values
 from hsp_control.simulation.measures import Measure
 
@@ -172,10 +172,10 @@ def test_a_seed_is_a_design(design: Any) -> None:
 def test_rows_are_in_the_order_of_the_plan() -> None:
     """In whichever order they finish, and also if some are missing."""
     varied = factors({"a": "10:30:3"})
-    plan = Plan(
+    plan = SweepPlan(
         "invented", {}, varied, "grid", None, 0, points(varied, "grid", None, 0)
     )
-    rows = [Row(k, "completed", "", {"e": 0.5 * k}, 0.0) for k in (2, 0)]
+    rows = [SweepRow(k, "completed", "", {"e": 0.5 * k}, 0.0) for k in (2, 0)]
     found = Sweep.collect(plan, {}, rows, {"e": Measure(0.0, "m", "error")})
     assert found["run"].tolist() == [0, 2]
     assert found["a"].tolist() == [10, 30]

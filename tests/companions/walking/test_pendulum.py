@@ -5,7 +5,7 @@ import pytest
 
 from hsp_control.common.arrays import Array
 from hsp_control.companions.walking.pendulum import (
-    Phase,
+    DcmPhase,
     dcm_of,
     error_after,
     in_step,
@@ -21,11 +21,11 @@ W = 3.3
 H = 1e-6
 
 
-def some_phases() -> list[Phase]:
+def some_phases() -> list[DcmPhase]:
     rng = np.random.default_rng(1)
     points = np.cumsum(rng.normal(scale=0.2, size=(6, 2)), axis=0)
     return [
-        Phase(d, a, b)
+        DcmPhase(d, a, b)
         for d, a, b in zip(
             (0.4, 0.2, 0.7, 0.15, 0.3), points[:-1], points[1:], strict=True
         )
@@ -84,7 +84,7 @@ def test_the_error_that_bounded_feedback_leaves(error, t):
 
 def test_a_phase_takes_as_long_as_the_component_needs():
     """A foot that lands 30 ms early or late changes how long the weight shifts."""
-    phase = Phase(0.15, np.array([0.48, -0.08]), np.array([0.74, 0.08]))
+    phase = DcmPhase(0.15, np.array([0.48, -0.08]), np.array([0.74, 0.08]))
     last = phase.end + np.array([0.03, -0.02])
     for duration in (0.12, 0.15, 0.18):
         there = phase._replace(duration=duration).first_dcm(last, W)

@@ -13,7 +13,7 @@ from hsp_control.companions.walking.footsteps import (
     near,
 )
 from hsp_control.companions.walking.polygon import convex_hull, nearest_inside
-from hsp_control.companions.walking.quintic import Motion, to_rest
+from hsp_control.companions.walking.quintic import FootMotion, to_rest
 from hsp_control.companions.walking.step_adjustment import (
     WEIGHT_DCM,
     WEIGHT_TIME,
@@ -35,7 +35,7 @@ def a_swing(height: float = 0.1) -> Swing:
 
 
 def test_a_quintic_begins_as_given_and_comes_to_rest():
-    now = Motion(*np.random.default_rng(3).normal(size=(3, 2)))
+    now = FootMotion(*np.random.default_rng(3).normal(size=(3, 2)))
     motion = to_rest(now, [1.0, -2.0], 0.5, 0.8)
     for given, made in zip(now, motion.sample(0.5), strict=True):
         assert made == pytest.approx(given, abs=1e-12)

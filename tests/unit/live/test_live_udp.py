@@ -22,8 +22,8 @@ from hsp_control.live import (
 from hsp_control.live.link import (
     AgeEstimator,
     FaultInjector,
-    Kind,
     Packet,
+    PacketKind,
     decode,
     encode,
 )
@@ -34,7 +34,7 @@ numbers = st.lists(st.floats(), max_size=20)
 
 def packet(sequence: int = 1, payload: list[float] | None = None) -> Packet:
     values = np.array([1.5, -2.0] if payload is None else payload)
-    return Packet(Kind.STATE, 1, 7, sequence, 3, -5, 0.25, values)
+    return Packet(PacketKind.STATE, 1, 7, sequence, 3, -5, 0.25, values)
 
 
 def same(a: Packet, b: Packet) -> bool:
@@ -151,7 +151,7 @@ def test_a_link_sorts_what_comes(links: tuple[Link, Link]) -> None:
 def test_nobody_to_send_to_and_nowhere_to_listen() -> None:
     link = Link(7)
     with pytest.raises(HardwareError, match="no packet of the robot has arrived yet"):
-        link.send(Kind.EFFORT)
+        link.send(PacketKind.EFFORT)
     with pytest.raises(HardwareError, match=r"cannot listen at 127\.0\.0\.1"):
         Link(7, link.address)
     link.close()
@@ -221,7 +221,7 @@ def test_efforts_that_answer_old_states_are_nobody_s() -> None:
         if newest and robot.t > 0.05:
             receiver.newest = 20  # what it answers is long ago
         if newest:
-            receiver.send(Kind.EFFORT, tau)
+            receiver.send(PacketKind.EFFORT, tau)
 
     served = serve(robot, link, stop_reason=pilot)  # type: ignore[arg-type]
     assert robot.reason.startswith("the watchdog")

@@ -112,7 +112,7 @@ def test_momentum_of_a_tumbling_robot(monkeypatch: pytest.MonkeyPatch) -> None:
     model, data = robot.model, robot.model.createData()
     laid = []
 
-    class Counted(integrators.Chart):
+    class Counted(integrators.TangentChart):
         def __init__(self, robot: Robot, base: Array) -> None:
             laid.append(1)
             super().__init__(robot, base)
