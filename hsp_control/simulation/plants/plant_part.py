@@ -183,12 +183,13 @@ class _OrItsName(AnyOf):
         return super().validate({"type": value} if isinstance(value, str) else value)
 
     def _json_schema(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> Any:
+        members = super()._json_schema(schema, handler)  # imports those of companions
         names = [
             name
             for name, member in self.members.items()
             if not any(field.is_required() for field in _fields(member))
         ]
-        return {"anyOf": [{"enum": names}, super()._json_schema(schema, handler)]}
+        return {"anyOf": [{"enum": names}, members]}
 
 
 def _fields(member: type[Declared]) -> list[Any]:
