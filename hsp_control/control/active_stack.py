@@ -111,8 +111,9 @@ class ActiveStack:
                 self.bounds.append((each.task.name, here, away))
                 self.resolution.problem.bounded[here] = True
             # Who is about to fall needs the balance whatever it costs.
+            balances = robot.unactuated and each.task.keeps_balance(robot)
             follows = each.key in below or len(in_force.feedback.largest)
-            if follows and not (spring or each.task.keeps_balance(robot)):
+            if follows and not (spring or balances):
                 plans.append(partial(_asked, in_force.feedback, sample, asked))
             row += each.task.rows
         self._plans = plans

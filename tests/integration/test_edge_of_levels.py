@@ -1,11 +1,14 @@
 """Beyond the reach, levels keep their order, and the arm rests."""
 
+from typing import Any
+
 import numpy as np
 import pinocchio as pin
 import pytest
 from task_cases import FRAMES, load
 
 from hsp_control import (
+    CenterOfMass,
     Controller,
     FrameOrientation,
     FramePosition,
@@ -55,3 +58,15 @@ def test_the_hand_is_as_near_as_it_can_be_whatever_is_asked_below(
     left, change = rests_at(*below)
     assert left - alone <= SHORT
     assert change <= 1e-3
+
+
+def test_a_centre_of_mass_out_of_reach_rests() -> None:
+    """On a fixed base it keeps no balance: its threshold follows as any other's."""
+    robot, rng = load("panda"), np.random.default_rng(0)
+    q0 = robot.home() + rng.uniform(-0.3, 0.3, robot.nv)
+    here = robot.state(0.0, q0, np.zeros(robot.nv)).centroidal.position
+    task = CenterOfMass(Hold(here + 0.5 * rng.normal(size=3)))
+    how: Any = {"duration": 6.0, "control_period": 1e-3, "log_period": 1e-3}
+    run = simulate(Controller(robot, [task], JointCentering()), q0, **how)
+    changes = np.abs(np.diff(run.tau[-1000:], axis=0)).max(axis=0)
+    assert (changes <= 1e-3 * robot.model.effortLimit).all()
