@@ -21,8 +21,8 @@ from hsp_control.null_space.metrics import Metric
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
+from hsp_control.tasks.feedback import Feedback, InForce, beyond_largest, write_asked
 from hsp_control.tasks.slipping import slipped
-from hsp_control.tasks.task import Feedback, InForce, beyond_largest, write_asked
 from hsp_control.trajectories.streams.stream import Streamed
 
 

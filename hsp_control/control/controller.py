@@ -42,8 +42,8 @@ from hsp_control.null_space.metrics import Metric
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
+from hsp_control.tasks.feedback import Feedback
 from hsp_control.tasks.impedance import parts_of
-from hsp_control.tasks.task import Feedback
 from hsp_control.trajectories.streams.stream import Streamed
 
 _MEMORY = 1.0

@@ -31,9 +31,9 @@ from hsp_control.declaration import within
 from hsp_control.robot import RobotState
 from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
+from hsp_control.tasks.feedback import InForce
 from hsp_control.tasks.impedance import parts_of
 from hsp_control.tasks.slipping import spring_force
-from hsp_control.tasks.task import InForce
 
 _SMALLEST = 1e-15
 """Smallest scale of gains that is tried."""

@@ -181,6 +181,17 @@ def frame_kinematics(
             drift[i] += J_dot[i, j] * v[j]
 
 
+@kernel
+def copy_rows(
+    J_frame: Array, J_frame_dot: Array, first: int, J: Array, J_dot: Array
+) -> None:
+    """Write J and J': rows ``first``, ``first`` + 1, ... of the frame's."""
+    for i in range(J.shape[0]):
+        for j in range(J.shape[1]):
+            J[i, j] = J_frame[first + i, j]
+            J_dot[i, j] = J_frame_dot[first + i, j]
+
+
 class Term(NamedTuple):
     """An array of a state, and the call that brings it up to date."""
 

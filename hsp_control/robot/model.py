@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from functools import cached_property
-from math import atan2
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,6 @@ from hsp_control.common.exceptions import (
     ShapeError,
     SimulationError,
 )
-from hsp_control.common.kernels import kernel
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.robot.description.loading import moving_joints
 from hsp_control.robot.motion import Acceleration
@@ -498,21 +496,3 @@ def _unit_block(joint: Any) -> tuple[int, int]:
     """Return start and size of a joint's (cos, sin) pair or quaternion in q."""
     size = 2 if joint.nv in {1, 3} and not _is_ball(joint) else 4
     return joint.idx_q + joint.nq - size, size
-
-
-@kernel
-def joint_displacements(
-    q: Array, reference: Array, single_dof_joints: Indices, out: Array
-) -> None:
-    """Write q ⊖ reference for single-dof joints; continuous joints are within ±π."""
-    for k in range(single_dof_joints.shape[0]):
-        i, at, size = (
-            single_dof_joints[k, 0],
-            single_dof_joints[k, 1],
-            single_dof_joints[k, 2],
-        )
-        if size == 1:
-            out[i] = q[at] - reference[at]
-        else:  # (cos, sin)
-            c, s, c_ref, s_ref = q[at], q[at + 1], reference[at], reference[at + 1]
-            out[i] = atan2(s * c_ref - c * s_ref, c * c_ref + s * s_ref)

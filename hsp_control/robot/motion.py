@@ -1,7 +1,7 @@
-"""What moves a state: valid numbers, accelerations, and steps of equal length."""
+"""What moves a state: valid numbers, displacements, accelerations, equal steps."""
 
 from collections.abc import Callable
-from math import ceil
+from math import atan2, ceil
 from typing import NamedTuple
 
 import numpy as np
@@ -63,3 +63,21 @@ def copy_valid(
             v[i] = v_in[i]
         stamp[0] += 1
     return bool(ok)
+
+
+@kernel
+def joint_displacements(
+    q: Array, reference: Array, single_dof_joints: Indices, out: Array
+) -> None:
+    """Write q ⊖ reference for single-dof joints; continuous joints are within ±π."""
+    for k in range(single_dof_joints.shape[0]):
+        i, at, size = (
+            single_dof_joints[k, 0],
+            single_dof_joints[k, 1],
+            single_dof_joints[k, 2],
+        )
+        if size == 1:
+            out[i] = q[at] - reference[at]
+        else:  # (cos, sin)
+            c, s, c_ref, s_ref = q[at], q[at + 1], reference[at], reference[at + 1]
+            out[i] = atan2(s * c_ref - c * s_ref, c * c_ref + s * s_ref)

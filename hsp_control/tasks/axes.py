@@ -6,7 +6,7 @@ from hsp_control.common.arrays import Indices
 from hsp_control.common.kernels import kernel
 from hsp_control.law import TaskSample
 from hsp_control.robot.kinematics import FrameMotion, PointMotion
-from hsp_control.tasks.task import Feedback, add_feedback
+from hsp_control.tasks.feedback import Feedback, add_feedback
 from hsp_control.trajectories import TrajectorySample
 
 

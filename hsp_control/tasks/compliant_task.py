@@ -11,6 +11,7 @@ from hsp_control.common.native import StepPlan, planned
 from hsp_control.declaration import within
 from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
+from hsp_control.tasks.feedback import Feedback, InForce
 from hsp_control.tasks.gains import Gains
 from hsp_control.tasks.impedance import Impedance, parts_of
 from hsp_control.tasks.impedance_gains import (
@@ -18,7 +19,7 @@ from hsp_control.tasks.impedance_gains import (
     Rotating,
     impedance_gains,
 )
-from hsp_control.tasks.task import Feedback, InForce, SecondOrderTask, Task
+from hsp_control.tasks.task import SecondOrderTask, Task
 
 _NO_GAINS = Gains(natural_frequency=10.0)
 

@@ -23,8 +23,9 @@ from hsp_control.common.rotations import (
 from hsp_control.declaration import AnyOf
 from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
-from hsp_control.robot.kinematics import FrameKinematics, FrameMotion
+from hsp_control.robot.kinematics import FrameKinematics, FrameMotion, copy_rows
 from hsp_control.tasks.compliant_task import CompliantTask
+from hsp_control.tasks.feedback import ErrorPart, Feedback, add_feedback
 from hsp_control.tasks.frame_task import (
     FrameTask,
     TrackingTask,
@@ -32,7 +33,7 @@ from hsp_control.tasks.frame_task import (
     place_pose,
 )
 from hsp_control.tasks.impedance_gains import Rotating
-from hsp_control.tasks.task import Drawn, ErrorPart, Feedback, add_feedback, copy_rows
+from hsp_control.tasks.task import Drawn
 from hsp_control.trajectories import (
     ComposedPose,
     HoldOrientation,

@@ -10,8 +10,9 @@ from hsp_control.robot import RobotState
 from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.tasks.axes import axis_indices, track_axes
 from hsp_control.tasks.compliant_task import CompliantTask
+from hsp_control.tasks.feedback import ErrorPart
 from hsp_control.tasks.frame_task import FrameTask, TrackingTask, place_point
-from hsp_control.tasks.task import Drawn, ErrorPart
+from hsp_control.tasks.task import Drawn
 from hsp_control.trajectories import Hold, Trajectory
 
 

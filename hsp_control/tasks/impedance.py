@@ -12,8 +12,8 @@ from hsp_control.common.exceptions import GainError
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import Gain, Positive
 from hsp_control.robot import Robot
+from hsp_control.tasks.feedback import ErrorPart, LargestError, each_part
 from hsp_control.tasks.gains import as_gain, as_matrix
-from hsp_control.tasks.task import ErrorPart, LargestError, each_part
 
 
 class Impedance(Part, error=GainError):

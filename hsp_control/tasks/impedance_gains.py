@@ -36,8 +36,8 @@ from hsp_control.common.linalg import (
 )
 from hsp_control.common.rotations import compose, jexp3_dot, jlog3
 from hsp_control.law import TaskSample
+from hsp_control.tasks.feedback import Feedback
 from hsp_control.tasks.slipping import bounded_stiffness
-from hsp_control.tasks.task import Feedback
 
 _THRESHOLD = 0.03  # default threshold of the law's singularities: see `Controller`
 

@@ -16,8 +16,9 @@ from hsp_control.declaration.quantities import Vector3
 from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
 from hsp_control.robot.kinematics import FrameKinematics, FrameMotion
+from hsp_control.tasks.feedback import ErrorPart, Feedback, add_feedback
 from hsp_control.tasks.frame_task import FrameTask, place_orientation
-from hsp_control.tasks.task import Drawn, ErrorPart, Feedback, add_feedback
+from hsp_control.tasks.task import Drawn
 from hsp_control.trajectories import (
     HoldOrientation,
     OrientationSample,

@@ -2,95 +2,38 @@
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, replace
 from functools import partial
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.exceptions import HspControlError, TaskError
-from hsp_control.common.kernels import KernelCall, kernel
+from hsp_control.common.exceptions import TaskError
+from hsp_control.common.kernels import KernelCall
 from hsp_control.common.native import StepPlan, planned, says
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.nested import parts_within
-from hsp_control.declaration.quantities import Positive, PositiveCount, plain
+from hsp_control.declaration.quantities import PositiveCount
 from hsp_control.geometry.start import Start
 from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
+from hsp_control.tasks.feedback import (
+    UNBOUNDED,
+    ErrorPart,
+    Feedback,
+    InForce,
+    LargestError,
+    largest_errors,
+)
 from hsp_control.tasks.gains import Gains
 from hsp_control.trajectories import Schedule
 from hsp_control.trajectories.crossfade import AnyReference
 from hsp_control.trajectories.remembering import with_memories_copied
 from hsp_control.trajectories.streams.stream import Streamed
 
-_UNBOUNDED = np.zeros((0, 3))
-
-
-class Feedback(NamedTuple):
-    """Kv e' + Kp s(e) + offset: a task's feedback, as one argument of a kernel.
-
-    s(e) is e with each part of it, such as its position, shortened to its largest
-    length: s(e) = e wherever no part is longer.
-
-    The controller owns these arrays and changes them in place: gains by events, the
-    offset by compensators such as integral action.
-    """
-
-    Kp: Array  # position gain, shape (m, m) [1/s²]
-    Kv: Array  # velocity gain, shape (m, m) [1/s]
-    # additional term of the error equation, shape (m,) [m/s² or rad/s²]; zero unless a
-    # compensator writes it
-    offset: Array
-    # of each part of e that is bounded: its first row, the row after its last, and its
-    # largest length, shape (parts, 3) [-, -, m or rad]
-    largest: Array = _UNBOUNDED
-
-
-class InForce(NamedTuple):
-    """What a task's feedback is made of while it runs: the controller owns it."""
-
-    # What changes change: Kp and Kv, (2, m, m), or what another kind of feedback is
-    # made of.
-    numbers: Array
-    feedback: Feedback  # what the task reads
-    # Λ⁻¹ in the coordinates of the error, (m, m), of the last step; only of a task with
-    # an impedance.
-    mobility: Array
-
-
-_OF_SIZE, _ANGLE = 0.3, 1.0
-"""The largest error by default: of a position, as a part of the robot's size [-]; and
-of an orientation [rad]. At ω0 = 10 rad/s the hand of an arm of 1 m then approaches at
-1.5 m/s, about as fast as its joints can."""
-
-LargestError = Annotated[
-    Literal["robot", "none"] | Positive | Sequence[Positive | None] | None,
-    BeforeValidator(plain),
-    AfterValidator(lambda given: tuple(given) if isinstance(given, list) else given),
-]
-"""The robot's own, none, one number, or one for each part of the error."""
-
 Drawn = Literal["position", "orientation", "direction"]
 """What can be drawn in the world; see `Task`."""
-
-
-class ErrorPart(NamedTuple):
-    """Some consecutive components of a task's error that share a unit.
-
-    Attributes:
-        name: What they are, such as ``position``.
-        unit: Their unit, such as ``m``.
-        rate_unit: The unit of their rates, such as ``m/s``.
-        size: How many they are.
-    """
-
-    name: str
-    unit: str
-    rate_unit: str
-    size: int
 
 
 class Task(Part, ABC, family="tasks", error=TaskError):
@@ -378,7 +321,7 @@ class SecondOrderTask(Task):
     def _largest(self) -> Array:
         """Return `Feedback.largest`; a task that is not placed has no bound."""
         if self.largest_error is None or isinstance(self.largest_error, str):
-            return _UNBOUNDED
+            return UNBOUNDED
         found, first = [], 0
         numbers: Any = self.largest_error
         for part, length in zip(self.error_parts, numbers, strict=True):
@@ -388,94 +331,6 @@ class SecondOrderTask(Task):
         return np.array(found).reshape(-1, 3)
 
 
-def largest_errors(
-    declared: Any, parts: Sequence[ErrorPart], robot: Robot
-) -> Sequence[float | None] | str:
-    """Return the largest error of each part, None for no bound; or "none" for all."""
-    own = {"m": _OF_SIZE * robot.size, "rad": _ANGLE, "-": _ANGLE}
-    return each_part(declared, parts, own, TaskError)
-
-
-def each_part(
-    declared: Any,
-    parts: Sequence[ErrorPart],
-    own: Mapping[str, float],
-    error: type[HspControlError],
-) -> Sequence[float | None] | str:
-    """Return a bound for each part of an error, None for no bound; or "none" for all.
-
-    ``own`` is what the robot has by the unit of the error, inf for no bound.
-    """
-    if declared == "none" or declared is None:
-        return "none"
-    if declared == "robot":
-        found = [own.get(each.unit, np.inf) for each in parts]
-    else:
-        several = isinstance(declared, tuple)
-        found = [*declared] if several else [declared] * len(parts)
-        if len(found) != len(parts):
-            names = " and ".join(f"{each.name} [{each.unit}]" for each in parts)
-            raise error(
-                f"has {len(found)} numbers; needs one for each part of the error: "
-                f"{names}"
-            )
-    return tuple(
-        None if each is None or np.isinf(each) else float(each) for each in found
-    )
-
-
-def beyond_largest(e: Array, largest: Array) -> float:
-    """Return the length of the longest part of an error beyond its largest, or 0."""
-    found = 0.0
-    for first, end, longest in largest.tolist():
-        away = float(np.linalg.norm(e[int(first) : int(end)]))
-        if away > max(longest, found):
-            found = away
-    return found
-
-
 def default_name(frame: str) -> str:
     """Return a frame's name as a task name: other characters become ``_``."""
     return re.sub("[^0-9A-Za-z_-]", "_", frame)
-
-
-@kernel
-def copy_rows(
-    J_frame: Array, J_frame_dot: Array, first: int, J: Array, J_dot: Array
-) -> None:
-    """Write J and J': rows ``first``, ``first`` + 1, ... of the frame's."""
-    for i in range(J.shape[0]):
-        for j in range(J.shape[1]):
-            J[i, j] = J_frame[first + i, j]
-            J_dot[i, j] = J_frame_dot[first + i, j]
-
-
-@kernel
-def add_feedback(
-    feed_forward: Array, feedback: Feedback, e: Array, e_dot: Array, out: Array
-) -> None:
-    """Write feed_forward + offset + Kv e' + Kp s(e), perhaps in place."""
-    Kp, Kv, offset, largest = feedback
-    for i in range(e.shape[0]):
-        total = feed_forward[i] + offset[i]
-        for j in range(e.shape[0]):
-            total += Kv[i, j] * e_dot[j] + Kp[i, j] * e[j]
-        out[i] = total
-    for part in range(largest.shape[0]):
-        first, end = int(largest[part, 0]), int(largest[part, 1])
-        square = 0.0
-        for j in range(first, end):
-            square += e[j] * e[j]
-        if square > largest[part, 2] * largest[part, 2]:
-            beyond = 1.0 - largest[part, 2] / np.sqrt(square)
-            for i in range(e.shape[0]):
-                for j in range(first, end):
-                    out[i] -= Kp[i, j] * beyond * e[j]
-
-
-@kernel
-def write_asked(feedback: Feedback, e: Array, rest: Array, out: Array) -> None:
-    """Write Kp s(e), what the feedback asks for at rest, shape (m,); ``rest`` is 0."""
-    for i in range(e.shape[0]):
-        out[i] = -feedback.offset[i]
-    add_feedback(out, feedback, e, rest, out)

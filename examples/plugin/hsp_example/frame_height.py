@@ -10,7 +10,8 @@ from hsp_control.declaration import within
 from hsp_control.geometry.start import Start
 from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
-from hsp_control.tasks.task import ErrorPart, Feedback, SecondOrderTask
+from hsp_control.tasks.feedback import ErrorPart, Feedback
+from hsp_control.tasks.task import SecondOrderTask
 from hsp_control.trajectories import Hold, Trajectory
 
 Array = NDArray[np.float64]

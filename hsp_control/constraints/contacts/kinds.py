@@ -21,8 +21,7 @@ from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Points, Positive, Vector3, read_only
 from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
-from hsp_control.robot.kinematics import FrameMotion
-from hsp_control.tasks.task import copy_rows
+from hsp_control.robot.kinematics import FrameMotion, copy_rows
 
 
 class PointContact(Contact, type="point"):

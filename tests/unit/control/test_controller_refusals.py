@@ -37,7 +37,7 @@ from hsp_control.law import VARYING
 from hsp_control.null_space.fields import FieldSample, FunctionField
 from hsp_control.null_space.metrics import ConstantMetric, Metric, MetricSample
 from hsp_control.tasks import Task, TaskSample
-from hsp_control.tasks.task import Feedback
+from hsp_control.tasks.feedback import Feedback
 from hsp_control.trajectories import CallableTrajectory, Trajectory, TrajectorySample
 
 Parts = dict[str, Any]

@@ -43,7 +43,7 @@ from hsp_control.geometry.shapes import (
 from hsp_control.null_space.metrics import CoordinatesMetric
 from hsp_control.simulation import log_series
 from hsp_control.simulation.log_series import predicted_decay
-from hsp_control.tasks.task import ErrorPart
+from hsp_control.tasks.feedback import ErrorPart
 from hsp_control.trajectories import Circle as Round
 from hsp_control.trajectories import Spin
 from hsp_control.visualization import palette

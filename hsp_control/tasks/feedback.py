@@ -1,0 +1,154 @@
+"""The feedback of a task, Kv e' + Kp s(e) + offset, and how much error counts."""
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Literal, NamedTuple
+
+import numpy as np
+from pydantic import AfterValidator, BeforeValidator
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import HspControlError, TaskError
+from hsp_control.common.kernels import kernel
+from hsp_control.declaration.quantities import Positive, plain
+from hsp_control.robot import Robot
+
+UNBOUNDED = np.zeros((0, 3))
+"""No part of the error is bounded: see `Feedback.largest`."""
+
+
+class Feedback(NamedTuple):
+    """Kv e' + Kp s(e) + offset: a task's feedback, as one argument of a kernel.
+
+    s(e) is e with each part of it, such as its position, shortened to its largest
+    length: s(e) = e wherever no part is longer.
+
+    The controller owns these arrays and changes them in place: gains by events, the
+    offset by compensators such as integral action.
+    """
+
+    Kp: Array  # position gain, shape (m, m) [1/s²]
+    Kv: Array  # velocity gain, shape (m, m) [1/s]
+    # additional term of the error equation, shape (m,) [m/s² or rad/s²]; zero unless a
+    # compensator writes it
+    offset: Array
+    # of each part of e that is bounded: its first row, the row after its last, and its
+    # largest length, shape (parts, 3) [-, -, m or rad]
+    largest: Array = UNBOUNDED
+
+
+class InForce(NamedTuple):
+    """What a task's feedback is made of while it runs: the controller owns it."""
+
+    # What changes change: Kp and Kv, (2, m, m), or what another kind of feedback is
+    # made of.
+    numbers: Array
+    feedback: Feedback  # what the task reads
+    # Λ⁻¹ in the coordinates of the error, (m, m), of the last step; only of a task with
+    # an impedance.
+    mobility: Array
+
+
+@kernel
+def add_feedback(
+    feed_forward: Array, feedback: Feedback, e: Array, e_dot: Array, out: Array
+) -> None:
+    """Write feed_forward + offset + Kv e' + Kp s(e), perhaps in place."""
+    Kp, Kv, offset, largest = feedback
+    for i in range(e.shape[0]):
+        total = feed_forward[i] + offset[i]
+        for j in range(e.shape[0]):
+            total += Kv[i, j] * e_dot[j] + Kp[i, j] * e[j]
+        out[i] = total
+    for part in range(largest.shape[0]):
+        first, end = int(largest[part, 0]), int(largest[part, 1])
+        square = 0.0
+        for j in range(first, end):
+            square += e[j] * e[j]
+        if square > largest[part, 2] * largest[part, 2]:
+            beyond = 1.0 - largest[part, 2] / np.sqrt(square)
+            for i in range(e.shape[0]):
+                for j in range(first, end):
+                    out[i] -= Kp[i, j] * beyond * e[j]
+
+
+@kernel
+def write_asked(feedback: Feedback, e: Array, rest: Array, out: Array) -> None:
+    """Write Kp s(e), what the feedback asks for at rest, shape (m,); ``rest`` is 0."""
+    for i in range(e.shape[0]):
+        out[i] = -feedback.offset[i]
+    add_feedback(out, feedback, e, rest, out)
+
+
+class ErrorPart(NamedTuple):
+    """Some consecutive components of a task's error that share a unit.
+
+    Attributes:
+        name: What they are, such as ``position``.
+        unit: Their unit, such as ``m``.
+        rate_unit: The unit of their rates, such as ``m/s``.
+        size: How many they are.
+    """
+
+    name: str
+    unit: str
+    rate_unit: str
+    size: int
+
+
+_OF_SIZE, _ANGLE = 0.3, 1.0
+"""The largest error by default: of a position, as a part of the robot's size [-]; and
+of an orientation [rad]. At ω0 = 10 rad/s the hand of an arm of 1 m then approaches at
+1.5 m/s, about as fast as its joints can."""
+
+LargestError = Annotated[
+    Literal["robot", "none"] | Positive | Sequence[Positive | None] | None,
+    BeforeValidator(plain),
+    AfterValidator(lambda given: tuple(given) if isinstance(given, list) else given),
+]
+"""The robot's own, none, one number, or one for each part of the error."""
+
+
+def largest_errors(
+    declared: Any, parts: Sequence[ErrorPart], robot: Robot
+) -> Sequence[float | None] | str:
+    """Return the largest error of each part, None for no bound; or "none" for all."""
+    own = {"m": _OF_SIZE * robot.size, "rad": _ANGLE, "-": _ANGLE}
+    return each_part(declared, parts, own, TaskError)
+
+
+def each_part(
+    declared: Any,
+    parts: Sequence[ErrorPart],
+    own: Mapping[str, float],
+    error: type[HspControlError],
+) -> Sequence[float | None] | str:
+    """Return a bound for each part of an error, None for no bound; or "none" for all.
+
+    ``own`` is what the robot has by the unit of the error, inf for no bound.
+    """
+    if declared == "none" or declared is None:
+        return "none"
+    if declared == "robot":
+        found = [own.get(each.unit, np.inf) for each in parts]
+    else:
+        several = isinstance(declared, tuple)
+        found = [*declared] if several else [declared] * len(parts)
+        if len(found) != len(parts):
+            names = " and ".join(f"{each.name} [{each.unit}]" for each in parts)
+            raise error(
+                f"has {len(found)} numbers; needs one for each part of the error: "
+                f"{names}"
+            )
+    return tuple(
+        None if each is None or np.isinf(each) else float(each) for each in found
+    )
+
+
+def beyond_largest(e: Array, largest: Array) -> float:
+    """Return the length of the longest part of an error beyond its largest, or 0."""
+    found = 0.0
+    for first, end, longest in largest.tolist():
+        away = float(np.linalg.norm(e[int(first) : int(end)]))
+        if away > max(longest, found):
+            found = away
+    return found
