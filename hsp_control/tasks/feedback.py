@@ -35,6 +35,12 @@ class Feedback(NamedTuple):
     # largest length, shape (parts, 3) [-, -, m or rad]
     largest: Array = UNBOUNDED
 
+    def acceleration(self, e: Array, e_dot: Array) -> Array:
+        """Return Kv e' + Kp s(e) + offset, shape (m,), for a task in plain Python."""
+        out = np.zeros(len(self.offset))
+        add_feedback(out, self, e, e_dot, out)
+        return out
+
 
 class InForce(NamedTuple):
     """What a task's feedback is made of while it runs: the controller owns it."""

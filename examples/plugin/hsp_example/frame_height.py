@@ -10,8 +10,7 @@ from hsp_control.declaration import within
 from hsp_control.geometry.start import Start
 from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
-from hsp_control.tasks.feedback import ErrorPart, Feedback
-from hsp_control.tasks.task import SecondOrderTask
+from hsp_control.tasks import ErrorPart, Feedback, SecondOrderTask
 from hsp_control.trajectories import Hold, Trajectory
 
 Array = NDArray[np.float64]
@@ -46,7 +45,7 @@ class FrameHeight(SecondOrderTask, type="frame_height"):
         out: TaskSample | None = None,
         feedback: Feedback | None = None,
     ) -> TaskSample:
-        """Write J, J', e, e' and a_x = z_d'' + Kv e' + Kp e + offset."""
+        """Write J, J', e, e' and a_x = z_d'' + Kv e' + Kp s(e) + offset."""
         out, feedback = self.given(state, out, feedback)
         assert self.frame is not None
         frame, desired = state.frame(self.frame), self.trajectory.sample(state.t)
@@ -54,8 +53,8 @@ class FrameHeight(SecondOrderTask, type="frame_height"):
         out.jacobian_dot[:] = frame.jacobian_dot[2:3]
         out.error[:] = desired.position - frame.position[2]
         out.error_rate[:] = desired.velocity - frame.velocity[2]
-        out.acceleration[:] = desired.acceleration + feedback.offset
-        out.acceleration[:] += feedback.Kv @ out.error_rate + feedback.Kp @ out.error
+        fed_back = feedback.acceleration(out.error, out.error_rate)
+        out.acceleration[:] = desired.acceleration + fed_back
         return out
 
     def reference_rate(self, state: RobotState) -> Array:
