@@ -258,22 +258,10 @@ def _resolve_levels(step: Step) -> int:
             scratch.inner, scratch.tall, scratch.square[2], scratch.square, scratch.rows
         )
         damped = resolve_levels(
-            task,
-            step.field,
-            step.metric,
-            step.form,
-            step.v,
-            step.K_N,
-            step.threshold,
-            step.following,
-            step.asked,
-            step.thresholds,
-            step.controls,
-            step.ends,
-            levels,
-            step.e_N,
-            step.a,
-        )
+            task, step.field, step.metric, step.form, step.v, step.K_N, step.threshold,
+            step.following, step.asked, step.thresholds, step.controls, step.ends,
+            levels, step.e_N, step.a,
+        )  # fmt: skip
         if not _all_finite(step.a):
             damped = BEYOND_ANY_LEVEL
         step.code[0] = damped
@@ -283,14 +271,10 @@ def _resolve_levels(step: Step) -> int:
 @kernel
 def _write_thresholds(step: Step) -> float:
     """Write ε of each level, and return the largest."""
-    asked, bounded, ends, threshold = (
-        step.asked,
-        step.bounded,
-        step.ends,
-        step.threshold,
-    )
-    follows, out = step.following, step.thresholds
-    return write_thresholds(asked, bounded, ends, threshold, follows, out)
+    return write_thresholds(
+        step.asked, step.bounded, step.ends, step.threshold, step.following,
+        step.thresholds,
+    )  # fmt: skip
 
 
 @kernel

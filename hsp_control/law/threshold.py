@@ -12,9 +12,10 @@ whatever the target. A task that is tracked has f = 0 nearly, at any speed: for 
 law is exact down to ε_0. ``docs/law.md``, The edge, has the proposition.
 
 A level that is held at its edge leaves to those below the very directions in which it
-is drawn there: along them its spring must outweigh what they ask for. So a level below
-follows with an L that is a fiftieth: it is as steep as it is strong, and the nearer to
-the edge the level above is held, the less it gets there.
+is drawn there: along them its spring must outweigh what they ask for. They ask for
+f - J a_f, with a_f what those above draw at rest: a task that is met undoes it. So a
+level below follows that with an L that is a fiftieth: it is as steep as it is strong,
+and the nearer to the edge the level above is held, the less it gets there.
 """
 
 from typing import NamedTuple, Self
@@ -94,7 +95,7 @@ def threshold_below(asked: Array, held: float, following: Following) -> float:
     """Return the ε that a level below a held one has at least.
 
     Args:
-        asked: f of the level, shape (m,).
+        asked: f - J a_f of the level, shape (m,).
         held: How much a level above is held, see `how_held`.
         following: f_0 and L.
     """
