@@ -93,7 +93,9 @@ class Actuation:
         self._tau_within = bind(within, self._tau, *bounds[2:])
         self._qp: LimitedStep | None = None
         if limits.limits is not None or support.size:
-            self._qp = self._limited_step(0)
+            held = limits.limits.static_effort if limits.limits else None
+            rows = 0 if held is None else int(np.isfinite(held.effort).sum())
+            self._qp = self._limited_step(rows)
             # what is delivered where it was solved at once
             self._solved = Delivered(*self._qp.result, LIMITED, 0.0)
 

@@ -19,10 +19,10 @@ from hsp_control.law import IDENTITY, Resolution
 from hsp_control.law.pseudo_inverse import whiten
 from hsp_control.law.resolution import Factors, Projectors
 
-_ONE_LEVEL, _SEVERAL_LEVELS = 1e-6, 1e-8
-"""Least cost of null-space deviation relative to the first level: for one level and for
-several. The smaller it is, the stricter the priorities; at 1e-6 an error of 1e-3 m/s²
-remains in the task (docs/limits.md)."""
+_LEAST = 1e-6
+"""Least cost of null-space deviation relative to the first level. The smaller it is,
+the stricter the priorities; at 1e-6 an error of 1e-3 m/s² remains in the task
+(docs/limits.md)."""
 
 _OF_ERROR, _MOST = 0.2, 0.1
 """How much more what is below a level costs for an error of the robot's size, relative
@@ -95,7 +95,6 @@ class Directions(NamedTuple):
         m, n = J.shape
         every = len(resolution.ends)
         levels = every - supported
-        whole = _ONE_LEVEL if levels <= 1 else _SEVERAL_LEVELS
         return cls(
             J,
             resolution.problem.metric.L,
@@ -105,7 +104,7 @@ class Directions(NamedTuple):
             resolution.problem.springs,
             size,
             int(supported),
-            whole ** (1.0 / max(levels, 1)),
+            _LEAST ** (1.0 / max(levels, 1)),
             resolution.thresholds,
             resolution.factors,
             resolution.projectors,

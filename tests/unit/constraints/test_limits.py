@@ -77,7 +77,23 @@ def test_by_default_they_are_the_robots_own() -> None:
     assert np.isinf(limits.acceleration).all()
     assert limits.bandwidth == 10.0
     assert limits.distances == ()
-    assert limits.static_effort is None
+
+
+def test_by_default_gravity_may_overload_no_motor_of_an_arm() -> None:
+    """Where it could ask for more than a motor has in some posture, it is limited."""
+    robot, rng, rest = panda(), np.random.default_rng(1), np.zeros(7)
+    asked = [
+        np.abs(robot.inverse_dynamics(robot.random_configuration(rng), rest, rest))
+        for _ in range(2000)
+    ]
+    assert (robot.largest_gravity > np.max(asked, axis=0)).all()
+    for none in ({}, {"effort": "none"}, {"effort": 1.0, "static_effort": "none"}):
+        assert of(robot, **none).static_effort is None
+    assert of(fingers(), effort=1.0).static_effort is None
+    weak = of(robot, effort=[87.0, 87.0, 30.0, 50.0, 12.0, 12.0, 12.0]).static_effort
+    assert weak is not None
+    assert weak.share == 0.95
+    np.testing.assert_array_equal(np.isfinite(weak.effort), np.arange(7) == 2)
 
 
 def test_the_rate_of_efforts_is_one_for_all_joints_of_a_unit() -> None:
