@@ -5,36 +5,23 @@ import pinocchio as pin
 import pytest
 from task_cases import FRAMES, load
 
-from hsp_control import (
-    Controller,
-    FrameOrientation,
-    FramePosition,
-    Hold,
-    JointCentering,
-    JointPosture,
-    simulate,
-)
+import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.tasks import Task
 from hsp_control.trajectories import HoldOrientation
 
 PERIOD = 0.005
 SHORT = 0.02  # 1 to 8 mm; without the rule of `threshold_below` 160 to 510 mm
 
 
-def rests_at(name: str, q0: Array, away: Array, *below: Task) -> float:
+def rests_at(name: str, q0: Array, away: Array, *below: hsp.Task) -> float:
     """Return how far a hand stays from where it is sent; it is at rest there."""
     robot, frame = load(name), FRAMES[name]
     goal = robot.state(0.0, q0, np.zeros(robot.nv)).position(frame) + away
-    controller = Controller(
-        robot, [FramePosition(frame, Hold(goal)), *below], JointCentering(), start=q0
-    )
-    run = simulate(
-        controller, q0, duration=5.0, control_period=PERIOD, log_period=PERIOD
-    )
-    q = run.columns["q"][-1]
-    left = goal - robot.state(0.0, q, np.zeros(robot.nv)).position(frame)
-    changes = np.abs(np.diff(run.columns["tau"][-200:], axis=0)).max(axis=0)
+    tasks = [hsp.FramePosition(frame, hsp.Hold(goal)), *below]
+    made = hsp.Controller(robot, tasks, hsp.JointCentering(), start=q0)
+    run = hsp.simulate(made, q0, duration=5, control_period=PERIOD, log_period=PERIOD)
+    left = goal - robot.state(0.0, run.q[-1], np.zeros(robot.nv)).position(frame)
+    changes = np.abs(np.diff(run.tau[-200:], axis=0)).max(axis=0)
     share = changes / robot.model.effortLimit * (1e-3 / PERIOD)
     assert share.max() <= 1e-3
     return float(np.linalg.norm(left))
@@ -50,9 +37,9 @@ def test_the_hand_is_as_near_as_it_can_be_whatever_is_asked_below(
     start = robot.state(0.0, q0, np.zeros(robot.nv)).frame(FRAMES[name])
     away = 1.5 * np.array([0.6, 0.5, 0.6]) / np.linalg.norm([0.6, 0.5, 0.6])
     turned = HoldOrientation(start.rotation @ pin.exp3(np.array([0.0, 0.8, 0.0])))
-    below: list[Task] = [FrameOrientation(FRAMES[name], turned, priority=2)]
+    below: list[hsp.Task] = [hsp.FrameOrientation(FRAMES[name], turned, priority=2)]
     if postures:
-        below.append(JointPosture(q0, priority=3))
+        below.append(hsp.JointPosture(q0, priority=3))
     alone = rests_at(name, q0, away)
     assert rests_at(name, q0, away, *below) - alone <= SHORT
 
@@ -61,6 +48,6 @@ def test_an_orientation_that_is_met_gives_way_too() -> None:
     """It asks for nothing, but would undo what the position above it draws."""
     q0 = np.array([-0.019, -1.491, 1.837, -2.484, -1.32, -0.043])
     away = np.array([-1.993, -0.799, 0.043])
-    below = FrameOrientation(FRAMES["ur5"], priority=2)
+    below = hsp.FrameOrientation(FRAMES["ur5"], priority=2)
     alone = rests_at("ur5", q0, away)
     assert rests_at("ur5", q0, away, below) - alone <= SHORT  # it was 0.25 m

@@ -104,21 +104,12 @@ class Actuation:
         state, code, self._solve_if = self._state, self._law.code, np.zeros(2)
         if self._limits.limits is None:
             return bind(_unlimited, code, self.found, timed=True)
+        limits, wanted = self._limits, self._wanted.acceleration
         return bind(
-            _check,
-            state.q,
-            state.v,
-            self._wanted.acceleration,
-            state.effort,
-            state.robot.dof_indices,
-            self._limits.motion,
-            self._limits.sent.held,
-            self._limits.bounds,
-            code,
-            self.found,
-            self._solve_if,
-            timed=True,
-        )
+            _check, state.q, state.v, wanted, state.effort, state.robot.dof_indices,
+            limits.motion, limits.sent.held, limits.bounds, code, self.found,
+            self._solve_if, timed=True,
+        )  # fmt: skip
 
     def calls(self) -> list[Callable[[float], Any]]:
         """Return the calls of the time that deliver the law's own acceleration.

@@ -95,30 +95,15 @@ class Directions(NamedTuple):
         m, n = J.shape
         every = len(resolution.ends)
         levels = every - supported
+        problem, least = resolution.problem, _LEAST ** (1.0 / max(levels, 1))
         return cls(
-            J,
-            resolution.problem.metric.L,
-            resolution.form,
-            resolution.ends,
-            resolution.problem.task.error,
-            resolution.problem.springs,
-            size,
-            int(supported),
-            _LEAST ** (1.0 / max(levels, 1)),
-            resolution.thresholds,
-            resolution.factors,
-            resolution.projectors,
-            resolution.code,
-            resolution.alone,
-            np.empty((m, n)),
-            np.empty((m, m)),
-            np.empty((3, n, max(n, m))),
-            np.empty((2, max(n, m))),
-            np.empty((n, n)),
-            np.zeros(1, dtype=np.int64),
-            np.empty(n),
-            np.zeros((2, every + 1)),
-        )
+            J, problem.metric.L, resolution.form, resolution.ends, problem.task.error,
+            problem.springs, size, int(supported), least, resolution.thresholds,
+            resolution.factors, resolution.projectors, resolution.code,
+            resolution.alone, np.empty((m, n)), np.empty((m, m)),
+            np.empty((3, n, max(n, m))), np.empty((2, max(n, m))), np.empty((n, n)),
+            np.zeros(1, dtype=np.int64), np.empty(n), np.zeros((2, every + 1)),
+        )  # fmt: skip
 
 
 @kernel
