@@ -92,33 +92,32 @@ def resolve_levels(
     n = v.shape[0]
     damped = 0
     _invert(metric.L, Q)
+    drawn, pushed = rows[2, :n], rows[1]
     for i in range(n):
-        a[i] = 0.0
+        a[i] = drawn[i] = 0.0
     start, held = 0, 0.0
     for level in range(ends.shape[0]):
         end = ends[level]
         block = slice(start, end)
-        G_inv, rest = G_inverse[block, block], rows[0, start:end]
+        G_inv, rest, opposed = G_inverse[block, block], rows[0], rows[3]
         threshold = thresholds[level]
+        for k in range(end - start):
+            rest[k], opposed[k] = a_x[start + k], asked[start + k]
+            for i in range(n):
+                rest[k] -= J_dot[start + k, i] * v[i] + J[start + k, i] * a[i]
+                opposed[k] -= J[start + k, i] * drawn[i]
         if held > 0.0:
-            threshold = max(threshold, threshold_below(asked[block], held, following))
+            least_here = threshold_below(opposed[: end - start], held, following)
+            threshold = max(threshold, least_here)
         smallest = _open_level(J[block], Q, QJ[:, block], G_inv, square, threshold)
         if smallest < threshold * threshold:
             held = max(held, how_held(smallest, threshold, least))
             if damped == 0:
                 damped = level + 1
         thresholds[level] = threshold
-        for k in range(start, end):
-            total = a_x[k]
-            for i in range(n):
-                total -= J_dot[k, i] * v[i] + J[k, i] * a[i]
-            rows[0, k] = total
-        pushed = rows[1, : end - start]
-        multiply(G_inv, rest, pushed)
-        for i in range(n):
-            for k in range(end - start):
-                a[i] += QJ[i, start + k] * pushed[k]
-        _close_level(Q, QJ[:, block], G_inv, rows[1])
+        _add_level(QJ[:, block], G_inv, rest, pushed, a)
+        _add_level(QJ[:, block], G_inv, opposed, pushed, drawn)
+        _close_level(Q, QJ[:, block], G_inv, pushed)
         start = end
 
     x, Wx, Y, bent = rows[0, :n], rows[1, :n], rows[2, :n], rows[3, :n]
@@ -210,6 +209,16 @@ def _open_level(
                 total += V[r, p] * G[r, 0] * V[r, k]
             G_inverse[p, k] = total
     return smallest
+
+
+@kernel
+def _add_level(QJ: Array, G_inverse: Array, rest: Array, row: Array, a: Array) -> None:
+    """Add Q Jᵀ q(G) times what is left to do to a."""
+    n, m = QJ.shape
+    multiply(G_inverse, rest[:m], row[:m])
+    for i in range(n):
+        for k in range(m):
+            a[i] += QJ[i, k] * row[k]
 
 
 @kernel

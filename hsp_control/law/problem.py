@@ -57,8 +57,9 @@ class Problem:
         gain: K_N, shape (nv, nv) [1/s].
         asked: Kp s(e), what the feedback asks for at rest in the coordinates of e,
             shape (m,); zero in rows without one, such as those of contacts.
-        bounded: Whether a row's error is bounded, so that its level's threshold follows
-            what is asked for also below no other level, shape (m,).
+        yields: How much the threshold of a row's level yields to what the row asks
+            for, shape (m,): 0 where no bound is on its error, so that it follows only
+            below a held level; see `write_thresholds`.
         springs: Whether a row is that of a spring, shape (m,). The law itself treats
             all rows alike; where limits bind, a spring yields as a body would.
     """
@@ -71,5 +72,5 @@ class Problem:
         self.metric = MetricSample.allocate(nv)
         self.gain = gain
         self.asked = np.zeros(rows)
-        self.bounded = np.zeros(rows, dtype=np.bool_)
+        self.yields = np.zeros(rows)
         self.springs = np.zeros(rows, dtype=np.bool_)

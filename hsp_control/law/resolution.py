@@ -157,7 +157,7 @@ class Resolution:
         step = (
             *(problem.task, problem.field, problem.metric, self.form),
             *(v, problem.gain, self.threshold, self._following, controls),
-            *(self.ends, problem.asked, problem.bounded, self.thresholds),
+            *(self.ends, problem.asked, problem.yields, self.thresholds),
             *(self._scratch, self.null_space_error, self.acceleration, self.code),
         )
         resolve = _resolve_at_once if self.alone else _resolve_levels
@@ -212,7 +212,7 @@ class LawStep(NamedTuple):
     controls: bool
     ends: Indices
     asked: Array
-    bounded: Array
+    yields: Array
     thresholds: Array
     scratch: Scratch
     e_N: Array
@@ -258,22 +258,10 @@ def _resolve_levels(step: LawStep) -> int:
             scratch.inner, scratch.tall, scratch.square[2], scratch.square, scratch.rows
         )
         damped = resolve_levels(
-            task,
-            step.field,
-            step.metric,
-            step.form,
-            step.v,
-            step.K_N,
-            step.threshold,
-            step.following,
-            step.asked,
-            step.thresholds,
-            step.controls,
-            step.ends,
-            levels,
-            step.e_N,
-            step.a,
-        )
+            task, step.field, step.metric, step.form, step.v, step.K_N, step.threshold,
+            step.following, step.asked, step.thresholds, step.controls, step.ends,
+            levels, step.e_N, step.a,
+        )  # fmt: skip
         if not _all_finite(step.a):
             damped = BEYOND_ANY_LEVEL
         step.code[0] = damped
@@ -283,14 +271,10 @@ def _resolve_levels(step: LawStep) -> int:
 @kernel
 def _write_thresholds(step: LawStep) -> float:
     """Write ε of each level, and return the largest."""
-    asked, bounded, ends, threshold = (
-        step.asked,
-        step.bounded,
-        step.ends,
-        step.threshold,
-    )
-    follows, out = step.following, step.thresholds
-    return write_thresholds(asked, bounded, ends, threshold, follows, out)
+    return write_thresholds(
+        step.asked, step.yields, step.ends, step.threshold, step.following,
+        step.thresholds,
+    )  # fmt: skip
 
 
 @kernel

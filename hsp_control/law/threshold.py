@@ -11,10 +11,16 @@ the acceleration that it causes changes by at most 2 (L + f_0/ε_0²) for each u
 whatever the target. A task that is tracked has f = 0 nearly, at any speed: for it the
 law is exact down to ε_0. ``docs/law.md``, The edge, has the proposition.
 
+How hard the spring at the edge draws is 2 L |∂s/∂q|. At a stretched elbow |∂s/∂q| is up
+to a quarter of the robot's size. Where only a height counts, or x and y, it is up to
+the whole size, and the spring moves the whole arm. So an error of one component gets a
+third of L, one of two components two thirds.
+
 A level that is held at its edge leaves to those below the very directions in which it
-is drawn there: along them its spring must outweigh what they ask for. So a level below
-follows with an L that is a fiftieth: it is as steep as it is strong, and the nearer to
-the edge the level above is held, the less it gets there.
+is drawn there: along them its spring must outweigh what they ask for. They ask for
+f - J a_f, with a_f what those above draw at rest: a task that is met undoes it. So a
+level below follows that with an L that is a fiftieth: it is as steep as it is strong,
+and the nearer to the edge the level above is held, the less it gets there.
 """
 
 from typing import NamedTuple, Self
@@ -26,8 +32,11 @@ from hsp_control.common.kernels import kernel
 
 STIFFNESS = 200.0
 """L times the robot's size [1/s²]. A stretched elbow is then drawn to its singular
-posture by a spring of at most 2 L |∂s/∂q| ≤ 400 1/s² of its own inertia, 20 rad/s: slow
-beside periods of up to 10 ms, and damped by a null-space gain of 10 1/s."""
+posture by a spring of at most 2 L |∂s/∂q| ≤ 100 1/s² of its own inertia, 10 rad/s: slow
+beside periods of up to 10 ms and what motors can give, and damped by a null-space gain
+of 10 1/s."""
+WHOLE = 3
+"""Components of an error to which all of L belongs; one of m < 3 gets L m/3."""
 BELOW = 4.0
 """L times the robot's size below a held level [1/s²]. Its feedback then accelerates a
 joint by at most 2 L s, 1/50 of the spring of the level above."""
@@ -60,7 +69,7 @@ NOT = Following(np.inf, 0.0, np.inf)
 @kernel
 def write_thresholds(
     asked: Array,
-    bounded: Array,
+    yields: Array,
     ends: Indices,
     least: float,
     following: Following,
@@ -70,7 +79,7 @@ def write_thresholds(
 
     Args:
         asked: f, what the feedback asks for at rest, level after level, shape (m,).
-        bounded: Whether a row counts, shape (m,).
+        yields: By how much L is less for a row, shape (m,); 0: it does not count.
         ends: Where each level's rows end in the stack, shape (levels,).
         least: ε_0.
         following: L and f_0.
@@ -78,11 +87,14 @@ def write_thresholds(
     """
     largest, start = least, 0
     for level in range(ends.shape[0]):
-        square = 0.0
+        square = weighted = 0.0
         for k in range(start, ends[level]):
-            if bounded[k]:
+            if yields[k] > 0.0:
                 square += asked[k] * asked[k]
+                weighted += yields[k] * asked[k] * asked[k]
         beyond = max(np.sqrt(square) - following.modest, 0.0)
+        if beyond > 0.0:
+            beyond *= weighted / square
         thresholds[level] = max(least, np.sqrt(beyond / following.steepest))
         largest = max(largest, thresholds[level])
         start = ends[level]
@@ -94,7 +106,7 @@ def threshold_below(asked: Array, held: float, following: Following) -> float:
     """Return the ε that a level below a held one has at least.
 
     Args:
-        asked: f of the level, shape (m,).
+        asked: f - J a_f of the level, shape (m,).
         held: How much a level above is held, see `how_held`.
         following: f_0 and L.
     """

@@ -196,17 +196,13 @@ class RobotModel:
         whatever the model says, and for a joint whose two limits are equal, which
         means that its URDF gives none.
         """
-        lower = np.full(self.nv, -np.inf)
-        upper = np.full(self.nv, np.inf)
-        for joint in self.joints.values():
-            if joint.nq == 1 and joint.nv == 1:
-                low = self.model.lowerPositionLimit[joint.idx_q]
-                high = self.model.upperPositionLimit[joint.idx_q]
-                if low < high:
-                    lower[joint.idx_v], upper[joint.idx_v] = low, high
-        largest = np.finfo(float).max  # Pinocchio's value for unlimited
-        lower[lower <= -largest] = -np.inf
-        upper[upper >= largest] = np.inf
+        i = np.flatnonzero(self.dof_indices >= 0)
+        lower, upper = np.full(self.nv, -np.inf), np.full(self.nv, np.inf)
+        lower[i] = self.model.lowerPositionLimit[self.dof_indices[i]]
+        upper[i] = self.model.upperPositionLimit[self.dof_indices[i]]
+        none, largest = lower >= upper, np.finfo(float).max  # Pinocchio's: unlimited
+        lower[none | (lower <= -largest)] = -np.inf
+        upper[none | (upper >= largest)] = np.inf
         return lower, upper
 
     def check_configuration(self, q: ArrayLike) -> Array:
@@ -347,6 +343,16 @@ class RobotModel:
         It is the sum of the distances between the origins of consecutive joints, and of
         the ranges of prismatic ones: an arm reaches no farther from its first joint.
         """
+        longest = self._lengths.max()
+        for frame in self.model.frames:
+            if frame.parentJoint > 0:
+                away = np.linalg.norm(frame.placement.translation)
+                longest = max(longest, self._lengths[frame.parentJoint] + away)
+        return float(longest)
+
+    @cached_property
+    def _lengths(self) -> Array:
+        """Length of the chain from the first joint to each, shape (njoints,) [m]."""
         model, lengths = self.model, np.zeros(self.model.njoints)
         lower, upper = self.position_limits()
         for joint in range(1, model.njoints):
@@ -358,12 +364,26 @@ class RobotModel:
             if moved.nv == 1 and self.units[moved.idx_v] == "m":
                 slid = (upper - lower)[moved.idx_v]
                 lengths[joint] += slid if np.isfinite(slid) else 0.0
-        longest = lengths.max()
-        for frame in model.frames:
-            if frame.parentJoint > 0:
-                away = np.linalg.norm(frame.placement.translation)
-                longest = max(longest, lengths[frame.parentJoint] + away)
-        return float(longest)
+        return lengths
+
+    @cached_property
+    def largest_gravity(self) -> Array:
+        """What gravity takes of each motor at most, shape (nv,) [N·m or N].
+
+        It is as if all that a joint carries were stretched level: a bound, which an arm
+        does not reach.
+        """
+        model, most = self.model, np.zeros(self.nv)
+        g = float(np.linalg.norm(model.gravity.linear))
+        for joint in range(1, model.njoints):
+            own = model.joints[joint]
+            turns = self.units[own.idx_v] == "rad"
+            for body in model.subtrees[joint]:
+                inertia = model.inertias[body]
+                away = self._lengths[body] - self._lengths[joint]
+                lever = away + float(np.linalg.norm(inertia.lever)) if turns else 1.0
+                most[own.idx_v : own.idx_v + own.nv] += g * inertia.mass * lever
+        return most
 
     @property
     def effort_rate(self) -> Array:

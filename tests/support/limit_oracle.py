@@ -52,7 +52,7 @@ def level_costs(resolution: Resolution, supported: bool, size: float) -> Array:
     where there are none.
     """
     count = len(resolution.ends) - supported
-    least = 1e-6 if count <= 1 else 1e-8 ** (1.0 / count)
+    least = 1e-6 ** (1.0 / max(count, 1))
     costs, start = [1.0], 0
     for k, end in enumerate(resolution.ends):
         error = np.linalg.norm(resolution.problem.task.error[start:end])

@@ -10,10 +10,6 @@ from hsp_control.common.kernels import kernel
 _STEEPER = 4.0
 """How much steeper the velocity barrier is beyond the guarded speed."""
 
-_GROWTH = 1.25
-"""How much larger the error of the acceleration may be in the next period than it was
-in the last ones: without it one random rollout passed a limit by 0.1 % at 100 Hz."""
-
 _SHIFT = 0.1
 """How much of a joint's range the drift may take away at one end: a joint that
 something blocks drifts by all that it should accelerate."""
@@ -63,7 +59,7 @@ def acceleration_bounds(
     can. ``where`` is the index in q of each dof's coordinate, -1 for none.
 
     The margin of the speed covers the largest ``error`` that the acceleration had of
-    late and its growth, up to half the speed. The barrier of the position makes up for
+    late, up to half the speed. The barrier of the position makes up for
     the ``drift``, the mean error, where it leads beyond the limit. ``steady`` is what
     of it is still there: what is commanded against a steady force moves nothing, and
     the barriers are wider by as much.
@@ -83,7 +79,7 @@ def acceleration_bounds(
             high -= min(max(drift[i], 0.0), most)
             low -= max(steady[i], 0.0)
             high -= min(steady[i], 0.0)
-        speed = velocity[i] - _GROWTH * error[i] / (2.0 * bandwidth * _STEEPER)
+        speed = velocity[i] - error[i] / (2.0 * bandwidth * _STEEPER)
         speed = max(speed, 0.5 * velocity[i])
         rising = _speed_barrier(speed - v[i], bandwidth, jerk[i])
         slowing = -_speed_barrier(speed + v[i], bandwidth, jerk[i])

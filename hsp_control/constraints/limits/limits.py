@@ -146,13 +146,11 @@ class SelfDistance(MinimumDistance, type="self"):
 class StaticEffort:
     """Gravity takes at most a part of every motor's effort.
 
-    An effort limit alone bounds the acceleration, but lets the arm reach postures in
-    which the motors cannot hold it: there it falls. The gravity effort of a motor,
-    G_i(q), depends on the posture only, so this is a limit on postures. With
-    h = share - |G_i|/effort_i, the rows require h'' + 2α h' + α² h ≥ 0 (an exponential
-    control barrier function), with G_i'' = ∇G_i·a + the drift of G_i' at constant
-    velocity.
-    Robots with mimic joints are not supported.
+    Else an arm reaches postures in which its motors cannot hold it, and falls. A
+    motor's gravity effort, G_i(q), depends on the posture only, so this is a limit on
+    postures: with h = share - |G_i|/effort_i, the rows require h'' + 2α h' + α² h ≥ 0,
+    with G_i'' = ∇G_i·a + the drift of G_i' at constant velocity. Robots with mimic
+    joints are not supported.
 
     Attributes:
         effort: Maximum effort, shape (nv,) [N·m or N]; inf where unlimited.
@@ -257,6 +255,9 @@ class RobotLimits:
 BANDWIDTH = 10.0
 """α of the barriers where nothing else is given [1/s]."""
 
+_HELD = 0.95
+"""Part of a motor that gravity may take by default: what is left brakes the arm."""
+
 
 class Limits(Part, error=LimitError):
     """Limits on effort, joint motion and distances, which the controller keeps.
@@ -271,11 +272,10 @@ class Limits(Part, error=LimitError):
         acceleration    a ≤ a_max
 
     and likewise from below; the velocity barrier is four times as steep within its
-    margin. j is what the effort's rate can do to the acceleration. Distances have their
-    own barriers, see `MinimumDistance`; the effort against
-    gravity has its own too, see `StaticEffort`. Where limits contradict each other they
-    are relaxed in this order: static effort, acceleration, velocity, position,
-    distance. Effort limits are never relaxed.
+    margin. j is what the effort's rate can do to the acceleration. Distances and the
+    effort against gravity have barriers of their own. Where limits contradict each
+    other they are relaxed in this order: static effort, acceleration, velocity,
+    position, distance. Effort limits are never relaxed.
 
     Where a limit binds, the null space deviates from the law first, and then the tasks,
     the lowest priority first.
@@ -317,9 +317,12 @@ class Limits(Part, error=LimitError):
     """Bandwidth α of the barriers [1/s]: 10 by default, or what a plan needs. Motors
     can follow 5 to 20: faster barriers act so late that they need more than the effort
     rate permits. A joint at rest is allowed α² times what is left to its limit."""
-    static_effort: Fraction | None = None
+    static_effort: Annotated[
+        Literal["robot", "none"] | Fraction | None, BeforeValidator(none_for_nothing)
+    ] = "robot"
     """Fraction of the effort limit that gravity may use [-], so that an arm stays where
-    its motors can hold it; for motors that carry no contact. Unlimited by default."""
+    its motors can hold it; for motors that carry no contact. By default 0.95 for an arm
+    that gravity may ask for more than a motor has; none where the base floats."""
 
     def placed(self, start: Start) -> RobotLimits:
         """Return the limits in numbers, for one robot and one scene."""
@@ -334,17 +337,11 @@ class Limits(Part, error=LimitError):
         for k, each in enumerate(self.distances):
             with within("distances", k):
                 distances.append(each.placed(start))
-        if self.static_effort is not None and robot.mimics:
-            with within("static_effort"):
-                raise LimitError(
-                    f"does not support mimic joints; {robot.name} has some"
-                )
         with within("effort_rate"):
             effort_rate = maximum(self.effort_rate, robot.effort_rate, robot)
-        effort, share = read_only(effort), self.static_effort
         return RobotLimits(
             robot=robot,
-            effort=effort,
+            effort=read_only(effort),
             effort_rate=read_only(effort_rate),
             velocity=read_only(velocity),
             lower=read_only(lower),
@@ -358,8 +355,24 @@ class Limits(Part, error=LimitError):
                 read_only([BANDWIDTH if self.bandwidth is None else self.bandwidth]),
             ),
             distances=tuple(distances),
-            static_effort=None if share is None else StaticEffort(effort, share),
+            static_effort=self._static_effort(robot, effort),
         )
+
+    def _static_effort(self, robot: Robot, effort: Array) -> StaticEffort | None:
+        share = self.static_effort
+        if share == "robot":
+            effort = np.where(robot.largest_gravity > effort, effort, np.inf)
+            if robot.unactuated or robot.mimics or not np.isfinite(effort).any():
+                return None
+            share = _HELD
+        if share is None or isinstance(share, str):
+            return None
+        if robot.mimics:
+            with within("static_effort"):
+                raise LimitError(
+                    f"does not support mimic joints; {robot.name} has some"
+                )
+        return StaticEffort(read_only(effort), share)
 
     def _numbers(self, field: str, robot: Robot) -> Array:
         """Return the numbers of a field, shape (nv,); inf where there is no limit."""

@@ -93,7 +93,9 @@ class Actuation:
         self._tau_within = bind(within, self._tau, *bounds[2:])
         self._qp: LimitedStep | None = None
         if limits.limits is not None or support.size:
-            self._qp = self._limited_step(0)
+            held = limits.limits.static_effort if limits.limits else None
+            rows = 0 if held is None else int(np.isfinite(held.effort).sum())
+            self._qp = self._limited_step(rows)
             # what is delivered where it was solved at once
             self._solved = Delivered(*self._qp.result, LIMITED, 0.0)
 
@@ -102,21 +104,12 @@ class Actuation:
         state, code, self._solve_if = self._state, self._law.code, np.zeros(2)
         if self._limits.limits is None:
             return bind(_unlimited, code, self.found, timed=True)
+        limits, wanted = self._limits, self._wanted.acceleration
         return bind(
-            _check,
-            state.q,
-            state.v,
-            self._wanted.acceleration,
-            state.effort,
-            state.robot.dof_indices,
-            self._limits.motion,
-            self._limits.sent.held,
-            self._limits.bounds,
-            code,
-            self.found,
-            self._solve_if,
-            timed=True,
-        )
+            _check, state.q, state.v, wanted, state.effort, state.robot.dof_indices,
+            limits.motion, limits.sent.held, limits.bounds, code, self.found,
+            self._solve_if, timed=True,
+        )  # fmt: skip
 
     def calls(self) -> list[Callable[[float], Any]]:
         """Return the calls of the time that deliver the law's own acceleration.

@@ -19,10 +19,10 @@ from hsp_control.law import IDENTITY, Resolution
 from hsp_control.law.pseudo_inverse import whiten
 from hsp_control.law.resolution import Factors, Projectors
 
-_ONE_LEVEL, _SEVERAL_LEVELS = 1e-6, 1e-8
-"""Least cost of null-space deviation relative to the first level: for one level and for
-several. The smaller it is, the stricter the priorities; at 1e-6 an error of 1e-3 m/s²
-remains in the task (docs/limits.md)."""
+_LEAST = 1e-6
+"""Least cost of null-space deviation relative to the first level. The smaller it is,
+the stricter the priorities; at 1e-6 an error of 1e-3 m/s² remains in the task
+(docs/limits.md)."""
 
 _OF_ERROR, _MOST = 0.2, 0.1
 """How much more what is below a level costs for an error of the robot's size, relative
@@ -95,31 +95,15 @@ class Directions(NamedTuple):
         m, n = J.shape
         every = len(resolution.ends)
         levels = every - supported
-        whole = _ONE_LEVEL if levels <= 1 else _SEVERAL_LEVELS
+        problem, least = resolution.problem, _LEAST ** (1.0 / max(levels, 1))
         return cls(
-            J,
-            resolution.problem.metric.L,
-            resolution.form,
-            resolution.ends,
-            resolution.problem.task.error,
-            resolution.problem.springs,
-            size,
-            int(supported),
-            whole ** (1.0 / max(levels, 1)),
-            resolution.thresholds,
-            resolution.factors,
-            resolution.projectors,
-            resolution.code,
-            resolution.alone,
-            np.empty((m, n)),
-            np.empty((m, m)),
-            np.empty((3, n, max(n, m))),
-            np.empty((2, max(n, m))),
-            np.empty((n, n)),
-            np.zeros(1, dtype=np.int64),
-            np.empty(n),
-            np.zeros((2, every + 1)),
-        )
+            J, problem.metric.L, resolution.form, resolution.ends, problem.task.error,
+            problem.springs, size, int(supported), least, resolution.thresholds,
+            resolution.factors, resolution.projectors, resolution.code,
+            resolution.alone, np.empty((m, n)), np.empty((m, m)),
+            np.empty((3, n, max(n, m))), np.empty((2, max(n, m))), np.empty((n, n)),
+            np.zeros(1, dtype=np.int64), np.empty(n), np.zeros((2, every + 1)),
+        )  # fmt: skip
 
 
 @kernel

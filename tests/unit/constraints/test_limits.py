@@ -77,7 +77,21 @@ def test_by_default_they_are_the_robots_own() -> None:
     assert np.isinf(limits.acceleration).all()
     assert limits.bandwidth == 10.0
     assert limits.distances == ()
-    assert limits.static_effort is None
+
+
+def test_by_default_gravity_may_overload_no_motor_of_an_arm() -> None:
+    """Where it could ask for more than a motor has in some posture, it is limited."""
+    robot, rng, rest = panda(), np.random.default_rng(1), np.zeros(7)
+    for _ in range(2000):
+        asked = robot.inverse_dynamics(robot.random_configuration(rng), rest, rest)
+        assert (np.abs(asked) < robot.largest_gravity).all()
+    for none in ({}, {"effort": "none"}, {"effort": 1.0, "static_effort": "none"}):
+        assert of(robot, **none).static_effort is None
+    assert of(fingers(), effort=1.0).static_effort is None
+    held = of(robot, effort=[87.0, 87.0, 30.0, 50.0, 12.0, 12.0, 12.0]).static_effort
+    assert held is not None
+    assert held.share == 0.95
+    np.testing.assert_array_equal(np.isfinite(held.effort), np.arange(7) == 2)
 
 
 def test_the_rate_of_efforts_is_one_for_all_joints_of_a_unit() -> None:
@@ -93,16 +107,10 @@ def test_one_number_or_one_for_each() -> None:
     numbers = np.arange(1.0, 8.0)
     some = [1.0, None, np.inf, 4.0, 5.0, 6.0, 7.0]
     limits = of(
-        panda(),
-        effort=3.0,
-        effort_rate=1000.0,
-        velocity=numbers,
-        velocity_margin=0.5,
-        acceleration=some,
-        position=PositionRange(-1.0, numbers),
-        position_margin=0.25,
+        panda(), effort=3.0, effort_rate=1000.0, velocity=numbers, velocity_margin=0.5,
+        acceleration=some, position=PositionRange(-1.0, numbers), position_margin=0.25,
         bandwidth=7.0,
-    )
+    )  # fmt: skip
     np.testing.assert_array_equal(limits.effort, np.full(7, 3.0))
     np.testing.assert_array_equal(limits.effort_rate, np.full(7, 1000.0))
     np.testing.assert_array_equal(limits.velocity, numbers)

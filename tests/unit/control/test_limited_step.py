@@ -30,7 +30,7 @@ def arm(strength: float = 0.5, **options: Any) -> hsp.Controller:
         panda().home(), gains=gains, joints=["panda_joint1"], name="j1", priority=2
     )
     field = 20.0 * hsp.JointCentering()
-    limits = hsp.Limits(effort=Scaled(strength))
+    limits = hsp.Limits(effort=Scaled(strength), static_effort="none")
     return hsp.Controller(panda(), [hand, elbow], field, limits=limits, **options)
 
 
@@ -145,7 +145,7 @@ def test_least_violation_is_the_least(seed: int) -> None:
     joint = int(rng.integers(7))
     q[joint], v[joint] = upper[joint] - 0.02, rng.uniform(1.0, 2.0)
     task = hsp.FramePosition("panda_tcp", gains=hsp.Gains(natural_frequency=10.0))
-    limits = hsp.Limits(effort=2.0, velocity=None)
+    limits = hsp.Limits(effort=2.0, velocity=None, static_effort=None)
     made = hsp.Controller(panda(), [task], limits=limits)
     out = made.compute(0.0, q, v)
     if out.status != Status.RELAXED:

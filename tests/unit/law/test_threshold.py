@@ -40,7 +40,7 @@ def test_it_bounds_what_the_feedback_asks_for_over_its_square(
 ) -> None:
     """‖f‖/ε² ≤ L + f_0/ε_0² for each level, and ε = ε_0 for all that is modest."""
     rng, L, least = np.random.default_rng(seed), 150.0, 0.03
-    everywhere, nowhere = np.ones(9, dtype=bool), np.zeros(9, dtype=bool)
+    everywhere, nowhere = np.ones(9), np.zeros(9)
     modest = 1.3
     sizes = [3, 0, 2, 4]
     ends, thresholds = np.cumsum(sizes), np.zeros(4)
@@ -54,6 +54,10 @@ def test_it_bounds_what_the_feedback_asks_for_over_its_square(
         assert epsilon >= least
         if norm <= modest + 0.99 * L * least**2:
             assert epsilon == least
+    few = np.zeros(4)  # errors of one component: a third of L
+    write_thresholds(asked, 3.0 * everywhere, ends, least, following, few)
+    exact = thresholds > least
+    np.testing.assert_allclose(few[exact] ** 2, 3.0 * thresholds[exact] ** 2)
     for counts, kind in ((everywhere, NOT), (nowhere, following)):
         write_thresholds(asked, counts, ends, least, kind, thresholds)
         assert (thresholds == least).all()
