@@ -1,12 +1,10 @@
 """``hsp live``: control a simulated robot in another process in real time."""
 
 import argparse
-import os
-import signal
 import sys
 from collections.abc import Callable
 from contextlib import ExitStack
-from math import inf, nan
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -52,17 +50,14 @@ _DRY_RUN_OF_A_PLAN = 3.0
 
 def live(options: argparse.Namespace) -> int:
     """Run a loop in real time, print its response times and why it ended."""
-    faults, kill = Faults.parse(options.faults), _parse_kill(options.kill)
+    faults = Faults.parse(options.faults)
     loaded = load_scenario(read(options))
     simulation = loaded.scenario.simulation
     duration = simulation.duration if options.duration is None else options.duration
     if not duration > 0.0:
         raise LiveError(f"--duration {duration:g}; must be positive")
-    if options.robot is not None and (options.faults or options.kill):
-        raise LiveError(
-            "--faults and --kill are for the simulated robot: leave them out with "
-            "--robot"
-        )
+    if options.robot is not None and options.faults:
+        raise LiveError("--faults are for the simulated robot: leave them out")
     if options.robot is not None and options.steer == "simulated":
         raise LiveError(
             "--steer: a page that moves a real robot needs a dead-man's key; say "
@@ -147,8 +142,6 @@ def live(options: argparse.Namespace) -> int:
         with RobotProcess(
             experiment, faults=faults, log=robot_log, log_period=simulation.log_period
         ) as robot:
-            if kill is not None:
-                on_period.append(_kill_action(kill, robot))
             report = run(robot.hardware)
             robot_report = robot.wait()
     link = robot.hardware.link
@@ -173,20 +166,6 @@ def _meta(experiment: Experiment) -> dict[str, Any]:
     }
 
 
-def _parse_kill(text: str | None) -> tuple[str, float] | None:
-    """Return which process to kill, and when [s], from ``robot=1.5``."""
-    if text is None:
-        return None
-    process, _, when = text.partition("=")
-    try:
-        time = float(when)
-    except ValueError:
-        time = nan
-    if process not in {"robot", "controller"} or not time >= 0.0:
-        raise LiveError(f"--kill {text!r}; needs robot=SECONDS or controller=SECONDS")
-    return process, time
-
-
 def _in_turn(
     actions: list[Callable[[float], object]],
 ) -> Callable[[float], object] | None:
@@ -198,23 +177,6 @@ def _in_turn(
             action(t)
 
     return act
-
-
-def _kill_action(
-    setting: tuple[str, float], robot: RobotProcess
-) -> Callable[[float], object]:
-    process, time = setting
-    pending = [True]
-
-    def kill(t: float) -> None:
-        if t >= time and pending:
-            pending.clear()
-            if process == "robot":
-                robot.kill()
-            else:
-                os.kill(os.getpid(), signal.SIGKILL)
-
-    return kill
 
 
 def _times(report: LoopReport, experiment: Experiment) -> Table:

@@ -141,11 +141,6 @@ class RobotProcess:
             self.process.wait()
         return self.report
 
-    def kill(self) -> None:
-        """Kill the process at once, without a safe stop; do not wait."""
-        if self.process is not None:
-            os.kill(self.process.pid, signal.SIGKILL)
-
     def close(self) -> None:
         """Stop the robot and end its process; a second call does nothing."""
         self.hardware.close()

@@ -176,7 +176,6 @@ class ServerReport:
     # by how much the robot's time fell behind real time, because its process did not
     # get the processor [s]
     overrun: float = 0.0
-    never_started: bool = False  # whether no effort arrived
 
 
 Row = Callable[[float, Array, Array, bool], object]
@@ -237,7 +236,6 @@ def serve(
             reason = stop_reason()
             if robot.phase == Phase.WAITING and not efforts:
                 if reason is not None or monotonic() > give_up or robot.halted:
-                    report.never_started = True
                     return report
             elif reason is not None:
                 robot.halt(reason)

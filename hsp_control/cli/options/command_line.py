@@ -264,11 +264,6 @@ def add_live(live: argparse.ArgumentParser) -> None:
         "directions; delay=PACKETS of late ones, and seed=N",
     )
     live.add_argument(
-        "--kill",
-        metavar="WHO=S",
-        help="kill the process of the robot or of the controller after so long",
-    )
-    live.add_argument(
         "--out", type=Path, default=Path("out"), metavar="DIR", help="default: out"
     )
     live.add_argument(

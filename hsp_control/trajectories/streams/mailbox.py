@@ -60,7 +60,7 @@ def listening_inbox(source: str, space: Space) -> Inbox:
     if source in _threads:  # of an inbox that nobody uses: the port is soon free
         _threads[source].join()
     listen = _kind(source).opened(source, space)
-    inbox = Inbox(space)
+    inbox = Inbox(space, source)
     _inboxes[source] = inbox
     _threads[source] = Thread(
         target=listen, args=(ref(inbox),), name=f"stream {source}", daemon=True

@@ -1,5 +1,6 @@
 """Poses of ROS 2 as targets: what of a pose a stream takes, and what it refuses."""
 
+import re
 from collections.abc import Callable
 from time import monotonic
 from typing import Any
@@ -43,7 +44,7 @@ def opened(space: Space, options: str = "") -> tuple[Inbox, Publisher[PoseStampe
     return inbox, publisher
 
 
-def until(true: Callable[[], bool]) -> None:
+def until(true: Callable[[], Any]) -> None:
     end = monotonic() + LONG
     while not true():
         assert monotonic() < end
@@ -68,6 +69,9 @@ def test_a_stream_takes_what_it_needs_of_a_pose(space: Space, value: Any) -> Non
     publisher.send(pose(stamp=0, frame=""))
     until(lambda: inbox.count == 2)
     assert inbox.after(1, take=True)[0].message.t is None
+    other = Node(DOMAIN).publisher(publisher.topic, PoseStamped)
+    until(lambda: publisher.send(pose()) or other.send(pose()) or inbox.rejected)
+    assert re.search(r"publisher \d+ sends while publisher \d+ does", inbox.reason)
 
 
 @pytest.mark.parametrize(
