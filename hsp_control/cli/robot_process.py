@@ -21,11 +21,12 @@ from hsp_control.config import Experiment, load_experiment
 from hsp_control.config.streams import without_sources
 from hsp_control.control.measurement import LogChannel
 from hsp_control.control.output import ControlOutput
+from hsp_control.live.hardware import installed
 from hsp_control.live.link import Faults, Kind, Link
 from hsp_control.live.live_log import DueRows, live_channels
 from hsp_control.live.settings import LiveSettings
 from hsp_control.live.simulated_robot import SimulatedRobot
-from hsp_control.live.udp import CLOSED_BY_LOOP, SensorLayout, UdpHardware, serve
+from hsp_control.live.udp import CLOSED_BY_LOOP, Row, SensorLayout, UdpHardware, serve
 from hsp_control.robot import RobotState
 from hsp_control.simulation.limit_excess import LimitExcess
 from hsp_control.simulation.log_writer import LogWriter
@@ -61,6 +62,7 @@ class RobotProcess:
         faults: Faults | None = None,
         log: str | Path | None = None,
         log_period: float = 0.01,
+        cameras: str | None = None,
     ) -> None:
         check_live(experiment)
         faults = faults or Faults()
@@ -78,6 +80,7 @@ class RobotProcess:
             "faults": faults.as_json(),
             "log": None if log is None else str(Path(log).absolute()),
             "log_period": log_period,
+            "cameras": cameras,
             "peer": self.hardware.address,
             "session": self.hardware.session,
         }
@@ -196,10 +199,12 @@ def _run(settings: dict[str, Any], stop_reason: Any) -> dict[str, Any]:
         stream=2,
     )
     log = _RobotLog(experiment, robot, settings) if settings["log"] else None
+    rows: list[Row] = [log.row] if log else []
+    if settings["cameras"]:
+        address, known = installed("--cameras", settings["cameras"], "cameras")
+        rows.append(known.load()(address, robot.plant))
     _print(READY)
-    served = serve(
-        robot, link, stop_reason=stop_reason, on_row=log.row if log else None
-    )
+    served = serve(robot, link, stop_reason=stop_reason, on_rows=rows)
     link.send(Kind.BYE)  # its sequence number tells the loop how many packets it lost
     reason = robot.reason or "no effort arrived"
     report: dict[str, Any] = {

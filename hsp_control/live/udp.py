@@ -1,7 +1,7 @@
 """A robot that is connected by UDP: the loop's end, and that of a simulated one."""
 
 import secrets
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from time import monotonic, sleep
@@ -189,7 +189,7 @@ def serve(
     *,
     stop_reason: Callable[[], str | None],
     start_timeout: float = 60.0,
-    on_row: Row | None = None,
+    on_rows: Sequence[Row] = (),
 ) -> ServerReport:
     """Run a robot in real time, until it has stopped and was held.
 
@@ -205,7 +205,7 @@ def serve(
         link: The connection; its peer is known.
         stop_reason: Called every period; returns a reason to stop, or None.
         start_timeout: Longest time to wait for the first effort [s].
-        on_row: Called after the state was sent, in the rest of the period.
+        on_rows: Called after the state was sent, in the rest of the period.
 
     Returns:
         The counts.
@@ -246,7 +246,8 @@ def serve(
                 link.send(Kind.STATE, state, t=robot.t, phase=int(robot.phase))
             state_sequence = link.counts["sent"]
             done = robot.done
-            if on_row is not None and robot.t > t:
-                on_row(t, q, v, done)
+            if robot.t > t:
+                for on_row in on_rows:
+                    on_row(t, q, v, done)
             if done:
                 return report

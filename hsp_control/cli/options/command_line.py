@@ -251,6 +251,11 @@ def add_live(live: argparse.ArgumentParser) -> None:
         help="tell the state: udp://HOST:PORT to a policy, ros2://NAME to watchers",
     )
     live.add_argument(
+        "--cameras",
+        metavar="NAME://ADDRESS",
+        help="show a MuJoCo scene's cameras: http://HOST:PORT has pictures /CAMERA.jpg",
+    )
+    live.add_argument(
         "--duration",
         type=float,
         metavar="S",

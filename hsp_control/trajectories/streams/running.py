@@ -29,15 +29,11 @@ from hsp_control.trajectories.streams.segments import (
 )
 
 _WINDOW = 2.0  # the sender's clock is compared with the controller's over this time [s]
-_NEW_CLOCK = 1.0
-"""A sender whose time jumps back by more than this has started again [s]."""
-_KEPT = 1.0
-"""Waypoints that were passed are kept for this time, to estimate velocities, and so are
-pieces [s]: an integrator may ask for earlier times."""
+_NEW_CLOCK = 1.0  # a sender's time that jumps back by more shows another start [s]
+# Waypoints that were passed are kept so long, to estimate velocities, and so are pieces
+_KEPT = 1.0  # [s]: an integrator may ask for earlier times.
 MOST = 4096  # most waypoints that are kept
-_APART = 0.01
-"""Neighbours for derivatives are at least so far in time [s]: of waypoints that are
-closer, noise would be most of the difference."""
+_APART = 0.01  # between neighbours for derivatives [s]; closer ones differ by noise
 
 
 class SenderClock:
