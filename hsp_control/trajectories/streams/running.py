@@ -367,10 +367,10 @@ class RunningStream:
                 return smooth
         goal = goals.passed(last, policy.smoothing)
         end = goal.time + (0.0 if self._ends_at_rest else policy.extrapolation)
-        if t < end and goal.rate.any():
-            return self._meet(t, state, goal, end)
-        if not self._ends_at_rest:
+        if goal.rate.any() and not self._ends_at_rest and t >= end:
             return self._to_rest(t, state)
+        if goal.rate.any() and t < end:
+            return self._meet(t, state, goal, end)
         if _on_line(state, goal.at_rest(), t):
             return self._to_rest(t, state)
         return self._joiner.fastest(t, state, goal.at_rest())
