@@ -209,22 +209,6 @@ def test_a_recorded_file_is_followed_and_its_log_repeats_the_run(
     assert np.array_equal(hsp.load_experiment(yaml).run().q, run.q)
 
 
-def test_what_python_sends_is_in_the_log_and_repeats_the_run(tmp_path: Path) -> None:
-    stream = hsp.StreamPose(policy="extrapolate")
-    experiment = hsp.Experiment(
-        "panda",
-        [hsp.FramePose("panda_tcp", stream)],
-        simulation=hsp.load_experiment(config({"type": "stream"})).scenario.simulation,
-    )
-    start = hand_pose(PANDA)
-    run = experiment.run(
-        on_row=every(0.05, lambda t: stream.send(moved(start, t), t=t))
-    )
-    assert run["stream.panda_tcp.taken"][-1] == 12
-    again = hsp.load_experiment(run.save(tmp_path / "run.npz")).run()
-    assert np.array_equal(run.q, again.q)
-
-
 @pytest.mark.parametrize(("trajectory", "message"), [
     ({"source": "udp://:5005"}, r"yaml:1: tasks.hand.trajectory: source is .*HOST"),
     ({"source": "none.jsonl"}, r"tasks.hand.trajectory.*none.jsonl: the recording"),

@@ -8,7 +8,7 @@ from urllib.request import urlopen
 
 import numpy as np
 import pytest
-from mjcf_texts import CELL
+from mjcf_texts import ARM, CELL
 from PIL import Image
 
 import hsp_control as hsp
@@ -22,23 +22,21 @@ pytest.importorskip("OpenGL")
 pytestmark = pytest.mark.process
 
 CAMERA = '<light pos="0 0 3"/><camera name="above" pos=".3 .3 .5"/></worldbody>'
-CONFIG = {
-    "robot": {"mjcf": "cell.xml", "root": "base", "joints": ["j1", "j2", "j3", "j4"]},
-    "tasks": {"tip": {"type": "frame_position", "frame": "tip"}},
-    "plant": "mujoco_scene",
-    "simulation": {"duration": 0.1, "control_period": 0.002},
-    "live": {"missing": 1000, "age": 5.0, "watchdog": 1000},
-}
 
 
 @pytest.fixture
-def cell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> hsp.Experiment:
+def cell(tmp_path: Path) -> hsp.Experiment:
     """An arm beside a ball, below a camera."""
-    monkeypatch.chdir(tmp_path)
     text = CELL.replace("</worldbody>", CAMERA).replace('size=".03" ', 'size=".09" ')
-    Path("cell.xml").write_text(text)
-    mjcf = {"mjcf": str(tmp_path / "cell.xml")}
-    return hsp.load_experiment({**CONFIG, "robot": {**CONFIG["robot"], **mjcf}})
+    mjcf = tmp_path / "cell.xml"
+    mjcf.write_text(text)
+    return hsp.load_experiment({
+        "robot": {"mjcf": str(mjcf), "root": "base", "joints": ARM},
+        "tasks": {"tip": {"type": "frame_position", "frame": "tip"}},
+        "plant": "mujoco_scene",
+        "simulation": {"duration": 0.1, "control_period": 0.002},
+        "live": {"missing": 1000, "age": 5.0, "watchdog": 1000},
+    })  # fmt: skip
 
 
 @pytest.fixture
@@ -92,14 +90,8 @@ def test_a_robot_in_its_own_process_is_seen(cell: hsp.Experiment, address: str) 
             if t > 0.05 and not later:
                 later.append(seen(address, "above.jpg")[0])
 
-        settings = cell.scenario.live
-        run_loop(
-            cell.controller,
-            robot.hardware,
-            duration=0.1,
-            settings=settings,
-            on_period=look,
-        )
+        options = {"settings": cell.scenario.live, "on_period": look}
+        run_loop(cell.controller, robot.hardware, duration=0.1, **options)
         assert later[0] >= 0.05
     with pytest.raises(OSError, match="refused"):
         seen(address, "above.jpg")

@@ -217,11 +217,15 @@ def test_the_limiter_keeps_the_rate_from_both(seed: int, compensates: bool) -> N
         changed = limiter.robot_has(known)
         assert changed is (not np.array_equal(known, before))
         assert limiter.apply(100.0 * rng.standard_normal(7), start())
+        np.testing.assert_allclose(limiter.applied, limiter.sent + borne, atol=1e-12)
         assert (np.abs(limiter.sent + borne) <= most + 1e-9).all()
         true = np.clip(known, -most - borne, most - borne)
         assert (np.abs(limiter.sent - true) <= step + 1e-9).all()
         near = np.abs(true - before) <= 2.0 * step
         assert (np.abs(limiter.sent - before)[near] <= step + 1e-9).all()
+    before = limiter.sent.copy()
+    assert not limiter.apply(np.full(7, np.nan), start())
+    np.testing.assert_array_equal(limiter.sent, before)
 
 
 def test_a_lost_effort_corrects_the_momentum_observer() -> None:
