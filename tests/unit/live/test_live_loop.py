@@ -52,10 +52,6 @@ AT_REST = 0.02
 """Speeds of a robot that holds: below twice the speed at which damping ends [rad/s]."""
 
 
-def gravity(q: Array) -> Array:
-    return panda().inverse_dynamics(q, np.zeros(7), np.zeros(7))
-
-
 def assert_held(rig: Rig, report: LoopReport) -> None:
     """The loop brought the robot itself to rest before it let go."""
     assert report.phase is Phase.HOLDING

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from live_rigs import PERIOD, Array, Rig, law, panda, start, watched
+from live_rigs import PERIOD, Array, Rig, gravity, law, panda, start, watched
 
 from hsp_control import Gains, Robot
 from hsp_control.control.compensation import Command, Compensation, MomentumObserver
@@ -23,10 +23,6 @@ from hsp_control.simulation.plants import IntegratedPlant, RigidBodyPlant
 
 RATE = 500.0
 RATED = LiveSettings(effort_rate=RATE)
-
-
-def gravity(q: Array) -> Array:
-    return panda().inverse_dynamics(q, np.zeros(7), np.zeros(7))
 
 
 def fed(robot: SimulatedRobot, efforts: Iterable[Array]) -> Array:

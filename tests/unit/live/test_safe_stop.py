@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from live_rigs import PERIOD, panda, start, watched
+from live_rigs import PERIOD, gravity, panda, start, watched
 from numpy.typing import NDArray
 
 from hsp_control.live import LiveSettings, Phase, SafeStop, StopSettings
@@ -24,10 +24,6 @@ seeds = st.integers(0, 2**32 - 1)
 def at_random(seed: int) -> tuple[Array, Array]:
     rng = np.random.default_rng(seed)
     return panda().random_configuration(rng), rng.standard_normal(7)
-
-
-def gravity(q: Array) -> Array:
-    return panda().inverse_dynamics(q, np.zeros(7), np.zeros(7))
 
 
 @given(seed=seeds, limited=st.booleans())
