@@ -41,10 +41,8 @@ from hsp_control.live.operator_requests import stop_signals
 from hsp_control.play.live_loop import PAGE_ENDED
 from hsp_control.simulation import Rollout
 
-_DRY_RUN = 0.5
-"""Duration of the dry run before the real-time run [s]: it compiles the kernels."""
-_DRY_RUN_OF_A_PLAN = 3.0
-"""The same with a plan [s], which has to come to its first steps."""
+_DRY_RUN = 0.5  # duration of the run before that compiles the kernels [s]
+_DRY_RUN_OF_A_PLAN = 3.0  # the same with a plan, which has to come to its steps [s]
 
 
 def live(options: argparse.Namespace) -> int:

@@ -170,12 +170,8 @@ CLOSED_BY_LOOP = "the loop closed the connection"
 class ServerReport:
     """What `serve` counted."""
 
-    # number of efforts that were ignored, because they were computed from a state older
-    # than the watchdog's limit
-    outdated: int = 0
-    # by how much the robot's time fell behind real time, because its process did not
-    # get the processor [s]
-    overrun: float = 0.0
+    outdated: int = 0  # efforts that answered a state beyond the watchdog's limit
+    overrun: float = 0.0  # by how much its time fell behind real time [s]
 
 
 Row = Callable[[float, Array, Array, bool], object]

@@ -25,7 +25,10 @@ from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.simulation.plants import ImperfectPlant, Plant
 from hsp_control.simulation.plants.mujoco_plant import MujocoEngine
 
-_FORMATS = {"jpg": {"format": "JPEG", "quality": 95}, "png": {"format": "PNG"}}
+_FORMATS: dict[str, dict[str, Any]] = {
+    "jpg": {"format": "JPEG", "quality": 95},
+    "png": {"format": "PNG"},
+}
 _SIZE = {"width": 640, "height": 480}
 _LARGEST = 2048
 """Most pixels of a side."""
@@ -69,7 +72,7 @@ def show(address: str, plant: Plant) -> Callable[..., object]:
     kind = int(mujoco.mjtState.mjSTATE_INTEGRATION)
     anew = multiprocessing.get_context("spawn")
     memory = anew.RawArray(ctypes.c_double, mujoco.mj_stateSize(model, kind))
-    state, lock = np.frombuffer(memory), anew.Lock()
+    state, lock = np.ctypeslib.as_array(memory), anew.Lock()
 
     def tell(*_: object) -> None:
         if lock.acquire(block=False):  # who draws has it for microseconds
@@ -129,7 +132,7 @@ class _Pictures:
         self.model = mujoco.MjModel.from_binary_path(name, {name: compiled})
         self.model.vis.global_.offwidth = self.model.vis.global_.offheight = _LARGEST
         self._data = mujoco.MjData(self.model)
-        self._state, self._lock = np.frombuffer(memory), lock
+        self._state, self._lock = np.ctypeslib.as_array(memory), lock
         self._renderers: dict[tuple[int, int], Any] = {}
         self.cameras = [self.model.camera(k).name for k in range(self.model.ncam)]
         self.drawn(0, **_SIZE)
@@ -173,7 +176,7 @@ class _Handler(BaseHTTPRequestHandler):
             return
         t, picture = self.server.pictures.drawn(camera, **size)
         text = BytesIO()
-        Image.fromarray(picture).save(text, **_FORMATS[ending])  # type: ignore[arg-type]
+        Image.fromarray(picture).save(text, **_FORMATS[ending])
         self.send_response(200)
         self.send_header("Content-Type", f"image/{_FORMATS[ending]['format']}".lower())
         self.send_header("Content-Length", str(text.tell()))
