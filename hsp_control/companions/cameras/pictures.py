@@ -34,6 +34,7 @@ _LARGEST = 2048
 """Most pixels of a side."""
 _SIZES = 4
 """Of how many sizes pictures are drawn without a new start."""
+_INSTALL = "(pip install 'hsp_control[cameras]'; on Debian and Ubuntu also libegl1)"
 
 
 def show(address: str, plant: Plant) -> Callable[..., object]:
@@ -106,7 +107,10 @@ def _serve(
         pictures = _Pictures(compiled, memory, lock)
         server = _Server((host, port), _Handler)
         server.pictures = pictures
-    except (ImportError, RuntimeError, OSError, AttributeError) as error:
+    except ImportError as error:
+        ready.send(f"{error} {_INSTALL}")
+        return
+    except (RuntimeError, OSError, AttributeError) as error:
         ready.send(str(error) or type(error).__name__)
         return
     ready.send("")
