@@ -1,6 +1,7 @@
 """What another process sees through the cameras of a MuJoCo scene."""
 
 import socket
+from ctypes.util import find_library
 from io import BytesIO
 from pathlib import Path
 from urllib.error import HTTPError
@@ -19,7 +20,10 @@ from hsp_control.live import run_loop
 
 pytest.importorskip("mujoco")
 pytest.importorskip("OpenGL")
-pytestmark = pytest.mark.process
+pytestmark = [
+    pytest.mark.process,
+    pytest.mark.skipif(not find_library("EGL"), reason="needs libegl1"),
+]
 
 CAMERA = '<light pos="0 0 3"/><camera name="above" pos=".3 .3 .5"/></worldbody>'
 
