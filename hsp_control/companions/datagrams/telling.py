@@ -66,7 +66,7 @@ class Teller:
     """Sends the state of a loop to one address; `run_loop` calls it as ``on_period``.
 
     Nobody need listen, and nothing waits: what cannot be sent is dropped, and said
-    once. ``docs/companions/datagrams.md`` has the keys.
+    once. ``docs/companions/policies.md`` has the keys.
     """
 
     def __init__(self, to: Any, rate: float, source: EffortSource) -> None:

@@ -93,20 +93,6 @@ def test_wrong_poses_are_counted_and_dropped(
     until(lambda: inbox.count == 1)
 
 
-def test_a_task_s_reference_goes_where_the_topic_says() -> None:
-    topic, _, _ = fresh()
-    source = f"ros2:/{topic}?domain={DOMAIN}"
-    stream = Stream([0.4, 0.0, 0.5], source=source, delay=0.0).anchored(None)
-    stream.sample(0.0)
-    inbox = stream._mailbox.inbox
-    publisher = Node(DOMAIN).publisher(topic, PoseStamped)
-    publisher.send(pose(stamp=0, x=0.45))
-    until(lambda: inbox.count == 1)
-    for t in np.linspace(0.01, 5.0, 500):
-        reached = stream.sample(float(t))
-    assert np.allclose(reached.position, [0.45, 0.1, 0.5], atol=1e-9)
-
-
 @pytest.mark.parametrize(
     ("make", "message"),
     [
