@@ -1,8 +1,8 @@
 """Targets from other processes: JSON datagrams; a port may be shared by streams."""
 
 import socket
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from functools import partial
 from ipaddress import ip_address
 from threading import Lock
@@ -115,16 +115,18 @@ class _Port:
             inbox.note_silence(now)
         if text is None:
             return
+        sender = f"{host}:{port}"
         try:
             heard = _parts_of(text, there)
             for name in heard:
-                there[name].check_sender(f"{host}:{port}", now)
+                with _naming(name):
+                    there[name].check_sender(sender, now)
         except StreamError as error:
             for k, inbox in enumerate(there.values()):
                 inbox.reject(str(error), aloud=k == 0)
             return
         for name, message in heard.items():
-            there[name].hear(f"{host}:{port}", now, message)
+            there[name].hear(sender, now, message)
 
     def close(self) -> None:
         """Close the port."""
@@ -152,12 +154,19 @@ def _parts_of(text: bytes, inboxes: Mapping[str, Inbox]) -> dict[str, dict[str, 
             )
         if isinstance(message, Mapping):
             message = {"t": data.get("t"), **message}
-        try:
+        with _naming(name):
             message_of(message, inboxes[name].space)
-        except StreamError as error:
-            raise StreamError(f"{name}: {error}") from None
         found[name] = message
     return found
+
+
+@contextmanager
+def _naming(part: str) -> Iterator[None]:
+    """Put a part's name before what is wrong with it."""
+    try:
+        yield
+    except StreamError as error:
+        raise StreamError(f"{part}: {error}" if part else str(error)) from None
 
 
 _ports: dict[tuple[str, int], _Port] = {}

@@ -204,6 +204,7 @@ def test_one_stream_of_two_poses_or_two_senders_lead_two_hands(
         if senders == 2:  # each keeps to its own hand
             sender.sendto(data, ("127.0.0.1", port))
             wait_until(lambda: all(each._mailbox.inbox.rejected for each in streams))
+            assert re.match(r"right: \S+ sends while", streams[0].last_rejection)
 
     run = experiment.run(on_row=lead)
     other.close()
