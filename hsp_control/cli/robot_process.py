@@ -107,6 +107,7 @@ class RobotProcess:
         assert self.process.stdin is not None
         assert self.process.stdout is not None
         ready: list[Any] = [True]
+        answer = b""
         try:
             line = json.dumps(self._settings).encode() + b"\n"
             self.process.stdin.write(line)
@@ -114,11 +115,11 @@ class RobotProcess:
             ready, _, _ = select([self.process.stdout], [], [], timeout)
             answer = self.process.stdout.readline() if ready else b""
         except OSError:
-            answer = b""
-        if answer.strip() != b"ready":
+            pass
+        if (told := answer.decode().strip()) != READY:
             self.close()
-            fault = "did not start" if ready else f"did not start in {timeout:g} s"
-            raise HardwareError(f"the simulated robot {fault}")
+            late = "" if ready else f" in {timeout:g} s"
+            raise HardwareError(told or f"the simulated robot did not start{late}")
 
     def wait(self, timeout: float = 15.0) -> dict[str, Any] | None:
         """Wait until the robot has stopped and its process has ended."""
@@ -135,8 +136,10 @@ class RobotProcess:
             if not data:
                 break
             output += data
-        if output:
+        if output.startswith(b"{"):
             self.report = json.loads(output)
+        elif output:
+            print(f"hsp: {output.decode().strip()}", file=sys.stderr)
         try:
             self.process.wait(max(end - monotonic(), 0.1))
         except subprocess.TimeoutExpired:
@@ -157,12 +160,12 @@ READY = "ready"
 
 
 def main() -> int:
-    """Run the robot until it has stopped; return 0, or 2 after one error message.
+    """Run the robot until it has stopped; return 0, or 2 if it cannot.
 
     This is the robot's process. It reads its settings from its standard input, one line
     of JSON. The input then stays open; when the parent process dies it is closed, and
     the robot stops itself, completes its log and ends. It writes two lines to its
-    standard output: ``ready``, and at the end its report, as JSON.
+    standard output: ``ready``, and at the end its report, as JSON, or what is wrong.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C stops the loop only
     terminated = threading.Event()
@@ -182,7 +185,7 @@ def main() -> int:
     try:
         report = _run(settings, stop_reason)
     except HspControlError as error:
-        print(f"hsp: the simulated robot: {error}", file=sys.stderr)
+        _print(f"the simulated robot: {error}")
         return 2
     _print(json.dumps(report))
     return 0
