@@ -4,12 +4,15 @@
 
 A Panda's hand on springs presses on a table of MuJoCo's. A scripted policy sees where
 the wipe should be, thinks for 50 to 800 ms, and emits 8 to 50 waypoints; each chunk is
-some millimetres off the one before, one comes late, and in the end the policy dies.
-Beside the policies of `hsp.Stream` stands what others do with waypoints. Writes a table
-into benchmarks/results/chunks.md.
+some millimetres off the one before, one comes late, and in the end the policy dies. So
+does a trained one, whose chunks `chunks_trained.py` has recorded. An operator leads the
+hand at 60 Hz, with a clutch. Beside the policies of `hsp.Stream` stands what others do
+with waypoints. Writes a table into benchmarks/results/chunks.md.
 """
 
 from collections.abc import Callable
+from functools import cache
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,30 +24,16 @@ from hsp_control.simulation import SimulationSettings
 from hsp_control.trajectories import Trajectory, TrajectorySample
 
 DURATION, PERIOD = 8.0, 0.001  # [s]
-BEGIN, DEATH = (
-    1.5,
-    5.0,
-)  # measured from here on; the policy emits nothing after that [s]
+BEGIN = 1.5  # measured from here on [s]
+DEATH = 5.0  # the policy emits nothing after that [s]
+OPEN, CLOSED = 2.5, 3.5  # when the operator's clutch opens, and closes again [s]
+MOVED = np.array([0.0, 0.06, 0.0])  # how far the operator's hand is then [m]
 DEPTH = 0.008  # of the targets below where the hand touches the table [m]
 LATE = 4  # number of the chunk that takes three times as long
 BAND = (4.0, 40.0)  # normal forces that wipe [N]
 
 
-class Case(NamedTuple):
-    """A policy's habits: its waypoints, their rate, and its times of thinking."""
-
-    waypoints: int
-    rate: float  # of the waypoints [1/s]
-    every: float  # time from chunk to chunk [s]
-    inference: float  # time from what is seen to the chunk [s]
-
-
-CASES = [
-    Case(8, 10.0, 0.3, 0.05),
-    Case(16, 20.0, 0.4, 0.2),
-    Case(50, 50.0, 0.4, 0.3),
-    Case(50, 20.0, 1.0, 0.8),
-]
+RECORDED = Path(__file__).with_name("chunks_trained.npz")
 
 
 class Chunk(NamedTuple):
@@ -82,16 +71,90 @@ def wipe(t: float, start: Array) -> Array:
     return np.asarray(start + np.array([*away, -DEPTH * begun]))
 
 
-def chunks(case: Case, start: Array) -> list[Chunk]:
-    """Return the chunks of a policy, in the order in which they arrive."""
-    rng, found = np.random.default_rng(0), []
-    for number, made in enumerate(np.arange(0.0, DEATH, case.every)):
-        times = np.arange(case.waypoints) / case.rate
-        seam = rng.uniform(-1.0, 1.0, 3) * [0.004, 0.004, 0.002]
-        values = np.array([wipe(made + each, start) + seam for each in times])
-        thinks = case.inference * (3.0 if number == LATE else rng.uniform(0.9, 1.1))
-        found.append(Chunk(made + thinks, made, times, values))
+class Case(NamedTuple):
+    """Chunks, and the path that they mean."""
+
+    name: str
+    chunks: Callable[[Array], list[Chunk]]  # of where the hand starts
+    path: Callable[[float, Array], Array] = wipe
+    delay: float = 0.0  # of `hsp.Stream` [s]
+
+
+def scripted(waypoints: int, rate: float, every: float, inference: float) -> Case:
+    """Return a scripted policy's chunks, in the order in which they arrive.
+
+    Args:
+        waypoints: How many each has.
+        rate: Of the waypoints [1/s].
+        every: Time from chunk to chunk [s].
+        inference: Time from what is seen to the chunk [s].
+    """
+
+    def chunks(start: Array) -> list[Chunk]:
+        rng, found = np.random.default_rng(0), []
+        for number, made in enumerate(np.arange(0.0, DEATH, every)):
+            times = np.arange(waypoints) / rate
+            seam = rng.uniform(-1.0, 1.0, 3) * [0.004, 0.004, 0.002]
+            values = np.array([wipe(made + each, start) + seam for each in times])
+            thinks = inference * (3.0 if number == LATE else rng.uniform(0.9, 1.1))
+            found.append(Chunk(made + thinks, made, times, values))
+        return sorted(found, key=lambda each: each.at)
+
+    name = (
+        f"{waypoints} at {rate:g} Hz, each {1e3 * every:.0f} ms, "
+        f"{1e3 * inference:.0f} ms old"
+    )
+    return Case(name, chunks)
+
+
+@cache
+def recorded() -> list[Chunk]:
+    """Return the chunks of a trained policy, from where the hand starts."""
+    with np.load(RECORDED) as kept:
+        rows = zip(kept["at"], kept["made"], kept["values"], strict=True)
+        return [Chunk(at, made, kept["times"], x) for at, made, x in rows]
+
+
+def trained(start: Array) -> list[Chunk]:
+    """Return these chunks in order of arrival."""
+    found = [each._replace(values=start + each.values) for each in recorded()]
     return sorted(found, key=lambda each: each.at)
+
+
+def intended(t: float, start: Array) -> Array:
+    """Return where the trained policy wanted the hand, when it last looked."""
+    chunk = max((c for c in recorded() if c.made <= t), key=lambda c: c.made)
+    columns = [np.interp(t - chunk.made, chunk.times, x) for x in chunk.values.T]
+    return np.asarray(start + columns)
+
+
+def clutched(t: float, start: Array) -> Array:
+    """Return where an operator's hand is, which moves on while the clutch is open."""
+    return wipe(t, start) + MOVED * (t >= CLOSED)
+
+
+def operator(start: Array) -> list[Chunk]:
+    """Return the goals of an operator, 20 to 30 ms old."""
+    rng, found = np.random.default_rng(0), []
+    for made in np.arange(0.0, DEATH, 1.0 / 60.0):
+        if not OPEN <= made < CLOSED:
+            value = clutched(made, start)[None]
+            found.append(
+                Chunk(made + rng.uniform(0.02, 0.03), made, np.zeros(1), value)
+            )
+    return found
+
+
+CASES = [
+    scripted(8, 10.0, 0.3, 0.05),
+    scripted(16, 20.0, 0.4, 0.2),
+    scripted(50, 50.0, 0.4, 0.3),
+    scripted(50, 20.0, 1.0, 0.8),
+    Case("trained, 16 at 20 Hz, each 300 ms, 80 to 400 ms old", trained, intended),
+    Case(
+        "an operator at 60 Hz, whose clutch closes 60 mm away", operator, clutched, 0.05
+    ),
+]
 
 
 Way = Callable[[float, Array, Array], tuple[Array, Array]]
@@ -143,22 +206,21 @@ OTHERS: dict[str, Callable[[], Way]] = {
 OURS = ("interpolate", "extrapolate")  # with chunks latest does as interpolate
 
 
-def followed(case: Case, way: str) -> tuple[str, ...]:
-    """Return a row of the table: one way to follow a policy's chunks."""
+def start_of_wipe() -> Array:
+    """Return where the hand starts, on the table, shape (3,) [m]."""
     wiped = hsp.load_experiment("forces/panda_wipe")
-    start = wiped.robot.state(0.0, wiped.q0, wiped.v0).position("panda_tcp").copy()
-    left, other = chunks(case, start), OTHERS.get(way, OTHERS["hold"])()
-    last = max(left, key=lambda each: each.made).values[-1]
-    now = np.array([start, np.zeros(3)])
-    reference: Trajectory = (
-        hsp.Stream(policy=way, delay=0.0) if way in OURS else Given(now)
-    )
+    return wiped.robot.state(0.0, wiped.q0, wiped.v0).position("panda_tcp").copy()
+
+
+def wiping_with(reference: Trajectory) -> hsp.Experiment:
+    """Return the experiment whose hand follows a reference over the table."""
+    wiped = hsp.load_experiment("forces/panda_wipe")
     spring, stiff = hsp.Impedance(2000.0), hsp.Impedance(60.0)
     tasks: list[hsp.Task] = [
         hsp.FramePosition("panda_tcp", reference, impedance=spring, name="hand"),
         hsp.FrameOrientation("panda_tcp", impedance=stiff, name="upright"),
     ]
-    experiment = hsp.Experiment(
+    return hsp.Experiment(
         wiped.robot,
         tasks,
         hsp.TargetPosture("start"),
@@ -168,6 +230,18 @@ def followed(case: Case, way: str) -> tuple[str, ...]:
             duration=DURATION, control_period=PERIOD, log_period=PERIOD
         ),
     )
+
+
+def followed(case: Case, way: str) -> tuple[str, ...]:
+    """Return a row of the table: one way to follow a policy's chunks."""
+    start = start_of_wipe()
+    left, other = case.chunks(start), OTHERS.get(way, OTHERS["hold"])()
+    last = max(left, key=lambda each: each.made).values[-1]
+    now = np.array([start, np.zeros(3)])
+    reference: Trajectory = (
+        hsp.Stream(policy=way, delay=case.delay) if way in OURS else Given(now)
+    )
+    experiment = wiping_with(reference)
     points, rows, newest = np.array([[-1.0, *start]]), iter(range(10**9)), -1.0
 
     def deliver(_: object) -> None:
@@ -175,7 +249,9 @@ def followed(case: Case, way: str) -> tuple[str, ...]:
         t = PERIOD * next(rows)
         while left and left[0].at <= t:
             at, made, times, values = left.pop(0)
-            if isinstance(reference, hsp.Stream):  # its clock is that of its messages
+            if isinstance(reference, hsp.Stream) and len(times) == 1:
+                reference.send(values[0], t=made)
+            elif isinstance(reference, hsp.Stream):  # its clock is that of its messages
                 reference.send_chunk(values, made + times - at, t=at)
             elif made > newest:  # nobody goes back to an older chunk
                 newest, new = made, np.column_stack([made + times, values])
@@ -184,27 +260,23 @@ def followed(case: Case, way: str) -> tuple[str, ...]:
         now[:] = other(t, points, hand)
 
     run = experiment.run(on_row=deliver)
-    return name_of(case), way, *figures(run, start, last)
+    return case.name, way, *figures(run, case.path, start, last)
 
 
-def name_of(case: Case) -> str:
-    """Return a policy's name."""
-    return (
-        f"{case.waypoints} at {case.rate:g} Hz, each {1e3 * case.every:.0f} ms, "
-        f"{1e3 * case.inference:.0f} ms old"
-    )
-
-
-def figures(run: hsp.Rollout, start: Array, last: Array) -> tuple[str, ...]:
+def figures(
+    run: hsp.Rollout, path: Callable[[float, Array], Array], start: Array, last: Array
+) -> tuple[str, ...]:
     """Return what a run shows: the force, the path, the efforts, and the end."""
     t, hand = run.t, run["task.hand.actual"]
     force = np.abs(run["plant.contact.panda_tcp.force"][:, 2])
     wiping = (t > BEGIN) & (t < DEATH)
+    if path is clutched:
+        wiping &= (t < OPEN) | (t > CLOSED + 0.5)
     pressed = np.mean((force[wiping] > BAND[0]) & (force[wiping] < BAND[1]))
     delays = np.arange(0.0, 0.6, 0.01)
 
     def error(delay: float) -> float:
-        wanted = np.array([wipe(each - delay, start) for each in t[wiping][::10]])
+        wanted = np.array([path(each - delay, start) for each in t[wiping][::10]])
         away = (hand[wiping][::10] - wanted)[:, :2]
         return float(np.sqrt(np.mean((away**2).sum(axis=1))))
 

@@ -1,12 +1,10 @@
 """``hsp live``: control a simulated robot in another process in real time."""
 
 import argparse
-import os
-import signal
 import sys
 from collections.abc import Callable
 from contextlib import ExitStack
-from math import inf, nan
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -40,27 +38,24 @@ from hsp_control.live import (
 )
 from hsp_control.live.hardware import AdaptingHardware, LocatedHardware
 from hsp_control.live.operator_requests import stop_signals
-from hsp_control.live.report import Quantiles
 from hsp_control.play.live_loop import PAGE_ENDED
 from hsp_control.simulation import Rollout
 
-_DRY_RUN = 0.5
-"""Duration of the dry run before the real-time run [s]: it compiles the kernels."""
-_DRY_RUN_OF_A_PLAN = 3.0
-"""The same with a plan [s], which has to come to its first steps."""
+_DRY_RUN = 0.5  # duration of the run before that compiles the kernels [s]
+_DRY_RUN_OF_A_PLAN = 3.0  # the same with a plan, which has to come to its steps [s]
 
 
 def live(options: argparse.Namespace) -> int:
     """Run a loop in real time, print its response times and why it ended."""
-    faults, kill = Faults.parse(options.faults), _parse_kill(options.kill)
+    faults = Faults.parse(options.faults)
     loaded = load_scenario(read(options))
     simulation = loaded.scenario.simulation
     duration = simulation.duration if options.duration is None else options.duration
     if not duration > 0.0:
         raise LiveError(f"--duration {duration:g}; must be positive")
-    if options.robot is not None and (options.faults or options.kill):
+    if options.robot is not None and (options.faults or options.cameras):
         raise LiveError(
-            "--faults and --kill are for the simulated robot: leave them out with "
+            "--faults and --cameras are for the simulated robot: leave them out with "
             "--robot"
         )
     if options.robot is not None and options.steer == "simulated":
@@ -98,9 +93,13 @@ def live(options: argparse.Namespace) -> int:
                 hardware,
                 duration=None if duration == inf else duration,
                 log=loop_log,
-                meta=_meta(experiment),
+                meta={
+                    "name": f"{experiment.name}, live",
+                    "title": experiment.scenario.title,
+                    "config": experiment.config,
+                },
                 priority=options.priority,
-                on_period=_in_turn(on_period),
+                on_period=lambda t: [each(t) for each in on_period],
                 **options_of_loop,
             )
             if publisher is not None:
@@ -118,13 +117,12 @@ def live(options: argparse.Namespace) -> int:
         if options.robot is not None:
             hardware = connect(options.robot, experiment.robot, live_period(experiment))
             stack.callback(hardware.close)
-        if isinstance(hardware, AdaptingHardware):
-            options_of_loop["settings"] = hardware.adapted(experiment.scenario.live)
         if isinstance(hardware, LocatedHardware):
             experiment = begun_where_it_is(experiment, options, hardware.q)
             options_of_loop["scene"] = experiment.scene
             command = Command(experiment.controller, experiment.compensation)
         if isinstance(hardware, AdaptingHardware):
+            options_of_loop["settings"] = hardware.adapted(experiment.scenario.live)
             for line in hardware.lines:
                 out.print(line, highlight=False)
         if options.publish is not None:
@@ -145,10 +143,12 @@ def live(options: argparse.Namespace) -> int:
             print(f"hsp: {report.reason if told else fault}", file=sys.stderr)
             return 2
         with RobotProcess(
-            experiment, faults=faults, log=robot_log, log_period=simulation.log_period
+            experiment,
+            faults=faults,
+            log=robot_log,
+            log_period=simulation.log_period,
+            cameras=options.cameras,
         ) as robot:
-            if kill is not None:
-                on_period.append(_kill_action(kill, robot))
             report = run(robot.hardware)
             robot_report = robot.wait()
     link = robot.hardware.link
@@ -165,71 +165,24 @@ def live(options: argparse.Namespace) -> int:
     return 0 if regular and robot_report is not None else 2
 
 
-def _meta(experiment: Experiment) -> dict[str, Any]:
-    return {
-        "name": f"{experiment.name}, live",
-        "title": experiment.scenario.title,
-        "config": experiment.config,
-    }
-
-
-def _parse_kill(text: str | None) -> tuple[str, float] | None:
-    """Return which process to kill, and when [s], from ``robot=1.5``."""
-    if text is None:
-        return None
-    process, _, when = text.partition("=")
-    try:
-        time = float(when)
-    except ValueError:
-        time = nan
-    if process not in {"robot", "controller"} or not time >= 0.0:
-        raise LiveError(f"--kill {text!r}; needs robot=SECONDS or controller=SECONDS")
-    return process, time
-
-
-def _in_turn(
-    actions: list[Callable[[float], object]],
-) -> Callable[[float], object] | None:
-    if len(actions) < 2:
-        return actions[0] if actions else None
-
-    def act(t: float) -> None:
-        for action in actions:
-            action(t)
-
-    return act
-
-
-def _kill_action(
-    setting: tuple[str, float], robot: RobotProcess
-) -> Callable[[float], object]:
-    process, time = setting
-    pending = [True]
-
-    def kill(t: float) -> None:
-        if t >= time and pending:
-            pending.clear()
-            if process == "robot":
-                robot.kill()
-            else:
-                os.kill(os.getpid(), signal.SIGKILL)
-
-    return kill
+def _table(title: str, *headings: str) -> Table:
+    table = Table(title, box=None, pad_edge=False)
+    for heading in headings:
+        table.add_column(heading, justify="right")
+    return table
 
 
 def _times(report: LoopReport, experiment: Experiment) -> Table:
     deadlines = report.deadlines
-    table = Table(box=None, pad_edge=False)
-    table.add_column(f"{experiment.name} at {1.0 / deadlines.period:g} Hz, times in µs")
-    for heading in ("median", "p99", "p99.9", "worst"):
-        table.add_column(heading, justify="right")
+    title = f"{experiment.name} at {1.0 / deadlines.period:g} Hz, times in µs"
+    table = _table(title, "median", "p99", "p99.9", "worst")
 
-    def row(name: str, times: Quantiles | None) -> None:
+    for name, times in (
+        ("response: from a state to its effort", deadlines.response),
+        ("interval: from state to state", deadlines.interval),
+    ):
         if times is not None:
             table.add_row(name, *(f"{1e6 * x:.0f}" for x in times))
-
-    row("response: from a state to its effort", deadlines.response)
-    row("interval: from state to state", deadlines.interval)
     return table
 
 
@@ -238,36 +191,28 @@ def _packets(
     injected: dict[str, int],
     robot_report: dict[str, Any] | None,
 ) -> Table:
-    table = Table(box=None, pad_edge=False)
-    table.add_column("packets")
     kinds = ("accepted", "lost", "stale", "duplicated", "corrupted", "foreign")
-    for heading in ("sent", *kinds):
-        table.add_column(heading, justify="right")
+    table = _table("packets", "sent", *kinds)
     robot = None if robot_report is None else robot_report["link"]
     sent = "-" if robot is None else str(robot["sent"])
     table.add_row("states to the loop", sent, *(str(counts[kind]) for kind in kinds))
     received = ["-"] * len(kinds) if robot is None else [str(robot[k]) for k in kinds]
     table.add_row("efforts to the robot", str(counts["sent"]), *received)
-    if robot_report is None:
-        return table
-    if any([*injected.values(), *robot_report["injected"].values()]):
-        for packets, faults in (
-            ("states", robot_report["injected"]),
-            ("efforts", injected),
-        ):
-            column = {"late": "stale"}
-            shown = {column.get(kind, kind): str(n) for kind, n in faults.items()}
-            cells = (shown.get(kind, "") for kind in kinds)
+    theirs = {} if robot_report is None else robot_report["injected"]
+    if any([*injected.values(), *theirs.values()]):
+        for packets, faults in {"states": theirs, "efforts": injected}.items():
+            column = {"stale": "late"}
+            cells = (str(faults.get(column.get(kind, kind), "")) for kind in kinds)
             table.add_row(f"  injected, {packets}", "", *cells)
     return table
 
 
 def _print_ends(report: LoopReport, robot_report: dict[str, Any] | None) -> None:
-    deadlines = report.deadlines
+    times = report.deadlines
     out.print(
-        f"Periods: {deadlines.periods} answered, {deadlines.missed} deadline misses; "
-        f"{deadlines.without_state} without a new state, {deadlines.skipped_states} "
-        "states skipped"
+        f"Periods: {times.periods} answered, {times.missed} deadline misses; "
+        f"{times.without_state} without a new state, {times.skipped_states} states "
+        "skipped"
     )
     held = "held the robot" if report.at_rest else "could not bring the robot to rest"
     end = "fell silent" if report.silent else held

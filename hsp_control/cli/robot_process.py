@@ -21,11 +21,12 @@ from hsp_control.config import Experiment, load_experiment
 from hsp_control.config.streams import without_sources
 from hsp_control.control.measurement import LogChannel
 from hsp_control.control.output import ControlOutput
+from hsp_control.live.hardware import installed
 from hsp_control.live.link import Faults, Link, PacketKind
 from hsp_control.live.live_log import DueRows, live_channels
 from hsp_control.live.settings import LiveSettings
 from hsp_control.live.simulated_robot import SimulatedRobot
-from hsp_control.live.udp import CLOSED_BY_LOOP, SensorLayout, UdpHardware, serve
+from hsp_control.live.udp import CLOSED_BY_LOOP, Row, SensorLayout, UdpHardware, serve
 from hsp_control.robot import RobotState
 from hsp_control.simulation.limit_excess import LimitExcess
 from hsp_control.simulation.log_writer import LogWriter
@@ -61,6 +62,7 @@ class RobotProcess:
         faults: Faults | None = None,
         log: str | Path | None = None,
         log_period: float = 0.01,
+        cameras: str | None = None,
     ) -> None:
         check_live(experiment)
         faults = faults or Faults()
@@ -78,6 +80,7 @@ class RobotProcess:
             "faults": faults.as_json(),
             "log": None if log is None else str(Path(log).absolute()),
             "log_period": log_period,
+            "cameras": cameras,
             "peer": self.hardware.address,
             "session": self.hardware.session,
         }
@@ -104,6 +107,7 @@ class RobotProcess:
         assert self.process.stdin is not None
         assert self.process.stdout is not None
         ready: list[Any] = [True]
+        answer = b""
         try:
             line = json.dumps(self._settings).encode() + b"\n"
             self.process.stdin.write(line)
@@ -111,11 +115,11 @@ class RobotProcess:
             ready, _, _ = select([self.process.stdout], [], [], timeout)
             answer = self.process.stdout.readline() if ready else b""
         except OSError:
-            answer = b""
-        if answer.strip() != b"ready":
+            pass
+        if (told := answer.decode().strip()) != READY:
             self.close()
-            fault = "did not start" if ready else f"did not start in {timeout:g} s"
-            raise HardwareError(f"the simulated robot {fault}")
+            late = "" if ready else f" in {timeout:g} s"
+            raise HardwareError(told or f"the simulated robot did not start{late}")
 
     def wait(self, timeout: float = 15.0) -> dict[str, Any] | None:
         """Wait until the robot has stopped and its process has ended."""
@@ -132,19 +136,16 @@ class RobotProcess:
             if not data:
                 break
             output += data
-        if output:
+        if output.startswith(b"{"):
             self.report = json.loads(output)
+        elif output:
+            print(f"hsp: {output.decode().strip()}", file=sys.stderr)
         try:
             self.process.wait(max(end - monotonic(), 0.1))
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()
         return self.report
-
-    def kill(self) -> None:
-        """Kill the process at once, without a safe stop; do not wait."""
-        if self.process is not None:
-            os.kill(self.process.pid, signal.SIGKILL)
 
     def close(self) -> None:
         """Stop the robot and end its process; a second call does nothing."""
@@ -159,12 +160,12 @@ READY = "ready"
 
 
 def main() -> int:
-    """Run the robot until it has stopped; return 0, or 2 after one error message.
+    """Run the robot until it has stopped; return 0, or 2 if it cannot.
 
     This is the robot's process. It reads its settings from its standard input, one line
     of JSON. The input then stays open; when the parent process dies it is closed, and
     the robot stops itself, completes its log and ends. It writes two lines to its
-    standard output: ``ready``, and at the end its report, as JSON.
+    standard output: ``ready``, and at the end its report, as JSON, or what is wrong.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C stops the loop only
     terminated = threading.Event()
@@ -184,7 +185,7 @@ def main() -> int:
     try:
         report = _run(settings, stop_reason)
     except HspControlError as error:
-        print(f"hsp: the simulated robot: {error}", file=sys.stderr)
+        _print(f"the simulated robot: {error}")
         return 2
     _print(json.dumps(report))
     return 0
@@ -201,13 +202,13 @@ def _run(settings: dict[str, Any], stop_reason: Any) -> dict[str, Any]:
         stream=2,
     )
     log = _RobotLog(experiment, robot, settings) if settings["log"] else None
+    rows: list[Row] = [log.row] if log else []
+    if settings["cameras"]:
+        address, known = installed("--cameras", settings["cameras"], "cameras")
+        rows.append(known.load()(address, robot.plant))
     _print(READY)
-    served = serve(
-        robot, link, stop_reason=stop_reason, on_row=log.row if log else None
-    )
-    link.send(
-        PacketKind.BYE
-    )  # its sequence number tells the loop how many packets it lost
+    served = serve(robot, link, stop_reason=stop_reason, on_rows=rows)
+    link.send(PacketKind.BYE)  # its number tells the loop how many packets it lost
     reason = robot.reason or "no effort arrived"
     report: dict[str, Any] = {
         "phase": robot.phase.name.lower(),

@@ -39,8 +39,7 @@ from hsp_control.play.picture import FRAME, Picture
 from hsp_control.visualization.viewer import Viewer
 from hsp_control.visualization.viewer.transport import PageServer
 
-START = 60.0
-"""Time in which the page's process must say its address [s]."""
+START = 60.0  # time in which the page's process must say its address [s]
 
 
 class PageProcess:
@@ -115,8 +114,7 @@ class PageProcess:
             self._process.stdin.flush()
 
 
-_REHEARSAL = 0.5
-"""Time of a rehearsal [s]: beyond the ramps of changes."""
+_REHEARSAL = 0.5  # time of a rehearsal [s]: beyond the ramps of changes
 _POLL = 0.02
 
 
@@ -193,12 +191,9 @@ def _rehearse(controller: Controller, period: float, experiment: Experiment) -> 
         handles.turn_knobs()
 
 
-_PAGE_POLL = 0.005
-"""Time between two looks at what has come [s]."""
-_NICENESS = 5
-"""The loop comes first where processes are many."""
-_RATE_WINDOW = 1.0
-"""Time over which the loop's rate is measured [s]."""
+_PAGE_POLL = 0.005  # time between two looks at what has come [s]
+_NICENESS = 5  # the loop comes first where processes are many
+_RATE_WINDOW = 1.0  # time over which the loop's rate is measured [s]
 
 
 def main() -> int:

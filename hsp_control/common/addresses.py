@@ -1,5 +1,6 @@
 """Addresses ``NAME?KEY=VALUE&KEY=VALUE``, as a command line takes them."""
 
+from collections.abc import Mapping
 from urllib.parse import unquote
 
 
@@ -19,3 +20,17 @@ def name_and_options(address: str) -> tuple[str, dict[str, str]]:
             raise ValueError(f"the option {key!r} is given twice")
         options[key] = unquote(value)
     return name, options
+
+
+def rate_of(options: Mapping[str, str]) -> float:
+    """Return the option ``rate``, how often something is told [Hz]; 100 by default."""
+    text = options.get("rate", "100")
+    try:
+        rate = float(text)
+    except ValueError:
+        rate = 0.0
+    if not 0.0 < rate <= 10_000.0:
+        raise ValueError(
+            f"the rate is {text!r}; needs a number above 0, at most 10000 Hz"
+        )
+    return rate

@@ -11,7 +11,7 @@ from hsp_control.config.scenario import Scenario
 from hsp_control.declaration import within
 from hsp_control.declaration.nested import with_parts_replaced
 from hsp_control.robot.description.access import Access
-from hsp_control.trajectories.streams.mailbox import is_local
+from hsp_control.trajectories.streams.mailbox import kind_of
 from hsp_control.trajectories.streams.stream import Streamed
 
 
@@ -46,7 +46,7 @@ def _with_streams(
 
 def _check_listening(stream: Streamed, access: Access) -> None:
     assert stream.source is not None
-    if not access.strict or is_local(stream.source):
+    if not access.strict or kind_of(stream.source).is_local(stream.source):
         return
     raise AccessError(
         f"{stream.source} listens to other computers; strict reading allows only "

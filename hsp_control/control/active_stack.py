@@ -109,9 +109,9 @@ class ActiveStack:
             elif len(in_force.feedback.largest):
                 away = partial(beyond_largest, largest=in_force.feedback.largest)
                 self.bounds.append((each.task.name, here, away))
-                sizes = np.array([part.size for part in each.task.error_parts])
-                yields = np.maximum(WHOLE / sizes, 1.0)
-                self.resolution.problem.yields[here] = np.repeat(yields, sizes)
+                parts = np.array([part.size for part in each.task.error_parts])
+                yields = np.maximum(WHOLE / parts, 1.0)
+                self.resolution.problem.yields[here] = np.repeat(yields, parts)
             # Who is about to fall needs the balance whatever it costs.
             balances = robot.unactuated and each.task.keeps_balance(robot)
             follows = each.key in below or len(in_force.feedback.largest)

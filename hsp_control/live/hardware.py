@@ -105,7 +105,7 @@ def connect(url: str, robot: Robot, period: float) -> Hardware:
         LiveError: If no package provides the name.
         HardwareError: If the robot cannot be reached.
     """
-    address, known = _known("--robot", url, "hardware")
+    address, known = installed("--robot", url, "hardware")
     make: Callable[[str, Robot, float], Hardware] = known.load()
     return make(address, robot, period)
 
@@ -131,13 +131,13 @@ def publish(url: str, source: EffortSource) -> Publisher:
         LiveError: If no package provides the name.
         HardwareError: If the address is wrong, or something is not installed.
     """
-    address, known = _known("--publish", url, "publishers")
+    address, known = installed("--publish", url, "publishers")
     make: Callable[[str, EffortSource], Publisher] = known.load()
     return make(address, source)
 
 
-def _known(option: str, url: str, group: str) -> tuple[str, EntryPoint]:
-    """Return the address and what is installed for ``name://address``."""
+def installed(option: str, url: str, group: str) -> tuple[str, EntryPoint]:
+    """Return the address and what is installed in a group for ``name://address``."""
     name, separator, address = url.partition("://")
     known = entry_points(group)
     if not separator or name not in known:

@@ -1,7 +1,7 @@
 """A robot that is connected by UDP: the loop's end, and that of a simulated one."""
 
 import secrets
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from time import monotonic, sleep
@@ -177,13 +177,8 @@ CLOSED_BY_LOOP = "the loop closed the connection"
 class ServerReport:
     """What `serve` counted."""
 
-    # number of efforts that were ignored, because they were computed from a state older
-    # than the watchdog's limit
-    outdated: int = 0
-    # by how much the robot's time fell behind real time, because its process did not
-    # get the processor [s]
-    overrun: float = 0.0
-    never_started: bool = False  # whether no effort arrived
+    outdated: int = 0  # efforts that answered a state beyond the watchdog's limit
+    overrun: float = 0.0  # by how much its time fell behind real time [s]
 
 
 Row = Callable[[float, Array, Array, bool], object]
@@ -197,7 +192,7 @@ def serve(
     *,
     stop_reason: Callable[[], str | None],
     start_timeout: float = 60.0,
-    on_row: Row | None = None,
+    on_rows: Sequence[Row] = (),
 ) -> ServerReport:
     """Run a robot in real time, until it has stopped and was held.
 
@@ -213,7 +208,7 @@ def serve(
         link: The connection; its peer is known.
         stop_reason: Called every period; returns a reason to stop, or None.
         start_timeout: Longest time to wait for the first effort [s].
-        on_row: Called after the state was sent, in the rest of the period.
+        on_rows: Called after the state was sent, in the rest of the period.
 
     Returns:
         The counts.
@@ -244,7 +239,6 @@ def serve(
             reason = stop_reason()
             if robot.phase == Phase.WAITING and not efforts:
                 if reason is not None or monotonic() > give_up or robot.halted:
-                    report.never_started = True
                     return report
             elif reason is not None:
                 robot.halt(reason)
@@ -255,7 +249,8 @@ def serve(
                 link.send(PacketKind.STATE, state, t=robot.t, phase=int(robot.phase))
             state_sequence = link.counts["sent"]
             done = robot.done
-            if on_row is not None and robot.t > t:
-                on_row(t, q, v, done)
+            if robot.t > t:
+                for on_row in on_rows:
+                    on_row(t, q, v, done)
             if done:
                 return report

@@ -23,6 +23,10 @@ def start() -> Array:
     return panda().home().copy()
 
 
+def gravity(q: Array) -> Array:
+    return panda().inverse_dynamics(q, np.zeros(7), np.zeros(7))
+
+
 def law(
     field: hsp.NullSpaceField | None = None,
     gains: hsp.Gains = hsp.Gains(natural_frequency=10.0),  # noqa: B008 (a value)

@@ -134,7 +134,7 @@ def test_the_robot_s_process_is_killed(tmp_path: Path) -> None:
         def kill(t: float) -> None:
             if t >= 0.3 and not killed:
                 killed.append(t)
-                robot.kill()
+                robot.process.kill()
 
         report = run_loop(
             experiment.controller,
@@ -179,7 +179,9 @@ def rows(path: Path) -> int:
 
 
 def test_the_loop_s_process_is_killed(tmp_path: Path) -> None:
-    process = hsp_live(tmp_path, "--duration", "60", "--kill", "controller=0.3")
+    process = hsp_live(tmp_path, "--duration", "60")
+    assert wait_for(lambda: rows(tmp_path / "arm-live.journal") > 20, 200.0)
+    process.kill()
     process.communicate(timeout=200)
     assert process.returncode == -signal.SIGKILL
     # The robot is alone now: it stops, writes its log, and its process ends.
@@ -196,29 +198,23 @@ def test_the_loop_s_process_is_killed(tmp_path: Path) -> None:
     assert Phase.DAMPING in truth["live.phase"]  # nobody else braked it
     assert log.status == "interrupted"
     assert_whole(log)
-    assert log.t[-1] == pytest.approx(0.3, abs=0.02)
     assert set(log["live.phase"]) == {Phase.RUNNING}
 
 
 @pytest.mark.smoke
-def test_a_robot_that_cannot_start_says_so(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_robot_that_cannot_start_says_so(tmp_path: Path) -> None:
     experiment = hsp.load_experiment(CONFIG)
     robot = RobotProcess(experiment, log=tmp_path / "none" / "file")
     (tmp_path / "none").write_text("")
-    with pytest.raises(HardwareError, match="the simulated robot did not start"):
+    with pytest.raises(HardwareError, match=r"^the simulated robot: .*none"):
         robot.start()
-    assert "hsp: the simulated robot: " in capfd.readouterr().err
     robot.close()
 
 
 @pytest.mark.parametrize(("options", "message"), [
     (["--faults", "lots=1"], "no fault 'lots'"),
     (["--duration", "-1"], "--duration -1; must be positive"),
-    (["--kill", "me=1"], "--kill 'me=1'; needs robot=SECONDS or controller="),
     (["--robot", "a://b", "--faults", "lost=0.1"], "are for the simulated robot"),
-    (["--robot", "a://b", "--kill", "robot=1"], "are for the simulated robot"),
     (["--set", "live.missing=-1"], "live.missing"),
 ])  # fmt: skip
 def test_options_that_are_none(

@@ -251,6 +251,11 @@ def add_live(live: argparse.ArgumentParser) -> None:
         help="tell the state: udp://HOST:PORT to a policy, ros2://NAME to watchers",
     )
     live.add_argument(
+        "--cameras",
+        metavar="NAME://ADDRESS",
+        help="show a MuJoCo scene's cameras: http://HOST:PORT has pictures /CAMERA.jpg",
+    )
+    live.add_argument(
         "--duration",
         type=float,
         metavar="S",
@@ -262,11 +267,6 @@ def add_live(live: argparse.ArgumentParser) -> None:
         metavar="KIND=P,...",
         help="probabilities of late, lost, duplicated and corrupted packets, in both "
         "directions; delay=PACKETS of late ones, and seed=N",
-    )
-    live.add_argument(
-        "--kill",
-        metavar="WHO=S",
-        help="kill the process of the robot or of the controller after so long",
     )
     live.add_argument(
         "--out", type=Path, default=Path("out"), metavar="DIR", help="default: out"

@@ -1,8 +1,8 @@
 """Targets from other processes: JSON datagrams; a port may be shared by streams."""
 
-import logging
 import socket
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from functools import partial
 from ipaddress import ip_address
 from threading import Lock
@@ -18,9 +18,6 @@ from hsp_control.trajectories.streams.message import Space, message_of, parsed
 
 SCHEME = "udp://"
 _LARGEST = 65_536
-_TOGETHER = 2.0  # senders that take turns within this time send at the same time [s]
-_JUMP = 1.0  # what a clock goes back, or ahead of ours, that is no delay [s]
-_log = logging.getLogger(__name__)
 _POLL = 0.2  # how soon a listener notices that nobody needs it any more [s]
 
 
@@ -78,75 +75,21 @@ def opened(source: str, space: Space) -> Callable[["ref[Inbox]"], None]:
         port = _ports.get(address[:2])
         if port is None:
             port = _ports[address[:2]] = _Port(address)
-        parts = [name for name, each in port.parts.items() if not each.is_gone]
+        parts = [name for name, each in port.parts.items() if not each or each()]
         if parts and "" in (*parts, address.part):
             raise StreamError(
                 f"{source}: another stream of this process hears all that comes there, "
                 "or a part of it; give each its own udp://HOST:PORT/PART"
             )
-        port.parts[address.part] = _Part(source)
+        port.parts[address.part] = None
     return partial(_listen, port, address.part)
-
-
-class _Part:
-    """What one stream hears at a port, and who sends it."""
-
-    def __init__(self, source: str) -> None:
-        self._source = source
-        self.inbox: Callable[[], Inbox | None] = _nobody
-        self._told = {"senders": False, "clock": False}
-        self._seen: dict[Any, float] = {}
-        self._last: Any = None
-        self._newest, self._behind = -float("inf"), float("inf")
-
-    @property
-    def is_gone(self) -> bool:
-        """Whether its stream is gone, and its thread soon."""
-        return self.inbox is not _nobody and self.inbox() is None
-
-    def hear(self, sender: Any, t: object) -> None:
-        """Note who has sent now, and its clock; say once what is wrong with them."""
-        now, last = monotonic(), self._last
-        recent = {s: at for s, at in self._seen.items() if now - at < _TOGETHER}
-        if sender in recent and sender != last:
-            one, other = (":".join(map(str, each)) for each in (last, sender))
-            self._tell(
-                "senders", "two senders take turns, %s and %s; their targets and "
-                "clocks mix", one, other,
-            )  # fmt: skip
-        elif sender == last and isinstance(t, int | float):
-            self._compare(float(t), now - t)
-        if sender != last:
-            self._newest, self._behind = -float("inf"), float("inf")
-        self._seen, self._last = {**recent, sender: now}, sender
-
-    def _compare(self, t: float, behind: float) -> None:
-        """Compare a sender's clock with what it was; ``behind`` ours, it is late."""
-        back, ahead = self._newest - t, self._behind - behind
-        if back > _JUMP:
-            self._tell("clock", "the sender's clock jumps back by %.3g s", back)
-        elif _JUMP < ahead < float("inf"):
-            self._tell("clock", "the sender's clock jumps ahead by %.3g s", ahead)
-        if max(back, ahead) > _JUMP:  # it counts as another clock
-            self._newest, self._behind = t, behind
-        self._newest, self._behind = max(self._newest, t), min(self._behind, behind)
-
-    def _tell(self, what: str, message: str, *given: object) -> None:
-        if not self._told[what]:
-            self._told[what] = True
-            _log.warning(f"%s: {message}", self._source, *given)
-
-
-def _nobody() -> Inbox | None:
-    """Return no inbox: the stream does not listen yet."""
-    return None
 
 
 class _Port:
     """A port, and the streams of this process that hear what comes there."""
 
     def __init__(self, address: Address) -> None:
-        self.parts: dict[str, _Part] = {}
+        self.parts: dict[str, ref[Inbox] | None] = {}  # None: it listens soon
         self.reading = Lock()
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
@@ -160,23 +103,30 @@ class _Port:
         self._socket.settimeout(_POLL)
 
     def hear(self) -> None:
-        """Wait for a datagram; give each stream its part, or none if one is invalid."""
-        try:
-            text, sender = self._socket.recvfrom(_LARGEST)
-        except OSError:  # nothing came
+        """Wait for a datagram; give each stream its part, or none if one is refused."""
+        text: bytes | None = None
+        with suppress(OSError):  # nothing came
+            text, (host, port) = self._socket.recvfrom(_LARGEST)
+        parts, now = dict(self.parts), monotonic()
+        there = {
+            name: inbox for name, each in parts.items() if each and (inbox := each())
+        }
+        for inbox in there.values():
+            inbox.note_silence(now)
+        if text is None:
             return
-        parts = dict(self.parts)
-        there = {name: inbox for name, each in parts.items() if (inbox := each.inbox())}
+        sender = f"{host}:{port}"
         try:
             heard = _parts_of(text, there)
+            for name in heard:
+                with _naming(name):
+                    there[name].check_sender(sender, now)
         except StreamError as error:
-            for inbox in there.values():
-                inbox.reject(str(error))
-            heard = {name: {} for name in there}
+            for k, inbox in enumerate(there.values()):
+                inbox.reject(str(error), aloud=k == 0)
+            return
         for name, message in heard.items():
-            parts[name].hear(sender, message.get("t"))
-            if message:
-                there[name].put(**message)
+            there[name].hear(sender, now, message)
 
     def close(self) -> None:
         """Close the port."""
@@ -204,12 +154,19 @@ def _parts_of(text: bytes, inboxes: Mapping[str, Inbox]) -> dict[str, dict[str, 
             )
         if isinstance(message, Mapping):
             message = {"t": data.get("t"), **message}
-        try:
+        with _naming(name):
             message_of(message, inboxes[name].space)
-        except StreamError as error:
-            raise StreamError(f"{name}: {error}") from None
         found[name] = message
     return found
+
+
+@contextmanager
+def _naming(part: str) -> Iterator[None]:
+    """Put a part's name before what is wrong with it."""
+    try:
+        yield
+    except StreamError as error:
+        raise StreamError(f"{part}: {error}" if part else str(error)) from None
 
 
 _ports: dict[tuple[str, int], _Port] = {}
@@ -218,7 +175,7 @@ _lock = Lock()
 
 def _listen(port: _Port, part: str, inbox: "ref[Inbox]") -> None:
     """Hear what comes for as long as an inbox is there, in turn with the others."""
-    port.parts[part].inbox = inbox
+    port.parts[part] = inbox
     while inbox() is not None:
         if port.reading.acquire(timeout=_POLL):
             try:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hsp_control.common.addresses import name_and_options
+from hsp_control.common.addresses import name_and_options, rate_of
 from hsp_control.common.exceptions import HardwareError
 from hsp_control.common.rotations import quaternion_from_rotation
 from hsp_control.common.suggestions import did_you_mean
@@ -20,9 +20,6 @@ from hsp_control.simulation.control_chain import EffortSource
 from hsp_control.tasks import JointPosture
 from hsp_control.trajectories.streams.stream import Streamed
 
-_RATE = 100.0
-"""Datagrams in a second of the controller's time by default [1/s]."""
-_FASTEST = 10_000.0
 _BYES = 3
 """How often the end is told: a datagram may be lost."""
 _log = logging.getLogger(__name__)
@@ -54,16 +51,10 @@ def publish(address: str, source: EffortSource) -> "Teller":
         raise HardwareError(
             f"{where}: needs udp://HOST:PORT, for example udp://127.0.0.1:5006"
         )
-    text = options.get("rate", str(_RATE))
     try:
-        rate = float(text)
-    except ValueError:
-        rate = 0.0
-    if not 0.0 < rate <= _FASTEST:
-        raise HardwareError(
-            f"{where}: the rate is {text!r}; needs a number above 0, at most "
-            f"{_FASTEST:g} Hz"
-        )
+        rate = rate_of(options)
+    except ValueError as error:
+        raise HardwareError(f"{where}: {error}") from None
     try:
         found = socket.getaddrinfo(*to[:2], socket.AF_INET, socket.SOCK_DGRAM)
     except OSError as error:
@@ -75,7 +66,7 @@ class Teller:
     """Sends the state of a loop to one address; `run_loop` calls it as ``on_period``.
 
     Nobody need listen, and nothing waits: what cannot be sent is dropped, and said
-    once. ``docs/companions/datagrams.md`` has the keys.
+    once. ``docs/companions/policies.md`` has the keys.
     """
 
     def __init__(self, to: Any, rate: float, source: EffortSource) -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from functools import partial
+from time import monotonic
 from typing import TYPE_CHECKING
 from weakref import ref
 
@@ -61,16 +62,23 @@ def _listen(
 ) -> None:
     """Put every pose into the inbox for as long as it is there."""
     while inbox() is not None:
-        if not subscription.wait(_POLL):
-            continue
-        for message, _ in subscription.take():
-            there = inbox()
-            if there is not None:
-                _put(there, message, frame, space)
-            del there
+        taken = subscription.take() if subscription.wait(_POLL) else []
+        if there := inbox():
+            now = monotonic()
+            there.note_silence(now)
+            for message, publisher in taken:
+                _put(there, message, f"publisher {publisher}", now, frame, space)
+        del there
 
 
-def _put(inbox: Inbox, message: "PoseStamped", frame: str, space: Space) -> None:
+def _put(
+    inbox: Inbox,
+    message: "PoseStamped",
+    publisher: str,
+    now: float,
+    frame: str,
+    space: Space,
+) -> None:
     header, pose = message.header, message.pose
     if header.frame_id not in {"", frame}:
         inbox.reject(f"a pose is in the frame {header.frame_id!r:.40}; needs {frame!r}")
@@ -81,6 +89,7 @@ def _put(inbox: Inbox, message: "PoseStamped", frame: str, space: Space) -> None
         value += [r.x, r.y, r.z, r.w]
     stamp = header.stamp.nanoseconds
     try:  # without a stamp: now
-        inbox.put(value=value, t=stamp / 1e9 if stamp else None)
+        t = stamp / 1e9 if stamp else None
+        inbox.hear(publisher, now, {"value": value, "t": t})
     except StreamError as error:
         inbox.reject(str(error))

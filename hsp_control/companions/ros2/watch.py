@@ -2,6 +2,7 @@
 
 from time import time_ns
 
+from hsp_control.common.addresses import rate_of
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HardwareError
 from hsp_control.companions.ros2.address import checked_name, parse
@@ -19,8 +20,6 @@ from hsp_control.companions.ros2.node import Node, TopicPublisher
 from hsp_control.simulation.control_chain import EffortSource
 from hsp_control.tasks import Task
 
-_RATE = 100.0
-"""Messages of a topic in a second of the controller's time by default [1/s]."""
 _POSITION, _POSE = ("position",), ("position", "orientation")
 
 
@@ -44,7 +43,10 @@ class Watched:
             HardwareError: If the address is invalid, or Cyclone DDS cannot start.
         """
         self._prefix, domain, options = parse(address, ("rate",))
-        self._every = 1.0 / _rate(options.get("rate"), address)
+        try:
+            self._every = 1.0 / rate_of(options)
+        except ValueError as error:
+            raise HardwareError(f"{address}: {error}") from None
         self._source = effort_source
         robot = effort_source.controller.robot
         self._joints = Joints(robot)
@@ -94,17 +96,3 @@ class Watched:
 def _pose_of(value: Array) -> Pose:
     x, y, z, *rest = value.tolist()
     return Pose(Point(x, y, z), Quaternion(*(rest or (0.0, 0.0, 0.0, 1.0))))
-
-
-def _rate(text: str | None, address: str) -> float:
-    if text is None:
-        return _RATE
-    try:
-        rate = float(text)
-    except ValueError:
-        rate = 0.0
-    if not 0.0 < rate <= 10_000.0:
-        raise HardwareError(
-            f"{address}: the rate is {text!r}; needs a number above 0, at most 10000 Hz"
-        )
-    return rate

@@ -1,12 +1,17 @@
-"""The messages that wait, and those that were taken."""
+"""The messages that wait, who sends them, and those that were taken."""
 
+import logging
+import re
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from math import inf
 from threading import Lock
 from typing import Any, NamedTuple
 
+from hsp_control.common.exceptions import StreamError
 from hsp_control.trajectories.streams.message import Message, Space, message_of
 
+_log = logging.getLogger(__name__)
 MOST = 5_000_000
 """Most numbers that are recorded: poses at 60 Hz for three hours, 0.1 GB."""
 
@@ -34,6 +39,10 @@ class InboxRecord:
 
 
 CAPACITY = 4096  # most messages that wait; where more come, the oldest are dropped
+_SILENCE = 2.0  # who sent several messages is heard alone until so long a silence [s]
+_JUMP = 1.0  # what a clock goes back, or ahead of ours, that is no delay [s]
+_MOST_SAID = 16  # different things that are said of one source
+_NUMBER = re.compile(r"-?\d[\d.:e+-]*|\bnan\b|-?\binf\b")
 
 
 class Received(NamedTuple):
@@ -46,13 +55,54 @@ class Received(NamedTuple):
 class Inbox:
     """Messages of one source; each reader remembers the number of its last message."""
 
-    def __init__(self, space: Space) -> None:
-        """Set what a value is."""
-        self.space = space
+    def __init__(self, space: Space, source: str = "") -> None:
+        """Set what a value is, and the address that is heard; by default none is."""
+        self.space, self._source = space, source
         self.count = self.rejected = self.taken = 0
         self.reason = ""
         self._waiting: deque[Received] = deque(maxlen=CAPACITY)
         self._lock = Lock()
+        self._said: set[str] = set()
+        self._sender, self._until = "", -inf  # who is heard alone, and until when
+        self._seen: dict[str, float] = {}
+        self._newest, self._behind = -inf, inf  # of its clock: its time, ours after it
+
+    def check_sender(self, sender: str, now: float) -> None:
+        """Raise if another one sends, who was first; ``now`` is our own time [s]."""
+        if sender != self._sender and now < self._until:
+            raise StreamError(
+                f"{sender} sends while {self._sender} does, which was first and is "
+                f"heard alone until it is silent for {_SILENCE:g} s"
+            )
+
+    def hear(self, sender: str, now: float, data: Mapping[str, Any]) -> None:
+        """Add a message of somebody elsewhere; say once what is odd about its clock."""
+        self.check_sender(sender, now)
+        self.put(**data)
+        if sender != self._sender:
+            self._sender, self._newest, self._behind = sender, -inf, inf
+        seen = {name: at for name, at in self._seen.items() if now - at < _SILENCE}
+        self._until = now + _SILENCE if sender in seen else -inf  # one is no stream
+        self._seen = {**seen, sender: now}
+        if (t := data.get("t")) is None:
+            return
+        back, ahead = self._newest - t, self._behind - (now - t)
+        if back > _JUMP:
+            self._say(f"the sender's clock jumps back by {back:.3g} s")
+        elif _JUMP < ahead < inf:
+            self._say(f"the sender's clock jumps ahead by {ahead:.3g} s")
+        if max(back, ahead) > _JUMP:  # it counts as another clock
+            self._newest, self._behind = -inf, inf
+        self._newest, self._behind = max(self._newest, t), min(self._behind, now - t)
+
+    def note_silence(self, now: float) -> None:
+        """Say once that who sent several messages sends no more."""
+        if -inf < self._until <= now:
+            self._until = -inf
+            self._say(
+                f"{self._sender} is silent for {_SILENCE:g} s; the reference rests "
+                "where its last message ends"
+            )
 
     def put(self, **data: Any) -> None:
         """Add a message, given by its entries; see `message_of`."""
@@ -61,11 +111,20 @@ class Inbox:
             self.count += 1
             self._waiting.append(Received(self.count, message))
 
-    def reject(self, reason: str) -> None:
-        """Count an invalid message."""
+    def reject(self, reason: str, *, aloud: bool = True) -> None:
+        """Count an invalid message; each kind of reason is said once."""
         with self._lock:
             self.rejected += 1
             self.reason = reason
+        if self._source and aloud:
+            self._say(f"a message is dropped: {reason}")
+
+    def _say(self, what: str) -> None:
+        """Warn, once for all that differs in its numbers alone."""
+        kind = _NUMBER.sub("", what)
+        if kind not in self._said and len(self._said) < _MOST_SAID:
+            self._said.add(kind)
+            _log.warning("%s: %s", self._source, what)
 
     def after(self, number: int, *, take: bool) -> list[Received]:
         """Return the messages that wait, later than a number, in order of arrival."""

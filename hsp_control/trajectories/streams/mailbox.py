@@ -37,16 +37,6 @@ def is_address(source: str) -> bool:
     return "://" in source
 
 
-def check_address(source: str) -> None:
-    """Check an address ``udp://HOST:PORT`` or ``ros2://TOPIC``."""
-    _kind(source).check_address(source)
-
-
-def is_local(source: str) -> bool:
-    """Return whether only this computer can send to an address."""
-    return _kind(source).is_local(source)
-
-
 def listening_inbox(source: str, space: Space) -> Inbox:
     """Return the inbox of an address, one per process; unused, it closes."""
     known = _inboxes.get(source)
@@ -59,8 +49,8 @@ def listening_inbox(source: str, space: Space) -> Inbox:
         return known
     if source in _threads:  # of an inbox that nobody uses: the port is soon free
         _threads[source].join()
-    listen = _kind(source).opened(source, space)
-    inbox = Inbox(space)
+    listen = kind_of(source).opened(source, space)
+    inbox = Inbox(space, source)
     _inboxes[source] = inbox
     _threads[source] = Thread(
         target=listen, args=(ref(inbox),), name=f"stream {source}", daemon=True
@@ -69,7 +59,8 @@ def listening_inbox(source: str, space: Space) -> Inbox:
     return inbox
 
 
-def _kind(source: str) -> AddressKind:
+def kind_of(source: str) -> AddressKind:
+    """Return what understands an address."""
     kinds = entry_points("targets")
     if found := kinds.get(source.partition("://")[0]):
         kind: AddressKind = found.load()

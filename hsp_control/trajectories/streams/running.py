@@ -29,15 +29,11 @@ from hsp_control.trajectories.streams.segments import (
 )
 
 _WINDOW = 2.0  # the sender's clock is compared with the controller's over this time [s]
-_NEW_CLOCK = 1.0
-"""A sender whose time jumps back by more than this has started again [s]."""
-_KEPT = 1.0
-"""Waypoints that were passed are kept for this time, to estimate velocities, and so are
-pieces [s]: an integrator may ask for earlier times."""
+_NEW_CLOCK = 1.0  # a sender's time that jumps back by more shows another start [s]
+# Waypoints that were passed are kept so long, to estimate velocities, and so are pieces
+_KEPT = 1.0  # [s]: an integrator may ask for earlier times.
 MOST = 4096  # most waypoints that are kept
-_APART = 0.01
-"""Neighbours for derivatives are at least so far in time [s]: of waypoints that are
-closer, noise would be most of the difference."""
+_APART = 0.01  # between neighbours for derivatives [s]; closer ones differ by noise
 
 
 class SenderClock:
@@ -371,10 +367,10 @@ class RunningStream:
                 return smooth
         goal = goals.passed(last, policy.smoothing)
         end = goal.time + (0.0 if self._ends_at_rest else policy.extrapolation)
-        if t < end and goal.rate.any():
-            return self._meet(t, state, goal, end)
-        if not self._ends_at_rest:
+        if goal.rate.any() and not self._ends_at_rest and t >= end:
             return self._to_rest(t, state)
+        if goal.rate.any() and t < end:
+            return self._meet(t, state, goal, end)
         if _on_line(state, goal.at_rest(), t):
             return self._to_rest(t, state)
         return self._joiner.fastest(t, state, goal.at_rest())

@@ -30,8 +30,8 @@ from hsp_control.trajectories.remembering import Remembering
 from hsp_control.trajectories.streams.chart import Chart, State
 from hsp_control.trajectories.streams.mailbox import (
     Mailbox,
-    check_address,
     is_address,
+    kind_of,
     read_recording,
     recorded,
 )
@@ -110,7 +110,7 @@ class Streamed(Remembering, error=TrajectoryError):
         if self.source is not None and self.messages is not None:
             raise StreamError("give either source or messages")
         if self.source is not None and is_address(self.source):
-            check_address(self.source)
+            kind_of(self.source).check_address(self.source)
         if self.messages is not None:  # what they carry is checked where it is known
             recorded(self.messages, Space(None, False))
         vars(self)["_mailbox"] = Mailbox(self._hears, self.space)

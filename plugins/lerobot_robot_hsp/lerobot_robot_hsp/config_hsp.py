@@ -7,6 +7,16 @@ from lerobot.robots import RobotConfig
 from lerobot.teleoperators import TeleoperatorConfig
 
 
+@CameraConfig.register_subclass("hsp")
+@dataclass(kw_only=True)
+class HspCameraConfig(CameraConfig):
+    """A camera of a simulated scene."""
+
+    camera: str  # its name in the scene
+    url: str = "http://127.0.0.1:5008"  # of hsp live --cameras http://HOST:PORT
+    timeout: float = 5.0  # of a picture [s]
+
+
 @dataclass(kw_only=True)
 class LoopConfig:
     """Where a loop tells its state, and what of it is an action."""

@@ -6,6 +6,7 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,10 +22,22 @@ PATIENT = {  # a machine that runs tests is late
     "live.watchdog": 2000,
     "live.velocity_margin": 2,
     "simulation.control_period": 0.005,
-    "simulation.integrator.step": 0.005,
-    "tasks.hand.gains.natural_frequency": 4,
-    "tasks.fingers.gains.natural_frequency": 4,
     "null_space.gain": 2,
+    "tasks.hand.gains.natural_frequency": 4,
+}
+FINGERS = {"tasks.fingers.gains.natural_frequency": 4}
+LOOPS = {  # a configuration, what is set of it, and options
+    "simulated": (
+        PLUGIN / "panda.yaml",
+        {**PATIENT, **FINGERS, "simulation.integrator.step": 0.005},
+        [],
+    ),
+    "seen": (PLUGIN / "scene.yaml", {**PATIENT, **FINGERS}, []),
+    "franka": (
+        ROOT / "examples/stream/panda.yaml",
+        {"live.missing": 2000, "live.age": 10},
+        ["--robot", "franka://127.0.0.2?realtime=ignore"],
+    ),
 }
 
 
@@ -41,7 +54,13 @@ class Running(NamedTuple):
     states: str
     targets: str
     gripper: str
+    cameras: str
     log: Path
+
+    @property
+    def has_gripper(self) -> bool:
+        """Whether its fingers move."""
+        return "fingers.displacement" in " ".join(self.process.args)
 
     def stop(self) -> Path:
         """End it as Ctrl-C does, and return its log."""
@@ -50,18 +69,19 @@ class Running(NamedTuple):
         return self.log
 
 
-@pytest.fixture(scope="module")
-def arm(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
-    """The simulated Panda of panda.yaml, which runs until it is stopped."""
-    out = tmp_path_factory.mktemp("out")
-    states, targets, gripper = (f"127.0.0.1:{free_port()}" for _ in range(3))
-    given = {
-        **PATIENT,
-        "tasks.hand.trajectory.source": f"udp://{targets}",
-        "tasks.fingers.displacement.source": f"udp://{gripper}",
-    }
-    command = [HSP, "live", str(PLUGIN / "panda.yaml"), "--duration", "inf"]
-    command += ["--out", str(out), "--publish", f"udp://{states}"]
+@contextmanager
+def run_live(kind: str, out: Path) -> Iterator[Running]:
+    """Run one of `LOOPS` until it is stopped."""
+    config, given, options = LOOPS[kind]
+    states, targets, gripper, pictures = (f"127.0.0.1:{free_port()}" for _ in range(4))
+    given = {**given, "tasks.hand.trajectory.source": f"udp://{targets}"}
+    if kind != "franka":
+        given["tasks.fingers.displacement.source"] = f"udp://{gripper}"
+    command = [HSP, "live", str(config), "--duration", "inf", "--out", str(out)]
+    command += [*options, "--publish", f"udp://{states}"]
+    cameras = f"http://{pictures}"
+    if kind == "seen":
+        command += ["--cameras", cameras]
     for key, value in given.items():
         command += ["--set", f"{key}={value}"]
     process = subprocess.Popen(command)
@@ -69,17 +89,46 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
     try:
         loop.state()
         loop.close()
-        yield Running(process, states, targets, gripper, out / "panda-live.npz")
+        log = out / f"{config.stem}-live.npz"
+        yield Running(process, states, targets, gripper, cameras, log)
     finally:
         process.send_signal(signal.SIGINT)
         process.wait(120.0)
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
+    """The simulated Panda of panda.yaml."""
+    with run_live("simulated", tmp_path_factory.mktemp("out")) as running:
+        yield running
+
+
+@pytest.fixture
+def seen(tmp_path: Path) -> Iterator[Running]:
+    """The simulated Panda of scene.yaml, with cameras."""
+    with run_live("seen", tmp_path) as running:
+        yield running
+
+
+@pytest.fixture
+def franka(tmp_path: Path) -> Iterator[Running]:
+    """A Franka, as far as its control box is one."""
+    command = [HSP, "franka-box", "panda", "--lockstep", "--host", "127.0.0.2"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as box:
+        assert box.stdout is not None
+        assert "in lockstep" in box.stdout.readline()
+        try:
+            with run_live("franka", tmp_path) as running:
+                yield running
+        finally:
+            box.send_signal(signal.SIGINT)
 
 
 @pytest.fixture
 def leader() -> Iterator[str]:
     """Something that tells where it is, on a circle; returns the address."""
     address = f"127.0.0.1:{free_port()}"
-    where = ["0.3069", "0", "0.4869"]  # where the hand of panda.yaml starts
+    where = ["0.3069", "0", "0.4869"]  # where the hand starts
     script = str(PLUGIN / "tests/leader.py")
     process = subprocess.Popen([sys.executable, script, address, *where])
     yield address

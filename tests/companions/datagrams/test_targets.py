@@ -1,7 +1,6 @@
 """Targets by datagrams: a port, who sends there, and streams that share it."""
 
 import json
-import logging
 import re
 import socket
 import time
@@ -16,8 +15,9 @@ import hsp_control as hsp
 from hsp_control import Stream
 from hsp_control.cli.live_experiment import of_a_robot
 from hsp_control.common.exceptions import StreamError
-from hsp_control.companions.datagrams.targets import _Part
 from hsp_control.config.source import read_document
+from hsp_control.trajectories.streams.inbox import Inbox
+from hsp_control.trajectories.streams.message import Space
 
 
 def free_port() -> int:
@@ -52,27 +52,51 @@ def listening(port: int, part: str = "") -> Stream:
     return stream
 
 
-def test_datagrams_arrive_and_bad_ones_are_counted(
+def test_datagrams_arrive_and_bad_ones_are_counted_and_said_once(
     port: int, sender: socket.socket, caplog: pytest.LogCaptureFixture
 ) -> None:
     stream = listening(port)
     inbox = stream._mailbox.inbox
-    bad = ("{", '{"value": [NaN]}', '{"value": [0.1, 0.2]}', "[]", "1" * 9000)
-    for text in bad:
+    bad = ("{", '{"value": [NaN]}', '{"value": [0.1, 0.2]}', "[]", "1" * 9000, "")
+    backwards = '{"values": [[0.1], [0.2]], "times": [0.2, 0.1]}'
+    for text in (*bad, backwards, backwards.replace("0.2", "0.3")):
         sender.sendto(text.encode(), ("127.0.0.1", port))
     sender.sendto(b'{"value": [0.1], "t": 3.5}', ("127.0.0.1", port))
     wait_until(lambda: inbox.count == 1)
-    assert caplog.text == ""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as second:
-        for one in (second, sender, second):
-            one.sendto(b"0", ("127.0.0.1", port))
-            time.sleep(0.01)
-        wait_until(lambda: inbox.rejected == 8)
-    assert caplog.text.count("two senders take turns, 127.0.0.1:") == 1
+    assert [caplog.text.count(each) for each in ("NaN is no", "times must")] == [1, 1]
     last = [stream.sample(t).position[0] for t in np.arange(0.0, 1.0, 0.01)][-1]
     assert last == pytest.approx(0.1, abs=1e-9)
     assert stream.counts()["rejected"] == 8
-    assert "a message is 0; needs a mapping" in stream.last_rejection
+    assert "times[1] = 0.1 is not later" in stream.last_rejection
+
+
+def test_a_second_sender_is_refused_until_the_first_is_silent(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    inbox = Inbox(Space(1, False), "udp://127.0.0.1:5005")
+
+    def taken(sender: str, now: float) -> bool:
+        before = inbox.count
+        inbox.note_silence(now)
+        try:
+            inbox.hear(sender, now, {"value": [0.1], "t": now})
+        except StreamError as error:
+            inbox.reject(str(error))
+        return inbox.count > before
+
+    assert taken("a:1", 0.0)
+    assert taken("b:2", 0.1)  # one goal of each: nobody streams yet
+    for k in range(9):
+        assert taken("a:1", 0.2 + 0.05 * k)
+        assert not taken("b:2", 0.22 + 0.05 * k)
+    assert not taken("b:2", 2.59)
+    assert all(taken("b:2", 2.6 + 0.05 * k) for k in range(40))
+    refused, silent = (each.partition("5005: ")[2] for each in caplog.messages)
+    assert refused == (
+        "a message is dropped: b:2 sends while a:1 does, which was first and is heard "
+        "alone until it is silent for 2 s"
+    )
+    assert silent.startswith("a:1 is silent for 2 s; the reference rests where")
 
 
 @pytest.mark.parametrize("source", ["udp://5005", "udp://a:5005/x/y", "udp://a:5/?"])
@@ -139,9 +163,11 @@ def test_each_stream_of_a_port_hears_its_part_or_nobody_does(
     assert (message.t, other.count) == (2.0, 0)
 
 
-def test_one_stream_of_two_poses_leads_two_hands(
-    port: int, sender: socket.socket
+@pytest.mark.parametrize("senders", [1, 2])
+def test_one_stream_of_two_poses_or_two_senders_lead_two_hands(
+    port: int, sender: socket.socket, senders: int
 ) -> None:
+    other = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     sides = {"left": 0.33, "right": -0.33}
     parts = {
         each: {"name": "panda", "position": [0, y, 0]} for each, y in sides.items()
@@ -168,11 +194,20 @@ def test_one_stream_of_two_poses_leads_two_hands(
         for task in controller.tasks:
             goals[task.name] = task.measure(controller.state)[1].tolist()
             goals[task.name][2] += 0.05
-        text = {"t": 7.0, **{name: {"value": each} for name, each in goals.items()}}
-        sender.sendto(json.dumps(text).encode(), ("127.0.0.1", port))
-        wait_until(lambda: all(each._mailbox.inbox.count for each in streams))
+        said = {name: {"value": each} for name, each in goals.items()}
+        texts = [said] if senders == 1 else [{name: said[name]} for name in said]
+        for _ in range(2):
+            for one, text in zip((sender, other), texts, strict=False):
+                data = json.dumps({"t": 7.0, **text}).encode()
+                one.sendto(data, ("127.0.0.1", port))
+        wait_until(lambda: all(each._mailbox.inbox.count == 2 for each in streams))
+        if senders == 2:  # each keeps to its own hand
+            sender.sendto(data, ("127.0.0.1", port))
+            wait_until(lambda: all(each._mailbox.inbox.rejected for each in streams))
+            assert re.match(r"right: \S+ sends while", streams[0].last_rejection)
 
     run = experiment.run(on_row=lead)
+    other.close()
     for name in sides:
         np.testing.assert_allclose(
             run[f"task.{name}.actual"][-1], goals[name], atol=1e-5
@@ -195,19 +230,12 @@ def test_one_stream_of_two_poses_leads_two_hands(
 def test_a_clock_that_jumps_is_said_once(
     clock: Callable[[int], float | None],
     said: list[str],
-    monkeypatch: pytest.MonkeyPatch,
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    now = [0.0]
-    monkeypatch.setattr(
-        "hsp_control.companions.datagrams.targets.monotonic", lambda: now[0]
-    )
-    caplog.set_level(logging.WARNING)
-    heard = _Part("udp://127.0.0.1:5005")
+    inbox = Inbox(Space(1, False), "ros2://goal")
     for k in range(12):
-        now[0] = 100.0 + 0.05 * k
-        heard.hear(("127.0.0.1", 1), clock(k))
-    for k in range(2):  # a policy that starts again is no second sender
-        heard.hear(("127.0.0.1", 2), 0.05 * k)
-    assert [each.removeprefix("udp://127.0.0.1:5005: the sender's clock ")
+        inbox.hear("one", 100.0 + 0.05 * k, {"value": [0.0], "t": clock(k)})
+    for k in range(2):  # a policy that starts again has another clock
+        inbox.hear("two", 110.0 + 0.05 * k, {"value": [0.0], "t": 0.05 * k})
+    assert [each.removeprefix("ros2://goal: the sender's clock ")
             for each in caplog.messages] == said  # fmt: skip

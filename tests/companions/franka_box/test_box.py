@@ -4,10 +4,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from franka_boxes import home, panda, plant
+from franka_boxes import command, home, panda, plant
 
 from hsp_control.companions.franka.layouts import (
-    COMMAND,
     HEADER,
     PERIOD,
     REQUESTS,
@@ -35,13 +34,6 @@ class Talking(Box):
         self.said: list[str] = []
         start = home() if q is None else q
         super().__init__(panda(), simulated or plant(), start, self.said.append)
-
-
-def command(**fields: Any) -> Any:
-    record = np.zeros(1, COMMAND)
-    for name, value in fields.items():
-        record[name] = value
-    return record[0]
 
 
 def state(box: Box) -> Any:

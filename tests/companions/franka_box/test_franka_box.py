@@ -6,18 +6,13 @@ A client can hang where libfranka waits for ever, so each has a time limit.
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
-from franka_boxes import (
-    LONGEST,
-    PATIENCE,
-    PRELUDE,
-    addresses,
-    home,
-    served,
-)
+from franka_boxes import LONGEST, PATIENCE, PRELUDE, addresses, home, served
 
 from hsp_control import Rollout
 
@@ -184,27 +179,23 @@ control = robot = None
         )
 
 
-def await_start(box: "subprocess.Popen[str]") -> None:
-    assert box.stdout is not None
-    while "research interface 10" not in (line := box.stdout.readline()):
-        assert line, "the box did not start"
+@contextmanager
+def started(*options: str | Path) -> "Iterator[subprocess.Popen[str]]":
+    command = [*COMMAND, *options]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as box:
+        assert box.stdout is not None
+        try:
+            while "research interface 10" not in (line := box.stdout.readline()):
+                assert line, "the box did not start"
+            yield box
+        finally:
+            box.kill()
 
 
 @pytest.mark.slow
 def test_a_client_sees_that_its_box_was_killed() -> None:
     host = next(addresses())
-    with subprocess.Popen(
-        [*COMMAND, "--host", host], stdout=subprocess.PIPE, text=True
-    ) as box:
-        assert box.stdout is not None
-        try:
-            await_start(box)
-            client = subprocess.Popen(
-                [
-                    sys.executable,
-                    "-c",
-                    PRELUDE
-                    + """
+    source = f"""{PRELUDE}
 control = robot.start_torque_control()
 try:
     while True:
@@ -215,20 +206,16 @@ except franka.NetworkException as error:
     print(error, flush=True)
     import os
     os._exit(7)
-""",
-                    host,
-                ],
-                stdout=subprocess.PIPE,
-                text=True,
-            )
-            assert client.stdout is not None
-            assert client.stdout.readline()
-            box.send_signal(signal.SIGKILL)
-            said, _ = client.communicate(timeout=LONGEST)
-            assert client.returncode == 7
-            assert "libfranka: " in said
-        finally:
-            box.kill()
+"""
+    command = [sys.executable, "-c", source, host]
+    with started("--host", host) as box:
+        client = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        assert client.stdout is not None
+        assert client.stdout.readline()
+        box.send_signal(signal.SIGKILL)
+        said, _ = client.communicate(timeout=LONGEST)
+        assert client.returncode == 7
+        assert "libfranka: " in said
 
 
 @pytest.mark.smoke
@@ -252,21 +239,15 @@ def test_the_example_in_the_documentation_runs(tmp_path: Path) -> None:
     example = page.read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]
     assert len(example.strip().splitlines()) <= 14
     host, log = next(addresses()), tmp_path / "example.npz"
-    with subprocess.Popen(
-        [*COMMAND, "--host", host, "--log", log], stdout=subprocess.PIPE, text=True
-    ) as box:
-        try:
-            await_start(box)
-            source = example.replace("127.0.0.1", host)
-            client = subprocess.run(
-                [sys.executable, "-c", source],
-                capture_output=True, text=True, timeout=LONGEST,
-            )  # fmt: skip
-            assert client.returncode == 0, client.stderr
-            box.send_signal(signal.SIGINT)
-            said, _ = box.communicate(timeout=LONGEST)
-        finally:
-            box.kill()
+    source = example.replace("127.0.0.1", host)
+    with started("--host", host, "--log", log) as box:
+        client = subprocess.run(
+            [sys.executable, "-c", source],
+            capture_output=True, text=True, timeout=LONGEST,
+        )  # fmt: skip
+        assert client.returncode == 0, client.stderr
+        box.send_signal(signal.SIGINT)
+        said, _ = box.communicate(timeout=LONGEST)
     assert box.returncode == 0
     assert "motion ended: the client has finished it (2999 commands, 0 lost)" in said
     assert f"Log: {log}" in said

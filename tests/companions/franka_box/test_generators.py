@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from franka_boxes import home, panda
+from franka_boxes import command, home, panda
 
-from hsp_control.companions.franka.layouts import COMMAND, PERIOD, Error
+from hsp_control.companions.franka.layouts import PERIOD, Error
 from hsp_control.companions.franka_box import hand, reference, reflexes
 from hsp_control.companions.franka_box.generators import (
     Generator,
@@ -23,13 +23,6 @@ def made(kind: type[Any]) -> tuple[Any, Model]:
     model, start = Model(panda()), reference.at_rest(home())
     arguments = [start, panda().limits]
     return kind(*arguments, *([model] if issubclass(kind, HandPoses) else [])), model
-
-
-def command(**fields: Any) -> Any:
-    record = np.zeros(1, COMMAND)
-    for name, value in fields.items():
-        record[name] = value
-    return record[0]
 
 
 def columns(pose: pin.SE3) -> Any:

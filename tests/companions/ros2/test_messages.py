@@ -1,6 +1,5 @@
 """The bytes are ROS 2's, as an independent decoder reads them; names of a node."""
 
-import struct
 from typing import Any
 
 import numpy as np
@@ -61,17 +60,6 @@ def test_ros_reads_our_bytes_and_writes_the_same(message: Any, store: Stores) ->
     assert (
         type(message).deserialize(bytes(types.serialize_cdr(theirs, name))) == message
     )
-
-
-def test_a_state_is_plain_little_endian_cdr() -> None:
-    message = JointState(Header(Time(7, 8), "base"), ["j"], [0.5], [], [-1.0])
-    body = struct.pack("<iI", 7, 8)
-    body += struct.pack("<I5s", 5, b"base\0") + b"\0" * 3  # to a multiple of 4
-    body += struct.pack("<II2s", 1, 2, b"j\0") + b"\0\0"
-    body += struct.pack("<I", 1) + b"\0" * 4 + struct.pack("<d", 0.5)  # of 8
-    body += struct.pack("<I", 0)
-    body += struct.pack("<I", 1) + struct.pack("<d", -1.0)
-    assert message.serialize() == b"\x00\x01\x00\x00" + body
 
 
 def test_the_hashes_are_those_of_ros() -> None:

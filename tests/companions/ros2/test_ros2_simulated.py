@@ -55,48 +55,11 @@ def served() -> Iterator[Served]:
     made.ended()
 
 
-class Listening:
-    """Hardware that waits for as long as it takes, and remembers.
-
-    Attributes:
-        heard: The states that it read.
-        sent: The efforts that it sent.
-    """
-
-    period = PERIOD
-
-    def __init__(self, hardware: Ros2Hardware) -> None:
-        self._hardware = hardware
-        self.heard: list[np.ndarray] = []
-        self.sent: list[np.ndarray] = []
-
-    def read(self, timeout: float) -> object:
-        found = self._hardware.read(LONG)
-        assert found is not None
-        self.heard.append(np.concatenate([found.q, found.v]))
-        return found
-
-    def write(self, effort: np.ndarray) -> None:
-        self.sent.append(effort.copy())
-        self._hardware.write(effort)
-
-    def close(self) -> None:
-        self._hardware.close()
-
-
-def test_the_wire_changes_no_bit_of_a_run(served: Served) -> None:
-    hardware = Listening(Ros2Hardware(served.address, panda(), PERIOD, timeout=LONG))
-    report = run_loop(law(), hardware, duration=0.2, settings=PATIENT)  # type: ignore[arg-type]
+def test_a_loop_over_the_wire_comes_to_its_end(served: Served) -> None:
+    hardware = Ros2Hardware(served.address, panda(), PERIOD, timeout=LONG)
+    report = run_loop(law(), hardware, duration=0.2, settings=PATIENT)
     assert report.ended == "completed", report.reason
     assert served.ended() == "the loop closed the connection"
-    # The same efforts again, without a wire: every state that was heard is there.
-    twin, states = watched(PATIENT), set()
-    states.add(np.concatenate(twin.measure()).tobytes())
-    for effort in hardware.sent:
-        twin.advance([effort])
-        states.add(np.concatenate(twin.measure()).tobytes())
-    assert {state.tobytes() for state in hardware.heard} <= states
-    assert len({state.tobytes() for state in hardware.heard}) > 200
 
 
 def wrong_size(send: Callable[[list[float]], None], _: Served) -> None:

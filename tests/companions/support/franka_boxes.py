@@ -16,7 +16,7 @@ import numpy as np
 from hsp_control import Robot
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HardwareError
-from hsp_control.companions.franka.layouts import PERIOD
+from hsp_control.companions.franka.layouts import COMMAND, PERIOD
 from hsp_control.companions.franka_box import Arm, Box, Server
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants import IntegratedPlant, RigidBody, SampledPlant
@@ -34,6 +34,13 @@ def damped(state, effort):
     return franka.Torques((effort - 5.0 * np.array(state.dq)).tolist())
 """
 """What the clients of these tests begin with."""
+
+
+def command(**fields: Any) -> Any:
+    record = np.zeros(1, COMMAND)
+    for name, value in fields.items():
+        record[name] = value
+    return record[0]
 
 
 @cache

@@ -9,15 +9,8 @@ import pytest
 from scipy import stats
 
 from hsp_control.common.exceptions import SweepError
-from hsp_control.companions.sweeps import (
-    Integers,
-    LogUniform,
-    Normal,
-    Sweep,
-    Uniform,
-    sensitivity,
-    sweep_figure,
-)
+from hsp_control.companions import sweeps
+from hsp_control.companions.sweeps import Integers, LogUniform, Normal, Sweep, Uniform
 from hsp_control.companions.sweeps.design import chosen_design, points
 from hsp_control.companions.sweeps.factor import factors
 from hsp_control.companions.sweeps.plan import SweepPlan
@@ -33,19 +26,13 @@ pytestmark = pytest.mark.process
 @pytest.mark.parametrize(
     ("text", "levels"),
     [
-        ("1,2,5", (1, 2, 5)),
-        ("rest,flow", ("rest", "flow")),
-        ("[0, 0, 1], [0, 1, 0]", ([0, 0, 1], [0, 1, 0])),
-        ("true", (True,)),
-        ("'a:b', c", ("a:b", "c")),
-        ("{type: hold}", ({"type": "hold"},)),
-        ("0:10:3", (0, 5, 10)),
-        ("0:1:3", (0.0, 0.5, 1.0)),
-        ("-1e-2:0.5:2", (-0.01, 0.5)),
-        ("linear:1:9:5", (1, 3, 5, 7, 9)),
-        ("log:1:100:3", (1.0, 10.0, 100.0)),
+        ("1,2,5", (1, 2, 5)), ("rest,flow", ("rest", "flow")), ("true", (True,)),
+        ("[0, 0, 1], [0, 1, 0]", ([0, 0, 1], [0, 1, 0])), ("'a:b', c", ("a:b", "c")),
+        ("{type: hold}", ({"type": "hold"},)), ("0:10:3", (0, 5, 10)),
+        ("0:1:3", (0.0, 0.5, 1.0)), ("-1e-2:0.5:2", (-0.01, 0.5)),
+        ("linear:1:9:5", (1, 3, 5, 7, 9)), ("log:1:100:3", (1.0, 10.0, 100.0)),
     ],
-)
+)  # fmt: skip
 def test_lists_and_ranges_as_they_are_spelled(text: str, levels: tuple) -> None:
     found = values(text).levels()
     assert found is not None
@@ -77,26 +64,20 @@ def test_distributions_as_they_are_spelled(text: str, distribution: object) -> N
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "the values are missing"),
-        ("5:1:3", "from 5 to 1"),
-        ("1:5:1", "at least 2"),
-        ("1:5:2.5", "'2.5' is not an integer"),
-        ("1:5:1000000", "at most 100000"),
-        ("1:x:3", "'x' is not a number"),
-        ("1:2:3:4", "has 4 parts"),
-        ("nan:1", "must be finite"),
-        ("log:0:1:3", "must be positive"),
-        ("loguniform:-1:1", "must be positive"),
+        ("", "the values are missing"), ("5:1:3", "from 5 to 1"),
+        ("1:5:1", "at least 2"), ("1:5:2.5", "'2.5' is not an integer"),
+        ("1:5:1000000", "at most 100000"), ("1:x:3", "'x' is not a number"),
+        ("1:2:3:4", "has 4 parts"), ("nan:1", "must be finite"),
+        ("log:0:1:3", "must be positive"), ("loguniform:-1:1", "must be positive"),
         ("unifrom:1:2", "did you mean 'uniform'?"),
         ("uniform:1", "has 1 numbers; needs uniform:LOW:HIGH"),
         ("normal:0:0", "the deviation positive"),
         ("normal:0:1:2:1", "cut to 2 ... 1; low must be below high"),
         ("normal:0:1:50:60", "has no values from 50 to 60"),
         ("integers:3:1", "no integers from 3 to 1"),
-        ("integers:0:1.5", "'1.5' is not an integer"),
-        ("[1, 2", "not a list"),
+        ("integers:0:1.5", "'1.5' is not an integer"), ("[1, 2", "not a list"),
     ],
-)
+)  # fmt: skip
 def test_what_is_no_range_is_refused(text: str, message: str) -> None:
     with pytest.raises(SweepError, match=message.replace("?", r"\?")):
         values(text)
@@ -225,7 +206,7 @@ def invented(runs: int = 200) -> Sweep:
 
 
 def test_sensitivities_are_those_that_were_put_in() -> None:
-    found = sensitivity(invented())
+    found = sweeps.sensitivity(invented())
     assert found.outcomes == (
         "tracking.x.rms", "manipulability.min", "distance.y.min", "effort.max",
     )  # fmt: skip
@@ -253,14 +234,14 @@ def test_sensitivities_are_those_that_were_put_in() -> None:
 
 def test_what_cannot_be_told_is_not_told() -> None:
     with pytest.raises(SweepError, match="5 runs were completed"):
-        sensitivity(invented(10))
+        sweeps.sensitivity(invented(10))
     with pytest.raises(SweepError, match=r"did you mean 'effort.max'\?"):
-        sensitivity(invented(), ["effort.mx"])
+        sweeps.sensitivity(invented(), ["effort.mx"])
     unknown = invented()
     unknown["effort.max"][5:] = np.nan
-    assert "effort.max" not in sensitivity(unknown).outcomes
+    assert "effort.max" not in sweeps.sensitivity(unknown).outcomes
     with pytest.raises(SweepError, match="no completed run has the metric"):
-        sensitivity(unknown, ["effort.max"])
+        sweeps.sensitivity(unknown, ["effort.max"])
     with pytest.raises(SweepError, match="has no run 200"):
         invented().configuration(200)
     with pytest.raises(SweepError, match="has no column 'upp'; did you mean 'up'"):
@@ -268,7 +249,7 @@ def test_what_cannot_be_told_is_not_told() -> None:
 
 
 def test_every_pair_has_its_panel_and_failures_are_shown() -> None:
-    figure = sweep_figure(invented())
+    figure = sweeps.sweep_figure(invented())
     figure.canvas.draw()
     axes = figure.axes
     assert len(axes) == 16

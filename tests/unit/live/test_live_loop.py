@@ -2,7 +2,6 @@
 
 import re
 import warnings
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -50,10 +49,6 @@ from hsp_control.live import (
 Array = NDArray[np.float64]
 AT_REST = 0.02
 """Speeds of a robot that holds: below twice the speed at which damping ends [rad/s]."""
-
-
-def gravity(q: Array) -> Array:
-    return panda().inverse_dynamics(q, np.zeros(7), np.zeros(7))
 
 
 def assert_held(rig: Rig, report: LoopReport) -> None:
@@ -146,25 +141,11 @@ def interrupt(found: Measurement) -> Measurement:
     raise KeyboardInterrupt
 
 
-def call_from(t: float, what: Callable[[], object]) -> Callable[[float], None]:
-    def on_period(now: float) -> None:
-        if now >= t:
-            what()
-
-    return on_period
-
-
 @pytest.mark.slow
-def test_the_operator_s_stop_and_ctrl_c(tmp_path: Path) -> None:
-    requests, rig = OperatorRequests(), Rig()
-    on_period = call_from(0.1, requests.stop)
-    report = run_loop(law(), rig, requests=requests, on_period=on_period)
-    assert (report.ended, report.status) == ("operator", "interrupted")
-    assert_held(rig, report)
-
+def test_ctrl_c_in_a_read_is_the_operator_s_stop(tmp_path: Path) -> None:
     rig, log = Rig(tricks={150: interrupt}), tmp_path / "run.journal"
     report = run_loop(law(), rig, log=log)
-    assert report.ended == "operator"
+    assert (report.ended, report.status) == ("operator", "interrupted")
     assert_held(rig, report)
     assert Rollout.load(log).status == "interrupted"
 

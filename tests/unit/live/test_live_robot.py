@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from live_rigs import PERIOD, Array, Rig, law, panda, start, watched
+from live_rigs import PERIOD, Array, Rig, gravity, law, panda, start, watched
 
 from hsp_control import Gains, Robot
 from hsp_control.control.compensation import Command, Compensation, MomentumObserver
@@ -23,10 +23,6 @@ from hsp_control.simulation.plants import IntegratedPlant, RigidBodyPlant
 
 RATE = 500.0
 RATED = LiveSettings(effort_rate=RATE)
-
-
-def gravity(q: Array) -> Array:
-    return panda().inverse_dynamics(q, np.zeros(7), np.zeros(7))
 
 
 def fed(robot: SimulatedRobot, efforts: Iterable[Array]) -> Array:
@@ -217,11 +213,15 @@ def test_the_limiter_keeps_the_rate_from_both(seed: int, compensates: bool) -> N
         changed = limiter.robot_has(known)
         assert changed is (not np.array_equal(known, before))
         assert limiter.apply(100.0 * rng.standard_normal(7), start())
+        np.testing.assert_allclose(limiter.applied, limiter.sent + borne, atol=1e-12)
         assert (np.abs(limiter.sent + borne) <= most + 1e-9).all()
         true = np.clip(known, -most - borne, most - borne)
         assert (np.abs(limiter.sent - true) <= step + 1e-9).all()
         near = np.abs(true - before) <= 2.0 * step
         assert (np.abs(limiter.sent - before)[near] <= step + 1e-9).all()
+    before = limiter.sent.copy()
+    assert not limiter.apply(np.full(7, np.nan), start())
+    np.testing.assert_array_equal(limiter.sent, before)
 
 
 def test_a_lost_effort_corrects_the_momentum_observer() -> None:

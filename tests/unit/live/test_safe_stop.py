@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from live_rigs import PERIOD, panda, start, watched
+from live_rigs import PERIOD, gravity, panda, start, watched
 from numpy.typing import NDArray
 
 from hsp_control.live import LiveSettings, Phase, SafeStop, StopSettings
-from hsp_control.live.effort_limiter import EffortLimiter
 from hsp_control.live.report import Deadlines
 from hsp_control.live.safe_stop import largest_scale
 from hsp_control.live.state_reader import DeadReckoning
@@ -27,15 +26,11 @@ def at_random(seed: int) -> tuple[Array, Array]:
     return panda().random_configuration(rng), rng.standard_normal(7)
 
 
-def gravity(q: Array) -> Array:
-    return panda().inverse_dynamics(q, np.zeros(7), np.zeros(7))
-
-
 @given(seed=seeds, limited=st.booleans())
 def test_damping_takes_energy_whatever_the_inertia(seed: int, limited: bool) -> None:
     q, v = at_random(seed)
     most = LIMITED if limited else FREE
-    stop = SafeStop(panda(), StopSettings(), most, PERIOD)
+    stop = SafeStop(panda(), StopSettings(damping=8.0), most, PERIOD)
     tau = stop.effort(panda().state(0.0, q, v))
     power = float(v @ (tau - gravity(q)))  # what is not potential energy
     M = panda().state(0.0, q, v).mass_matrix
@@ -43,7 +38,7 @@ def test_damping_takes_energy_whatever_the_inertia(seed: int, limited: bool) -> 
     assert power < 0.0
     assert (np.abs(tau) <= most * (1.0 + 1e-12)).all()
     if not limited:
-        np.testing.assert_allclose(power, -20.0 * v @ M @ v, rtol=1e-9)
+        np.testing.assert_allclose(power, -8.0 * v @ M @ v, rtol=1e-9)
 
 
 def test_a_share_of_the_damping_brakes_where_clipped_damping_would_drive() -> None:
@@ -85,26 +80,6 @@ def test_it_stops_a_robot_that_is_not_the_model(seed: int, factor: float) -> Non
     assert sag.max() < 0.5 * abs(factor - 1.0) + 1e-6
 
 
-def test_with_the_right_model_energy_falls_like_the_exponential() -> None:
-    _, v = at_random(1)
-    q, k = start(), 8.0
-    settings = StopSettings(damping=k)
-    stop = SafeStop(panda(), settings, FREE, 1e-4)
-    plant = IntegratedPlant(RigidBodyPlant(panda()), Rk4(1e-4))
-    plant.reset(0.0, q, v)
-    state = panda().state(0.0, q, v)
-    energies = []
-    for i in range(1000):
-        tau = stop.effort(state.update(1e-4 * i, q, v))
-        energies.append(0.5 * v @ state.mass_matrix @ v)
-        q, v = plant.advance(1e-4 * i, 1e-4 * (i + 1), tau)
-    times = 1e-4 * np.arange(1000)
-    # The effort is held for 1e-4 s: first order in k h = 8e-4, over k t = 0.8.
-    np.testing.assert_allclose(
-        energies, energies[0] * np.exp(-2.0 * k * times), rtol=3e-3
-    )
-
-
 @given(seed=seeds)
 def test_the_share_is_the_greatest_that_fits(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -120,33 +95,6 @@ def test_the_share_is_the_greatest_that_fits(seed: int) -> None:
         if s < 1.0:
             more = np.abs(base + 1.01 * s * direction + 1e-9 * direction)
             assert (more > most).any()
-
-
-@pytest.mark.slow
-@given(seed=seeds, compensates=st.booleans())
-def test_the_limiter_keeps_both_limits_where_both_can_be(
-    seed: int, compensates: bool
-) -> None:
-    rng = np.random.default_rng(seed)
-    rate, most = 500.0, 40.0
-    settings = LiveSettings(
-        compensates_gravity=compensates, effort_rate=rate, effort=most
-    )
-    limiter = EffortLimiter(panda(), settings, PERIOD)
-    q = start()
-    limiter.reset(q)
-    for _ in range(30):
-        before = limiter.sent.copy()
-        q = panda().integrate(q, 1e-3 * rng.standard_normal(7))
-        assert limiter.apply(100.0 * rng.standard_normal(7), q)
-        assert (np.abs(limiter.sent - before) <= rate * PERIOD + 1e-12).all()
-        borne = gravity(q) if compensates else 0.0
-        np.testing.assert_allclose(limiter.applied, limiter.sent + borne, atol=1e-12)
-        # q moves by 1e-3 rad a period: gravity by less than the step of 0.5 N·m.
-        assert (np.abs(limiter.applied) <= most + 1e-9).all()
-    before = limiter.sent.copy()
-    assert not limiter.apply(np.full(7, np.nan), q)
-    np.testing.assert_array_equal(limiter.sent, before)
 
 
 def test_reckoning_is_the_model_s_motion() -> None:

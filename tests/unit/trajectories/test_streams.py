@@ -180,10 +180,14 @@ def test_lost_and_jittered_waypoints_in_any_order_change_little() -> None:
     assert np.abs(x - wanted)[1500:3900].max() < 4e-3
 
 
-def test_the_newest_target_is_reached_at_rest() -> None:
-    stream = Stream([0.0], policy="latest").anchored(None)
+@pytest.mark.parametrize(
+    ("policy", "goals"),
+    [("latest", [0.5, 0.2]), ("interpolate", [0.2]), ("extrapolate", [0.2])],
+)
+def test_the_newest_target_is_reached_at_rest(policy: Any, goals: list[float]) -> None:
+    stream = Stream([0.0], policy=policy).anchored(None)
     feed = at_times(
-        (0.1, lambda: stream.send([0.5])), (0.3, lambda: stream.send([0.2]))
+        *((0.1 + 0.2 * k, lambda x=x: stream.send([x])) for k, x in enumerate(goals))
     )
     x, rate, acceleration = columns(sampled(stream, 2.0, feed))
     assert x[-1, 0] == pytest.approx(0.2, abs=1e-9)

@@ -1,0 +1,209 @@
+"""Pictures of a simulated robot's MuJoCo scene by HTTP: ``/CAMERA.jpg``.
+
+A process of its own draws, each picture when it is asked for, of the scene as it is
+then; what simulates the robot only copies its state. Without a graphics card Mesa
+draws.
+"""
+
+import ctypes
+import multiprocessing
+import os
+from collections.abc import Callable
+from http.server import BaseHTTPRequestHandler, HTTPServer
+from io import BytesIO
+from multiprocessing.connection import Connection
+from threading import Thread
+from typing import Any
+from urllib.parse import parse_qsl, unquote, urlsplit
+
+import numpy as np
+from PIL import Image
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.companions.mujoco.plant import MujocoEngine
+from hsp_control.simulation.plants import ImperfectPlant, Plant
+
+_FORMATS: dict[str, dict[str, Any]] = {
+    "jpg": {"format": "JPEG", "quality": 95},
+    "png": {"format": "PNG"},
+}
+_SIZE = {"width": 640, "height": 480}
+_LARGEST = 2048
+"""Most pixels of a side."""
+_SIZES = 4
+"""Of how many sizes pictures are drawn without a new start."""
+_INSTALL = "(pip install 'hsp_control[cameras]'; on Debian and Ubuntu also libegl1)"
+
+
+def show(address: str, plant: Plant) -> Callable[..., object]:
+    """Serve pictures of a plant; return what must be called after each of its steps.
+
+    Args:
+        address: ``HOST:PORT``.
+        plant: The plant, which MuJoCo moves.
+
+    Raises:
+        HardwareError: If the address is invalid, the scene has no camera, or nothing
+            can be drawn here.
+    """
+    where = f"http://{address}"
+    try:
+        parts = urlsplit(where)
+        host, port = parts.hostname, parts.port
+    except ValueError:
+        host = port = None
+    if not host or not port or where != f"http://{host}:{port}":
+        raise HardwareError(
+            f"{where}: needs http://HOST:PORT, for example http://127.0.0.1:5008"
+        )
+    while isinstance(plant, ImperfectPlant):
+        plant = plant.plant
+    if not isinstance(plant, MujocoEngine) or not plant.model.ncam:
+        raise HardwareError(
+            f"{where}: there is no camera; needs plant: mujoco_scene, and a <camera> "
+            "in its MJCF"
+        )
+    import mujoco
+
+    model, data = plant.model, plant.data
+    compiled = np.zeros(mujoco.mj_sizeModel(model), np.uint8)
+    mujoco.mj_saveModel(model, None, compiled)
+    kind = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+    anew = multiprocessing.get_context("spawn")
+    memory = anew.RawArray(ctypes.c_double, mujoco.mj_stateSize(model, kind))
+    state, lock = np.ctypeslib.as_array(memory), anew.Lock()
+
+    def tell(*_: object) -> None:
+        if lock.acquire(block=False):  # who draws has it for microseconds
+            mujoco.mj_getState(model, data, state, kind)
+            lock.release()
+
+    tell()
+    ours, theirs = anew.Pipe(duplex=False)
+    arguments = (host, port, compiled.tobytes(), memory, lock, theirs)
+    anew.Process(target=_serve, args=arguments, name="cameras", daemon=True).start()
+    theirs.close()
+    try:
+        fault = ours.recv()
+    except EOFError:
+        fault = "its process has ended"
+    if fault:
+        raise HardwareError(f"{where}: no pictures there: {fault}")
+    return tell
+
+
+def _serve(
+    host: str, port: int, compiled: bytes, memory: Any, lock: Any, ready: Connection
+) -> None:
+    """Draw until the process that simulates has ended."""
+    nothing = os.open(os.devnull, os.O_RDWR)
+    for pipe in (0, 1):  # its parent's, which waits for their end
+        os.dup2(nothing, pipe)
+    os.nice(10)
+    Thread(target=_end_with_parent, daemon=True).start()
+    try:
+        pictures = _Pictures(compiled, memory, lock)
+        server = _Server((host, port), _Handler)
+        server.pictures = pictures
+    except ImportError as error:
+        ready.send(f"{error} {_INSTALL}")
+        return
+    except (RuntimeError, OSError, AttributeError) as error:
+        ready.send(str(error) or type(error).__name__)
+        return
+    ready.send("")
+    server.serve_forever()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(0)
+
+
+class _Pictures:
+    """Draws a scene whose state another process writes."""
+
+    def __init__(self, compiled: bytes, memory: Any, lock: Any) -> None:
+        """Load the scene, and try whether it can be drawn."""
+        os.environ.setdefault("MUJOCO_GL", "egl")  # no screen is needed
+        import mujoco
+
+        self._mujoco, name = mujoco, "scene.mjb"
+        self.model = mujoco.MjModel.from_binary_path(name, {name: compiled})
+        self.model.vis.global_.offwidth = self.model.vis.global_.offheight = _LARGEST
+        self._data = mujoco.MjData(self.model)
+        self._state, self._lock = np.ctypeslib.as_array(memory), lock
+        self._renderers: dict[tuple[int, int], Any] = {}
+        self.cameras = [self.model.camera(k).name for k in range(self.model.ncam)]
+        self.drawn(0, **_SIZE)
+
+    def drawn(self, camera: int, width: int, height: int) -> tuple[float, Array]:
+        """Return the time [s], and what a camera sees, shape (height, width, 3)."""
+        mujoco, data = self._mujoco, self._data
+        if (width, height) not in self._renderers:
+            if len(self._renderers) == _SIZES:
+                self._renderers.pop(next(iter(self._renderers))).close()
+            renderer = mujoco.Renderer(self.model, height, width)
+            self._renderers[width, height] = renderer
+        with self._lock:
+            state = self._state.copy()
+        kind = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+        mujoco.mj_setState(self.model, data, state, kind)
+        mujoco.mj_forward(self.model, data)
+        renderer = self._renderers[width, height]
+        renderer.update_scene(data, camera)
+        return float(data.time), renderer.render()
+
+
+class _Server(HTTPServer):
+    """Answers one request after another, in the thread that draws."""
+
+    pictures: _Pictures
+
+
+class _Handler(BaseHTTPRequestHandler):
+    """Answers one request."""
+
+    server: _Server
+    timeout = 1.0  # of a client that asks for nothing [s]
+
+    def do_GET(self) -> None:
+        """Send a picture, or say what there is."""
+        try:
+            camera, ending, size = _asked(self.path, self.server.pictures.cameras)
+        except ValueError as error:
+            self.send_error(404, explain=str(error))
+            return
+        t, picture = self.server.pictures.drawn(camera, **size)
+        text = BytesIO()
+        Image.fromarray(picture).save(text, **_FORMATS[ending])
+        self.send_response(200)
+        self.send_header("Content-Type", f"image/{_FORMATS[ending]['format']}".lower())
+        self.send_header("Content-Length", str(text.tell()))
+        self.send_header("Time", repr(t))
+        self.end_headers()
+        self.wfile.write(text.getvalue())
+
+    def log_message(self, *_: Any) -> None:
+        """Say nothing."""
+
+
+def _asked(path: str, cameras: list[str]) -> tuple[int, str, dict[str, int]]:
+    """Return the camera, the format and the size that a path asks for."""
+    parts = urlsplit(path)
+    name, _, ending = unquote(parts.path).removeprefix("/").rpartition(".")
+    if name not in cameras or ending not in _FORMATS:
+        there = listing([f"/{each}.jpg" for each in cameras])
+        raise ValueError(f"no {path}{did_you_mean(name, cameras)} (there is {there})")
+    size = dict(_SIZE)
+    for key, value in parse_qsl(parts.query):
+        if key not in size or not value.isdecimal() or not 0 < int(value) <= _LARGEST:
+            raise ValueError(
+                f"{key}={value}; needs width and height, each 1 to {_LARGEST}"
+            )
+        size[key] = int(value)
+    return cameras.index(name), ending, size

@@ -1,0 +1,111 @@
+"""What another process sees through the cameras of a MuJoCo scene."""
+
+import socket
+from ctypes.util import find_library
+from io import BytesIO
+from pathlib import Path
+from urllib.error import HTTPError
+from urllib.request import urlopen
+
+import numpy as np
+import pytest
+from mjcf_texts import ARM, CELL
+from PIL import Image
+
+import hsp_control as hsp
+from hsp_control.cli.robot_process import RobotProcess
+from hsp_control.common.exceptions import HardwareError
+from hsp_control.companions.cameras import show
+from hsp_control.live import run_loop
+
+pytest.importorskip("mujoco")
+pytest.importorskip("OpenGL")
+pytestmark = [
+    pytest.mark.process,
+    pytest.mark.skipif(not find_library("EGL"), reason="needs libegl1"),
+]
+
+CAMERA = '<light pos="0 0 3"/><camera name="above" pos=".3 .3 .5"/></worldbody>'
+
+
+@pytest.fixture
+def cell(tmp_path: Path) -> hsp.Experiment:
+    """An arm beside a ball, below a camera."""
+    text = CELL.replace("</worldbody>", CAMERA).replace('size=".03" ', 'size=".09" ')
+    mjcf = tmp_path / "cell.xml"
+    mjcf.write_text(text)
+    return hsp.load_experiment({
+        "robot": {"mjcf": str(mjcf), "root": "base", "joints": ARM},
+        "tasks": {"tip": {"type": "frame_position", "frame": "tip"}},
+        "plant": "mujoco_scene",
+        "simulation": {"duration": 0.1, "control_period": 0.002},
+        "live": {"missing": 1000, "age": 5.0, "watchdog": 1000},
+    })  # fmt: skip
+
+
+@pytest.fixture
+def address() -> str:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"127.0.0.1:{probe.getsockname()[1]}"
+
+
+def seen(address: str, what: str) -> tuple[float, np.ndarray]:
+    """Return the time and the pixels of a picture."""
+    with urlopen(f"http://{address}/{what}", timeout=60.0) as answer:
+        picture = Image.open(BytesIO(answer.read()))
+        return float(answer.headers["Time"]), np.asarray(picture).astype(int)
+
+
+def test_a_picture_shows_the_scene_as_it_is_then(
+    cell: hsp.Experiment, address: str
+) -> None:
+    plant = cell.plant
+    assert isinstance(plant, hsp.plants.MujocoScenePlant)
+    plant.reset(0.0, cell.q0, cell.v0)
+    told = show(address, plant)
+    t, ball = seen(address, "above.png?width=64&height=48")
+    assert (t, ball.shape) == (0.0, (48, 64, 3))
+    _, again = seen(address, "above.jpg?width=64&height=48")
+    assert np.abs(again - ball).mean() < 3.0
+    plant.data.joint("ball").qpos[0] += 0.3
+    plant.data.time = 1.5
+    told()
+    t, floor = seen(address, "above.png?width=64&height=48")
+    assert t == 1.5
+    assert np.abs(floor - ball)[16:32, 24:40].mean() > 5.0
+    for wrong, said in (
+        ("abov.png", "no /abov.png; did you mean 'above'? (there is /above.jpg)"),
+        ("above.png?width=9999", "width=9999; needs width and height, each 1 to 2048"),
+    ):
+        with pytest.raises(HTTPError) as caught:
+            seen(address, wrong)
+        assert said in caught.value.read().decode()
+    with pytest.raises(HardwareError, match=r"no pictures there: .*Address already"):
+        show(address, plant)
+
+
+def test_a_robot_in_its_own_process_is_seen(cell: hsp.Experiment, address: str) -> None:
+    with RobotProcess(cell, cameras=f"http://{address}") as robot:
+        assert seen(address, "above.jpg")[0] == 0.0
+        later: list[float] = []
+
+        def look(t: float) -> None:
+            if t > 0.05 and not later:
+                later.append(seen(address, "above.jpg")[0])
+
+        options = {"settings": cell.scenario.live, "on_period": look}
+        run_loop(cell.controller, robot.hardware, duration=0.1, **options)
+        assert later[0] >= 0.05
+    with pytest.raises(OSError, match="refused"):
+        seen(address, "above.jpg")
+
+
+@pytest.mark.parametrize(
+    ("where", "message"),
+    [("127.0.0.1", "needs http://HOST:PORT"), ("a:1", "there is no camera; needs")],
+)
+def test_mistakes_are_named(where: str, message: str) -> None:
+    robot = hsp.Robot.load("planar3r")
+    with pytest.raises(HardwareError, match=message):
+        show(where, hsp.plants.RigidBodyPlant(robot))
