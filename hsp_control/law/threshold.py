@@ -87,14 +87,14 @@ def write_thresholds(
     """
     largest, start = least, 0
     for level in range(ends.shape[0]):
-        square = weighted = 0.0
+        square = more = 0.0
         for k in range(start, ends[level]):
             if yields[k] > 0.0:
                 square += asked[k] * asked[k]
-                weighted += yields[k] * asked[k] * asked[k]
+                more += (yields[k] - 1.0) * asked[k] * asked[k]
         beyond = max(np.sqrt(square) - following.modest, 0.0)
         if beyond > 0.0:
-            beyond *= weighted / square
+            beyond *= 1.0 + more / square
         thresholds[level] = max(least, np.sqrt(beyond / following.steepest))
         largest = max(largest, thresholds[level])
         start = ends[level]
