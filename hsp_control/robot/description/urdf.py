@@ -118,6 +118,65 @@ def problems(robot: Element) -> Iterator[tuple[str, str]]:
                 if problem := _repeated(element):
                     name = part.get("name", "")
                     yield f"{kind} {name!r}: <{element.tag}>", problem
+    yield from _hidden(robot)
+    yield from _no_tree(robot)
+
+
+def _hidden(robot: Element) -> Iterator[tuple[str, str]]:
+    """Yield the links and joints that are written where parsers do not look."""
+    for child in robot:
+        for element in child.iter() if child.tag != "gazebo" else ():
+            kind = element.tag.rpartition("}")[2].lower()
+            parent = element.find("parent")
+            if kind not in _SINGLE or element.tag == kind and element is child:
+                continue
+            if element is not child and (parent is None or not parent.get("link")):
+                continue  # as in a <transmission>: a joint's name alone
+            within = "" if element is child else f" in <{child.tag}>"
+            yield (
+                f"{kind} {element.get('name', '')!r}",
+                f"parsers skip <{element.tag}>{within}; must be <{kind}> in <robot>",
+            )
+
+
+def _no_tree(robot: Element) -> Iterator[tuple[str, str]]:
+    """Yield what makes the links no tree; parsers then drop a part, silently."""
+    links = [link.get("name") for link in robot.findall("link")]
+    above: dict[str | None, tuple[str, str | None]] = {}  # joint above it, its parent
+    complete = True
+    for joint in robot.findall("joint"):
+        name = joint.get("name", "")
+        ends = [joint.find("parent"), joint.find("child")]
+        parent, child = (None if end is None else end.get("link") for end in ends)
+        if parent not in links or child not in links:
+            return  # the parser says so
+        if parent == child:
+            complete = False
+            yield f"joint {name!r}", f"link {child!r} is both its parent and its child"
+        elif child in above:
+            complete = False
+            joints = f"the joints {above[child][0]!r} and {name!r}"
+            yield f"link {child!r}", f"it is the child of {joints}; must be of one"
+        else:
+            above[child] = name, parent
+    roots = [repr(link) for link in links if link not in above]
+    if complete and len(roots) > 1:
+        yield (
+            f"links {listing(roots)}",
+            "none is the child of a joint; a robot has one such link, its root",
+        )
+    rooted: set[str | None] = set()
+    for link in links:
+        way: dict[str | None, str] = {}  # the joints from a link to the root
+        while link in above and link not in rooted:
+            if link in way:
+                loop = list(way)[list(way).index(link) :]
+                names = [repr(way[each]) for each in loop]
+                where = f"links {listing(map(repr, loop))}"
+                yield where, f"the joints {listing(names)} connect them to a loop"
+                break
+            way[link], link = above[link]
+        rooted |= way.keys()
 
 
 def named_files(robot: Element) -> Iterator[tuple[str, str]]:
