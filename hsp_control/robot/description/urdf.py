@@ -125,24 +125,24 @@ def problems(robot: Element) -> Iterator[tuple[str, str]]:
 def _hidden(robot: Element) -> Iterator[tuple[str, str]]:
     """Yield the links and joints that are written where parsers do not look."""
     for child in robot:
-        for element in child.iter() if child.tag != "gazebo" else ():
-            kind = element.tag.rpartition("}")[2].lower()
-            parent = element.find("parent")
-            if kind not in _SINGLE or element.tag == kind and element is child:
-                continue
-            if element is not child and (parent is None or not parent.get("link")):
-                continue  # as in a <transmission>: a joint's name alone
-            within = "" if element is child else f" in <{child.tag}>"
-            yield (
-                f"{kind} {element.get('name', '')!r}",
-                f"parsers skip <{element.tag}>{within}; must be <{kind}> in <robot>",
-            )
+        if child.tag == "gazebo":
+            continue
+        found = [each for each in child.iter("joint") if each is not child]
+        found = [each for each in found if each.find("parent[@link]") is not None]
+        kind = child.tag.rpartition("}")[2].lower()
+        if kind in ("link", "joint") and child.tag != kind:
+            found.append(child)
+        for each in found:
+            kind, name = each.tag.rpartition("}")[2].lower(), each.get("name", "")
+            within = "" if each is child else f" in <{child.tag}>"
+            message = f"parsers skip <{each.tag}>{within}; must be <{kind}> in <robot>"
+            yield f"{kind} {name!r}", message
 
 
 def _no_tree(robot: Element) -> Iterator[tuple[str, str]]:
     """Yield what makes the links no tree; parsers then drop a part, silently."""
     links = [link.get("name") for link in robot.findall("link")]
-    above: dict[str | None, tuple[str, str | None]] = {}  # joint above it, its parent
+    above: dict[str | None, tuple[str, str | None]] = {}  # its joint, and parent link
     complete = True
     for joint in robot.findall("joint"):
         name = joint.get("name", "")
