@@ -212,6 +212,41 @@ def test_check_tells_of_targets_along_some_axes_and_of_hands_on_legs(
     assert ("reach" not in warned) if told is None else re.search(told, warned)
 
 
+def forced(config: str, contact: str, newtons: object) -> list[str]:
+    """Return the options of a configuration that presses with another force."""
+    ramp = f"{{type: force, contact: {contact}, at: 0, ramp: 0.5, force: {{value: "
+    return [f"forces/{config}", "--set", f"changes=[{ramp}{newtons}}}}}]"]
+
+
+def test_a_wipe_that_loses_contact_is_told_before_and_after_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("mujoco")
+    fast = ["--set", "tasks.path.trajectory.angular_rate=3"]
+    short = ["--set", "simulation.duration=2", "--out", str(tmp_path), "--no-view"]
+    assert main(["run", *forced("panda_wipe", "wiper", 5), *fast, *short]) == 0
+    told = capsys.readouterr()
+    assert "it slides at 0.34 m/s, and MuJoCo's surface pushes it off below" in told.err
+    assert re.search(
+        r"force wiper .* of 5\.\d* N at the end, missed by [3-9]", told.out
+    )
+    assert re.search(r"\n +\d\d rows: contact lost", told.out)
+
+
+@pytest.mark.parametrize(
+    ("newtons", "had"), [(60, None), (150, "at most 104 of 150 N")]
+)
+def test_check_tells_of_a_force_that_soles_cannot_balance(
+    newtons: float, had: str | None, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A run with 150 N ends with 114 N at the wall."""
+    pytest.importorskip("mujoco")
+    command = forced("talos_wall", "hand", f"[0, 0, {newtons}]")
+    assert main(["check", *command]) == 0
+    warned = capsys.readouterr().err
+    assert had in warned if had else not warned
+
+
 @pytest.mark.slow
 def test_plot_draws_beside_the_log(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
