@@ -175,8 +175,8 @@ class Requests:
         where = f"{mass:g} kg at {com.tolist()} m"
         if not (mass >= 0.0 and np.isfinite(mass) and np.abs(com).max() <= _NEAR):
             return self._invalid(command, where)
-        point = pin.Inertia(min(mass, _HEAVIEST), com, np.zeros((3, 3)))
-        held = np.abs(self._box.gravity_with(point))
+        load = pin.Inertia(min(mass, _HEAVIEST), com, np.zeros((3, 3)))
+        held = np.abs(self._box.gravity_with(load))
         worst = int(np.argmax(held - (limit := self._box.arm.limits.effort)))
         if held[worst] > limit[worst]:
             why = f"joint {worst + 1} cannot hold it here with {limit[worst]:g} N·m"
@@ -185,7 +185,8 @@ class Requests:
         small = np.abs(inertia).max(initial=0.0) <= mass * _NEAR**2 + _TOLERANCE
         if not (symmetric and small and is_possible(inertia, _TOLERANCE)):
             return self._invalid(command, "no inertia of a body of this mass")
-        self._box.carry(pin.Inertia(mass, com, inertia))
+        load.inertia = inertia  # the constructor refuses what rounding leaves below 0
+        self._box.carry(load)
         self._box.readings.set_end_effector(self._box.model)
         return Status.SUCCESS
 

@@ -74,7 +74,8 @@ def test_a_payload_sinks_unless_its_load_is_set() -> None:
         box = Talking(
             plant(payload=Payload("panda_link8", 2.0, center=[0.0, 0.0, 0.1]))
         )
-        assert ask(box, Command.SET_LOAD, m_load=mass, F_x_Cload=[0, 0, 0.1]) == [
+        flat = {"F_x_Cload": [0, 0, 0.1], "I_load": np.diag([-1e-9, 0, 0]).ravel()}
+        assert ask(box, Command.SET_LOAD, m_load=mass, **flat) == [
             (Command.SET_LOAD, 5, Status.SUCCESS)
         ]
         assert state(box)["m_load"] == mass
