@@ -124,20 +124,21 @@ class Foot(Switched):
         corners = here.position + self._points @ here.rotation.T
         return float(corners[:, 2].mean())
 
-    def ground(self, state: RobotState, there: Footstep) -> tuple[Array, float]:
-        """Return how the ground lies on which it stands, and its rise to a place.
+    def ground(self, state: RobotState) -> tuple[Array, float, Array]:
+        """Return how it stands: the ground's tilt, its height, the ground's slope.
 
-        The tilt is a rotation from the level, shape (3, 3); the rise is in m.
+        The tilt is a rotation from the level, shape (3, 3); the height is that of the
+        frame's origin [m]; the slope is the ground's gradient, shape (2,) [-]. Level
+        ground counts as level, and the height is what it was as the foot landed.
         """
-        flat = self.flat(self.place.yaw)
-        normal = state.frame(self.frame).rotation @ flat[2]
-        slope = normal[:2] / normal[2]
+        here = state.frame(self.frame)
+        normal = here.rotation @ self.flat(self.place.yaw)[2]
+        slope = -normal[:2] / normal[2]
         if np.hypot(*slope) < SLOPE:
-            return np.eye(3), 0.0
+            return np.eye(3), self.frame_height, np.zeros(2)
         axis = np.array([-normal[1], normal[0], 0.0])
         angle = np.arccos(min(float(normal[2]), 1.0)) / np.linalg.norm(axis)
-        rise = -float(slope @ (there.point - self.place.point))
-        return pin.exp3(angle * axis), rise
+        return pin.exp3(angle * axis), float(here.position[2]), slope
 
     def place_of(self, origin: Footstep) -> Footstep:
         """Return the footstep whose frame's origin is at a place."""

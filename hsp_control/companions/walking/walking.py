@@ -37,7 +37,7 @@ from hsp_control.trajectories.fed import Fed, FedOrientation
 
 FIRST_SHIFT = (0.4, 0.6)
 """Time to get ready, and time to shift the weight for the first step [s]."""
-LATE = 0.08
+LATE = 0.2
 """How long a foot without ground under it is waited for [s]."""
 EARLY = 0.6
 """Share of a swing before which no force counts as touchdown."""
@@ -311,7 +311,8 @@ class RunningWalk(RunningPlan):
         self._mode = "single"
         self._hull = self._feet[-self._side].corners(walk.margin)
         here, standing = self._state.frame(foot.frame), self._feet[-self._side]
-        tilt, rise = standing.ground(self._state, self._target)
+        tilt, height, slope = standing.ground(self._state)
+        rise = float(slope @ (self._target.point - standing.place.point))
         self._follow_ground(t, standing.sole_height(self._state) + 0.5 * rise)
         self._swing = foot.swing = Swing(
             t,
@@ -320,8 +321,9 @@ class RunningWalk(RunningPlan):
             here.rotation,
             foot.origin_of(self._target),
             tilt @ foot.flat(self._target.yaw),
-            standing.frame_height + rise,
+            height + rise,
             walk.lift,
+            slope,
         )
         self._react(t)
         yaw = between(self._feet[-self._side].place, self._target).yaw
@@ -362,7 +364,9 @@ class RunningWalk(RunningPlan):
         """Walk as high above the ground as before."""
         if abs(ground - self._ground) > _LEVEL:
             self._ground, height = ground, ground + self._above
-            self._sinking = to_rest(self._sinking.sample(t), [height], t, self.walk.swing)
+            self._sinking = to_rest(
+                self._sinking.sample(t), [height], t, self.walk.swing
+            )
 
     def _plan(self, t: float, before: list[Phase], shift: float, point: Array) -> None:
         """Plan the steps to come, from a phase on two feet on, until it stands.
