@@ -24,8 +24,6 @@ from hsp_control.robot.description.mesh_files import (
 )
 from hsp_control.robot.description.sources import RobotSource
 from hsp_control.robot.description.urdf import parse_urdf, problems
-from hsp_control.tasks import FramePose
-from hsp_control.tasks.task import largest_errors
 
 Severity = Literal["error", "warning", "note"]
 """Of an error, the robot does not load; of a warning, something does not work well; a
@@ -374,8 +372,7 @@ def _of_robot(robot: Robot) -> tuple[list[Finding], dict[str, str]]:
     findings += [*check_home(robot), *check_strength(robot)]
     root = "floating base" if robot.unactuated else "fixed base"
     home = ", ".join(f"{x:.3g}" for x in robot.joint_positions(robot.home()) + 0.0)
-    pose = FramePose(robot.end_effector).error_parts
-    far, turned = largest_errors("robot", pose, robot)
+    far, turned = robot.largest_error
     return findings, {
         "robot": f"{robot.name}: nq = {robot.nq}, nv = {robot.nv}, {root}",
         "end effector": f"{robot.end_effector} (by default)",

@@ -102,8 +102,9 @@ def _share(controller: Controller, support: Support, t: float) -> float:
         equal.append(rows[2::3] if free else rows)
         given.append(np.zeros(len(equal[-1])))
     # cones and the efforts N - F f, each above a lower bound
-    limits, tau = controller.limits, state.nonlinear_effects
-    limit = np.full(len(tau), np.inf) if limits is None else limits.effort.copy()
+    limit, tau = np.full(robot.nv, np.inf), state.nonlinear_effects
+    if controller.limits is not None:
+        limit[:] = controller.limits.effort
     limit[list(robot.unactuated)] = np.inf
     rows = np.vstack([support.cone, support.map, -support.map])
     least = np.concatenate([np.zeros(len(support.cone)), tau - limit, -tau - limit])
@@ -115,7 +116,7 @@ def _share(controller: Controller, support: Support, t: float) -> float:
         np.concatenate(given),
         [*zip(support.lower, support.upper, strict=True), (0.0, 1.0)],
     )
-    return float(found.x[-1]) if found.success else 1.0
+    return 1.0 if found.x is None else float(found.x[-1])
 
 
 def _center(controller: Controller, state: RobotState, t: float) -> Array:
@@ -131,8 +132,9 @@ def _slip(controller: Controller, contact: SlidingContact, t: float) -> float:
     """Return the speed at which tasks move a contact along its plane [m/s]."""
     speed, h, across = 0.0, 1e-4, contact.axes[:, :2].T
     for task in controller.tasks:
-        known = isinstance(task, FramePose | FramePosition) and not task.remembers
-        if known and task.frame_name == contact.frame:
+        if not isinstance(task, FramePose | FramePosition) or task.remembers:
+            continue
+        if task.frame_name == contact.frame:
             now, then = (
                 target_of(task, t).translation,
                 target_of(task, t + h).translation,
