@@ -92,14 +92,11 @@ def test_an_elbow_that_is_commanded_is_reached_by_a_hand_that_stays() -> None:
     assert np.abs(hand.displacement(start, at)).max() < 1e-5
 
 
-@pytest.mark.parametrize(
-    ("first", "elbow", "error"),
-    [
-        (True, [0.0, 1.0], Error.CARTESIAN_MOTION_GENERATOR_ELBOW_SIGN_INCONSISTENT),
-        (True, [0.1, -1.0], Error.CARTESIAN_MOTION_GENERATOR_START_ELBOW_INVALID),
-        (False, [0.1, -1.0], Error.CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION),
-    ],
-)
+@pytest.mark.parametrize(("first", "elbow", "error"), [
+    (True, [0.0, 1.0], Error.CARTESIAN_MOTION_GENERATOR_ELBOW_SIGN_INCONSISTENT),
+    (True, [0.1, -1.0], Error.CARTESIAN_MOTION_GENERATOR_START_ELBOW_INVALID),
+    (False, [0.1, -1.0], Error.CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION),
+])  # fmt: skip
 def test_an_elbow_elsewhere_is_refused(first: bool, elbow: Any, error: Error) -> None:
     generator, model = made(HandPoses)
     pose = columns(model.hand_at(home())[0])

@@ -75,17 +75,14 @@ def test_inertias_are_named_and_their_cure_helps(look: Look) -> None:
     assert found.message == "it has an inertia, but its mass is 0"
 
 
-@pytest.mark.parametrize(
-    ("limit", "severity", "message"),
-    [
-        (LIMIT.replace("-3", "4"), "error", "lower limit 4 is above its upper limit 3"),
-        (LIMIT.replace("-3", "3"), "warning", "both 3: taken for no limit"),
-        ("", "error", "revolute without <limit>"),
-        (LIMIT.replace('effort="9"', ""), "error", "<limit> without effort"),
-        (LIMIT.replace('"9"', '"-1"', 1), "error", "effort limit -1 is negative"),
-        (LIMIT.replace('"9"', '"0"'), "note", "no effort and no velocity limit"),
-    ],
-)
+@pytest.mark.parametrize(("limit", "severity", "message"), [
+    (LIMIT.replace("-3", "4"), "error", "lower limit 4 is above its upper limit 3"),
+    (LIMIT.replace("-3", "3"), "warning", "both 3: taken for no limit"),
+    ("", "error", "revolute without <limit>"),
+    (LIMIT.replace('effort="9"', ""), "error", "<limit> without effort"),
+    (LIMIT.replace('"9"', '"-1"', 1), "error", "effort limit -1 is negative"),
+    (LIMIT.replace('"9"', '"0"'), "note", "no effort and no velocity limit"),
+])  # fmt: skip
 def test_limits(limit: str, severity: str, message: str, look: Look) -> None:
     (found,) = look(ARM.replace(LIMIT, limit, 1))["limit"]
     assert (found.severity, found.element) == (severity, "joint 'shoulder'")
@@ -227,23 +224,3 @@ def test_mistakes_of_the_command(
     assert "'mass=3': an argument of a xacro file is name:=value" in (
         capsys.readouterr().err
     )
-
-
-def test_a_folder_is_told_however_it_is_written(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "arms").mkdir()
-    (tmp_path / "arms" / "arm.urdf").write_text(ARM)
-    monkeypatch.chdir(tmp_path)
-    for written in ("arms", "./arms"):
-        assert main(["inspect", written]) == 2
-        told = "hsp: arms is a folder; give a .urdf file in it (it contains arm.urdf)\n"
-        assert capsys.readouterr().err == told
-
-
-@pytest.mark.parametrize("name", ["", "a" * 300, "a\0b"])
-def test_what_can_be_no_folder_is_no_robot(
-    name: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["inspect", name]) == 2
-    assert capsys.readouterr().err.startswith("hsp: no robot ")

@@ -25,6 +25,12 @@ from hsp_control.robot import ToolFrame
     ("PANDA", "did you mean 'panda'?"),
     ("xyzzy", "no robot 'xyzzy' (give a path to a .urdf file, or one of: "),
     ("robots/panda/", "is a folder; give a .urdf file in it (it contains panda."),
+    ("robots/panda", "robots/panda is a folder; give a .urdf file in it (it contains"),
+    ("./robots/panda", "robots/panda is a folder; give a .urdf file in it (it contai"),
+    ("robots", "robots is a folder; give a .urdf file in it (it contains none)"),
+    ("", "no robot ''"),
+    (300 * "a", "no robot 'aaa"),
+    ("a\0b", "no robot 'a\\x00b'"),
     ("/nowhere/arm.urdf", "/nowhere/arm.urdf: no such file"),
     ("arm_without_folder.urdf", "arm_without_folder.urdf: no such file"),
 ])  # fmt: skip
