@@ -143,39 +143,33 @@ def _no_tree(robot: Element) -> Iterator[tuple[str, str]]:
     """Yield what makes the links no tree; parsers then drop a part, silently."""
     links = [link.get("name") for link in robot.findall("link")]
     above: dict[str | None, tuple[str, str | None]] = {}  # its joint, and parent link
-    complete = True
     for joint in robot.findall("joint"):
-        name = joint.get("name", "")
         ends = [joint.find("parent"), joint.find("child")]
         parent, child = (None if end is None else end.get("link") for end in ends)
         if parent not in links or child not in links:
             return  # the parser says so
-        if parent == child:
-            complete = False
-            yield f"joint {name!r}", f"link {child!r} is both its parent and its child"
-        elif child in above:
-            complete = False
+        name = joint.get("name", "")
+        if child in above:
             joints = f"the joints {above[child][0]!r} and {name!r}"
             yield f"link {child!r}", f"it is the child of {joints}; must be of one"
         else:
             above[child] = name, parent
     roots = [repr(link) for link in links if link not in above]
-    if complete and len(roots) > 1:
-        yield (
-            f"links {listing(roots)}",
-            "none is the child of a joint; a robot has one such link, its root",
-        )
+    if len(roots) > 1:
+        message = "none is the child of a joint; a robot has one such link, its root"
+        yield f"links {listing(roots)}", message
     rooted: set[str | None] = set()
     for link in links:
         way: dict[str | None, str] = {}  # the joints from a link to the root
-        while link in above and link not in rooted:
-            if link in way:
-                loop = list(way)[list(way).index(link) :]
-                names = [repr(way[each]) for each in loop]
-                where = f"links {listing(map(repr, loop))}"
-                yield where, f"the joints {listing(names)} connect them to a loop"
-                break
+        while link in above and link not in rooted and link not in way:
             way[link], link = above[link]
+        if link in way:
+            loop = [*way][[*way].index(link) :]
+            names = listing(repr(way[each]) for each in loop)
+            yield (
+                f"links {listing(map(repr, loop))}",
+                f"their joints {names} make a loop",
+            )
         rooted |= way.keys()
 
 
