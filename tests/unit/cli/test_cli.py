@@ -11,6 +11,7 @@ from collections.abc import Callable
 from importlib import metadata
 from importlib.metadata import EntryPoint
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -201,6 +202,20 @@ def test_check_tells_of_targets_along_some_axes_and_of_hands_on_legs(
     assert main(["check", config, *options]) == 0
     warned = capsys.readouterr().err
     assert ("reach" not in warned) if told is None else re.search(told, warned)
+
+
+def test_a_play_that_failed_and_was_not_reset_says_so_with_its_status(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fail(session: Any, *_: Any) -> None:
+        session.over = "the arm is too fast; reset to go on"
+
+    monkeypatch.setattr("hsp_control.cli.play.play_in_real_time", fail)
+    arguments = [MOVING, "--out", str(tmp_path), "--no-browser"]
+    assert main(["play", *arguments]) == 2
+    assert capsys.readouterr().err.endswith("hsp: the arm is too fast\n")
+    monkeypatch.setattr("hsp_control.cli.play.play_in_real_time", lambda *_: None)
+    assert main(["play", *arguments]) == 0
 
 
 def forced(config: str, contact: str, newtons: object) -> list[str]:
