@@ -10,6 +10,7 @@ from a noisy inertial measurement unit and noisy encoders.
 """
 
 import argparse
+from math import cos, radians, sin
 from time import process_time
 from typing import Any
 
@@ -34,6 +35,20 @@ STEPS = {
     "spacing": [0.8, 0.0, 0.0],
 }
 """Plates of 2 cm, up and down again."""
+
+
+def ramp(degrees: float, edge: float) -> dict[str, Any]:
+    """Return a platform up to an edge [m], and a ramp beyond it that goes down."""
+    slope = radians(degrees)
+    box = {"shape": {"type": "box", "size": [6.0, 4.0, 0.2]}, "friction": 0.7}
+    x = edge + 3.0 * cos(slope) - 0.1 * sin(slope)
+    middle = [x, 0.0, -3.0 * sin(slope) - 0.1 * cos(slope)]
+    return {
+        "flat": box | {"position": [edge - 3.0, 0.0, -0.1]},
+        "ramp": box | {"position": middle, "rotation": [0.0, slope, 0.0]},
+    }
+
+
 CASES: dict[str, dict[str, Any]] = {
     "0.3 m/s": {"plan": {"speed": 0.3}},
     "0.6 m/s": {"plan": {"speed": 0.6}},
@@ -41,6 +56,8 @@ CASES: dict[str, dict[str, Any]] = {
     "0.2 m/s sideways": {"plan": {"sideways": 0.2}},
     "0.3 m/s, friction 0.4": {"plan": {"speed": 0.3}, "friction": 0.4},
     "0.3 m/s, steps of 2 cm": {"plan": {"speed": 0.3}, "solids": {"steps": STEPS}},
+    "0.3 m/s, down 5°": {"plan": {"speed": 0.3}, "solids": ramp(5.0, 0.5)},
+    "0.3 m/s, down 10°": {"plan": {"speed": 0.3}, "solids": ramp(10.0, 0.5)},
     "crawl, 0.06 m/s": {"plan": {"type": "crawl", "speed": 0.06}, "duration": 9.0},
 }
 """What is different in each case."""
@@ -78,12 +95,17 @@ def configuration(
         "plant": {
             "type": "mujoco",
             "contacts": {f: {"shape": shape} for f in frames},
-            "ground": {"friction": friction},
+            "ground": {"friction": friction} | _below(case),
             "solids": case.get("solids", {}),
             "sensors": {"imu": trunk, **(NOISE if estimated else {})},
         },
         **({"estimators": {"base": True}} if estimated else {}),
     }
+
+
+def _below(case: dict[str, Any]) -> dict[str, float]:
+    """Return where the ground is, under a ramp."""
+    return {"height": -3.0} if "ramp" in case.get("solids", {}) else {}
 
 
 def said(robot: str, case: dict[str, Any], *, estimated: bool) -> str:

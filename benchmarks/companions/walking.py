@@ -14,6 +14,7 @@ from math import cos, pi, sin
 from typing import Any
 
 import numpy as np
+from trotting import ramp
 
 from hsp_control import Rollout, load_experiment
 from hsp_control.common.exceptions import SimulationError
@@ -41,6 +42,9 @@ def cases() -> Iterator[tuple[str, dict[str, Any]]]:
     left = {"plan.speed": 0, "plan.sideways": 0.1}
     yield "sideways", left | {"plan.steps": 7, "simulation.duration": 9}
     yield "friction 0.4", {"plan.steps": 8, "simulation.duration": 10} | slippery()
+    for edge in (0.2, 0.3, 0.4):
+        down = {"plan.steps": 8, "simulation.duration": 9, "plant.ground.height": -3}
+        yield f"down 5° from {edge} m on", down | {"plant.solids": ramp(5.0, edge)}
     for seed in range(3):
         yield (
             f"masses +5 % ± 10 %, seed {seed}",

@@ -21,6 +21,7 @@ from hsp_control.robot import Robot
 from hsp_control.robot.description.inertias import impossible_inertias
 from hsp_control.robot.description.urdf import read_urdf
 from hsp_control.simulation import Rollout
+from hsp_control.simulation.force_check import missed_forces
 from hsp_control.simulation.initial_state import posture_search
 from hsp_control.simulation.reach_check import out_of_reach
 
@@ -140,14 +141,17 @@ _LIMITS = {
 
 
 def warn_of_reach(experiment: Experiment) -> None:
-    """Print which targets cannot be reached, by how much and when."""
+    """Print which targets and commanded forces cannot be had, and when."""
     robot, law = experiment.robot, experiment.controller
     if robot.unactuated and experiment.scenario.plan is not None:
         return  # it moves contacts and references
     duration = experiment.scenario.simulation.duration
     asked = experiment.q0, duration, law.contacts, law.limits
-    for found in out_of_reach(robot, law.tasks, *asked):
-        print(f"hsp: {found.message}", file=sys.stderr)
+    told = [each.message for each in out_of_reach(robot, law.tasks, *asked)]
+    push_off = experiment.scenario.plant.push_off
+    told += missed_forces(law, experiment.q0, duration, push_off)
+    for message in told:
+        print(f"hsp: {message}", file=sys.stderr)
 
 
 def warn_of_rates(experiment: Experiment) -> None:

@@ -5,7 +5,8 @@ import json
 import logging
 import textwrap
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from pathlib import Path
 
 from hsp_control.cli.consoles import out, working
 from hsp_control.cli.loading import robot_access
@@ -13,6 +14,7 @@ from hsp_control.common.exceptions import ModelError
 from hsp_control.inspection import Inspection
 from hsp_control.inspection import inspect as inspect_robot
 from hsp_control.robot import RobotDescription
+from hsp_control.robot.description.access import XmlError, read_xml
 from hsp_control.robot.description.urdf import write_repaired
 
 _WIDTH = 80
@@ -22,17 +24,18 @@ _SHOWN = 12
 
 def inspect(options: argparse.Namespace) -> int:
     """Print what is odd about a robot; return 2 if it does not load."""
-    description = RobotDescription(options.robot, xacro_args=_arguments(options.args))
-    source = description.find(robot_access(str(options.robot), options))
+    arguments, access = _arguments(options.args), robot_access(options.robot, options)
+    given = "mjcf" if _is_mjcf(Path(options.robot)) else "name"
+    description = RobotDescription(**{given: options.robot}, xacro_args=arguments)
     with _no_warnings(), working(f"Inspecting {options.robot}"):
-        inspection = inspect_robot(source, description)
+        inspection = inspect_robot(description, access)
     if options.json:
         print(json.dumps(inspection.to_dict(), indent=2, ensure_ascii=False))
     else:
         for line in report(inspection):
             out.print(line, markup=False)
     if options.fix is not None:
-        file = write_repaired(source, options.fix)
+        file = write_repaired(inspection.source, options.fix)
         if not options.json:
             out.print(f"Written with projected inertias: {file}", markup=False)
     return 0 if inspection.loads else 2
@@ -58,6 +61,13 @@ def report(inspection: Inspection) -> Iterator[str]:
         for severity in ("error", "warning", "note")
     }
     yield ", ".join(f"{n} {s}{'s' * (n != 1)}" for s, n in counts.items())
+
+
+def _is_mjcf(path: Path) -> bool:
+    """Return whether a file is an MJCF: both kinds of file may end in .xml."""
+    with suppress(OSError, ValueError, XmlError):  # of a robot by name; said later
+        return path.suffix == ".xml" and read_xml(path).tag == "mujoco"
+    return False
 
 
 @contextmanager

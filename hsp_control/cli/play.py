@@ -3,6 +3,7 @@
 import argparse
 import gc
 import signal
+import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from types import FrameType
@@ -21,7 +22,7 @@ from hsp_control.visualization.viewer.transport import PageServer
 
 
 def play(options: argparse.Namespace) -> int:
-    """Serve the page until Ctrl-C, and save the log at the end."""
+    """Serve the page until Ctrl-C, and save the log at the end; 2 if a run failed."""
     options.out.mkdir(parents=True, exist_ok=True)  # fails before the play, not after
     with ExitStack() as stack:
         server = PageServer(options.port, host=options.host, steerable=True)
@@ -66,7 +67,9 @@ def play(options: argparse.Namespace) -> int:
             out.print("Ctrl-C ends it and saves the log.")
             play_in_real_time(session, picture, server.messages, save)
         out.print(f"Log: {session.rollout().save(log)}")
-    return 0
+        if session.over:  # and was not reset
+            print(f"hsp: {session.over.partition('; reset')[0]}", file=sys.stderr)
+    return 2 if session.over else 0
 
 
 @contextmanager

@@ -12,11 +12,15 @@ from hsp_control.simulation.log_series import (
     FAR,
     OUT,
     effort_units,
+    forces_kept,
     rate_unit,
     rows_compare,
     task_errors,
     unreached,
 )
+
+GIVEN_UP = 0.01
+"""Share of a commanded force from which on its plan does not keep it."""
 
 
 def summary(rollout: Rollout) -> Table:
@@ -44,6 +48,8 @@ def summary(rollout: Rollout) -> Table:
                 if words == OUT and rows[-1]:
                     text += f", {away[task].length(-1)} at the end"
                 table.add_row("", text)
+    for contact, text in force_rows(rollout):
+        table.add_row(contact, text)
     norm, unit = rollout["null_space_norm"], rate_unit(rollout)
     table.add_row(
         "null space",
@@ -63,6 +69,20 @@ def summary(rollout: Rollout) -> Table:
     if damped := int((rollout["damped"] > 0.0).sum()):
         table.add_row("singular", f"{damped} rows: the law was damped there, not exact")
     return table
+
+
+def force_rows(rollout: Rollout) -> Iterator[tuple[str, str]]:
+    """Yield what became of commanded forces, as rows of the table."""
+    for contact, wanted, planned, felt, lost in forces_kept(rollout):
+        missed = np.sqrt(np.mean((felt - wanted) ** 2))
+        text = f"{felt[-1]:.3g} of {wanted[-1]:.3g} N at the end, "
+        yield f"force {contact}", f"{text}missed by {missed:.3g} N rms"
+        off = np.abs(wanted - planned)
+        if rows := int((off > GIVEN_UP * (1.0 + wanted)).sum()):
+            why = f"planned up to {off.max():.3g} N off, for a limit or the balance"
+            yield "", f"{rows} rows: {why}"
+        if lost:
+            yield "", f"{lost} rows: contact lost"
 
 
 def limit_rows(rollout: Rollout) -> Iterator[str]:

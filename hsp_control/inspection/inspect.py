@@ -14,8 +14,9 @@ from hsp_control.common.suggestions import listing
 from hsp_control.geometry import Proximity, link_shapes, self_pairs
 from hsp_control.geometry.good_postures import PostureSearch, Rows
 from hsp_control.robot import Robot, RobotDescription
+from hsp_control.robot.description.access import ANYWHERE, Access
 from hsp_control.robot.description.inertias import impossible_inertias, tensor_of
-from hsp_control.robot.description.loading import NEGATIVE_MOMENT, load_model
+from hsp_control.robot.description.loading import load_model
 from hsp_control.robot.description.mesh_files import (
     find_file,
     find_problem,
@@ -50,8 +51,7 @@ _CURE = "project_inertias: true takes the nearest possible one, --fix writes it"
 def check_inertias(xml: Element) -> Iterator[Finding]:
     """Yield the links whose inertia no body can have, and moments without a mass."""
     for found in impossible_inertias(xml):
-        refused = found.moments[0] < -NEGATIVE_MOMENT
-        severity: Severity = "error" if refused else "warning"
+        severity: Severity = "error" if found.negative else "warning"
         yield Finding(severity, "inertia", f"link {found.link!r}", found.reason, _CURE)
     for link in xml.findall("link"):
         mass, inertia = link.find("inertial/mass"), link.find("inertial/inertia")
@@ -311,53 +311,73 @@ class Inspection:
         }
 
 
-def inspect(source: RobotSource, description: RobotDescription) -> Inspection:
+def inspect(description: RobotDescription, access: Access = ANYWHERE) -> Inspection:
     """Return what is odd about a robot.
 
-    Checks of the file come first. If it has no errors, or only inertias that projection
+    Checks of a URDF come first. If it has no errors, or only inertias that projection
     repairs, the robot is loaded and looked at.
 
     Args:
-        source: Where it comes from, see `RobotDescription.find`.
-        description: How it is loaded.
+        description: Where it comes from, and how it is loaded.
+        access: Which files may be read.
 
     Raises:
         RobotNotFoundError: If its file cannot be read.
-        ModelError: If its file is not XML, not a URDF, or too large.
+        ModelError: If its file is not XML, no URDF or MJCF, or too large; or if an MJCF
+            is no robot.
     """
-    xml = parse_urdf(source)
-    # What is wrong with its elements: then the robot does not load.
-    findings = [Finding("error", "element", *each) for each in problems(xml)]
-    if not findings:
-        findings += [*check_inertias(xml), *check_limits(xml)]
-        findings += check_meshes(xml, source)
-    facts = {"file": str(source.urdf)}
-    errors = [f for f in findings if f.severity == "error"]
-    if all(error.check == "inertia" for error in errors):
-        if errors:
-            description = replace(description, project_inertias=True)
-        try:
-            model = load_model(source, description, description.gravity)
-            robot = Robot(model, source, description=description)
-            worst = worst_condition(robot)
-            facts |= _facts(robot, *worst)
-            findings += [*check_mass_matrix(*worst), *_of_robot(robot)]
-        except ModelError as error:
-            findings.append(
-                Finding("error", "robot", source.name, _reason(error, source))
-            )
+    findings: list[Finding] = []
+    facts: dict[str, str] = {}
+    if description.mjcf is not None:
+        robot = Robot.load(description, access=access)
+        source = robot.source
+        for sentence in source.omitted:
+            findings.append(Finding("note", "left out", source.name, sentence))
+        found, facts = _of_robot(robot)
+        findings += found
+    else:
+        source = description.find(access)
+        xml = parse_urdf(source)
+        # What is wrong with its elements: then the robot does not load.
+        findings += [Finding("error", "element", *each) for each in problems(xml)]
+        if not findings:
+            findings += [*check_inertias(xml), *check_limits(xml)]
+            findings += check_meshes(xml, source)
+        errors = [f for f in findings if f.severity == "error"]
+        if all(error.check == "inertia" for error in errors):
+            if errors:
+                description = replace(description, project_inertias=True)
+            try:
+                model = load_model(source, description, description.gravity)
+                found, facts = _of_robot(Robot(model, source, description=description))
+                findings += found
+            except ModelError as error:
+                reason = _reason(error, source)
+                findings.append(Finding("error", "robot", source.name, reason))
     order = ("error", "warning", "note")
     findings.sort(key=lambda finding: order.index(finding.severity))
-    return Inspection(source, tuple(findings), facts)
+    return Inspection(source, tuple(findings), {"file": str(source.urdf)} | facts)
 
 
-def _facts(robot: Robot, condition: float, dof: str) -> dict[str, str]:
+def _of_robot(robot: Robot) -> tuple[list[Finding], dict[str, str]]:
+    """Return what is odd about a robot that was loaded, and the facts about it."""
+    condition, dof = worst_condition(robot)
+    findings = [*check_mass_matrix(condition, dof)]
+    try:
+        findings += check_self_collisions(robot)
+    except ModelError as error:
+        reason = _reason(error, robot.source).partition(";")[0]
+        message = f"not checked: {reason}"
+        findings.append(Finding("warning", "self-collision", "all links", message))
+    findings += [*check_home(robot), *check_strength(robot)]
     root = "floating base" if robot.unactuated else "fixed base"
     home = ", ".join(f"{x:.3g}" for x in robot.joint_positions(robot.home()) + 0.0)
-    return {
+    far, turned = robot.largest_error
+    return findings, {
         "robot": f"{robot.name}: nq = {robot.nq}, nv = {robot.nv}, {root}",
         "end effector": f"{robot.end_effector} (by default)",
-        "size": f"{robot.size:.3g} m, the longest chain from the first joint",
+        "reach": f"{robot.size:.3g} m from the first joint at most: the longest chain",
+        "bounds": f"an error counts up to {far:.3g} m and {turned:.3g} rad by default",
         "effort rate": _rates(robot),
         "springs": _springs(robot),
         "mass": f"{pin.computeTotalMass(robot.model):.4g} kg move",
@@ -370,9 +390,9 @@ def _rates(robot: Robot) -> str:
     rates = robot.effort_rate[np.isfinite(robot.effort_rate)]
     if not rates.size:
         return "no effort limits, so none"
-    low, high = (f"{1e-3 * each:.2g}" for each in (rates.min(), rates.max()))
+    low, high = (f"{each:.3g}" for each in (rates.min(), rates.max()))
     most = high if low == high else f"{low} to {high}"
-    return f"no effort changes by more than {most} N·m or N in 1 ms"
+    return f"no effort changes by more than {most} N·m/s or N/s by default"
 
 
 def _springs(robot: Robot) -> str:
@@ -381,17 +401,6 @@ def _springs(robot: Robot) -> str:
         return "no effort limits, so they pull with any force"
     turned = f" and {moment:.3g} N·m" if np.isfinite(moment) else ""
     return f"a hand's pull with at most {force:.3g} N{turned} by default"
-
-
-def _of_robot(robot: Robot) -> Iterator[Finding]:
-    try:
-        yield from check_self_collisions(robot)
-    except ModelError as error:
-        reason = _reason(error, robot.source).partition(";")[0]
-        message = f"not checked: {reason}"
-        yield Finding("warning", "self-collision", "all links", message)
-    yield from check_home(robot)
-    yield from check_strength(robot)
 
 
 def _reason(error: ModelError, source: RobotSource) -> str:

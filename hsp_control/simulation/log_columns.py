@@ -45,7 +45,7 @@ class LogColumns:
         """Begin without columns; ``capacity`` is how many rows are kept."""
         self.row: dict[str, Array] = {}
         self.numbers = np.zeros(0)
-        self.descriptions: dict[str, dict[str, str]] = {}
+        self.descriptions: dict[str, dict[str, Any]] = {}
         self.count = 0
         self._capacity = capacity
         self._shapes: dict[str, tuple[int, ...]] = {}
@@ -60,7 +60,7 @@ class LogColumns:
         return {name: numbers.shape for name, numbers in self.row.items()}
 
     def add(
-        self, name: str, shape: tuple[int, ...], unit: str, meaning: str, **more: str
+        self, name: str, shape: tuple[int, ...], unit: str, meaning: str, **more: Any
     ) -> None:
         """Declare a column if there is none of that name; `lay_out` makes it."""
         if name not in self._shapes:
@@ -304,7 +304,8 @@ class ContactColumns:
             column(f"{prefix}.force", (3,), "N", "on the robot, in world axes")
             if contact.force is not None:
                 meaning = "force that is commanded, in world axes"
-                column(f"{prefix}.commanded", (3,), "N", meaning)
+                more = {"frame": contact.frame, "normal": contact.axes[:, 2].tolist()}
+                column(f"{prefix}.commanded", (3,), "N", meaning, **more)
             column(f"{prefix}.position", (3,), "m", "centre of pressure")
             column(f"{prefix}.weight", (), "-", "how much it bears, 0 to 1")
             column(

@@ -329,7 +329,7 @@ def predicted_decay(rollout: Rollout) -> Decay:
 FAR, OUT = "target far away", "target out of reach"
 """What is said of them, whoever says it."""
 REACHED = 0.01
-"""An error up to this length is not spoken of [m or rad]."""
+"""An error up to this length is not spoken of [m, rad or N]."""
 RESTING = 0.1
 """An error rests if it changes by less than this share of itself in a second [1/s]."""
 STAYS = 0.3
@@ -398,3 +398,39 @@ def unreached(
         # A log that says little has no such column.
         far = columns.get(f"task.{task}.bounded", none) > 0.0
         yield Unreached(task, far & (out == 0.0), out, units)
+
+
+# --- commanded forces ----------------------------------------------------------------
+
+
+class ForceKept(NamedTuple):
+    """What becomes of a contact's commanded force, in the rows that command one."""
+
+    contact: str  # its name
+    wanted: Array  # the commanded normal force, without feedback, shape (n,) [N]
+    planned: Array  # the planned one, likewise
+    felt: Array  # what the plant says of it, or else the planned one, shape (n,) [N]
+    lost: int  # in how many rows nothing is touched any more
+
+
+def forces_kept(rollout: Rollout) -> Iterator[ForceKept]:
+    """Yield how the contacts with a commanded force keep it."""
+    columns = rollout.columns
+    for column, about in rollout.meta["columns"].items():
+        if "normal" not in about:
+            continue
+        prefix, normal = column.removesuffix(".commanded"), np.array(about["normal"])
+        wanted = columns[column] @ normal  # NaN while the contact does not bear
+        rows = wanted > REACHED
+        if not rows.any():
+            continue
+        planned = columns[f"{prefix}.force"] @ normal
+        felt = columns.get(f"plant.contact.{about['frame']}.force")
+        felt = planned if felt is None else felt @ normal
+        added = columns.get(f"{prefix}.integral", np.zeros(len(rows)))
+        wanted, planned, felt = (
+            x[rows] for x in (wanted - added, planned - added, felt)
+        )
+        touched = felt > 0.0
+        lost = int((~touched[touched.argmax() :]).sum())
+        yield ForceKept(prefix.removeprefix("contact."), wanted, planned, felt, lost)

@@ -112,7 +112,7 @@ class _Search(NamedTuple):
     ) -> OutOfReach | None:
         """Return when and by how much rows of a target are out of reach, if so."""
         times = self.duration * np.linspace(0.0, 1.0, _TIMES) ** _UNEVEN
-        places = [_target(task, t) for t in times]
+        places = [target_of(task, t) for t in times]
         away: list[float] = []
         q = self.q0
         for k, place in enumerate(places):
@@ -149,7 +149,7 @@ class _Search(NamedTuple):
         return best.q, best.error
 
 
-def _target(task: FramePose | FramePosition, t: float) -> pin.SE3:
+def target_of(task: FramePose | FramePosition, t: float) -> pin.SE3:
     """Return where a task's frame is to be at a time [s]."""
     if isinstance(task, FramePose):
         pose = task.followed.sample(t)

@@ -101,11 +101,6 @@ class ErrorPart(NamedTuple):
     size: int
 
 
-_OF_SIZE, _ANGLE = 0.3, 1.0
-"""The largest error by default: of a position, as a part of the robot's size [-]; and
-of an orientation [rad]. At ω0 = 10 rad/s the hand of an arm of 1 m then approaches at
-1.5 m/s, about as fast as its joints can."""
-
 LargestError = Annotated[
     Literal["robot", "none"] | Positive | Sequence[Positive | None] | None,
     BeforeValidator(plain),
@@ -118,7 +113,8 @@ def largest_errors(
     declared: Any, parts: Sequence[ErrorPart], robot: Robot
 ) -> Sequence[float | None] | str:
     """Return the largest error of each part, None for no bound; or "none" for all."""
-    own = {"m": _OF_SIZE * robot.size, "rad": _ANGLE, "-": _ANGLE}
+    length, angle = robot.largest_error
+    own = {"m": length, "rad": angle, "-": angle}
     return each_part(declared, parts, own, TaskError)
 
 

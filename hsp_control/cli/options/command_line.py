@@ -179,7 +179,9 @@ def command_line() -> argparse.ArgumentParser:
     complete(name, bundled_robots)
     which.add_argument("--json", action="store_true", help="print JSON")
 
-    add_inspect(_command(commands, "inspect", "say what is odd about a robot's URDF"))
+    add_inspect(
+        _command(commands, "inspect", "say what is odd about a robot's URDF or MJCF")
+    )
     doctor = _command(commands, "doctor", "say what this machine lacks")
     doctor.add_argument("--json", action="store_true", help="print JSON")
     _command(commands, "schema", "print the JSON Schema of a configuration")
@@ -219,7 +221,7 @@ def add_export(export: argparse.ArgumentParser) -> None:
 def add_inspect(inspect: argparse.ArgumentParser) -> None:
     """Add all options of `hsp inspect`."""
     robot = inspect.add_argument(
-        "robot", metavar="ROBOT", help="a name, a URDF or a xacro file"
+        "robot", metavar="ROBOT", help="a name, a URDF, a xacro file or an MJCF"
     )
     complete(robot, bundled_robots)
     inspect.add_argument(

@@ -231,6 +231,11 @@ class Box:
         self.model.carry(load)
         self.model.state.update(self.t, *self._measured)
 
+    def gravity_with(self, load: pin.Inertia) -> Array:
+        """Return what gravity would ask of the joints with a load, shape (7,) [N·m]."""
+        robot, rest = self.arm.carrying(load), np.zeros(JOINTS)
+        return robot.inverse_dynamics(self.model.state.q, rest, rest)
+
     def _receive(self, motion: Motion, command: np.void | None) -> None:
         """Follow a client's command, or do without."""
         if command is None:

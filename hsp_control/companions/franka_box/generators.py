@@ -32,20 +32,53 @@ class Generator(ABC):
         """Begin at a posture."""
         self.reference, self.limits = start, limits
         self.hand: HandMotion | None = None
+        # after the first command, if it goes on from the start
+        self._under_way: tuple[Reference, HandMotion | None] | None = None
+
+    def follow(self, command: np.void, *, first: bool) -> list[Violation]:
+        """Follow a command, and return what it violates.
+
+        The first that arrives is often not the first of its client, which needs longer
+        for that: then the motion is under way since the start. The second shows.
+        """
+        start = self.reference, self.hand
+        found = list(self._follow(command, first=first))
+        begun = self.reference, self.hand
+        if first:
+            self.reference, self.hand = start
+            late = not any(self._follow(command, first=False))
+            self._under_way = (self.reference, self.hand) if late else None
+            self.reference, self.hand = begun
+        elif self._under_way is not None:
+            if found:
+                self.reference, self.hand = self._under_way
+                found = list(self._follow(command, first=False))
+            self._under_way = None
+        return found
+
+    def extrapolate(self) -> None:
+        """Go on without a command: the acceleration stays."""
+        self._extrapolate()
+        if self._under_way is not None:
+            begun = self.reference, self.hand
+            self.reference, self.hand = self._under_way
+            self._extrapolate()
+            self._under_way = self.reference, self.hand
+            self.reference, self.hand = begun
 
     @abstractmethod
-    def follow(self, command: np.void, *, first: bool) -> Iterator[Violation]:
+    def _follow(self, command: np.void, *, first: bool) -> Iterator[Violation]:
         """Follow a command, and yield what it violates."""
 
     @abstractmethod
-    def extrapolate(self) -> None:
-        """Go on without a command: the acceleration stays."""
+    def _extrapolate(self) -> None:
+        """Go on without a command."""
 
 
 class JointPositions(Generator):
     """The client commands positions of the joints."""
 
-    def follow(self, command: np.void, *, first: bool) -> Iterator[Violation]:
+    def _follow(self, command: np.void, *, first: bool) -> Iterator[Violation]:
         """Follow ``q_c``; see `Generator.follow`."""
         before, told = self.reference, reference.as_told(self.reference)
         q = np.array(command["q_c"])
@@ -57,7 +90,7 @@ class JointPositions(Generator):
         new = reference.to_position(q, told)
         yield from reflexes.commanded_motion(new, told, self.limits)
 
-    def extrapolate(self) -> None:
+    def _extrapolate(self) -> None:
         """Keep the acceleration; see `Generator.extrapolate`."""
         self.reference = reference.extrapolated(self.reference)
 
@@ -65,7 +98,7 @@ class JointPositions(Generator):
 class JointVelocities(JointPositions):
     """The client commands velocities of the joints."""
 
-    def follow(self, command: np.void, *, first: bool) -> Iterator[Violation]:
+    def _follow(self, command: np.void, *, first: bool) -> Iterator[Violation]:
         """Follow ``dq_c``; see `Generator.follow`."""
         before, told = self.reference, reference.as_told(self.reference)
         dq = np.array(command["dq_c"])
@@ -87,7 +120,7 @@ class HandPoses(Generator):
         self._model = model
         self.hand: HandMotion = hand.at_rest(model.hand_at(start.q)[0])
 
-    def follow(self, command: np.void, *, first: bool) -> Iterator[Violation]:
+    def _follow(self, command: np.void, *, first: bool) -> Iterator[Violation]:
         """Follow ``O_T_EE_c``; see `Generator.follow`."""
         pose = hand.placement(command["O_T_EE_c"])
         if pose is None:
@@ -105,7 +138,7 @@ class HandPoses(Generator):
             yield from reflexes.commanded_hand(hand.to_pose(pose, told), told)
         yield from self._move_joints(command, first=first)
 
-    def extrapolate(self) -> None:
+    def _extrapolate(self) -> None:
         """Keep the hand's acceleration; see `Generator.extrapolate`."""
         self.hand = hand.extrapolated(self.hand)
         q = self._posture(self.hand.pose, None)
@@ -144,7 +177,7 @@ class HandPoses(Generator):
 class HandTwists(HandPoses):
     """The client commands velocities of the end effector."""
 
-    def follow(self, command: np.void, *, first: bool) -> Iterator[Violation]:
+    def _follow(self, command: np.void, *, first: bool) -> Iterator[Violation]:
         """Follow ``O_dP_EE_c``; see `Generator.follow`."""
         twist = np.array(command["O_dP_EE_c"])
         told = hand.as_told(self.hand)

@@ -20,10 +20,17 @@ from hsp_control.companions.franka_box.box import Box
 from hsp_control.companions.franka_box.hand import placement
 from hsp_control.companions.franka_box.motion import OF_THE_HAND, SERVED
 from hsp_control.companions.franka_box.reflexes import Thresholds
+from hsp_control.robot.description.inertias import is_possible
 
 Say = Callable[[str], object]
 _TOLERANCE = 1e-5
 """How far below zero a moment of inertia may be, by rounding [kg·m²]."""
+_NEAR = 1.0
+"""How far from the flange a load may be along an axis, and reach [m]."""
+_HEAVIEST = 1e4
+"""Mass from which on it does not matter how much nobody can carry [kg]."""
+_STIFFEST = {"K_theta": np.full(7, 14250.0), "K_x": np.repeat([3000.0, 300.0], 3)}
+"""Largest stiffness of joints and hand (libfranka, ``robot.h``) [N·m/rad, N/m]."""
 
 
 class Requests:
@@ -128,14 +135,14 @@ class Requests:
 
     def _set_joint_impedance(self, number: int, body: np.void) -> int:
         stiffness = np.array(body["K_theta"])
-        if not _is_stiffness(stiffness):
+        if not _is_stiffness(stiffness, "K_theta"):
             return self._invalid(Command.SET_JOINT_IMPEDANCE, f"{stiffness} N·m/rad")
         self._box.joint_stiffness = stiffness
         return Status.SUCCESS
 
     def _set_cartesian_impedance(self, number: int, body: np.void) -> int:
         stiffness = np.array(body["K_x"])
-        if not _is_stiffness(stiffness):
+        if not _is_stiffness(stiffness, "K_x"):
             return self._invalid(Command.SET_CARTESIAN_IMPEDANCE, f"{stiffness}")
         self._box.cartesian_stiffness = stiffness
         return Status.SUCCESS
@@ -165,12 +172,21 @@ class Requests:
         mass, com = float(body["m_load"]), np.array(body["F_x_Cload"])
         inertia = np.array(body["I_load"]).reshape(3, 3).T
         command = Command.SET_LOAD
-        if not (np.isfinite(mass) and mass >= 0.0 and np.isfinite(com).all()):
-            return self._invalid(command, f"{mass:g} kg at {com.tolist()} m")
+        where = f"{mass:g} kg at {com.tolist()} m"
+        if not (mass >= 0.0 and np.isfinite(mass) and np.abs(com).max() <= _NEAR):
+            return self._invalid(command, where)
+        load = pin.Inertia(min(mass, _HEAVIEST), com, np.zeros((3, 3)))
+        held = np.abs(self._box.gravity_with(load))
+        worst = int(np.argmax(held - (limit := self._box.arm.limits.effort)))
+        if held[worst] > limit[worst]:
+            why = f"joint {worst + 1} cannot hold it here with {limit[worst]:g} N·m"
+            return self._invalid(command, f"{where}: {why}")
         symmetric = np.isfinite(inertia).all() and np.allclose(inertia, inertia.T)
-        if not (symmetric and np.linalg.eigvalsh(inertia)[0] >= -_TOLERANCE):
-            return self._invalid(command, "no inertia of a body")
-        self._box.carry(pin.Inertia(mass, com, inertia))
+        small = np.abs(inertia).max(initial=0.0) <= mass * _NEAR**2 + _TOLERANCE
+        if not (symmetric and small and is_possible(inertia, _TOLERANCE)):
+            return self._invalid(command, "no inertia of a body of this mass")
+        load.inertia = inertia  # the constructor refuses what rounding leaves below 0
+        self._box.carry(load)
         self._box.readings.set_end_effector(self._box.model)
         return Status.SUCCESS
 
@@ -181,8 +197,8 @@ class Requests:
 _PHASES = ("acceleration", "nominal")
 
 
-def _is_stiffness(values: Array) -> bool:
-    return bool(np.isfinite(values).all() and (values >= 0.0).all())
+def _is_stiffness(values: Array, of: str) -> bool:
+    return bool(((values >= 0.0) & (values <= _STIFFEST[of])).all())
 
 
 def _spelled(item: Command | Controller | MotionGenerator) -> str:

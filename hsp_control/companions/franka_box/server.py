@@ -96,7 +96,8 @@ class Server:
             on_period: Called before each period; false ends the service.
         """
         advance = self._in_lockstep if self._lockstep else self._in_real_time
-        with no_garbage_collection():
+        # What overflows is refused, or a reflex, and no matter of NumPy's.
+        with no_garbage_collection(), np.errstate(all="ignore"):
             self._due = monotonic()
             while on_period():
                 self._notice_cut()

@@ -206,6 +206,12 @@ class Solid(Part, error=SimulationError):
                 f"{self.copies} copies have the spacing [0, 0, 0]; give another one"
             )
 
+    @property
+    def push_off(self) -> float:
+        """μ b d/(1 - d) [1/s], with MuJoCo's own b and d where they are not given."""
+        d, b = self.impedance or _OWN_IMPEDANCE, self.slip_damping or _OWN_SLIP_DAMPING
+        return d / (1.0 - d) * self.friction * b
+
     def geoms(self) -> list[tuple[str, Geom]]:
         """Return the geoms with their names, placed in the world."""
         rotation = matrix_of(self.rotation)
@@ -230,8 +236,8 @@ Solids = Annotated[
 MIN_INERTIA = 1e-12
 """Smallest mass and inertia of a body [kg, kg·m²]; MuJoCo needs positive ones."""
 
-_OWN_IMPEDANCE = 0.95
-"""MuJoCo's own impedance of contacts, where they are deep."""
+_OWN_IMPEDANCE, _OWN_SLIP_DAMPING = 0.95, 100.0
+"""MuJoCo's own impedance of deep contacts, and damping of slip [1/s]."""
 _CONTACT, _GROUND, _LOOSE = 1, 2, 3  # kinds of geoms
 _COLLIDES = {_CONTACT: _GROUND, _GROUND: _CONTACT, _LOOSE: _LOOSE}
 """With which kinds each collides, bit by bit; what is loose with all."""

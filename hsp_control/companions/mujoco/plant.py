@@ -209,6 +209,11 @@ class Mujoco(FrictionalPart, type="mujoco"):
         """The longest step of MuJoCo [s]."""
         return self.timestep
 
+    @property
+    def push_off(self) -> float:
+        """That of its slowest solid [1/s]; see `Solid` and docs/forces.md."""
+        return min((each.push_off for each in self.solids), default=0.0)
+
     def engine(self, robot: Robot, integrator: Integrator) -> "MujocoPlant":
         """Return the plant, which has its own integrator."""
         return MujocoPlant(robot, self)

@@ -14,10 +14,13 @@ from hsp_control.companions.ros2.installed import check_installed
 from hsp_control.config.source import read_document
 from hsp_control.live import OperatorRequests
 from hsp_control.live.operator_requests import stop_signals
+from hsp_control.live.udp import CLOSED_BY_LOOP
+
+_NOTHING = "no effort arrived"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the robot until it has stopped; return 0, or 2 after one error message."""
+    """Run the robot until it has stopped; return 0, or 2 after an error or a fault."""
     parser = argparse.ArgumentParser(prog="hsp_control.companions.ros2.robot")
     parser.add_argument("config", metavar="CONFIG", help="as of `hsp live`")
     parser.add_argument("address", metavar="ros2://CONTROLLER")
@@ -41,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"hsp: {error}", file=sys.stderr)
         return 2
     print(f"The robot: {reason}")
-    return 0
+    return 0 if reason in (_NOTHING, CLOSED_BY_LOOP, requests.reason) else 2
 
 
 def _run(options: argparse.Namespace, requests: OperatorRequests) -> str:
@@ -61,7 +64,7 @@ def _run(options: argparse.Namespace, requests: OperatorRequests) -> str:
         stop_reason=lambda: requests.reason,
         lockstep=options.lockstep,
     )
-    return robot.reason or "no effort arrived"
+    return robot.reason or _NOTHING
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """A foot of a walking robot: its sole, its place, its references and its switches."""
 
 import numpy as np
+import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import PlanError
@@ -15,6 +16,8 @@ from hsp_control.trajectories import ComposedPose
 from hsp_control.trajectories.fed import Fed, FedOrientation
 from hsp_control.trajectories.switch import Switch
 
+SLOPE = 0.02
+"""Slope that is none: a sole that stands is tilted by so little [-]."""
 FLATNESS = 0.05
 """Largest angle between a sole and the ground at the start [rad]."""
 
@@ -113,8 +116,29 @@ class Foot(Switched):
         origin = Footstep(x, y, self._last_yaw)
         self.place = self.place_of(origin)
         self.frame_height = float(here.position[2])
+        self.height = self.sole_height(state)
+
+    def sole_height(self, state: RobotState) -> float:
+        """Return the height of the middle of its sole [m]."""
+        here = state.frame(self.frame)
         corners = here.position + self._points @ here.rotation.T
-        self.height = float(corners[:, 2].mean())
+        return float(corners[:, 2].mean())
+
+    def ground(self, state: RobotState) -> tuple[Array, float, Array]:
+        """Return how it stands: the ground's tilt, its height, the ground's slope.
+
+        The tilt is a rotation from the level, shape (3, 3); the height is that of the
+        frame's origin [m]; the slope is the ground's gradient, shape (2,) [-]. Level
+        ground counts as level, and the height is what it was as the foot landed.
+        """
+        here = state.frame(self.frame)
+        normal = here.rotation @ self.flat(self.place.yaw)[2]
+        slope = -normal[:2] / normal[2]
+        if np.hypot(*slope) < SLOPE:
+            return np.eye(3), self.frame_height, np.zeros(2)
+        axis = np.array([-normal[1], normal[0], 0.0])
+        angle = np.arccos(min(float(normal[2]), 1.0)) / np.linalg.norm(axis)
+        return pin.exp3(angle * axis), float(here.position[2]), slope
 
     def place_of(self, origin: Footstep) -> Footstep:
         """Return the footstep whose frame's origin is at a place."""

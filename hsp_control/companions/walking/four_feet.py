@@ -27,12 +27,12 @@ LATE = 0.12
 """How long a foot without ground under it is waited for [s]."""
 EARLY = 0.6
 """Share of a swing before which no force counts as touchdown."""
-DESCENT = 0.3
-"""How fast a foot goes on down that has not touched the ground in time [m/s]."""
 RISE = 0.3
 """How long the trunk takes to rise or sink with the ground [s]."""
 _PRESS = 0.002
 """How far below the ground a swing foot aims, so that it does not miss it [m]."""
+_SLOPE = 0.06
+"""Slope that is none: a foot stands on a plate, or is not yet down [-]."""
 _UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -306,6 +306,13 @@ class RunningQuadruped(RunningPlan):
         """Return the mean height of the feet where they stand, or stood last [m]."""
         return sum(foot.height for foot in self._feet) / len(self._feet)
 
+    def _slope(self) -> Array:
+        """Return the gradient of the plane through the feet, shape (2,) [-]."""
+        places = np.array([self._state.position(foot.frame) for foot in self._feet])
+        away = places - places.mean(axis=0)
+        slope = np.linalg.lstsq(away[:, :2], away[:, 2], rcond=None)[0]
+        return np.asarray(slope if np.hypot(*slope) > _SLOPE else 0.0 * slope)
+
     # -- a foot -----------------------------------------------------------------------
 
     def _lift_off(self, foot: PointFoot, t: float) -> None:
@@ -321,7 +328,7 @@ class RunningQuadruped(RunningPlan):
             np.eye(3),
             foot.height - _PRESS,
             self.gait.lift,
-            DESCENT,
+            self._slope(),
         )
 
     def _has_landed(self, foot: PointFoot, measured: Measurement) -> bool:

@@ -10,10 +10,11 @@ from hsp_control.trajectories.schedule import smooth_step
 
 APPROACH = 0.92
 """Share of the swing after which the foot is above its place, and only descends."""
-DESCENT = 0.1
+DESCENT = 0.3
 """How fast a foot descends that has not touched the ground in time [m/s]."""
 _SETTLING = 0.06
 """How long it takes to reach that speed [s]."""
+_LEVEL = np.zeros(2)
 
 
 class Swing:
@@ -38,14 +39,14 @@ class Swing:
         goal: Array,
         height: float,
         lift: float,
-        descent: float = DESCENT,
+        slope: Array = _LEVEL,
     ) -> None:
-        """Plan the motion."""
-        self._descent = descent
+        """Plan the motion, above ground of a slope, shape (2,) [-]."""
         self.start, self.end, self.target = t, t + duration, target
         self._rotation, self._axis = rotation.copy(), np.zeros(3)
         log3(goal @ rotation.T, self._axis)  # in world axes
-        self._height, self._top = height, max(float(position[2]), height) + lift
+        self._slope, self._level = slope, height - float(slope @ target.point)
+        self._top = max(float(position[2]), height) + lift
         along = at_rest([position[0], position[1], 0.0])
         self._along = to_rest(along, self._there, t, APPROACH * duration)
         self._up = to_rest(at_rest(position[2:]), [self._top], t, 0.5 * duration)
@@ -55,6 +56,11 @@ class Swing:
     def _there(self) -> Array:
         """Where the foot is to stand, and that it has then turned: x, y, 1."""
         return np.array([self.target.x, self.target.y, 1.0])
+
+    @property
+    def _height(self) -> float:
+        """How high the foot is to stand there [m]."""
+        return self._level + float(self._slope @ self.target.point)
 
     def _descending(self, now: FootMotion, t: float) -> Quintic:
         return to_rest(now, [self._height], t, max(self.end - t, 1e-3))
@@ -113,9 +119,9 @@ class Swing:
         # The integral of the smooth step.
         fallen = u**4 * (2.5 + u * (u - 3.0)) * _SETTLING + max(late - _SETTLING, 0.0)
         return FootMotion(
-            np.array([self._height - self._descent * fallen]),
-            np.array([-self._descent * s]),
-            np.array([-self._descent * s_dot]),
+            np.array([self._height - DESCENT * fallen]),
+            np.array([-DESCENT * s]),
+            np.array([-DESCENT * s_dot]),
         )
 
 

@@ -37,7 +37,7 @@ from hsp_control.trajectories.fed import Fed, FedOrientation
 
 FIRST_SHIFT = (0.4, 0.6)
 """Time to get ready, and time to shift the weight for the first step [s]."""
-LATE = 0.08
+LATE = 0.2
 """How long a foot without ground under it is waited for [s]."""
 EARLY = 0.6
 """Share of a swing before which no force counts as touchdown."""
@@ -50,6 +50,9 @@ _HELD = 1.1
 the law takes from the arms for a while [-]."""
 _CALM = 0.02
 """Error of the divergent component with which a walk that was held goes on [m]."""
+
+_LEVEL = 0.01
+"""Change of the ground's height that is none: a sole sinks in [m]."""
 
 Mode = Literal["standing", "double", "single"]
 
@@ -219,6 +222,7 @@ class RunningWalk(RunningPlan):
         frames = feet[0].frame, feet[1].frame
         self._falling = FallDetector(self._trunk_frame, frames, state)
         self._taken, self._side, self._held = 0, 1.0, False
+        self._above, self._ground = self._height - walk.crouch - ground, ground
         self._now = Velocity(0.0, 0.0, 0.0)
         self._swing: Swing | None = None
         self._legs.begin(state, self._first_yaw, walk.swing, self._frequency)
@@ -306,16 +310,20 @@ class RunningWalk(RunningPlan):
         foot.lift(t)
         self._mode = "single"
         self._hull = self._feet[-self._side].corners(walk.margin)
-        here = self._state.frame(foot.frame)
+        here, standing = self._state.frame(foot.frame), self._feet[-self._side]
+        tilt, height, slope = standing.ground(self._state)
+        rise = float(slope @ (self._target.point - standing.place.point))
+        self._follow_ground(t, standing.sole_height(self._state) + 0.5 * rise)
         self._swing = foot.swing = Swing(
             t,
             walk.swing,
             here.position,
             here.rotation,
             foot.origin_of(self._target),
-            foot.flat(self._target.yaw),
-            self._feet[-self._side].frame_height,
+            tilt @ foot.flat(self._target.yaw),
+            height + rise,
             walk.lift,
+            slope,
         )
         self._react(t)
         yaw = between(self._feet[-self._side].place, self._target).yaw
@@ -351,6 +359,14 @@ class RunningWalk(RunningPlan):
         self._plan(t, [], walk.double_support, self._point)
         if any(self._swings):
             self._feet[self._side].unload(t, self._phases[0].duration)
+
+    def _follow_ground(self, t: float, ground: float) -> None:
+        """Walk as high above the ground as before."""
+        if abs(ground - self._ground) > _LEVEL:
+            self._ground, height = ground, ground + self._above
+            self._sinking = to_rest(
+                self._sinking.sample(t), [height], t, self.walk.swing
+            )
 
     def _plan(
         self, t: float, before: list[DcmPhase], shift: float, point: Array

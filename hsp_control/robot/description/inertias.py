@@ -23,6 +23,11 @@ from hsp_control.common.arrays import Array
 
 ROUNDING = 1e-6
 """A second moment may be negative by this share of their sum: files are rounded."""
+NEGLIGIBLE = 1e-9
+"""It may also be negative by this share of the robot's mass [m²], as if all of that lay
+within 30 µm: nothing in motion shows so little. Zeros that were rounded are below it
+(-5e-20 kg·m²), and so are links of 1e-8 kg that stand for a frame.
+"""
 FLOOR = 1e-3
 """Least second moment of a projected inertia, as a share of their sum.
 
@@ -40,13 +45,15 @@ class ImpossibleInertia(NamedTuple):
     element: Element  # its element ``<inertia>``
     moments: Array  # the principal moments in the file, in ascending order [kg·m²]
     nearest: Array  # the nearest inertia of a body, shape (3, 3) [kg·m²]
+    negative: bool  # whether a principal moment is negative beyond rounding
 
     @property
     def reason(self) -> str:
         """Why no body can have it."""
         low, middle, high = self.moments
-        if low < 0.0:
+        if self.negative:
             return f"a principal moment is {low:.3g} kg·m²; must not be negative"
+        low, middle = max(low, 0.0), max(middle, 0.0)  # but for rounding
         return (
             f"the principal moment {high:.3g} exceeds the sum of the other two, "
             f"{low:.3g} + {middle:.3g} = {low + middle:.3g} kg·m²"
@@ -55,15 +62,18 @@ class ImpossibleInertia(NamedTuple):
 
 def impossible_inertias(robot: Element) -> Iterator[ImpossibleInertia]:
     """Yield the links of a URDF whose inertia no body can have, in its order."""
+    masses = (float(mass.get("value", 0.0)) for mass in robot.iter("mass"))
+    slack = NEGLIGIBLE * sum(masses)
     for link in robot.findall("link"):
         element = link.find("inertial/inertia")
         if element is None:
             continue
         tensor = tensor_of(element)
-        if not is_possible(tensor):
+        if not is_possible(tensor, slack):
             moments = np.asarray(np.linalg.eigvalsh(tensor), dtype=float)
-            nearest = nearest_possible(tensor)
-            yield ImpossibleInertia(link.get("name", ""), element, moments, nearest)
+            negative = bool(moments[0] < -max(slack, ROUNDING * moments[-1]))
+            nearest, name = nearest_possible(tensor), link.get("name", "")
+            yield ImpossibleInertia(name, element, moments, nearest, negative)
 
 
 def project_inertias(robot: Element) -> None:
@@ -73,10 +83,10 @@ def project_inertias(robot: Element) -> None:
             found.element.set(entry, repr(float(found.nearest[place])))
 
 
-def is_possible(tensor: Array) -> bool:
-    """Return whether a body can have an inertia, shape (3, 3), to rounding."""
+def is_possible(tensor: Array, slack: float = 0.0) -> bool:
+    """Return whether a body can have an inertia (3, 3), to rounding or `slack`."""
     moments = _second_moments(np.asarray(np.linalg.eigvalsh(tensor), dtype=float))
-    return bool(moments.min() >= -ROUNDING * np.abs(moments).sum())
+    return bool(moments.min() >= -max(slack, ROUNDING * np.abs(moments).sum()))
 
 
 def nearest_possible(tensor: Array) -> Array:

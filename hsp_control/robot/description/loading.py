@@ -41,11 +41,6 @@ _NO_HAND = re.compile(
     "finger|thumb|camera|imu|sensor|range|accelerometer|laser|optical|force|(^|_)ft_frame"
 )
 """Names of links on a last joint that are less likely the hand than others."""
-NEGATIVE_MOMENT = 1e-6
-"""A principal moment of inertia may be negative by this much [kg·m²].
-
-Many files contain rounded or guessed inertias; the mass matrix is checked later.
-"""
 
 
 def load_model(
@@ -176,7 +171,7 @@ def _parse(source: RobotSource, settings: OneRobot) -> pin.Model:
 def _check_inertias(xml: Element, source: RobotSource) -> None:
     """Check that no principal moment is negative, but for rounding."""
     for found in impossible_inertias(xml):
-        if found.moments[0] < -NEGATIVE_MOMENT:
+        if found.negative:
             raise ModelError(
                 f"{source.urdf}: link {found.link!r}: <inertia>: {found.reason}; "
                 "project_inertias: true takes the nearest that a body can have"

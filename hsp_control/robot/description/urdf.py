@@ -116,6 +116,59 @@ def problems(robot: Element) -> Iterator[tuple[str, str]]:
                 if problem := _repeated(element):
                     name = part.get("name", "")
                     yield f"{kind} {name!r}: <{element.tag}>", problem
+    yield from _hidden(robot)
+    yield from _no_tree(robot)
+
+
+def _hidden(robot: Element) -> Iterator[tuple[str, str]]:
+    """Yield the links and joints that are written where parsers do not look."""
+    for child in robot:
+        if child.tag == "gazebo":
+            continue
+        found = [each for each in child.iter("joint") if each is not child]
+        found = [each for each in found if each.find("parent[@link]") is not None]
+        kind = child.tag.rpartition("}")[2].lower()
+        if kind in ("link", "joint") and child.tag != kind:
+            found.append(child)
+        for each in found:
+            kind, name = each.tag.rpartition("}")[2].lower(), each.get("name", "")
+            within = "" if each is child else f" in <{child.tag}>"
+            message = f"parsers skip <{each.tag}>{within}; must be <{kind}> in <robot>"
+            yield f"{kind} {name!r}", message
+
+
+def _no_tree(robot: Element) -> Iterator[tuple[str, str]]:
+    """Yield what makes the links no tree; parsers then drop a part, silently."""
+    links = [link.get("name") for link in robot.findall("link")]
+    above: dict[str | None, tuple[str, str | None]] = {}  # its joint, and parent link
+    for joint in robot.findall("joint"):
+        ends = [joint.find("parent"), joint.find("child")]
+        parent, child = (None if end is None else end.get("link") for end in ends)
+        if parent not in links or child not in links:
+            return  # the parser says so
+        name = joint.get("name", "")
+        if child in above:
+            joints = f"the joints {above[child][0]!r} and {name!r}"
+            yield f"link {child!r}", f"it is the child of {joints}; must be of one"
+        else:
+            above[child] = name, parent
+    roots = [repr(link) for link in links if link not in above]
+    if len(roots) > 1:
+        message = "none is the child of a joint; a robot has one such link, its root"
+        yield f"links {listing(roots)}", message
+    rooted: set[str | None] = set()
+    for link in links:
+        way: dict[str | None, str] = {}  # the joints from a link to the root
+        while link in above and link not in rooted and link not in way:
+            way[link], link = above[link]
+        if link in way:
+            loop = [*way][[*way].index(link) :]
+            names = listing(repr(way[each]) for each in loop)
+            yield (
+                f"links {listing(map(repr, loop))}",
+                f"their joints {names} make a loop",
+            )
+        rooted |= way.keys()
 
 
 def named_files(robot: Element) -> Iterator[tuple[str, str]]:

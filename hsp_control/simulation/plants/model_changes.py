@@ -79,7 +79,7 @@ class Inertias(ModelChange):
                 )
 
     def _scaled(self, body: pin.Inertia) -> pin.Inertia:
-        return pin.Inertia(
+        return _inertia(
             self.mass_factor * body.mass,
             body.lever + np.asarray(self.com_shift),
             self.mass_factor * self.inertia_factor * body.inertia,
@@ -88,12 +88,19 @@ class Inertias(ModelChange):
     def _scattered(self, body: pin.Inertia, draws: Array) -> pin.Inertia:
         """Return a body with random errors, for 7 random numbers in -1..1."""
         factor = 1.0 + self.random_mass * draws[0]
-        return pin.Inertia(
+        return _inertia(
             factor * body.mass,
             body.lever + self.random_com * draws[1:4],
             factor
             * _scale_moments(body.inertia, 1.0 + self.random_inertia * draws[4:]),
         )
+
+
+def _inertia(mass: float, lever: Array, tensor: Array) -> pin.Inertia:
+    """Return a body's inertia; the constructor refuses a moment of -1e-20 kg·m²."""
+    body = pin.Inertia(mass, lever, np.eye(3))
+    body.inertia = tensor
+    return body
 
 
 def _scale_moments(inertia: Array, factors: Array) -> Array:

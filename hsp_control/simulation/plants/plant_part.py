@@ -88,6 +88,14 @@ class PlantPart(Part, ABC, family="plants", error=SimulationError):
         return None
 
     @property
+    def push_off(self) -> float:
+        """Acceleration with which its surfaces push off what slides, by its speed.
+
+        What is pressed with less comes loose [1/s]; 0: nothing is pushed off.
+        """
+        return 0.0
+
+    @property
     def sensor_delay(self) -> int:
         """Delay of the measurements [control periods]."""
         return sum(sensor.periods for sensor in self.sensors)

@@ -66,7 +66,8 @@ def test_a_payload_sinks_unless_its_load_is_set() -> None:
         box = Talking(
             plant(payload=Payload("panda_link8", 2.0, center=[0.0, 0.0, 0.1]))
         )
-        assert ask(box, Command.SET_LOAD, m_load=mass, F_x_Cload=[0, 0, 0.1]) == [
+        flat = {"F_x_Cload": [0, 0, 0.1], "I_load": np.diag([-1e-9, 0, 0]).ravel()}
+        assert ask(box, Command.SET_LOAD, m_load=mass, **flat) == [
             (Command.SET_LOAD, 5, Status.SUCCESS)
         ]
         assert state(box)["m_load"] == mass
@@ -180,21 +181,18 @@ def test_what_a_client_may_not_do_while_the_arm_moves() -> None:
     ]
 
 
-@pytest.mark.parametrize(
-    ("fields", "served"),
-    [
-        ({"controller": 2, "motion_generator": 4}, True),
-        ({"controller": 2, "motion_generator": 0}, True),
-        ({"controller": 0, "motion_generator": 1}, True),
-        ({"controller": 0, "motion_generator": 2}, True),
-        ({"controller": 1, "motion_generator": 3}, True),
-        ({"controller": 1, "motion_generator": 0}, True),
-        ({"controller": 1, "motion_generator": 4}, False),
-        ({"controller": 0, "motion_generator": 4}, False),
-        ({"controller": 0, "motion_generator": 0, "asynchronous": 1}, False),
-        ({"controller": 77, "motion_generator": 4}, False),
-    ],
-)
+@pytest.mark.parametrize(("fields", "served"), [
+    ({"controller": 2, "motion_generator": 4}, True),
+    ({"controller": 2, "motion_generator": 0}, True),
+    ({"controller": 0, "motion_generator": 1}, True),
+    ({"controller": 0, "motion_generator": 2}, True),
+    ({"controller": 1, "motion_generator": 3}, True),
+    ({"controller": 1, "motion_generator": 0}, True),
+    ({"controller": 1, "motion_generator": 4}, False),
+    ({"controller": 0, "motion_generator": 4}, False),
+    ({"controller": 0, "motion_generator": 0, "asynchronous": 1}, False),
+    ({"controller": 77, "motion_generator": 4}, False),
+])  # fmt: skip
 def test_which_motions_are_served(fields: dict[str, int], served: bool) -> None:
     (answer,) = ask(Talking(), Command.MOVE, **fields)
     status = (
@@ -225,19 +223,22 @@ def test_a_command_that_is_not_finite_ends_the_motion() -> None:
     assert np.isfinite(box.q).all()
 
 
-@pytest.mark.parametrize(
-    ("kind", "fields"),
-    [
-        (Command.SET_LOAD, {"m_load": np.nan}),
-        (Command.SET_LOAD, {"m_load": 1.0, "I_load": [1, 2, 3, 4, 5, 6, 7, 8, 9]}),
-        (Command.SET_EE_TO_K, {"EE_T_K": np.ones(16)}),
-        (Command.SET_NE_TO_EE, {"NE_T_EE": np.full(16, np.nan)}),
-        (Command.SET_JOINT_IMPEDANCE, {"K_theta": -np.ones(7)}),
-        (Command.SET_CARTESIAN_IMPEDANCE, {"K_x": np.full(6, np.nan)}),
-        (Command.SET_COLLISION_BEHAVIOR, {"lower_force_nominal": np.ones(6)}),
-        (Command.SET_COLLISION_BEHAVIOR, {"upper_torque_nominal": [np.inf] * 7}),
-    ],
-)
+@pytest.mark.parametrize(("kind", "fields"), [
+    (Command.SET_LOAD, {"m_load": np.nan}),
+    (Command.SET_LOAD, {"m_load": 1e300}),
+    (Command.SET_LOAD, {"m_load": 12.0, "F_x_Cload": [0.3, 0, 0.1]}),
+    (Command.SET_LOAD, {"m_load": 1.0, "F_x_Cload": [np.nan, 0, 0]}),
+    (Command.SET_LOAD, {"m_load": 1.0, "I_load": np.diag([1e300] * 3).ravel()}),
+    (Command.SET_LOAD, {"m_load": 1.0, "I_load": np.diag([-0.1, 1, 1]).ravel()}),
+    (Command.SET_LOAD, {"m_load": 1.0, "I_load": [1, 2, 3, 4, 5, 6, 7, 8, 9]}),
+    (Command.SET_EE_TO_K, {"EE_T_K": np.ones(16)}),
+    (Command.SET_NE_TO_EE, {"NE_T_EE": np.full(16, np.nan)}),
+    (Command.SET_JOINT_IMPEDANCE, {"K_theta": -np.ones(7)}),
+    (Command.SET_JOINT_IMPEDANCE, {"K_theta": np.full(7, 1e300)}),
+    (Command.SET_CARTESIAN_IMPEDANCE, {"K_x": np.full(6, np.nan)}),
+    (Command.SET_COLLISION_BEHAVIOR, {"lower_force_nominal": np.ones(6)}),
+    (Command.SET_COLLISION_BEHAVIOR, {"upper_torque_nominal": [np.inf] * 7}),
+])  # fmt: skip
 def test_invalid_arguments_are_refused(kind: Command, fields: dict[str, Any]) -> None:
     box = Talking()
     assert ask(box, kind, **fields) == [(kind, 5, Status.INVALID_ARGUMENT_REJECTED)]
@@ -265,17 +266,14 @@ def test_contacts_and_collisions_follow_the_thresholds() -> None:
     assert told["joint_collision"].any()
 
 
-@pytest.mark.parametrize(
-    ("controller", "kind", "stiffness"),
-    [
-        (Controller.JOINT_IMPEDANCE, Command.SET_JOINT_IMPEDANCE, [200.0] * 7),
-        (
-            Controller.CARTESIAN_IMPEDANCE,
-            Command.SET_CARTESIAN_IMPEDANCE,
-            [500.0, 500.0, 500.0, 300.0, 300.0, 300.0],
-        ),
-    ],
-)
+@pytest.mark.parametrize(("controller", "kind", "stiffness"), [
+    (Controller.JOINT_IMPEDANCE, Command.SET_JOINT_IMPEDANCE, [200.0] * 7),
+    (
+        Controller.CARTESIAN_IMPEDANCE,
+        Command.SET_CARTESIAN_IMPEDANCE,
+        [500.0, 500.0, 500.0, 300.0, 300.0, 300.0],
+    ),
+])  # fmt: skip
 def test_an_unknown_payload_stretches_the_springs_that_are_set(
     controller: Controller, kind: Command, stiffness: list[float]
 ) -> None:

@@ -46,16 +46,13 @@ def test_the_log_has_the_true_motion(tmp_path: Path) -> None:
     assert (torn.status, torn.meta["message"]) == ("stopped", "no line")
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["planar3r"], "planar3r has the joints"),
-        (["panda", "--host", "10.1.1.1"], "listens on loopback only"),
-        (["panda", "--deadline", "0"], "deadline 0 µs; must be above 0"),
-        (["panda", "--priority", "100"], "real-time priority 100"),
-        (["panda", "--set", "start.velocity=[1, 0, 0, 0, 0, 0, 0]"], "at rest"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "said"), [
+    (["planar3r"], "planar3r has the joints"),
+    (["panda", "--host", "10.1.1.1"], "listens on loopback only"),
+    (["panda", "--deadline", "0"], "deadline 0 µs; must be above 0"),
+    (["panda", "--priority", "100"], "real-time priority 100"),
+    (["panda", "--set", "start.velocity=[1, 0, 0, 0, 0, 0, 0]"], "at rest"),
+])  # fmt: skip
 def test_a_mistake_is_one_line(
     arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -58,6 +58,21 @@ def test_joints_follow_the_hand_to_its_pose() -> None:
         )
 
 
+@pytest.mark.parametrize(("late", "jerk"), [(0, 1800.0), (1, 1800.0), (2, 650.0)])
+def test_a_client_that_is_late_for_its_first_commands_has_begun(
+    late: int, jerk: float
+) -> None:
+    """What arrives first is no start at rest: the second would be a jerk of 19 j/6."""
+    generator, model = made(HandPoses)
+    start = model.hand_at(home())[0]
+    for step in (late, late + 1):
+        way = jerk * (step * PERIOD) ** 3 / 6.0 * np.array([1.0, 0.0, 0.0])
+        told = command(
+            O_T_EE_c=columns(pin.SE3(start.rotation, start.translation + way))
+        )
+        assert follow(generator, told, first=step == late) == []
+
+
 def test_an_elbow_that_is_commanded_is_reached_by_a_hand_that_stays() -> None:
     generator, model = made(HandPoses)
     start = model.hand_at(home())[0]
@@ -70,14 +85,11 @@ def test_an_elbow_that_is_commanded_is_reached_by_a_hand_that_stays() -> None:
     assert np.abs(hand.displacement(start, at)).max() < 1e-5
 
 
-@pytest.mark.parametrize(
-    ("first", "elbow", "error"),
-    [
-        (True, [0.0, 1.0], Error.CARTESIAN_MOTION_GENERATOR_ELBOW_SIGN_INCONSISTENT),
-        (True, [0.1, -1.0], Error.CARTESIAN_MOTION_GENERATOR_START_ELBOW_INVALID),
-        (False, [0.1, -1.0], Error.CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION),
-    ],
-)
+@pytest.mark.parametrize(("first", "elbow", "error"), [
+    (True, [0.0, 1.0], Error.CARTESIAN_MOTION_GENERATOR_ELBOW_SIGN_INCONSISTENT),
+    (True, [0.1, -1.0], Error.CARTESIAN_MOTION_GENERATOR_START_ELBOW_INVALID),
+    (False, [0.1, -1.0], Error.CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION),
+])  # fmt: skip
 def test_an_elbow_elsewhere_is_refused(first: bool, elbow: Any, error: Error) -> None:
     generator, model = made(HandPoses)
     pose = columns(model.hand_at(home())[0])

@@ -92,17 +92,14 @@ def test_another_version_is_told_ours() -> None:
         assert line.endswith("this box speaks 10, as libfranka 0.18 to 0.21 do")
 
 
-@pytest.mark.parametrize(
-    ("data", "said"),
-    [
-        (struct.pack("<III", 99, 1, 12), "command 99 does not exist"),
-        (struct.pack("<III", 1, 1, 12), "move of 12 bytes; it has 125"),
-        (struct.pack("<III", 2, 1, 5), "stop_move of 5 bytes; it has 12"),
-        (struct.pack("<III", 2, 1, 2**32 - 1), "4294967295 bytes; it has 12"),
-        (b"GET / HTTP/1.1\r\nHost: box\r\n\r\n", "does not exist"),
-        (struct.pack("<IIIHH", 0, 1, 16, 10, 1), "where the first request is over"),
-    ],
-)
+@pytest.mark.parametrize(("data", "said"), [
+    (struct.pack("<III", 99, 1, 12), "command 99 does not exist"),
+    (struct.pack("<III", 1, 1, 12), "move of 12 bytes; it has 125"),
+    (struct.pack("<III", 2, 1, 5), "stop_move of 5 bytes; it has 12"),
+    (struct.pack("<III", 2, 1, 2**32 - 1), "4294967295 bytes; it has 12"),
+    (b"GET / HTTP/1.1\r\nHost: box\r\n\r\n", "does not exist"),
+    (struct.pack("<IIIHH", 0, 1, 16, 10, 1), "where the first request is over"),
+])  # fmt: skip
 def test_a_malformed_request_ends_the_connection(data: bytes, said: str) -> None:
     with served() as rig:
         with client(rig) as bad:
@@ -200,15 +197,12 @@ def test_in_real_time_a_command_after_the_deadline_is_lost() -> None:
                 assert served_client.late + served_client.outdated > 0
 
 
-@pytest.mark.parametrize(
-    ("option", "said"),
-    [
-        ({"deadline": 0.0}, "deadline 0 µs; must be above 0"),
-        ({"deadline": 2e-3}, "deadline 2000 µs"),
-        ({"patience": float("nan")}, "patience nan s; must be positive"),
-        ({"cut": -1.0}, "cut -1 s"),
-    ],
-)
+@pytest.mark.parametrize(("option", "said"), [
+    ({"deadline": 0.0}, "deadline 0 µs; must be above 0"),
+    ({"deadline": 2e-3}, "deadline 2000 µs"),
+    ({"patience": float("nan")}, "patience nan s; must be positive"),
+    ({"cut": -1.0}, "cut -1 s"),
+])  # fmt: skip
 def test_times_out_of_range_are_refused(option: dict[str, float], said: str) -> None:
     box = Box(panda(), plant(), home(), print)
     with pytest.raises(LiveError, match=said):

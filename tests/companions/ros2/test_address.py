@@ -12,20 +12,17 @@ def test_an_address_has_a_name_a_domain_and_options() -> None:
     assert parse("/left/eff").name == "/left/eff"
 
 
-@pytest.mark.parametrize(
-    ("address", "message"),
-    [
-        ("", r"'' is no name of ROS 2; needs letters"),
-        ("a//b", r"'a//b' is no name of ROS 2"),
-        ("1a", r"'1a' is no name of ROS 2"),
-        ("ä", r"'ä' is no name of ROS 2"),
-        ("a?domain", r"ros2://a\?domain: needs options KEY=VALUE&\.\.\."),
-        ("a?domain=233", r"the domain is '233'; needs 0 to 232"),
-        ("a?domain=-1", r"the domain is '-1'"),
-        ("a?state=/b", r"there is no option 'state'; did you mean 'states'\? \(known"),
-        ("a?states=/b&states=/c", r"the option 'states' is given twice"),
-    ],
-)
+@pytest.mark.parametrize(("address", "message"), [
+    ("", r"'' is no name of ROS 2; needs letters"),
+    ("a//b", r"'a//b' is no name of ROS 2"),
+    ("1a", r"'1a' is no name of ROS 2"),
+    ("ä", r"'ä' is no name of ROS 2"),
+    ("a?domain", r"ros2://a\?domain: needs options KEY=VALUE&\.\.\."),
+    ("a?domain=233", r"the domain is '233'; needs 0 to 232"),
+    ("a?domain=-1", r"the domain is '-1'"),
+    ("a?state=/b", r"there is no option 'state'; did you mean 'states'\? \(known"),
+    ("a?states=/b&states=/c", r"the option 'states' is given twice"),
+])  # fmt: skip
 def test_what_is_wrong_is_named(address: str, message: str) -> None:
     with pytest.raises(HardwareError, match=message):
         parse(address, ("states",))

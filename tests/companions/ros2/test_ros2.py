@@ -67,6 +67,16 @@ def test_a_client_drives_the_simulated_robot(
     assert np.abs(reached[last][7:14]).max() > 0.01  # it moved
 
 
+def test_the_status_of_a_robot_that_a_fault_stopped_says_so(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    controller, states, address = fresh()
+    with client(tmp_path / "said.json", "drive", DOMAIN, controller, states, COUNT):
+        arguments = ["panda_obstacle", f"ros2://{address}", "--set", "live.watchdog=1"]
+        assert ros2_robot.main(arguments) == 2
+    assert "The robot: the loop closed the connection" not in capsys.readouterr().out
+
+
 class Recording:
     """Hardware that waits for as long as the robot lives, and remembers."""
 

@@ -78,26 +78,20 @@ def test_a_message_is_what_the_joints_read() -> None:
         assert message.effort == tau.tolist()
 
 
-@pytest.mark.parametrize(
-    ("order", "message"),
-    [
-        ("a", "joints=a: the robot has no joint 'a'"),
-        (",".join(NAMES[1:]), "joints=.*: 'panda_joint1' is missing"),
-        (",".join([*NAMES, NAMES[0]]), "joints=.*: a joint is there twice"),
-    ],
-)
+@pytest.mark.parametrize(("order", "message"), [
+    ("a", "joints=a: the robot has no joint 'a'"),
+    (",".join(NAMES[1:]), "joints=.*: 'panda_joint1' is missing"),
+    (",".join([*NAMES, NAMES[0]]), "joints=.*: a joint is there twice"),
+])  # fmt: skip
 def test_an_order_of_commands_has_every_joint_once(order: str, message: str) -> None:
     with pytest.raises(HardwareError, match=message):
         Joints(panda()).command_order(order)
 
 
-@pytest.mark.parametrize(
-    ("names", "message"),
-    [
-        (NAMES[:-1], r"/js: a message lacks panda_joint7; it has panda_joint1, "),
-        ((*NAMES, NAMES[2]), r"/js: a message names panda_joint3 twice"),
-    ],
-)
+@pytest.mark.parametrize(("names", "message"), [
+    (NAMES[:-1], r"/js: a message lacks panda_joint7; it has panda_joint1, "),
+    ((*NAMES, NAMES[2]), r"/js: a message names panda_joint3 twice"),
+])  # fmt: skip
 def test_a_message_has_every_joint_once(names: tuple[str, ...], message: str) -> None:
     with pytest.raises(HardwareError, match=message):
         Joints(panda()).state(joint_state(1, names, [0.0] * len(names)), "/js")
@@ -196,15 +190,12 @@ class Faulty:
         self.hardware.close()
 
 
-@pytest.mark.parametrize(
-    ("wrong", "reason"),
-    [
-        ({"v": [0.0, np.nan, *[0.0] * 5]}, r"the state is not finite: v\[1\] is nan"),
-        ({"v": []}, r"a message has 7 names, and velocity has 0 numbers"),
-        ({"names": NAMES[1:], "q": [0.0] * 6}, r"a message lacks panda_joint1; it has"),
-        ({"q": [9.0, *start()[1:]]}, r"panda_joint1 is at 9, outside"),
-    ],
-)
+@pytest.mark.parametrize(("wrong", "reason"), [
+    ({"v": [0.0, np.nan, *[0.0] * 5]}, r"the state is not finite: v\[1\] is nan"),
+    ({"v": []}, r"a message has 7 names, and velocity has 0 numbers"),
+    ({"names": NAMES[1:], "q": [0.0] * 6}, r"a message lacks panda_joint1; it has"),
+    ({"q": [9.0, *start()[1:]]}, r"panda_joint1 is at 9, outside"),
+])  # fmt: skip
 def test_the_loop_stops_safely(
     rig: tuple[Rig, Ros2Hardware], wrong: dict[str, object], reason: str
 ) -> None:
@@ -239,16 +230,13 @@ def test_a_robot_that_is_not_there_is_not_waited_for_in_silence() -> None:
         Ros2Hardware(address, panda(), PERIOD, timeout=5.0)
 
 
-@pytest.mark.parametrize(
-    ("message", "reason"),
-    [
-        ({"step": 2 * MILLISECOND}, r"a state every 0.002 s; the loop's period is"),
-        ({"step": 0}, r"the stamps of the states do not increase"),
-        ({"names": ("a",), "q": [0.0]}, r"no state of panda_joint1, .* arrived"),
-        ({"names": NAMES[:3], "q": [0.0] * 3}, r"a message lacks panda_joint4, "),
-        ({"v": []}, r"a message has 7 names, and velocity has 0 numbers"),
-    ],
-)
+@pytest.mark.parametrize(("message", "reason"), [
+    ({"step": 2 * MILLISECOND}, r"a state every 0.002 s; the loop's period is"),
+    ({"step": 0}, r"the stamps of the states do not increase"),
+    ({"names": ("a",), "q": [0.0]}, r"no state of panda_joint1, .* arrived"),
+    ({"names": NAMES[:3], "q": [0.0] * 3}, r"a message lacks panda_joint4, "),
+    ({"v": []}, r"a message has 7 names, and velocity has 0 numbers"),
+])  # fmt: skip
 def test_a_robot_that_does_not_fit_is_refused(
     message: dict[str, object], reason: str
 ) -> None:

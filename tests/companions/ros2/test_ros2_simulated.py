@@ -75,14 +75,11 @@ def second_publisher(send: Callable[[list[float]], None], served: Served) -> Non
     other.send(Float64MultiArray(MultiArrayLayout(), [0.0] * 7))
 
 
-@pytest.mark.parametrize(
-    ("mistake", "reason"),
-    [
-        (wrong_size, "an effort has 6 numbers; the robot has 7 joints"),
-        (not_finite, "an effort is not finite: [nan, 0.0, "),
-        (second_publisher, "/commands: two publishers send efforts"),
-    ],
-)
+@pytest.mark.parametrize(("mistake", "reason"), [
+    (wrong_size, "an effort has 6 numbers; the robot has 7 joints"),
+    (not_finite, "an effort is not finite: [nan, 0.0, "),
+    (second_publisher, "/commands: two publishers send efforts"),
+])  # fmt: skip
 def test_a_wrong_effort_stops_the_robot(
     served: Served, mistake: Callable[..., None], reason: str
 ) -> None:

@@ -52,14 +52,11 @@ def until(true: Callable[[], Any]) -> None:
         assert monotonic() < end
 
 
-@pytest.mark.parametrize(
-    ("space", "value"),
-    [
-        (POSE, [0.4, 0.1, 0.5, HALF, HALF, HALF, HALF]),
-        (POSITION, [0.4, 0.1, 0.5]),
-        (ORIENTATION, [HALF, HALF, HALF, HALF]),
-    ],
-)
+@pytest.mark.parametrize(("space", "value"), [
+    (POSE, [0.4, 0.1, 0.5, HALF, HALF, HALF, HALF]),
+    (POSITION, [0.4, 0.1, 0.5]),
+    (ORIENTATION, [HALF, HALF, HALF, HALF]),
+])  # fmt: skip
 def test_a_stream_takes_what_it_needs_of_a_pose(space: Space, value: Any) -> None:
     inbox, publisher = opened(space)
     publisher.send(pose())
@@ -76,14 +73,11 @@ def test_a_stream_takes_what_it_needs_of_a_pose(space: Space, value: Any) -> Non
     assert re.search(r"publisher \d+ sends while publisher \d+ does", inbox.reason)
 
 
-@pytest.mark.parametrize(
-    ("wrong", "reason"),
-    [
-        ({"frame": "camera"}, "a pose is in the frame 'camera'; needs 'world'"),
-        ({"x": np.nan}, "value contains nan; needs finite numbers of at most 1e+06"),
-        ({"w": 0.0}, "the quaternion [0.5, 0.5, 0.5, 0.0] has norm 0.866025; needs 1"),
-    ],
-)
+@pytest.mark.parametrize(("wrong", "reason"), [
+    ({"frame": "camera"}, "a pose is in the frame 'camera'; needs 'world'"),
+    ({"x": np.nan}, "value contains nan; needs finite numbers of at most 1e+06"),
+    ({"w": 0.0}, "the quaternion [0.5, 0.5, 0.5, 0.0] has norm 0.866025; needs 1"),
+])  # fmt: skip
 def test_wrong_poses_are_counted_and_dropped(
     wrong: dict[str, Any], reason: str
 ) -> None:
@@ -95,15 +89,12 @@ def test_wrong_poses_are_counted_and_dropped(
     until(lambda: inbox.count == 1)
 
 
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: Stream(source="ros2://a b"), "'ros2://a b': 'a b' is no name"),
-        (lambda: StreamPose(source="ros2://a?frames=b"), "'frames'; did you mean 'fra"),
-        (lambda: listening_inbox("ros2://a", Space(7, False)), "needs 7 numbers"),
-        (lambda: StreamPose(source="ros2://a?domain=300"), "is '300'; needs 0 to 232"),
-    ],
-)
+@pytest.mark.parametrize(("make", "message"), [
+    (lambda: Stream(source="ros2://a b"), "'ros2://a b': 'a b' is no name"),
+    (lambda: StreamPose(source="ros2://a?frames=b"), "'frames'; did you mean 'fra"),
+    (lambda: listening_inbox("ros2://a", Space(7, False)), "needs 7 numbers"),
+    (lambda: StreamPose(source="ros2://a?domain=300"), "is '300'; needs 0 to 232"),
+])  # fmt: skip
 def test_mistakes_are_named(make: Callable[[], object], message: str) -> None:
     with pytest.raises(StreamError) as caught:
         make()

@@ -138,18 +138,15 @@ def test_an_action_means_what_it_means_to_osc_pose(frame: str) -> None:
     np.testing.assert_allclose(*ends, atol=0.25 * np.linalg.norm(ends[0]))
 
 
-@pytest.mark.parametrize(
-    ("settings", "error", "message"),
-    [
-        ({"impedance_mode": "variable"}, ControllerError, "impedance_mode: HSP_POSE"),
-        ({"interpolation": "linear"}, ControllerError, "interpolation: HSP_POSE"),
-        ({"position_limits": [[0.0] * 3, [1.0] * 3]}, ControllerError, "position_lim"),
-        ({"position_limits": np.ones((2, 3))}, ControllerError, "position_limits: HSP"),
-        ({"kp": [150, 0, 150, 150, 150, 150]}, GainError, "kp: must be positive"),
-        ({"hsp": {"limit": "none"}}, ConfigError, "limit"),
-        ({"hsp": "nowhere.yaml"}, ConfigError, "nowhere.yaml"),
-    ],
-)
+@pytest.mark.parametrize(("settings", "error", "message"), [
+    ({"impedance_mode": "variable"}, ControllerError, "impedance_mode: HSP_POSE"),
+    ({"interpolation": "linear"}, ControllerError, "interpolation: HSP_POSE"),
+    ({"position_limits": [[0.0] * 3, [1.0] * 3]}, ControllerError, "position_lim"),
+    ({"position_limits": np.ones((2, 3))}, ControllerError, "position_limits: HSP"),
+    ({"kp": [150, 0, 150, 150, 150, 150]}, GainError, "kp: must be positive"),
+    ({"hsp": {"limit": "none"}}, ConfigError, "limit"),
+    ({"hsp": "nowhere.yaml"}, ConfigError, "nowhere.yaml"),
+])  # fmt: skip
 def test_what_it_cannot_do_is_refused(settings: Any, error: Any, message: str) -> None:
     with pytest.raises(error, match=message), made(**settings):
         pass

@@ -13,28 +13,25 @@ from hsp_control.common.exceptions import SweepError
 pytestmark = pytest.mark.process
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ([], "nothing is varied; give --over"),
-        (["--over", "null_space.gian=1,2"], "did you mean 'gain'?"),
-        (["--over", "null_space.gain.x=1,2"], "which has no keys"),
-        (["--over", "null_space.gain=2:1:3"], "--over null_space.gain: the interval"),
-        (["--over", "null_space.gain=unifrom:1:2"], "did you mean 'uniform'?"),
-        (["--over", "null_space.gain"], "needs the form key=values"),
-        (["--over", "null_space.gain=-3,-2"], "null_space.gain"),
-        (["--over", "null_space.gain=1:2"], "a grid needs a list"),
-        (["--over", "null_space.gain=1,2", "--over", "null_space.gain=3"], "twice"),
-        (["--over", "null_space.gain=1:2", "--design", "latin"], "'latin_hypercube'?"),
-        (["--over", "null_space.gain=1:2", "--design", "random"], "needs --samples"),
-        (["--over", "null_space.gain=1:2", "--samples", "0"], "0 samples"),
-        (
-            ["--over", "null_space.gain=1:2", "--samples", "9", "--seed", "-1"],
-            "seed is",
-        ),
-        (["--over", "null_space.gain=1,2", "--workers", "0"], "0 workers"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "message"), [
+    ([], "nothing is varied; give --over"),
+    (["--over", "null_space.gian=1,2"], "did you mean 'gain'?"),
+    (["--over", "null_space.gain.x=1,2"], "which has no keys"),
+    (["--over", "null_space.gain=2:1:3"], "--over null_space.gain: the interval"),
+    (["--over", "null_space.gain=unifrom:1:2"], "did you mean 'uniform'?"),
+    (["--over", "null_space.gain"], "needs the form key=values"),
+    (["--over", "null_space.gain=-3,-2"], "null_space.gain"),
+    (["--over", "null_space.gain=1:2"], "a grid needs a list"),
+    (["--over", "null_space.gain=1,2", "--over", "null_space.gain=3"], "twice"),
+    (["--over", "null_space.gain=1:2", "--design", "latin"], "'latin_hypercube'?"),
+    (["--over", "null_space.gain=1:2", "--design", "random"], "needs --samples"),
+    (["--over", "null_space.gain=1:2", "--samples", "0"], "0 samples"),
+    (
+        ["--over", "null_space.gain=1:2", "--samples", "9", "--seed", "-1"],
+        "seed is",
+    ),
+    (["--over", "null_space.gain=1,2", "--workers", "0"], "0 workers"),
+])  # fmt: skip
 def test_each_mistake_gets_one_message_and_status_2(
     arguments: list[str],
     message: str,

@@ -23,16 +23,13 @@ pytestmark = pytest.mark.process
 # --- values and designs --------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("text", "levels"),
-    [
-        ("1,2,5", (1, 2, 5)), ("rest,flow", ("rest", "flow")), ("true", (True,)),
-        ("[0, 0, 1], [0, 1, 0]", ([0, 0, 1], [0, 1, 0])), ("'a:b', c", ("a:b", "c")),
-        ("{type: hold}", ({"type": "hold"},)), ("0:10:3", (0, 5, 10)),
-        ("0:1:3", (0.0, 0.5, 1.0)), ("-1e-2:0.5:2", (-0.01, 0.5)),
-        ("linear:1:9:5", (1, 3, 5, 7, 9)), ("log:1:100:3", (1.0, 10.0, 100.0)),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("text", "levels"), [
+    ("1,2,5", (1, 2, 5)), ("rest,flow", ("rest", "flow")), ("true", (True,)),
+    ("[0, 0, 1], [0, 1, 0]", ([0, 0, 1], [0, 1, 0])), ("'a:b', c", ("a:b", "c")),
+    ("{type: hold}", ({"type": "hold"},)), ("0:10:3", (0, 5, 10)),
+    ("0:1:3", (0.0, 0.5, 1.0)), ("-1e-2:0.5:2", (-0.01, 0.5)),
+    ("linear:1:9:5", (1, 3, 5, 7, 9)), ("log:1:100:3", (1.0, 10.0, 100.0)),
+])  # fmt: skip
 def test_lists_and_ranges_as_they_are_spelled(text: str, levels: tuple) -> None:
     found = values(text).levels()
     assert found is not None
@@ -45,39 +42,33 @@ def test_lists_and_ranges_as_they_are_spelled(text: str, levels: tuple) -> None:
         assert found == levels
 
 
-@pytest.mark.parametrize(
-    ("text", "distribution"),
-    [
-        ("1:10", Uniform(1, 10)),
-        ("uniform:-1:1", Uniform(-1, 1)),
-        ("loguniform:0.1:10", LogUniform(0.1, 10)),
-        ("normal:0:0.1", Normal(0, 0.1)),
-        ("normal:1:0.1:0:2", Normal(1, 0.1, 0, 2)),
-        ("integers:0:99", Integers(0, 99)),
-    ],
-)
+@pytest.mark.parametrize(("text", "distribution"), [
+    ("1:10", Uniform(1, 10)),
+    ("uniform:-1:1", Uniform(-1, 1)),
+    ("loguniform:0.1:10", LogUniform(0.1, 10)),
+    ("normal:0:0.1", Normal(0, 0.1)),
+    ("normal:1:0.1:0:2", Normal(1, 0.1, 0, 2)),
+    ("integers:0:99", Integers(0, 99)),
+])  # fmt: skip
 def test_distributions_as_they_are_spelled(text: str, distribution: object) -> None:
     assert values(text) == distribution
     assert values(text).levels() is None
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("", "the values are missing"), ("5:1:3", "from 5 to 1"),
-        ("1:5:1", "at least 2"), ("1:5:2.5", "'2.5' is not an integer"),
-        ("1:5:1000000", "at most 100000"), ("1:x:3", "'x' is not a number"),
-        ("1:2:3:4", "has 4 parts"), ("nan:1", "must be finite"),
-        ("log:0:1:3", "must be positive"), ("loguniform:-1:1", "must be positive"),
-        ("unifrom:1:2", "did you mean 'uniform'?"),
-        ("uniform:1", "has 1 numbers; needs uniform:LOW:HIGH"),
-        ("normal:0:0", "the deviation positive"),
-        ("normal:0:1:2:1", "cut to 2 ... 1; low must be below high"),
-        ("normal:0:1:50:60", "has no values from 50 to 60"),
-        ("integers:3:1", "no integers from 3 to 1"),
-        ("integers:0:1.5", "'1.5' is not an integer"), ("[1, 2", "not a list"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("text", "message"), [
+    ("", "the values are missing"), ("5:1:3", "from 5 to 1"),
+    ("1:5:1", "at least 2"), ("1:5:2.5", "'2.5' is not an integer"),
+    ("1:5:1000000", "at most 100000"), ("1:x:3", "'x' is not a number"),
+    ("1:2:3:4", "has 4 parts"), ("nan:1", "must be finite"),
+    ("log:0:1:3", "must be positive"), ("loguniform:-1:1", "must be positive"),
+    ("unifrom:1:2", "did you mean 'uniform'?"),
+    ("uniform:1", "has 1 numbers; needs uniform:LOW:HIGH"),
+    ("normal:0:0", "the deviation positive"),
+    ("normal:0:1:2:1", "cut to 2 ... 1; low must be below high"),
+    ("normal:0:1:50:60", "has no values from 50 to 60"),
+    ("integers:3:1", "no integers from 3 to 1"),
+    ("integers:0:1.5", "'1.5' is not an integer"), ("[1, 2", "not a list"),
+])  # fmt: skip
 def test_what_is_no_range_is_refused(text: str, message: str) -> None:
     with pytest.raises(SweepError, match=message.replace("?", r"\?")):
         values(text)

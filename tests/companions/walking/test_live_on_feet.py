@@ -133,14 +133,11 @@ def test_a_regular_end_lets_the_plan_come_to_rest(by: str) -> None:
 
 @pytest.mark.system
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "plan",
-    [
-        "plan={type: walk, speed: 0.3}",
-        "plan={type: walk, footsteps: [[0.2, 0.1, 0], [0.4, -0.1, 0], [0.6, 0.1, 0], "
-        "[0.8, -0.1, 0]], first: left}",
-    ],
-)
+@pytest.mark.parametrize("plan", [
+    "plan={type: walk, speed: 0.3}",
+    "plan={type: walk, footsteps: [[0.2, 0.1, 0], [0.4, -0.1, 0], [0.6, 0.1, 0], "
+    "[0.8, -0.1, 0]], first: left}",
+])  # fmt: skip
 def test_a_walk_that_is_stopped_brings_its_feet_together(plan: str) -> None:
     experiment = hsp.load_experiment("walking/talos_walk", plan)
     report, robot = live(experiment, duration=2.0)
@@ -299,18 +296,15 @@ def test_a_state_with_sensors_comes_back() -> None:
 
 
 @pytest.mark.system
-@pytest.mark.parametrize(
-    ("changed", "message"),
-    [
-        ({"wrenches": {"a": np.full(6, np.nan)}}, r"not finite: wrench at a\[0\]"),
-        ({"wrenches": {"a": np.zeros(3)}}, r"wrench at a has shape \(3,\)"),
-        ({"inertial": (1, 2, 3)}, "inertial is of type tuple; needs an Inertial"),
-        (
-            {"inertial": Inertial("a", np.zeros(3), np.full(3, 1e9))},
-            r"absurd: specific force\[0\] is 1e\+09",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("changed", "message"), [
+    ({"wrenches": {"a": np.full(6, np.nan)}}, r"not finite: wrench at a\[0\]"),
+    ({"wrenches": {"a": np.zeros(3)}}, r"wrench at a has shape \(3,\)"),
+    ({"inertial": (1, 2, 3)}, "inertial is of type tuple; needs an Inertial"),
+    (
+        {"inertial": Inertial("a", np.zeros(3), np.full(3, 1e9))},
+        r"absurd: specific force\[0\] is 1e\+09",
+    ),
+])  # fmt: skip
 def test_a_sensor_that_cannot_be_right_is_refused(
     changed: dict[str, object], message: str
 ) -> None:

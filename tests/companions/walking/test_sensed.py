@@ -82,16 +82,13 @@ def test_with_height_and_force_both_must_be_felt(height, force, bears):
     assert contact.is_on == bears
 
 
-@pytest.mark.parametrize(
-    ("rule", "message"),
-    [
-        ("{}", "give force or height: what tells that it bears"),
-        ("{height: 0.1, release: 2}", "release is a force; give force, too"),
-        ("{force: 2, release: 2}", "release is 2 N; must be below force = 2 N"),
-        ("{force: 2, wanted: [[2, 1]]}", "the interval from 2 to 1 s is empty"),
-        ("{force: 2, task: fot}", "no task 'fot'; did you mean 'foot'"),
-    ],
-)
+@pytest.mark.parametrize(("rule", "message"), [
+    ("{}", "give force or height: what tells that it bears"),
+    ("{height: 0.1, release: 2}", "release is a force; give force, too"),
+    ("{force: 2, release: 2}", "release is 2 N; must be below force = 2 N"),
+    ("{force: 2, wanted: [[2, 1]]}", "the interval from 2 to 1 s is empty"),
+    ("{force: 2, task: fot}", "no task 'fot'; did you mean 'foot'"),
+])  # fmt: skip
 def test_what_does_not_fit_is_said(rule, message):
     with pytest.raises(HspControlError, match=message):
         told(rule)

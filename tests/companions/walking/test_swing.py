@@ -52,6 +52,16 @@ def test_a_quintic_begins_as_given_and_comes_to_rest():
     )
 
 
+def test_a_foot_that_is_sent_elsewhere_finds_the_slope_there():
+    level, slope = a_swing(), np.array([-0.1, 0.02])
+    swing = Swing(
+        1.0, 0.6, np.zeros(3), np.eye(3), level.target, np.eye(3), 0.1, 0.05, slope
+    )
+    assert swing.position(1.6).position[2] == pytest.approx(0.1)
+    swing.redirect(1.3, Footstep(0.5, 0.2, 0.0), 1.6)
+    assert swing.position(1.6).position[2] == pytest.approx(0.1 - 0.02 + 0.002)
+
+
 def assert_smooth(swing: Swing, first: float, last: float) -> None:
     """Assert that differences of the motion agree with its rates at all times."""
     for t in np.arange(first, last, 0.0037):

@@ -40,42 +40,39 @@ def test_it_adds_what_it_needs(solo):
     assert all(isinstance(each.schedule, Switch) for each in made.contacts)
 
 
-@pytest.mark.parametrize(
-    ("trot", "tasks", "contacts", "message"),
-    [
-        (Trot(), [], [], "^plan: a quadruped trots on four feet; there are 0 .declare"),
-        (
-            Trot(),
-            [],
-            FEET[:3],
-            "^plan: a quadruped trots on four feet; there are 3 .FL",
-        ),
-        (
-            Trot(feet=["FL_FOO"]),
-            [],
-            FEET,
-            "no contact 'FL_FOO'; did you mean 'FL_FOOT'",
-        ),
-        (
-            Trot(),
-            [],
-            [*FEET[:3], SurfaceContact("HR_FOOT", length=0.1, width=0.1)],
-            "^plan: contact 'HR_FOOT' is a surface; a quadruped trots on feet of type",
-        ),
-        (
-            Trot(),
-            [CenterOfMass()],
-            FEET,
-            "^tasks.center_of_mass: its axes are 'xyz'; the plan needs 'xy'",
-        ),
-        (
-            Trot(),
-            [],
-            [*FEET[:3], BallContact("HR_FOOT", radius=0.0165, normal=[1, 0, 0])],
-            r"^plan: contact 'HR_FOOT' has the normal \[1.0, 0.0, 0.0\]; a quadrup",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("trot", "tasks", "contacts", "message"), [
+    (Trot(), [], [], "^plan: a quadruped trots on four feet; there are 0 .declare"),
+    (
+        Trot(),
+        [],
+        FEET[:3],
+        "^plan: a quadruped trots on four feet; there are 3 .FL",
+    ),
+    (
+        Trot(feet=["FL_FOO"]),
+        [],
+        FEET,
+        "no contact 'FL_FOO'; did you mean 'FL_FOOT'",
+    ),
+    (
+        Trot(),
+        [],
+        [*FEET[:3], SurfaceContact("HR_FOOT", length=0.1, width=0.1)],
+        "^plan: contact 'HR_FOOT' is a surface; a quadruped trots on feet of type",
+    ),
+    (
+        Trot(),
+        [CenterOfMass()],
+        FEET,
+        "^tasks.center_of_mass: its axes are 'xyz'; the plan needs 'xy'",
+    ),
+    (
+        Trot(),
+        [],
+        [*FEET[:3], BallContact("HR_FOOT", radius=0.0165, normal=[1, 0, 0])],
+        r"^plan: contact 'HR_FOOT' has the normal \[1.0, 0.0, 0.0\]; a quadrup",
+    ),
+])  # fmt: skip
 def test_what_does_not_fit_is_said(solo, trot, tasks, contacts, message):
     with pytest.raises(HspControlError, match=message):
         trot.parts(solo, tasks, contacts)

@@ -2,6 +2,7 @@
 
 import re
 from functools import cache
+from math import cos, radians, sin, tan
 
 import numpy as np
 import pytest
@@ -51,6 +52,24 @@ def test_it_walks_and_stands_again():
     assert np.abs(np.delete(run.v[-1], [*SWINGING])).max() < 0.05
     error = run["plan.dcm"] - run["plan.dcm_reference"]
     assert np.sqrt((error**2).sum(axis=1).mean()) < 0.01
+
+
+def test_it_walks_down_a_ramp_of_which_it_does_not_know():
+    """Of -5 degrees, from a platform: the soles lie on it, the mass stays above it."""
+    slope = radians(5.0)
+    middle = [0.3 + 2.0 * cos(slope) - 0.1 * sin(slope), 0.0]
+    middle += [-2.0 * sin(slope) - 0.1 * cos(slope)]
+    box = "shape: {type: box, size: [4, 4, 0.2]}, position"
+    solids = f"{{flat: {{{box}: [-1.7, 0, -0.1]}}, ramp: {{{box}: {middle}, "
+    solids += f"rotation: [0, {slope}, 0]}}}}"
+    settings = f"plant.solids={solids}", "plant.ground={height: -3}"
+    run = load_experiment("walking/talos_walk", *settings).run()
+    assert run.status == "completed"
+    assert run["plan.phase"][-1] == 0
+    fallen = tan(slope) * (run.q[-1, 0] - 0.3)
+    assert fallen > 0.05
+    sunk = run["task.center_of_mass.actual"][[110, -1], 2]
+    assert sunk[0] - sunk[1] == pytest.approx(fallen, abs=0.03)
 
 
 def test_a_contact_changes_no_effort_by_a_jump():

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from importlib import metadata
 from importlib.metadata import EntryPoint
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -98,15 +99,12 @@ def test_a_log_is_not_replaced_by_its_repetition(
     assert [file.name for file in elsewhere.iterdir()] == [log.name]
 
 
-@pytest.mark.parametrize(
-    ("config", "freedom"),
-    [
-        # four feet hold three rows each
-        pytest.param(["whole_body/solo12_trunk"], 18 - 12 - 6, marks=ON_MUJOCO),
-        ([MOVING, "--set", "start.coordinates=[0, 0, 0]"], 3 - 1),  # stretched
-        ([MOVING, "--set", "tasks.tip.schedule={intervals: [[1, null]]}"], 3),
-    ],
-)
+@pytest.mark.parametrize(("config", "freedom"), [
+    # four feet hold three rows each
+    pytest.param(["whole_body/solo12_trunk"], 18 - 12 - 6, marks=ON_MUJOCO),
+    ([MOVING, "--set", "start.coordinates=[0, 0, 0]"], 3 - 1),  # stretched
+    ([MOVING, "--set", "tasks.tip.schedule={intervals: [[1, null]]}"], 3),
+])  # fmt: skip
 def test_check_counts_what_contacts_and_tasks_leave(
     config: list[str], freedom: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -132,35 +130,32 @@ def test_the_summary_tells_of_a_target_out_of_reach(
     assert re.search(r"\d+ rows: target out of reach, 1\.\d\d m at the end", told)
 
 
-@pytest.mark.parametrize(
-    ("hand", "told"),
-    [
-        (
-            "{type: frame_position, trajectory: "
-            "{type: line, origin: world, start: [0.4, 0, 0.5], end: [1.6, 0, 0.5], "
-            "duration: 2}}",
-            r"task 'hand': its target is out of reach by 0\.\d+ m, from t = 0\.\d* s, "
-            r"most at 2",
-        ),
-        (
-            "{type: frame_pose, trajectory: {type: composed, position: "
-            "{type: hold, point: [0.8, 0, 0.3]}, orientation: "
-            "{type: hold, rotation: [0, -2, 0]}}}",
-            "task 'hand': its target cannot be reached in its orientation, at the",
-        ),
-        (
-            # 39 turns: looked at evenly it would be seen where it begins, within reach
-            "{type: frame_position, trajectory: {type: circle, center: [-1.1, 0, 0.5], "
-            "radius: 1.5, angular_rate: 122.52211349000193}}",
-            "task 'hand': its target is out of reach by",
-        ),
-        (
-            "{type: frame_pose, trajectory: "
-            "{type: circle, radius: 0.1, angular_rate: 1}}",
-            None,
-        ),
-    ],
-)
+@pytest.mark.parametrize(("hand", "told"), [
+    (
+        "{type: frame_position, trajectory: "
+        "{type: line, origin: world, start: [0.4, 0, 0.5], end: [1.6, 0, 0.5], "
+        "duration: 2}}",
+        r"task 'hand': its target is out of reach by 0\.\d+ m, from t = 0\.\d* s, "
+        r"most at 2",
+    ),
+    (
+        "{type: frame_pose, trajectory: {type: composed, position: "
+        "{type: hold, point: [0.8, 0, 0.3]}, orientation: "
+        "{type: hold, rotation: [0, -2, 0]}}}",
+        "task 'hand': its target cannot be reached in its orientation, at the",
+    ),
+    (
+        # 39 turns: looked at evenly it would be seen where it begins, within reach
+        "{type: frame_position, trajectory: {type: circle, center: [-1.1, 0, 0.5], "
+        "radius: 1.5, angular_rate: 122.52211349000193}}",
+        "task 'hand': its target is out of reach by",
+    ),
+    (
+        "{type: frame_pose, trajectory: "
+        "{type: circle, radius: 0.1, angular_rate: 1}}",
+        None,
+    ),
+])  # fmt: skip
 def test_check_tells_before_the_run_what_is_out_of_reach(
     hand: str, told: str | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -175,37 +170,34 @@ def test_check_tells_before_the_run_what_is_out_of_reach(
     assert ("reach" not in warned) if told is None else re.search(told, warned)
 
 
-@pytest.mark.parametrize(
-    ("config", "tasks", "told"),
-    [
-        (  # three links of 1 m each
-            MOVING,
-            "{tip: {type: frame_position, axes: x, trajectory: "
-            "{type: line, origin: world, start: [1], end: [5], duration: 2}}}",
-            r"reach by 2 m, from t = 1\.0\d s, most at 2 s",
-        ),
-        (
-            MOVING,
-            "{tip: {type: frame_position, axes: yx, trajectory: "
-            "{type: hold, point: [0, 4]}}}",
-            "reach by 1 m, at the start",
-        ),
-        pytest.param(  # its feet stay where they are
-            "whole_body/talos_circle",
-            "{hand: {type: frame_position, frame: gripper_right_base_link, trajectory: "
-            "{type: hold, point: [4, 0, 1]}}}",
-            r"reach by 2(\.\d)? m, at the start",
-            marks=ON_MUJOCO,
-        ),
-        pytest.param(
-            "whole_body/talos_circle",
-            "{hand: {type: frame_position, frame: gripper_right_base_link, trajectory: "
-            "{type: hold, origin: start, point: [0.2, 0, 0]}}}",
-            None,
-            marks=ON_MUJOCO,
-        ),
-    ],
-)
+@pytest.mark.parametrize(("config", "tasks", "told"), [
+    (  # three links of 1 m each
+        MOVING,
+        "{tip: {type: frame_position, axes: x, trajectory: "
+        "{type: line, origin: world, start: [1], end: [5], duration: 2}}}",
+        r"reach by 2 m, from t = 1\.0\d s, most at 2 s",
+    ),
+    (
+        MOVING,
+        "{tip: {type: frame_position, axes: yx, trajectory: "
+        "{type: hold, point: [0, 4]}}}",
+        "reach by 1 m, at the start",
+    ),
+    pytest.param(  # its feet stay where they are
+        "whole_body/talos_circle",
+        "{hand: {type: frame_position, frame: gripper_right_base_link, trajectory: "
+        "{type: hold, point: [4, 0, 1]}}}",
+        r"reach by 2(\.\d)? m, at the start",
+        marks=ON_MUJOCO,
+    ),
+    pytest.param(
+        "whole_body/talos_circle",
+        "{hand: {type: frame_position, frame: gripper_right_base_link, trajectory: "
+        "{type: hold, origin: start, point: [0.2, 0, 0]}}}",
+        None,
+        marks=ON_MUJOCO,
+    ),
+])  # fmt: skip
 def test_check_tells_of_targets_along_some_axes_and_of_hands_on_legs(
     config: str, tasks: str, told: str | None, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -213,6 +205,20 @@ def test_check_tells_of_targets_along_some_axes_and_of_hands_on_legs(
     assert main(["check", config, *options]) == 0
     warned = capsys.readouterr().err
     assert ("reach" not in warned) if told is None else re.search(told, warned)
+
+
+def test_a_play_that_failed_and_was_not_reset_says_so_with_its_status(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fail(session: Any, *_: Any) -> None:
+        session.over = "the arm is too fast; reset to go on"
+
+    monkeypatch.setattr("hsp_control.cli.play.play_in_real_time", fail)
+    arguments = [MOVING, "--out", str(tmp_path), "--no-browser"]
+    assert main(["play", *arguments]) == 2
+    assert capsys.readouterr().err.endswith("hsp: the arm is too fast\n")
+    monkeypatch.setattr("hsp_control.cli.play.play_in_real_time", lambda *_: None)
+    assert main(["play", *arguments]) == 0
 
 
 @pytest.mark.slow
@@ -312,19 +318,16 @@ def versions_without(package: str) -> Callable[[str], str]:
     return found
 
 
-@pytest.mark.parametrize(
-    ("typed", "told"),
-    [
-        (["rnu"], "there is no command 'rnu'; did you mean 'run'?"),
-        (
-            ["run", MOVING, "--veiw"],
-            "there is no '--veiw' here; did you mean '--view'?",
-        ),
-        (["check", MOVING, "twice"], "'twice' is one argument too many"),
-        # Not taken for --strict.
-        (["run", MOVING, "--st", "a=1"], "no '--st' here; did you mean '--set'?"),
-    ],
-)
+@pytest.mark.parametrize(("typed", "told"), [
+    (["rnu"], "there is no command 'rnu'; did you mean 'run'?"),
+    (
+        ["run", MOVING, "--veiw"],
+        "there is no '--veiw' here; did you mean '--view'?",
+    ),
+    (["check", MOVING, "twice"], "'twice' is one argument too many"),
+    # Not taken for --strict.
+    (["run", MOVING, "--st", "a=1"], "no '--st' here; did you mean '--set'?"),
+])  # fmt: skip
 def test_what_was_mistyped_is_guessed(
     typed: list[str], told: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -334,19 +337,16 @@ def test_what_was_mistyped_is_guessed(
     assert told in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["run", "paper/4_moving"], "did you mean 'paper/4_moving_obstacle'?"),
-        (["run", "nowhere.yaml"], "hsp: nowhere.yaml: no such file"),
-        (["check", MOVING, "--set", "tasks.tip.frame=tpi"], "did you mean 'tip'?"),
-        (["check", MOVING, "--set", "nonsense"], "--set nonsense"),
-        (["plot", "nowhere.npz"], "hsp: nowhere.npz: no such file"),
-        (["plot", __file__], "not a complete .npz log"),
-        (["robots", "pand"], "did you mean 'panda'?"),
-        (["run", MOVING, *SHORT, "--out", "/proc/nowhere"], "hsp: /proc/nowhere"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "message"), [
+    (["run", "paper/4_moving"], "did you mean 'paper/4_moving_obstacle'?"),
+    (["run", "nowhere.yaml"], "hsp: nowhere.yaml: no such file"),
+    (["check", MOVING, "--set", "tasks.tip.frame=tpi"], "did you mean 'tip'?"),
+    (["check", MOVING, "--set", "nonsense"], "--set nonsense"),
+    (["plot", "nowhere.npz"], "hsp: nowhere.npz: no such file"),
+    (["plot", __file__], "not a complete .npz log"),
+    (["robots", "pand"], "did you mean 'panda'?"),
+    (["run", MOVING, *SHORT, "--out", "/proc/nowhere"], "hsp: /proc/nowhere"),
+])  # fmt: skip
 def test_each_mistake_gets_one_message_and_status_2(
     arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -498,19 +498,16 @@ def test_equality_looks_at_class_and_fields() -> None:
     assert Marble(1) != Ball(1)
 
 
-@pytest.mark.parametrize(
-    ("kind", "allowed", "refused"),
-    [
-        (Positive, [1e-300, 9.0], [0.0, -1.0, math.inf]),
-        (NonNegative, [0.0, 9.0], [-1e-300, math.inf]),
-        (Share, [0.0, 0.99], [-1e-300, 1.0]),
-        (Fraction, [1e-300, 1.0], [0.0, 1.01]),
-        (ProperFraction, [1e-300, 0.99], [0.0, 1.0]),
-        (Count, [0, 9], [-1]),
-        (PositiveCount, [1, 9], [0]),
-        (Periods, [0, 100_000], [-1, 100_001]),
-    ],
-)
+@pytest.mark.parametrize(("kind", "allowed", "refused"), [
+    (Positive, [1e-300, 9.0], [0.0, -1.0, math.inf]),
+    (NonNegative, [0.0, 9.0], [-1e-300, math.inf]),
+    (Share, [0.0, 0.99], [-1e-300, 1.0]),
+    (Fraction, [1e-300, 1.0], [0.0, 1.01]),
+    (ProperFraction, [1e-300, 0.99], [0.0, 1.0]),
+    (Count, [0, 9], [-1]),
+    (PositiveCount, [1, 9], [0]),
+    (Periods, [0, 100_000], [-1, 100_001]),
+])  # fmt: skip
 def test_bounds_belong_to_a_number_or_do_not(
     kind: Any, allowed: list[float], refused: list[float]
 ) -> None:

@@ -116,13 +116,10 @@ def test_primitives_serve_and_the_missing_mesh_is_named(
     assert "ROS_PACKAGE_PATH=<the folder that contains acme_arm>" in text
 
 
-@pytest.mark.parametrize(
-    ("name", "hint"),
-    [
-        ("package://acme_arm/upper.stl", "ROS_PACKAGE_PATH=<the folder that contains"),
-        ("upper.stl", "the path is relative to the URDF"),
-    ],
-)
+@pytest.mark.parametrize(("name", "hint"), [
+    ("package://acme_arm/upper.stl", "ROS_PACKAGE_PATH=<the folder that contains"),
+    ("upper.stl", "the path is relative to the URDF"),
+])  # fmt: skip
 def test_nothing_is_left(name: str, hint: str, tmp_path: Path) -> None:
     robot = odd_robot(tmp_path, arm=collision(f'<mesh filename="{name}"/>'))
     with pytest.raises(ModelError, match=f"no file '{name}', and no other .*{hint}"):

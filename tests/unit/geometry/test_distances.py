@@ -106,18 +106,15 @@ KINDS: dict[str, Callable[[np.random.Generator], Shape]] = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("link", "other"),
-    [
-        ("sphere", "sphere"),
-        ("sphere", "capsule"),
-        ("capsule", "sphere"),
-        ("capsule", "capsule"),
-        ("sphere", "plane"),
-        ("capsule", "plane"),
-        ("sphere", "box"),
-    ],
-)
+@pytest.mark.parametrize(("link", "other"), [
+    ("sphere", "sphere"),
+    ("sphere", "capsule"),
+    ("capsule", "sphere"),
+    ("capsule", "capsule"),
+    ("sphere", "plane"),
+    ("capsule", "plane"),
+    ("sphere", "box"),
+])  # fmt: skip
 def test_distance_witnesses_and_gradient_in_closed_form(link: str, other: str) -> None:
     """Signed distances, apart and overlapping, and ∇d = Jᵀn with Pinocchio's own J.
 

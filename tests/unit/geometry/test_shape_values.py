@@ -136,17 +136,14 @@ def test_logs_describe_shapes(shape: Shape) -> None:
 # --- obstacles and scenes ------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("center", "message"),
-    [
-        (Hold([0.0, 0.0]), "its dimension is 2; needs 3 (x, y, z)"),
-        (Hold(), "point is missing: nothing starts here"),
-        (
-            replace(THERE, origin="start"),
-            "origin: start is not available here; use origin: world",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("center", "message"), [
+    (Hold([0.0, 0.0]), "its dimension is 2; needs 3 (x, y, z)"),
+    (Hold(), "point is missing: nothing starts here"),
+    (
+        replace(THERE, origin="start"),
+        "origin: start is not available here; use origin: world",
+    ),
+])  # fmt: skip
 def test_centers_that_are_not_in_the_world(center: Any, message: str) -> None:
     with pytest.raises(SceneError) as caught:
         Obstacle("ball", Sphere(0.1), center)

@@ -25,6 +25,12 @@ from hsp_control.robot import ToolFrame
     ("PANDA", "did you mean 'panda'?"),
     ("xyzzy", "no robot 'xyzzy' (give a path to a .urdf file, or one of: "),
     ("robots/panda/", "is a folder; give a .urdf file in it (it contains panda."),
+    ("robots/panda", "robots/panda is a folder; give a .urdf file in it (it contains"),
+    ("./robots/panda", "robots/panda is a folder; give a .urdf file in it (it contai"),
+    ("robots", "robots is a folder; give a .urdf file in it (it contains none)"),
+    ("", "no robot ''"),
+    (300 * "a", "no robot 'aaa"),
+    ("a\0b", "no robot 'a\\x00b'"),
     ("/nowhere/arm.urdf", "/nowhere/arm.urdf: no such file"),
     ("arm_without_folder.urdf", "arm_without_folder.urdf: no such file"),
 ])  # fmt: skip
@@ -58,6 +64,11 @@ def test_file_that_may_not_be_read(
         Robot.load(path)
 
 
+def grown(*parts: str) -> str:
+    """Return the arm with more elements."""
+    return ARM.replace("</robot>", "".join(parts) + "</robot>")
+
+
 BUILD = "Pinocchio cannot build a model"
 TWO_SHAPES = '<geometry><sphere radius="1"/><box size="1 1 1"/></geometry>'
 NO_ROBOTS = [
@@ -71,11 +82,19 @@ NO_ROBOTS = [
      "joint 'shoulder': its lower limit 3 is above its upper limit -3"),
     (robot_xml(link("a"), link("b"), joint("j", "a", "b", "fixed")),
      "the robot has no moving joint"),
-    (robot_xml(link("a"), joint("j", "a", "b")), BUILD),
-    (robot_xml(ARM, joint("loop", "lower", "base")), BUILD),
-    (robot_xml(link("a"), link("a")), "link 'a': 2 links have this name"),
-    (ARM.replace("</robot>", joint("elbow", "base", "lower") + "</robot>"),
-     "joint 'elbow': 2 joints have this name"),
+    (grown(joint("j", "lower", "b")), BUILD + r".* child link \[b\] of joint \[j\] n"),
+    (grown(joint("second", "base", "lower")),
+     "link 'lower': it is the child of the joints 'elbow' and 'second'; must be of on"),
+    (grown(link("c"), joint("own", "c", "c")),
+     "links 'c': their joints 'own' make a loop"),
+    (grown(link("c")), "links 'base', 'c': none is the child of a joint; a robot has "),
+    (grown(link("c"), link("d"), joint("cd", "c", "d"), joint("dc", "d", "c")),
+     "links 'c', 'd': their joints 'dc', 'cd' make a loop"),
+    (grown("<arm>", link("c"), joint("wrist", "lower", "c"), "</arm>"),
+     "joint 'wrist': parsers skip <joint> in <arm>; must be <joint> in <robot>"),
+    (grown('<Link name="c"/>'), "link 'c': parsers skip <Link>; must be <link> in <r"),
+    (grown(link("base")), "link 'base': 2 links have this name"),
+    (grown(joint("elbow", "base", "lower")), "joint 'elbow': 2 joints have this name"),
     (ARM.replace('<mass value="2"/>', '<mass value="2"/><mass value="3"/>', 1),
      "link 'upper': <inertial>: contains 2 elements <mass>; must be one"),
     (ARM.replace("<axis", '<axis xyz="1 0 0"/><axis', 1),

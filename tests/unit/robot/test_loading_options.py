@@ -58,18 +58,15 @@ def test_follower_is_at_multiplier_times_leader_plus_offset(
 # --- locked joints -------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("name", "locks"),
-    [
-        (
-            "panda",
-            {"panda_joint3": 0.7, "panda_joint5": -1.1, "panda_finger_joint1": 0.0},
-        ),
-        ("planar3r", {"joint2": 2.5}),  # continuous
-        ("planar3r", {"joint1": -1.5, "joint3": 4.0}),  # beyond half a turn
-        ("kinova", {"j2s6s200_joint_1": -2.0, "j2s6s200_joint_3": 1.0}),
-    ],
-)
+@pytest.mark.parametrize(("name", "locks"), [
+    (
+        "panda",
+        {"panda_joint3": 0.7, "panda_joint5": -1.1, "panda_finger_joint1": 0.0},
+    ),
+    ("planar3r", {"joint2": 2.5}),  # continuous
+    ("planar3r", {"joint1": -1.5, "joint3": 4.0}),  # beyond half a turn
+    ("kinova", {"j2s6s200_joint_1": -2.0, "j2s6s200_joint_3": 1.0}),
+])  # fmt: skip
 def test_locked_joint_stands_where_it_is_told(
     name: str, locks: dict[str, float]
 ) -> None:

@@ -104,15 +104,12 @@ def test_unknown_frame() -> None:
         robot.frame_id("hand")
 
 
-@pytest.mark.parametrize(
-    ("joint", "hint"),
-    [
-        ("panda_joint8", "; did you mean 'panda_joint"),
-        ("panda_finger_joint1", "; did you mean 'panda_joint"),  # locked
-        ("universe", " (the model has panda_joint1, "),  # Pinocchio's, not a joint
-        ("panda_hand", " (the model has panda_joint1, "),  # a frame
-    ],
-)
+@pytest.mark.parametrize(("joint", "hint"), [
+    ("panda_joint8", "; did you mean 'panda_joint"),
+    ("panda_finger_joint1", "; did you mean 'panda_joint"),  # locked
+    ("universe", " (the model has panda_joint1, "),  # Pinocchio's, not a joint
+    ("panda_hand", " (the model has panda_joint1, "),  # a frame
+])  # fmt: skip
 def test_unknown_joint(joint: str, hint: str) -> None:
     with pytest.raises(JointNotFoundError, match=re.escape(f"no joint {joint!r}")) as e:
         load("panda").velocity_index(joint)

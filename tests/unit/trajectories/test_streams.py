@@ -346,20 +346,17 @@ def test_a_copy_changes_nothing_for_the_original() -> None:
 IDENTITY = [0.0, 0.0, 0.0, 1.0]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"value": [0.0, np.nan, 0.0, *IDENTITY]}, "value contains nan; needs finite"),
-        ({"value": [1e7, 0.0, 0.0, *IDENTITY]}, "value contains 1e\\+07; needs finite"),
-        ({"value": [0.0, 0.0, 0.0]}, "value has 3 numbers; this stream needs 7: x, y"),
-        ({"value": [0.0] * 7}, "the quaternion .* has norm 0; needs 1"),
-        ({"value": [0, 0, 0, 0, 0, 0, 1.1]}, "has norm 1.1; needs 1"),
-        ({"value": "here"}, "value is 'here'; needs a list of numbers"),
-        ({"velocity": [0.0] * 5}, "velocity has 5 numbers; this stream needs 6"),
-        ({}, "a message needs a value, values or one velocity"),
-        ({"value": [0.0] * 6 + [1.0], "t": np.inf}, "clock, is inf; needs a number of"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "message"), [
+    ({"value": [0.0, np.nan, 0.0, *IDENTITY]}, "value contains nan; needs finite"),
+    ({"value": [1e7, 0.0, 0.0, *IDENTITY]}, "value contains 1e\\+07; needs finite"),
+    ({"value": [0.0, 0.0, 0.0]}, "value has 3 numbers; this stream needs 7: x, y"),
+    ({"value": [0.0] * 7}, "the quaternion .* has norm 0; needs 1"),
+    ({"value": [0, 0, 0, 0, 0, 0, 1.1]}, "has norm 1.1; needs 1"),
+    ({"value": "here"}, "value is 'here'; needs a list of numbers"),
+    ({"velocity": [0.0] * 5}, "velocity has 5 numbers; this stream needs 6"),
+    ({}, "a message needs a value, values or one velocity"),
+    ({"value": [0.0] * 6 + [1.0], "t": np.inf}, "clock, is inf; needs a number of"),
+])  # fmt: skip
 def test_a_wrong_target_is_refused_where_it_is_sent(
     arguments: dict[str, Any], message: str
 ) -> None:
@@ -367,15 +364,12 @@ def test_a_wrong_target_is_refused_where_it_is_sent(
         StreamPose().send(**arguments)
 
 
-@pytest.mark.parametrize(
-    ("values", "times", "message"),
-    [
-        ([[0.0], [1.0]], [0.1, 0.1], r"times\[1\] = 0.1 is not later than times\[0\]"),
-        ([[0.0], [1.0]], [0.1], "there are 1 times for 2 values"),
-        ([[0.0]] * 1001, np.arange(1001), "values has 1001 rows; needs 1 to 1000"),
-        ([0.0], [0.1], r"values has shape \(1,\); needs a list of lists"),
-    ],
-)
+@pytest.mark.parametrize(("values", "times", "message"), [
+    ([[0.0], [1.0]], [0.1, 0.1], r"times\[1\] = 0.1 is not later than times\[0\]"),
+    ([[0.0], [1.0]], [0.1], "there are 1 times for 2 values"),
+    ([[0.0]] * 1001, np.arange(1001), "values has 1001 rows; needs 1 to 1000"),
+    ([0.0], [0.1], r"values has shape \(1,\); needs a list of lists"),
+])  # fmt: skip
 def test_a_wrong_chunk_is_refused(values: Any, times: Any, message: str) -> None:
     with pytest.raises(StreamError, match=message):
         Stream([0.0]).send_chunk(values, times)
@@ -391,17 +385,14 @@ def test_what_does_not_fit_the_task_is_counted_and_dropped() -> None:
         stream.send([0.1, 0.2])
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"source": "tcp://a:5005"}, "source is 'tcp://a:5005'; an address begins"),
-        ({"source": "a.jsonl", "messages": []}, "give either source or messages"),
-        ({"messages": [{"value": [0.0]}]}, "message 0 of the recording: it needs the"),
-        ({"messages": [{"at": 1.0, "valeu": [0.0]}]}, "has the key 'valeu'; known are"),
-        ({"speed": -1.0}, "speed"),
-        ({"policy": "newest"}, "policy"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "message"), [
+    ({"source": "tcp://a:5005"}, "source is 'tcp://a:5005'; an address begins"),
+    ({"source": "a.jsonl", "messages": []}, "give either source or messages"),
+    ({"messages": [{"value": [0.0]}]}, "message 0 of the recording: it needs the"),
+    ({"messages": [{"at": 1.0, "valeu": [0.0]}]}, "has the key 'valeu'; known are"),
+    ({"speed": -1.0}, "speed"),
+    ({"policy": "newest"}, "policy"),
+])  # fmt: skip
 def test_a_wrong_declaration_is_refused(
     arguments: dict[str, Any], message: str
 ) -> None:
@@ -431,13 +422,10 @@ def test_a_stream_that_hears_something_else_cannot_be_sent_to() -> None:
         Stream(source="goals.jsonl").send([0.0])
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ('{"at": 0, "value": [0]}\n{"at": NaN}', ":2: not JSON: NaN is no number"),
-        ("{", ":1: not JSON"),
-    ],
-)
+@pytest.mark.parametrize(("text", "message"), [
+    ('{"at": 0, "value": [0]}\n{"at": NaN}', ":2: not JSON: NaN is no number"),
+    ("{", ":1: not JSON"),
+])  # fmt: skip
 def test_a_wrong_recording_names_its_line(
     tmp_path: Any, text: str, message: str
 ) -> None:
