@@ -113,8 +113,7 @@ def how_held(smallest: float, threshold: float, least: float) -> float:
 
     Args:
         smallest: The smallest x = s² of the level, below ε².
-        threshold: ε, which follows what the level asks for: a level that asks for
-            little is not held, whatever its posture.
+        threshold: ε; of a level that asks for little ε_0, so that it is not held.
         least: ε_0.
     """
     z = smallest / (threshold * threshold)
