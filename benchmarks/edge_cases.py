@@ -70,7 +70,7 @@ class Arm:
             pose, J = self.at(q)
             return -float(direction @ pose.translation), -(direction @ J[:3])
 
-        return -min(self.minimized(cost, q).fun for q in self._starts(rng))
+        return -float(min(self.minimized(cost, q).fun for q in self._starts(rng)))
 
     def nearest(self, target: Target, q0: Array, rng: np.random.Generator) -> Array:
         """Return the position that the hand has where it is nearest, shape (3,) [m]."""
