@@ -1,6 +1,6 @@
 """What each ingredient of the edge is for: the same cases without it.
 
-    .venv/bin/python benchmarks/ablation.py [--cases N] [--keep FOLDER] [NAME ...]
+    .venv/bin/python benchmarks/ablation.py [--cases N] [--robots ROBOT ...] [NAME ...]
 
 An ingredient is left out of a copy of the package by replacing lines of it; a line that
 is not found ends the benchmark, so that what is left out is always a part of the code
@@ -19,29 +19,22 @@ import sys
 import tempfile
 import warnings
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import Any
 
 import numpy as np
-import pinocchio as pin
-from edge_cases import BEYOND, Arm, unit
+from edge_cases import Arm, unit
+from edge_rest import OUT, Case, case, measure
 from limit_robots import roll_out
 from marked_sections import RESULTS, replace_section
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import SimulationError
-from hsp_control.robot.inverse_kinematics import Target
-from hsp_control.simulation.plants import Push, RigidBodyPlant
-from hsp_control.trajectories import ComposedPose
 
 ROOT = Path(__file__).resolve().parents[1]
 ROBOTS, PERIODS = ("panda", "ur5", "iiwa14"), (0.001, 0.005)
-OUT = ("position", "pose", "spring", "levels")
 KINDS = (*OUT, "push", "steady")
+NEAREST = ("position", "levels")  # the hand's distance counts
 ROLLOUTS, WAYS, POINTS = 24, 6, 1000  # of a robot; of a way
-STIFFNESS, HELD, PUSHED = (100.0, 2000.0), (5.0, 40.0), (50.0, 200.0)  # [N/m, N, N]
-BEGIN, PUSH, REST, WATCHED = 0.5, 0.2, 3.0, 1.0  # [s]
-STILL = 1e-3  # change of an effort in 1 ms, as a part of its limit
 
 _LIMITS = "constraints/limits/acceleration_bounds.py"
 _COST = "control/actuation/deviation_cost.py"
@@ -61,13 +54,20 @@ INGREDIENTS: dict[str, tuple[Edit, ...]] = {
     "threshold that follows": ((_EDGE, "STIFFNESS = 200.0", "STIFFNESS = 1e12"),),
     "f₀": ((_EDGE, "ON_LEGS = 1.0, 10.0", "ON_LEGS = 0.0, 0.0"),),
     "threshold below a held level": ((_EDGE, "BELOW = 4.0", "BELOW = 1e12"),),
+    "what those above it draw": (
+        ("law/hierarchy.py", "opposed[k] -= J[start", "opposed[k] -= 0.0 * J[start"),
+    ),
+    "static effort": (
+        ("constraints/limits/limits.py", "_HELD = 0.95", "_HELD = 100.0"),
+    ),
     "effort's rate": ((_MODEL, "_LEG_RATE = 11.0, 500.0", "_LEG_RATE = 1e9, 1e9"),),
     "barrier of the speed knows the rate": (
         (_LIMITS, "if gap > 0.0 and jerk < np.inf:", "if gap > np.inf:"),
     ),
     "steeper beyond the speed": ((_LIMITS, "_STEEPER = 4.0", "_STEEPER = 1.0"),),
-    "speed's margin of the error": ((_LIMITS, "_GROWTH = 1.25", "_GROWTH = 0.0"),),
-    "its growth": ((_LIMITS, "_GROWTH = 1.25", "_GROWTH = 1.0"),),
+    "speed's margin of the error": (
+        (_LIMITS, "velocity[i] - error[i] /", "velocity[i] - 0.0 * error[i] /"),
+    ),
     "position's drift": ((_LIMITS, "_SHIFT = 0.1", "_SHIFT = 0.0"),),
     "steady force": (
         (_SENT, "steady[i] = max(", "steady[i] = 0.0 * max("),
@@ -75,9 +75,6 @@ INGREDIENTS: dict[str, tuple[Edit, ...]] = {
     ),
     "null space dearer with the error": (
         (_COST, "_OF_ERROR, _MOST = 0.2", "_OF_ERROR, _MOST = 0.0"),
-    ),
-    "stricter if there are several levels": (
-        (_COST, "_SEVERAL_LEVELS = 1e-6, 1e-8", "_SEVERAL_LEVELS = 1e-6, 1e-6"),
     ),
     "springs cost what is below them": (
         (_COST, "(standing or not springs)", "(standing or True)"),
@@ -93,119 +90,17 @@ INGREDIENTS: dict[str, tuple[Edit, ...]] = {
 }  # fmt: skip
 
 
-class Case(NamedTuple):
-    """What a hand is asked for.
-
-    Attributes:
-        robot: Name of the robot.
-        kind: One of `KINDS`.
-        period: How long an effort is held [s].
-        q0: Configuration at the start, shape (nq,) [rad].
-        goal: Where the hand should be, shape (3,) [m].
-        least: The smallest distance from it that it can have [m]; NaN: not looked for.
-        number: Stiffness [N/m].
-        vector: Force [N].
-    """
-
-    robot: str
-    kind: str
-    period: float
-    q0: list[float]
-    goal: list[float]
-    least: float
-    number: float
-    vector: list[float]
-
-
-def cases(count: int) -> list[Case]:
+def cases(robots: list[str], kinds: list[str], count: int) -> list[Case]:
     """Return ``count`` cases of a kind, robot and period; the same in every call."""
     found = []
-    for robot in ROBOTS:
+    for robot in robots:
         arm = Arm(robot)
-        for kind in KINDS:
+        for kind in kinds:
             for period in PERIODS:
                 key = [KINDS.index(kind), PERIODS.index(period)]
                 for seed in range(count):
                     rng = np.random.default_rng([seed, *key])
                     found.append(case(arm, kind, period, rng))
-    return found
-
-
-def case(arm: Arm, kind: str, period: float, rng: np.random.Generator) -> Case:
-    """Return a random case of a kind."""
-    q0, d = arm.start(rng), unit(rng)
-    here, _ = arm.at(q0)
-    goal, least, number, vector = here.translation.copy(), np.nan, 0.0, np.zeros(3)
-    if kind in OUT:
-        goal += (arm.extent(d, rng) - d @ goal + rng.uniform(*BEYOND)) * d
-    if kind == "position":
-        target = Target(arm.frame, pin.SE3(np.eye(3), goal), 3)
-        least = float(np.linalg.norm(goal - arm.nearest(target, q0, rng)))
-    if kind in ("spring", "steady"):
-        number = float(np.exp(rng.uniform(*np.log(STIFFNESS))))
-    if kind in ("push", "steady"):
-        vector = float(rng.uniform(*(PUSHED if kind == "push" else HELD))) * d
-    return Case(
-        arm.name, kind, period, q0.tolist(), goal.tolist(), least, number,
-        vector.tolist(),
-    )  # fmt: skip
-
-
-def controller(case: Case, robot: hsp.Robot) -> hsp.Controller:
-    """Return the controller of a case."""
-    frame, goal = robot.end_effector, hsp.Hold(case.goal)
-    spring = hsp.Impedance(case.number) if case.kind in ("spring", "steady") else None
-    hand: hsp.Task = hsp.FramePosition(frame, impedance=spring, name="hand")
-    if case.kind == "pose":
-        hand = hsp.FramePose(frame, name="hand")
-    below = [hsp.FrameOrientation(frame, priority=2)] * (case.kind == "levels")
-    made = hsp.Controller(robot, [hand, *below], hsp.JointCentering(), start=case.q0)
-    if case.kind in OUT:
-        pose = case.kind == "pose"
-        made.at(BEGIN).ramp(0.0).reference("hand", ComposedPose(goal) if pose else goal)
-    return made
-
-
-def measure(case: Case, robot: hsp.Robot) -> dict[str, Any]:
-    """Return the numbers of a run.
-
-    Returns:
-        rests: Whether no effort changes by more than `STILL`, from 3 s after the
-            beginning, or the push's end, for a second.
-        change: Largest change of an effort in 1 ms, as a part of its limit.
-        beyond: Largest position beyond a limit [rad].
-        away: How much farther than need be the hand is from its goal, at the end [m].
-        yields: Relative difference of the spring's length from F/k.
-    """
-    h, pushes = case.period, []
-    if case.kind in ("push", "steady"):
-        duration = PUSH if case.kind == "push" else 100.0
-        pushes = [Push(robot.end_effector, case.vector, start=BEGIN, duration=duration)]
-    rests, end = BEGIN + PUSH + REST, ""
-    try:
-        run = hsp.simulate(
-            controller(case, robot), case.q0, duration=rests + WATCHED,
-            control_period=h, log_period=h, plant=RigidBodyPlant(robot, pushes),
-        )  # fmt: skip
-    except SimulationError as fault:
-        run, end = cast("hsp.Rollout", fault.rollout), "diverged"
-    model, ms = robot.model, 1e3 * h
-    lower, upper = robot.position_limits()
-    change = np.abs(np.diff(run.tau, axis=0)) / model.effortLimit / ms
-    late = change[round(rests / h) :]
-    error = float(np.linalg.norm(run["task.hand.error"][-1, :3]))
-    force = float(np.linalg.norm(case.vector))
-    found = {
-        "kind": case.kind,
-        "rests": bool(not end and late.size and late.max() <= STILL),
-        "change": float(change.max()) if len(change) else 0.0,
-        "beyond": float(np.maximum(run.q - upper, lower - run.q).max()),
-        "away": float(error - case.least),
-        "yields": None,
-        "end": end,
-    }
-    if case.kind == "steady":
-        found["yields"] = float(abs(error * case.number / force - 1.0))
     return found
 
 
@@ -248,8 +143,8 @@ def jump(name: str, seed: int) -> float:
 def measure_all(given: Path, results: Path, *, limits: bool) -> None:
     """Measure the package that is found first; also what its limits do, or not."""
     warnings.simplefilter("ignore")
-    robots = {name: hsp.Robot.load(name) for name in ROBOTS}
     drawn = [Case(*each) for each in json.loads(given.read_text(encoding="utf-8"))]
+    robots = {name: hsp.Robot.load(name) for name in {case.robot for case in drawn}}
     found: dict[str, Any] = {
         "runs": [measure(case, robots[case.robot]) for case in drawn]
     }
@@ -297,7 +192,7 @@ def row(name: str, found: dict[str, Any]) -> str:
     runs = found["runs"]
     rest = [run["rests"] for run in runs]
     change = [run["change"] for run in runs]
-    away = [1e3 * run["away"] for run in runs if run["kind"] == "position"]
+    away = [1e3 * run["away"] for run in runs if run["kind"] in NEAREST]
     yields = [100.0 * run["yields"] for run in runs if run["yields"] is not None]
     beyond = max(run["beyond"] for run in runs)
     limits = "| |"
@@ -307,7 +202,7 @@ def row(name: str, found: dict[str, Any]) -> str:
     return (
         f"| {name} | {sum(rest)} of {len(rest)} | {np.median(change):.2g} / "
         f"{max(change):.2g} | {np.median(away):.2g} / {max(away):.2g} | "
-        f"{max(yields):.2g} % | {max(beyond, 0.0):.2g} {limits} |\n"
+        f"{max(yields, default=0.0):.2g} % | {max(beyond, 0.0):.2g} {limits} |\n"
     )
 
 
@@ -315,6 +210,8 @@ def main() -> None:
     """Measure all copies, print the table and write it."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--cases", type=int, default=3, help="of a kind, robot, period")
+    parser.add_argument("--robots", nargs="+", default=list(ROBOTS))
+    parser.add_argument("--kinds", nargs="+", default=list(KINDS))
     parser.add_argument("--keep", type=Path, help="a folder of runs already made")
     parser.add_argument("--measure", nargs=2, type=Path, help=argparse.SUPPRESS)
     parser.add_argument("--limits", action="store_true", help=argparse.SUPPRESS)
@@ -329,7 +226,8 @@ def main() -> None:
         kept.mkdir(parents=True, exist_ok=True)
         given = kept / "cases.json"
         if not given.exists():
-            given.write_text(json.dumps(cases(options.cases)), encoding="utf-8")
+            made = cases(options.robots, options.kinds, options.cases)
+            given.write_text(json.dumps(made), encoding="utf-8")
         for name in options.names:
             results = kept / f"{name}.json"
             if not results.exists():

@@ -41,21 +41,25 @@ class Arm:
         """Load the robot."""
         self.robot = hsp.Robot.load(name)
         self.name, self.frame = name, self.robot.end_effector
-        self.bent = np.array(BENT.get(name, self.robot.home()))
+        home = self.robot.joint_positions(self.robot.home())
+        self.bent = np.array(BENT.get(name, home))
         self.lower, self.upper = self.robot.position_limits()
-        if self.robot.nq != self.robot.nv or not np.isfinite(self.upper).all():
-            raise ValueError(f"{name}: joints that turn without end are not supported")
         self._state = hsp.RobotState(self.robot)
         self._rest = np.zeros(self.robot.nv)
 
-    def at(self, q: Array) -> tuple[pin.SE3, Array]:
+    def configuration(self, x: Array) -> Array:
+        """Return q, shape (nq,), of displacements from neutral, shape (nv,)."""
+        return self.robot.integrate(self.robot.neutral(), x)
+
+    def at(self, x: Array) -> tuple[pin.SE3, Array]:
         """Return the hand's pose and Jacobian, shape (6, nv)."""
+        q = self.configuration(x)
         frame = self._state.update(0.0, q, self._rest).frame(self.frame)
         pose = pin.SE3(frame.rotation.copy(), frame.position.copy())
         return pose, frame.jacobian.copy()
 
     def start(self, rng: np.random.Generator) -> Array:
-        """Return a configuration to start from, shape (nq,)."""
+        """Return displacements from neutral to start from, shape (nv,)."""
         q = self.bent + rng.uniform(-SPREAD, SPREAD, self.robot.nv)
         return np.clip(q, self.lower + ROOM, self.upper - ROOM)
 
@@ -66,7 +70,7 @@ class Arm:
             pose, J = self.at(q)
             return -float(direction @ pose.translation), -(direction @ J[:3])
 
-        return -min(self._minimized(cost, q).fun for q in self._starts(rng))
+        return -float(min(self.minimized(cost, q).fun for q in self._starts(rng)))
 
     def nearest(self, target: Target, q0: Array, rng: np.random.Generator) -> Array:
         """Return the position that the hand has where it is nearest, shape (3,) [m]."""
@@ -81,10 +85,11 @@ class Arm:
 
         found = []
         for q in (q0, *self._starts(rng)):
-            near = reach(
-                self.robot, target, q, self.bent, self.lower, self.upper
-            )  # refined, since its steps are made for targets within reach
-            found.append(self._minimized(cost, near.q))
+            start, lower, upper = self.configuration(q), self.lower, self.upper
+            # refined, since its steps are made for targets within reach
+            near = reach(self.robot, target, start, self.bent, lower, upper)
+            x = self.robot.joint_positions(near.q)
+            found.append(self.minimized(cost, np.clip(x, self.lower, self.upper)))
         best = min(found, key=lambda each: each.fun)
         return np.array(self.at(best.x)[0].translation)
 
@@ -93,15 +98,16 @@ class Arm:
         lower, upper = self.lower + ROOM, self.upper - ROOM
         fastest = HURRY * self.robot.model.velocityLimit
         for k, pose in enumerate(poses):
-            found = reach(
-                self.robot, Target(self.frame, pose, rows), q, q, lower, upper
-            )
-            _, J = self.at(found.q)
+            target, start = Target(self.frame, pose, rows), self.configuration(q)
+            found = reach(self.robot, target, start, q, lower, upper)
+            x = self.robot.joint_positions(found.q)
+            _, J = self.at(x)
             well = np.linalg.svd(J[:rows], compute_uv=False)[-1] >= WELL
-            slow = k == 0 or (np.abs(found.q - q) <= fastest * period).all()
+            turned = np.abs(self.robot.difference(start, found.q))
+            slow = k == 0 or (turned <= fastest * period).all()
             if not (found.converged and well and slow):
                 return False
-            q = found.q
+            q = x
         return True
 
     def _starts(self, rng: np.random.Generator) -> Iterator[Array]:
@@ -109,7 +115,8 @@ class Arm:
         for _ in range(STARTS):
             yield rng.uniform(low, high)
 
-    def _minimized(self, cost: Callable[[Array], tuple[float, Array]], q: Array) -> Any:
+    def minimized(self, cost: Callable[[Array], tuple[float, Array]], q: Array) -> Any:
+        """Return SciPy's result: where a cost is least, downhill from q."""
         bounds = list(zip(self.lower, self.upper, strict=True))
         return minimize(cost, q, jac=True, bounds=bounds, method="L-BFGS-B")
 
@@ -129,7 +136,7 @@ def case(arm: Arm, kind: str, rng: np.random.Generator) -> Case:
         start, rotation = here.translation, here.rotation
         made = Case(
             arm.name, kind, str(arm.robot.source.urdf), list(arm.robot.model.names),
-            arm.frame, rows, q0, start, rotation, start, start,
+            arm.frame, rows, arm.configuration(q0), start, rotation, start, start,
         )  # fmt: skip
         if kind == "step":
             made.goal = made.nearest = start + STEP * unit(rng)

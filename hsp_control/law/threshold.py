@@ -20,7 +20,8 @@ A level that is held at its edge leaves to those below the very directions in wh
 is drawn there: along them its spring must outweigh what they ask for. They ask for
 f - J a_f, with a_f what those above draw at rest: a task that is met undoes it. So a
 level below follows that with an L that is a fiftieth: it is as steep as it is strong,
-and the nearer to the edge the level above is held, the less it gets there.
+and gets the less there the more the level above gives away, (1 - s²/ε²)². That counts
+squared, so that a hand which is still far, but within reach, keeps no level waiting.
 """
 
 from typing import NamedTuple, Self
@@ -123,9 +124,8 @@ def how_held(smallest: float, threshold: float, least: float) -> float:
 
     Args:
         smallest: The smallest x = s² of the level, below ε².
-        threshold: ε, which follows what the level asks for: a level that asks for
-            little is not held, whatever its posture.
+        threshold: ε; of a level that asks for little ε_0, so that it is not held.
         least: ε_0.
     """
     z = smallest / (threshold * threshold)
-    return float((1.0 - z * z * z) * (1.0 - (least / threshold) ** 2))
+    return float(max(1.0 - z, 0.0) ** 4 * (1.0 - (least / threshold) ** 2))
