@@ -3,9 +3,10 @@
     .venv/bin/python benchmarks/edge_rest.py [--cases N] [--keep FILE] [ROBOT ...]
 
 Of each robot, kind and period: hands whose target is 5 cm to 1 m out of reach, at once,
-streamed in a line, dragged about, on springs, and above an orientation; steps of 0.5 m
-within reach, turns of 170°, and pushes of 50 to 200 N for 0.2 s. Efforts are held for a
-period and clipped. Writes the third table of benchmarks/results/edge.md.
+streamed in a line, dragged about, on springs, above an orientation, and along one axis
+or two; a centre of mass that far from where it is; steps of 0.5 m within reach, turns
+of 170°, and pushes of 50 to 200 N for 0.2 s. Efforts are held for a period and clipped.
+Writes the third table of benchmarks/results/edge.md.
 """
 
 import argparse
@@ -31,7 +32,7 @@ ROBOTS = (
 )  # fmt: skip
 PERIODS = (0.001, 0.002, 0.005, 0.01)
 OUT = ("position", "pose", "spring", "levels")
-KINDS = (*OUT, "push", "steady", "stream", "drag", "step", "flip")
+KINDS = (*OUT, "push", "steady", "stream", "drag", "step", "flip", "axes", "mass")
 OF_REST = tuple(kind for kind in KINDS if kind != "steady")
 IN_THE_PLANE = ("position", "spring", "push", "stream", "drag", "step")
 STIFFNESS, HELD, PUSHED = (100.0, 2000.0), (5.0, 40.0), (50.0, 200.0)  # [N/m, N, N]
@@ -54,7 +55,8 @@ class Case(NamedTuple):
         goal: Where the hand should be, shape (3,) [m].
         least: The smallest distance from it that it can have [m]; NaN: not looked for.
         number: Stiffness [N/m].
-        vector: Force [N]; of a flip the axis; of a drag where it passes.
+        vector: Force [N]; of a flip the axis; of a drag where it passes; of axes 1 for
+            each that counts.
     """
 
     robot: str
@@ -85,7 +87,13 @@ def case(arm: Arm, kind: str, period: float, rng: np.random.Generator) -> Case:
         d = np.array([d[0], d[1], 0.0]) / np.hypot(d[0], d[1])
     here, _ = arm.at(x0)
     goal, least, number, vector = here.translation.copy(), np.nan, 0.0, np.zeros(3)
-    if kind in (*OUT, "stream", "drag"):
+    if kind == "axes":
+        vector[rng.permutation(3)[: rng.integers(1, 3)]] = 1.0
+        d = vector * d / np.linalg.norm(vector * d)
+    if kind == "mass":
+        state = arm.robot.state(0.0, arm.configuration(x0), np.zeros(arm.robot.nv))
+        goal = state.centroidal.position + rng.uniform(*BEYOND) * d
+    if kind in (*OUT, "stream", "drag", "axes"):
         goal += (arm.extent(d, rng) - d @ goal + rng.uniform(*BEYOND)) * d
     if kind in ("position", "levels"):
         target = Target(arm.frame, pin.SE3(np.eye(3), goal), 3)
@@ -151,8 +159,14 @@ def controller(case: Case, robot: hsp.Robot) -> hsp.Controller:
     declared: dict[str, Any] = {"trajectory": reference} if streamed else {}
     if planar:
         declared["axes"] = "xy"
+    if case.kind == "axes":
+        counts = np.array(case.vector) > 0.0
+        declared["axes"] = "".join(np.array([*"xyz"])[counts])
+        reference = hsp.Hold(goal[counts])
     hand: hsp.Task
-    if pose:
+    if case.kind == "mass":
+        hand = hsp.CenterOfMass(name="hand")
+    elif pose:
         hand = hsp.FramePose(frame, name="hand", **declared)
     else:
         hand = hsp.FramePosition(frame, impedance=spring, name="hand", **declared)
