@@ -20,8 +20,7 @@ A level that is held at its edge leaves to those below the very directions in wh
 is drawn there: along them its spring must outweigh what they ask for. They ask for
 f - J a_f, with a_f what those above draw at rest: a task that is met undoes it. So a
 level below follows that with an L that is a fiftieth: it is as steep as it is strong,
-and gets the less there the more the level above gives away, (1 - s²/ε²)². That counts
-squared, so that a hand which is still far, but within reach, keeps no level waiting.
+and the nearer to the edge the level above is held, the less it gets there.
 """
 
 from typing import NamedTuple, Self
@@ -128,4 +127,4 @@ def how_held(smallest: float, threshold: float, least: float) -> float:
         least: ε_0.
     """
     z = smallest / (threshold * threshold)
-    return float(max(1.0 - z, 0.0) ** 4 * (1.0 - (least / threshold) ** 2))
+    return float((1.0 - z * z * z) * (1.0 - (least / threshold) ** 2))
