@@ -95,7 +95,7 @@ def controlled(robot: Robot, task: str, metric: Any) -> Controller:
             "tip", Hold([0.1]), gains=gains(), axes="x", largest_error="none", name="it"
         ),
         "center of mass": lambda: CenterOfMass(
-            Hold([0.05]), gains=gains(), axes="x", name="it"
+            Hold([0.05]), gains=gains(), axes="x", largest_error="none", name="it"
         ),
         "posture": lambda: JointPosture([0.2], gains=gains(), name="it"),
     }

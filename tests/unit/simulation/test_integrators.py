@@ -117,7 +117,7 @@ def test_momentum_of_a_tumbling_robot(monkeypatch: pytest.MonkeyPatch) -> None:
             laid.append(1)
             super().__init__(robot, base)
 
-    monkeypatch.setattr(integrators, "Chart", Counted)
+    monkeypatch.setattr(integrators, "TangentChart", Counted)
     q, v = start(robot, 4)
     v[3:6] = [2.5, -2.0, 2.4]
 
