@@ -16,7 +16,7 @@ import statistics
 from time import perf_counter
 from typing import NamedTuple
 
-from hsp_control import sweep
+from hsp_control.companions.sweeps import sweep
 
 
 class Cost(NamedTuple):
