@@ -61,7 +61,7 @@ def test_a_picture_shows_the_scene_as_it_is_then(
     cell: hsp.Experiment, address: str
 ) -> None:
     plant = cell.plant
-    assert isinstance(plant, hsp.plants.MujocoScenePlant)
+    assert isinstance(plant, hsp.mujoco.MujocoScenePlant)
     plant.reset(0.0, cell.q0, cell.v0)
     told = show(address, plant)
     t, ball = seen(address, "above.png?width=64&height=48")
