@@ -1,5 +1,6 @@
 """`hsp play` as somebody plays with it: the program, a real browser, and a mouse."""
 
+import socket
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -47,7 +48,10 @@ def browser() -> Iterator[Any]:
 
 @pytest.fixture
 def played(tmp_path: Path) -> Iterator[Played]:
-    process = Played("panda", "--out", str(tmp_path))
+    with socket.socket() as probe:  # a port that no other test finds free meanwhile
+        probe.bind(("127.0.0.1", 0))
+        port = str(probe.getsockname()[1])
+    process = Played("panda", "--out", str(tmp_path), "--port", port)
     yield process
     process.close()
 
