@@ -8,6 +8,19 @@ Indices = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 
+class _Owned:
+    """Memory and its owner, as NumPy takes them."""
+
+    def __init__(self, view: Array, owner: object) -> None:
+        self.__array_interface__ = view.__array_interface__
+        self.owner = owner
+
+
+def kept_view(view: Array, owner: object) -> Array:
+    """Return a view of somebody's memory that keeps its owner; Pinocchio's do not."""
+    return np.asarray(_Owned(view, owner))
+
+
 def matrix_view(matrix: Array) -> Array:
     """Return a matrix of Pinocchio's as a view of two dimensions, also if nv = 1."""
     return matrix.reshape(-1, 1) if matrix.ndim == 1 else matrix

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from hsp_control.common.arrays import Array, Indices, matrix_view
+from hsp_control.common.arrays import Array, Indices, kept_view, matrix_view
 from hsp_control.common.exceptions import ModelError
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind, once
@@ -207,7 +207,8 @@ def inertia_terms(
     model: pin.Model, data: pin.Data, q: Array, v: Array, stamp: Indices
 ) -> tuple[Term, Term]:
     """Return M (CRBA) and M' = C + Cᵀ along v, shape (nv, nv) each."""
-    M = Term(matrix_view(data.M), once([bind_pinocchio("crba", model, data, q)], stamp))
+    mass_matrix = kept_view(matrix_view(data.M), data)
+    M = Term(mass_matrix, once([bind_pinocchio("crba", model, data, q)], stamp))
     M_dot = np.zeros((model.nv, model.nv))
     calls: list[Callable[[], object]]
     if model.mimicking_joints:  # Pinocchio has no C of such a model
@@ -302,7 +303,7 @@ class CentroidalMotion:
         # Pinocchio allocates these results at the first call; take views after it.
         pin.computeCentroidalMapTimeVariation(model, data, q, v)
         self.mass: float = pin.computeTotalMass(model)
-        self.position: Array = data.com[0]
+        self.position: Array = kept_view(data.com[0], data)
         self.velocity: Array = np.zeros(3)
         self.jacobian: Array = np.zeros((3, model.nv))
         self.jacobian_dot: Array = np.zeros((3, model.nv))

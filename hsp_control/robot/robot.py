@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from hsp_control.common.arrays import Array, Indices, matrix_view
+from hsp_control.common.arrays import Array, Indices, kept_view, matrix_view
 from hsp_control.common.entry_points import entry_points
 from hsp_control.common.exceptions import (
     ImmutableError,
@@ -361,7 +361,7 @@ class RobotState:
         self._memory = self.q, self.v  # writable, also where `seen` binds calls
         self._seen: RobotState | None = None
         self.data: pin.Data = robot.model.createData()
-        self.effort: Array = self.data.tau
+        self.effort: Array = kept_view(self.data.tau, self.data)
         self._compute_jacobians = bind_pinocchio(
             "jacobians", robot.model, self.data, self.q, self.v
         )
@@ -493,7 +493,7 @@ class RobotState:
     def nonlinear_effects(self) -> Array:
         """N(q, v): Coriolis, centrifugal and gravity efforts, shape (nv,) (RNEA)."""
         self._compute_effects()
-        return self.data.nle  # type: ignore[no-any-return]
+        return kept_view(self.data.nle, self.data)
 
     def inverse_dynamics(self, acceleration: Array) -> Array:
         """Return the effort M a + N, shape (nv,), for an acceleration (nv,) (RNEA)."""

@@ -59,8 +59,7 @@ def test_a_centre_of_mass_out_of_reach_rests() -> None:
     """On a fixed base it keeps no balance: its threshold follows as any other's."""
     robot, rng = load("panda"), np.random.default_rng(0)
     q0 = robot.home() + rng.uniform(-0.3, 0.3, robot.nv)
-    state = robot.state(0.0, q0, np.zeros(robot.nv))
-    here = state.centroidal.position.copy()
+    here = robot.state(0.0, q0, np.zeros(robot.nv)).centroidal.position
     assert rests(robot, q0, hsp.CenterOfMass(hsp.Hold(here + 0.5 * rng.normal(size=3))))
 
 
