@@ -6,7 +6,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from hsp_control.common.arrays import Array
+from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import NonFiniteError
 from hsp_control.common.native import StepPlan, bind, steps
 from hsp_control.constraints.contacts import Contact
@@ -22,7 +22,7 @@ from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.feedback import Feedback, InForce, beyond_largest, write_asked
-from hsp_control.tasks.slipping import slipped
+from hsp_control.tasks.slipping import slipped, write_pulls
 from hsp_control.trajectories.streams.stream import Streamed
 
 
@@ -105,6 +105,8 @@ class ActiveStack:
             if spring:
                 ends = each.task.part_ends()
                 away = partial(slipped, in_force.numbers, ends)
+                pulls = self.resolution.problem.pulls[here]
+                plans.append(partial(_pulls, in_force.numbers, ends, sample, pulls))
                 self.bounds.append((each.task.name, here, away))
             elif len(in_force.feedback.largest):
                 away = partial(beyond_largest, largest=in_force.feedback.largest)
@@ -235,6 +237,11 @@ def _jacobian(contacts: Sequence[Contact], state: RobotState) -> Array:
         for contact in contacts
     ]
     return np.vstack([np.zeros((0, nv)), *rows])
+
+
+def _pulls(numbers: Array, ends: Indices, sample: TaskSample, out: Array) -> StepPlan:
+    """Return the step plan that writes how much a spring pulls."""
+    return StepPlan(write=(bind(write_pulls, numbers, ends, sample.error, out),))
 
 
 def _asked(feedback: Feedback, sample: TaskSample, asked: Array) -> StepPlan:

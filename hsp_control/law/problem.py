@@ -60,6 +60,8 @@ class Problem:
         yields: How much the threshold of a row's level yields to what the row asks
             for, shape (m,): 0 where no bound is on its error, so that it follows only
             below a held level; see `write_thresholds`.
+        pulls: With how much of its largest force a spring pulls along a row, shape
+            (m,); 0 for other rows.
         springs: Whether a row is that of a spring, shape (m,). The law itself treats
             all rows alike; where limits bind, a spring yields as a body would.
     """
@@ -73,4 +75,5 @@ class Problem:
         self.gain = gain
         self.asked = np.zeros(rows)
         self.yields = np.zeros(rows)
+        self.pulls = np.zeros(rows)
         self.springs = np.zeros(rows, dtype=np.bool_)

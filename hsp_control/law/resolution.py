@@ -21,7 +21,12 @@ from hsp_control.law.law import acceleration, null_space_command
 from hsp_control.law.problem import Problem
 from hsp_control.law.pseudo_inverse import weighted_pseudo_inverse, whiten
 from hsp_control.law.samples import FieldSample, MetricSample, TaskSample
-from hsp_control.law.threshold import NOT, Following, write_thresholds
+from hsp_control.law.threshold import (
+    NOT,
+    Following,
+    turning_threshold,
+    write_thresholds,
+)
 
 
 class Outcome(IntEnum):
@@ -157,7 +162,7 @@ class Resolution:
         step = (
             *(problem.task, problem.field, problem.metric, self.form),
             *(v, problem.gain, self.threshold, self._following, controls),
-            *(self.ends, problem.asked, problem.yields, self.thresholds),
+            *(self.ends, problem.asked, problem.yields, problem.pulls, self.thresholds),
             *(self._scratch, self.null_space_error, self.acceleration, self.code),
         )
         resolve = _resolve_at_once if self.alone else _resolve_levels
@@ -213,6 +218,7 @@ class LawStep(NamedTuple):
     ends: Indices
     asked: Array
     yields: Array
+    pulls: Array
     thresholds: Array
     scratch: Scratch
     e_N: Array
@@ -271,9 +277,10 @@ def _resolve_levels(step: LawStep) -> int:
 @kernel
 def _write_thresholds(step: LawStep) -> float:
     """Write ε of each level, and return the largest."""
+    turning = turning_threshold(step.field.g, step.v, step.following)
     return write_thresholds(
-        step.asked, step.yields, step.ends, step.threshold, step.following,
-        step.thresholds,
+        step.asked, step.yields, step.pulls, step.ends, step.threshold, turning,
+        step.following, step.thresholds,
     )  # fmt: skip
 
 

@@ -21,6 +21,10 @@ is drawn there: along them its spring must outweigh what they ask for. They ask 
 f - J a_f, with a_f what those above draw at rest: a task that is met undoes it. So a
 level below follows that with an L that is a fiftieth: it is as steep as it is strong,
 and the nearer to the edge the level above is held, the less it gets there.
+
+What is left to the null space turns with the robot, by at most 1.09 |∂J/∂q|/ε, and what
+a field g asks for there changes with it. So where an arm is held ε grows with g, also
+below a spring, whose own threshold is ε_0: what it asks for fades with its mobility.
 """
 
 from typing import NamedTuple, Self
@@ -29,6 +33,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
+from hsp_control.common.linalg import squared_norm
 
 STIFFNESS = 200.0
 """L times the robot's size [1/s²]. A stretched elbow is then drawn to its singular
@@ -44,6 +49,11 @@ MODEST, MODEST_ON_LEGS = 1.0, 10.0
 """f_0 over the robot's size [1/s²]: what a position 1 % of the size away asks for at
 10 rad/s; and with a floating base, whose feet ask for more where they land."""
 
+TURNING, QUARTER = 50.0, 0.25
+"""How fast what a field asks for may change as its null space turns [1/s]: what is held
+for a period h is stable below 2/h, and periods are up to 10 ms. A velocity counts for a
+quarter."""
+
 
 class Following(NamedTuple):
     """How the threshold follows what is asked for."""
@@ -52,26 +62,42 @@ class Following(NamedTuple):
     steepest: float
     modest: float  # f_0 [m/s² or rad/s²]
     below: float  # L of a level below a held one
+    turning: float  # ε for each rad/s of a field, where an arm is held [s]
 
     @classmethod
     def of(cls, size: float, *, on_legs: bool) -> Self:
         """Return it for a robot of a size [m]."""
         if size == 0.0:
-            return cls(np.inf, 0.0, np.inf)
+            return NOT
         modest = MODEST_ON_LEGS if on_legs else MODEST
-        return cls(STIFFNESS / size, size * modest, BELOW / size)
+        return cls(STIFFNESS / size, size * modest, BELOW / size, size / TURNING)
 
 
-NOT = Following(np.inf, 0.0, np.inf)
+NOT = Following(np.inf, 0.0, np.inf, 0.0)
 """The threshold does not follow."""
+
+
+@kernel
+def turning_threshold(g: Array, v: Array, following: Following) -> float:
+    """Return the ε that a field and a speed need where an arm is held.
+
+    Args:
+        g: The field, shape (nv,).
+        v: The velocity, shape (nv,).
+        following: What they count.
+    """
+    quickest = max(np.sqrt(squared_norm(g)), QUARTER * np.sqrt(squared_norm(v)))
+    return float(following.turning * quickest)
 
 
 @kernel
 def write_thresholds(
     asked: Array,
     yields: Array,
+    pulls: Array,
     ends: Indices,
     least: float,
+    turning: float,
     following: Following,
     thresholds: Array,
 ) -> float:
@@ -80,22 +106,31 @@ def write_thresholds(
     Args:
         asked: f, what the feedback asks for at rest, level after level, shape (m,).
         yields: By how much L is less for a row, shape (m,); 0: it does not count.
+        pulls: With how much of its largest force a spring pulls, shape (m,).
         ends: Where each level's rows end in the stack, shape (levels,).
         least: ε_0.
+        turning: See `turning_threshold`; for levels that ask for f_0, or springs that
+            pull with all their force, and for others as much as they do of it.
         following: L and f_0.
         thresholds: ε of each level, shape (levels,).
     """
     largest, start = least, 0
     for level in range(ends.shape[0]):
-        square = more = 0.0
+        square = more = pull = 0.0
         for k in range(start, ends[level]):
+            pull += pulls[k] * pulls[k]
             if yields[k] > 0.0:
                 square += asked[k] * asked[k]
                 more += (yields[k] - 1.0) * asked[k] * asked[k]
-        beyond = max(np.sqrt(square) - following.modest, 0.0)
+        norm, share = np.sqrt(square), np.sqrt(pull)
+        beyond = max(norm - following.modest, 0.0)
         if beyond > 0.0:
             beyond *= 1.0 + more / square
-        thresholds[level] = max(least, np.sqrt(beyond / following.steepest))
+            share = 1.0
+        elif norm > 0.0:
+            share = max(share, norm / following.modest)
+        follows = np.sqrt(beyond / following.steepest)
+        thresholds[level] = max(least, follows, min(share, 1.0) * turning)
         largest = max(largest, thresholds[level])
         start = ends[level]
     return float(largest)

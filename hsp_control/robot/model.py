@@ -415,16 +415,20 @@ class RobotModel:
         """The largest force and moment of springs by default [N, N·m]; inf for none.
 
         The force is what the strongest motor holds at half of `size`, the moment half
-        of that motor's effort. Only motors that slide count as they are.
+        of that motor's effort. Only motors that slide count as they are. Without a
+        maximum effort it is what moves the robot's mass as gains of 100 1/s² do at
+        `largest_error`.
         """
-        effort = self._largest_effort()
+        effort, lever = self._largest_effort(), 0.5 * self.size
         turns = np.array(self.units) == "rad"
-        found = effort[turns & np.isfinite(effort)]
-        if found.size and self.size > 0.0:
-            strongest = float(found.max())
-            return strongest / (0.5 * self.size), 0.5 * strongest
-        found = effort[~turns & np.isfinite(effort)]
-        return (float(found.max()) if found.size else np.inf), np.inf
+        slides = effort[~turns & np.isfinite(effort)]
+        turns = effort[turns & np.isfinite(effort)]
+        if turns.size and lever > 0.0:
+            return float(turns.max()) / lever, 0.5 * float(turns.max())
+        if slides.size:
+            return float(slides.max()), np.inf
+        moves = 100.0 * pin.computeTotalMass(self.model) * self.largest_error[0]
+        return moves or np.inf, 0.5 * moves * lever or np.inf
 
     def _largest_effort(self) -> Array:
         """Return the largest effort of each motor, shape (nv,); inf for none."""

@@ -46,6 +46,19 @@ def slipped(numbers: Array, ends: Indices, e: Array) -> float:
 
 
 @kernel
+def write_pulls(numbers: Array, ends: Indices, e: Array, out: Array) -> None:
+    """Write (K e)_i/F_g, shape (m,); 0 where there is no bound."""
+    for i in range(e.shape[0]):
+        out[i] = 0.0
+        for j in range(e.shape[0]):
+            out[i] += numbers[i, j] * e[j]
+    for g in range(ends.shape[0]):
+        first, end, most = group_of(g, ends, numbers)
+        for i in range(first, end):
+            out[i] /= most
+
+
+@kernel
 def group_of(g: int, ends: Indices, numbers: Array) -> tuple[int, int, float]:
     """Return a group's first row, the row after its last, and F_g; inf for no bound."""
     first = 0 if g == 0 else ends[g - 1]

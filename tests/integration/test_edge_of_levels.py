@@ -71,6 +71,17 @@ def test_a_height_out_of_reach_rests(name: str) -> None:
     assert rests(robot, robot.home(), task)
 
 
+def test_a_field_does_not_shake_an_arm_that_a_spring_holds_stretched() -> None:
+    """It asks for the arm's bent posture, and motors and joints have no limits."""
+    robot = load("planar3r")
+    q0 = robot.integrate(robot.neutral(), np.array([0.1, 0.6, 0.6]))
+    spring = hsp.Impedance(300.0)
+    hand = hsp.FramePosition("tip", hsp.Hold([3.0, 3.0]), axes="xy", impedance=spring)
+    made = hsp.Controller(robot, [hand], hsp.TargetPosture(q0))
+    run = hsp.simulate(made, q0, duration=5.0, control_period=0.005)
+    assert np.abs(run.v[-1]).max() < 1e-6
+
+
 def rests(robot: hsp.Robot, q0: Array, task: hsp.Task) -> bool:
     """Return whether no effort changes by more than 1e-3 of its limit in 1 ms."""
     how: Any = {"duration": 6.0, "control_period": 1e-3, "log_period": 1e-3}

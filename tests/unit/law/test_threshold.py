@@ -23,6 +23,7 @@ from hsp_control.law.threshold import (
     MODEST,
     NOT,
     STIFFNESS,
+    TURNING,
     Following,
     how_held,
     threshold_below,
@@ -45,8 +46,9 @@ def test_it_bounds_what_the_feedback_asks_for_over_its_square(
     sizes = [3, 0, 2, 4]
     ends, thresholds = np.cumsum(sizes), np.zeros(4)
     asked = 10.0**size * rng.standard_normal(9)
-    following = Following(L, modest, L / 50.0)
-    largest = write_thresholds(asked, everywhere, ends, least, following, thresholds)
+    following = Following(L, modest, L / 50.0, 0.0)
+    rest = ends, least, 0.0, following
+    largest = write_thresholds(asked, everywhere, nowhere, *rest, thresholds)
     assert largest == thresholds.max()
     for f, epsilon in zip(np.split(asked, ends[:-1]), thresholds, strict=True):
         norm = np.linalg.norm(f)
@@ -55,11 +57,12 @@ def test_it_bounds_what_the_feedback_asks_for_over_its_square(
         if norm <= modest + 0.99 * L * least**2:
             assert epsilon == least
     few = np.zeros(4)  # errors of one component: a third of L
-    write_thresholds(asked, 3.0 * everywhere, ends, least, following, few)
+    write_thresholds(asked, 3.0 * everywhere, nowhere, *rest, few)
     exact = thresholds > least
     np.testing.assert_allclose(few[exact] ** 2, 3.0 * thresholds[exact] ** 2)
     for counts, kind in ((everywhere, NOT), (nowhere, following)):
-        write_thresholds(asked, counts, ends, least, kind, thresholds)
+        rest = ends, least, 0.0, kind
+        write_thresholds(asked, counts, nowhere, *rest, thresholds)
         assert (thresholds == least).all()
 
 
@@ -69,7 +72,7 @@ def test_a_level_below_a_held_one_asks_for_less_than_draws_that_one(
 ) -> None:
     """It gets 2 s ‖f‖/ε² at most along s; held for good, that is 2 L s/50."""
     rng, least = np.random.default_rng(seed), 0.03
-    following = Following(150.0, 1.3, 3.0)
+    following = Following(150.0, 1.3, 3.0, 0.0)
     asked = 10.0 ** rng.uniform(-1.0, 4.0) * unit(rng, 3)
     held = how_held(nearness * threshold**2, threshold, least)
     assert 0.0 <= held <= 1.0
@@ -188,7 +191,7 @@ def slope_in_v(controller: Controller, q: Array, v: Array) -> Array:
 @given(seeds)
 @settings(max_examples=25)
 def test_no_target_makes_it_steep_in_v(name: str, seed: int) -> None:
-    """At any speed; the parts J#J and P have eigenvalues in [0, 1]."""
+    """The parts J#J and P have eigenvalues in [0, 1]; ε is not that of the speed."""
     robot, rng = load(name), np.random.default_rng(seed)
     q, lost = near_singular(robot, rng)
     target = 10.0 ** rng.uniform(-3.0, 3.0) * unit(rng, len(lost))
@@ -196,12 +199,15 @@ def test_no_target_makes_it_steep_in_v(name: str, seed: int) -> None:
     Kv, K_N = 20.0, rng.uniform(1.0, 40.0)
     field = TargetPosture(robot.random_configuration(rng))
     controller = Controller(robot, [hand], field, null_space_gain=K_N, limits=None)
-    v = 10.0 ** rng.uniform(-3.0, 1.0) * unit(rng, robot.nv)
+    v = 10.0 ** rng.uniform(-3.0, 0.0) * unit(rng, robot.nv)
     g = controller.compute(0.0, q, v).field.g
     _, tensor = position_jacobian(robot, q, FRAMES[name])
     bends = np.linalg.norm(tensor.reshape(robot.nv, -1), 2)
-    (epsilon,) = controller.active_stack.resolution.thresholds
+    resolution = controller.active_stack.resolution
+    (epsilon,) = resolution.thresholds
     speeds = 3.0 * np.linalg.norm(v) + np.linalg.norm(g - v)
+    if np.linalg.norm(resolution.problem.asked) >= MODEST * robot.size:
+        assert epsilon >= robot.size * np.linalg.norm(g) / TURNING
     bound = max(Kv, K_N) + 1.0 + 1.09 * speeds * bends / epsilon  # ∂g/∂q = -1
     assert np.linalg.norm(slope_in_v(controller, q, v), 2) <= bound * (1.0 + 1e-6)
 
