@@ -175,7 +175,10 @@ class Actuation:
         if limits is None:
             return found
         if limits.distances:
-            parts = [each.rows(state, limits.bandwidth) for each in limits.distances]
+            wanted = self._wanted.acceleration
+            parts = [
+                each.rows(state, limits.bandwidth, wanted) for each in limits.distances
+            ]
             A, lower = (np.concatenate(each) for each in zip(*parts, strict=True))
             found["distances"] = A, lower
         if limits.static_effort is not None:

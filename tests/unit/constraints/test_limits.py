@@ -254,18 +254,25 @@ def test_distance_rows_are_its_second_derivative(kind: str) -> None:
     v, a = 0.3 * rng.standard_normal(7), rng.standard_normal(7)
     q = robot.integrate(robot.home(), 0.3 * rng.standard_normal(7))  # nothing parallel
     state = robot.state(0.4, q, v)
-    A, b = limit.rows(state, 10.0)
 
-    def room(s: float) -> Array:
+    def room(s: float, a: Array) -> Array:
         there = robot.state(0.4 + s, robot.integrate(q, s * v + 0.5 * s * s * a), v)
         distances: Array = limit.clearance.proximity(there).measure(there)
         return distances - limit.minimum
 
-    h = 1e-3
-    near = room(0.0)
-    rate = (room(h) - room(-h)) / (2.0 * h)
-    second = (room(h) - 2.0 * near + room(-h)) / h**2
-    barrier = second + 20.0 * rate + 100.0 * near
-    chosen = np.flatnonzero(near + 0.5 * np.minimum(rate, 0.0) < 0.2)
-    assert len(chosen) == len(A) > 0
-    np.testing.assert_allclose(A @ a - b, barrier[chosen], rtol=0, atol=1e-3)
+    def second(a: Array) -> Array:
+        return (room(h, a) - 2.0 * near + room(-h, a)) / h**2
+
+    h, rest = 1e-3, np.zeros(7)
+    near = room(0.0, rest)
+    rate = (room(h, rest) - room(-h, rest)) / (2.0 * h)
+    least = -second(rest) - 20.0 * rate - 100.0 * near
+    close = near + 0.5 * np.minimum(rate, 0.0) < 0.2
+    for wanted in (a, 100.0 * a):  # one that far pairs permit, and one that they do not
+        asked = second(wanted) - second(rest)
+        chosen = close | (asked < 0.5 * least)
+        A, b = limit.rows(state, 10.0, wanted)
+        assert len(A) == chosen.sum() > 0
+        scale = 1e-2 * np.linalg.norm(wanted)
+        np.testing.assert_allclose(A @ wanted, asked[chosen], rtol=0, atol=scale)
+        np.testing.assert_allclose(b, least[chosen], rtol=0, atol=2e-2)
