@@ -34,8 +34,8 @@ from hsp_control.constraints.limits import RobotLimits
 from hsp_control.control.actuation import Status
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants import RigidBodyPlant
-from hsp_control.visualization.palette import INK, SERIES
-from hsp_control.visualization.plots import new_figure, styled
+from hsp_control.companions.plots.palette import INK, SERIES
+from hsp_control.companions.plots import new_figure, styled
 
 PERIOD = 1e-3  # [s]
 ARMS_STRENGTH = 0.2  # of two Pandas' efforts; at 0.25 one joint of each is at its limit

@@ -18,10 +18,10 @@ import numpy as np
 from marked_sections import RESULTS, replace_section
 
 from hsp_control.companions.film.chromium import headless_browser
-from hsp_control.play import Picture, Session, play
-from hsp_control.play.playable import playable
-from hsp_control.visualization.viewer import Viewer
-from hsp_control.visualization.viewer.transport import PageServer
+from hsp_control.companions.play import Picture, Session, play
+from hsp_control.companions.play.playable import playable
+from hsp_control.companions.viewer import Viewer
+from hsp_control.companions.viewer.transport import PageServer
 
 sys.path.append(str(Path(__file__).parents[1] / "tests" / "support"))
 from pages import Steering

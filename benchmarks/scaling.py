@@ -35,8 +35,8 @@ from hsp_control.null_space.fields import (
     Transmission,
 )
 from hsp_control.trajectories import ComposedPose, HoldOrientation, TrajectorySample
-from hsp_control.visualization.palette import SERIES as SERIES_COLORS
-from hsp_control.visualization.plots import new_figure, styled
+from hsp_control.companions.plots.palette import SERIES as SERIES_COLORS
+from hsp_control.companions.plots import new_figure, styled
 
 DOCUMENT, FIGURE = RESULTS / "speed.md", FIGURES / "scaling.png"
 GAINS = hsp.Gains(natural_frequency=10.0)

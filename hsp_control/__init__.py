@@ -75,9 +75,6 @@ if TYPE_CHECKING:  # what a type checker reads; the names are looked up below
     from .trajectories import Stream as Stream
     from .trajectories import StreamOrientation as StreamOrientation
     from .trajectories import StreamPose as StreamPose
-    from .visualization import viewer as viewer
-    from .visualization.viewer import Viewer as Viewer
-    from .visualization.viewer import show as show
 
 _NAMES = {
     "robot": "Robot RobotState",
@@ -96,7 +93,7 @@ _NAMES = {
     "simulation": "Rollout simulate",
     "live": "run_loop",
     "config": "Experiment Recorder load_experiment",
-    "visualization.viewer": "Viewer show",
+    "companions.viewer": "Viewer show",
     "common.exceptions": "HspControlError",
 }
 """The public names, by the room from which each is imported at its first use."""
@@ -120,7 +117,7 @@ _NAMESPACES = {
     "simulation": "simulation",
     "tasks": "tasks",
     "trajectories": "trajectories",
-    "viewer": "visualization.viewer",
+    "viewer": "companions.viewer",
 }
 """The public namespaces, and the room that each stands for."""
 

@@ -34,7 +34,7 @@ from hsp_control.simulation.log_writer import LogWriter
 from hsp_control.simulation.measures import measures
 
 if TYPE_CHECKING:
-    from hsp_control.cli.pages import Screen
+    from hsp_control.companions.viewer.pages import Screen
 
 
 def run(options: argparse.Namespace) -> int:
@@ -45,7 +45,7 @@ def run(options: argparse.Namespace) -> int:
     tell = _tell_json if options.json else _tell
     if not options.view:
         return _run_and_save(_built(loaded), log, tell, None)
-    from hsp_control.cli.pages import Screen
+    from hsp_control.companions.viewer.pages import Screen
 
     said = _errors if options.json else _out
     with Screen.open(loaded, options, lambda url: said.print(f"View: {url}")) as screen:
@@ -161,7 +161,7 @@ def _saved_elsewhere(rollout: Rollout, log: Path, error: LogError) -> Path:
 
 def view(options: argparse.Namespace) -> int:
     """Show logs in the browser."""
-    from hsp_control.cli.pages import show_logs
+    from hsp_control.companions.viewer.pages import show_logs
 
     show_logs(options)
     return 0
@@ -173,7 +173,7 @@ def plot(options: argparse.Namespace) -> int:
     others = entry_points("plots")
     if other := others.get(first.suffix.removeprefix(".")):
         return int(other.load()(options))
-    from hsp_control.visualization import plots
+    from hsp_control.companions import plots
 
     runs = [Rollout.load(log) for log in options.logs]
     folder, formats = options.out or first.parent, options.formats or ["png"]

@@ -20,7 +20,7 @@ from hsp_control.cli.live_experiment import (
 from hsp_control.cli.loading import read
 from hsp_control.cli.robot_process import RobotProcess
 from hsp_control.cli.run_summary import excess_rows
-from hsp_control.cli.steering import let_steer, steering_page
+from hsp_control.companions.play.steering import let_steer, steering_page
 from hsp_control.common.exceptions import LiveError, LogError
 from hsp_control.config import Experiment
 from hsp_control.config.loaded_scenario import load_scenario
@@ -38,7 +38,7 @@ from hsp_control.live import (
 )
 from hsp_control.live.hardware import AdaptingHardware, LocatedHardware
 from hsp_control.live.operator_requests import stop_signals
-from hsp_control.play.live_loop import PAGE_ENDED
+from hsp_control.companions.play.live_loop import PAGE_ENDED
 from hsp_control.simulation import Rollout
 
 _DRY_RUN = 0.5  # duration of the run before that compiles the kernels [s]

@@ -128,7 +128,7 @@ class Rollout:
             PlotError: If a log has no rows, or there is no such panel.
         """
         # Here: what draws is a room above, and takes long to import.
-        plots = import_module("hsp_control.visualization.plots")
+        plots = import_module("hsp_control.companions.plots")
         if paper:
             return plots.paper_figure(self, **options)
         return plots.diagnostics_figure(self, *others, **options)

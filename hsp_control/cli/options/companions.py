@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from hsp_control.common.entry_points import entry_points
 
 if TYPE_CHECKING:
-    from hsp_control.visualization.viewer.comparison import ComparedRun
+    from hsp_control.companions.viewer.comparison import ComparedRun
 
 
 class AddedCommand(NamedTuple):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from hsp_control.cli.options.companions import ExportFormat
 
 if TYPE_CHECKING:
-    from hsp_control.visualization.viewer.comparison import ComparedRun
+    from hsp_control.companions.viewer.comparison import ComparedRun
 
 
 def _write(

@@ -213,11 +213,11 @@ def test_a_play_that_failed_and_was_not_reset_says_so_with_its_status(
     def fail(session: Any, *_: Any) -> None:
         session.over = "the arm is too fast; reset to go on"
 
-    monkeypatch.setattr("hsp_control.cli.play.play_in_real_time", fail)
+    monkeypatch.setattr("hsp_control.companions.play.play_command.play_in_real_time", fail)
     arguments = [MOVING, "--out", str(tmp_path), "--no-browser"]
     assert main(["play", *arguments]) == 2
     assert capsys.readouterr().err.endswith("hsp: the arm is too fast\n")
-    monkeypatch.setattr("hsp_control.cli.play.play_in_real_time", lambda *_: None)
+    monkeypatch.setattr("hsp_control.companions.play.play_command.play_in_real_time", lambda *_: None)
     assert main(["play", *arguments]) == 0
 
 
