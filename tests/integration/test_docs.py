@@ -13,10 +13,10 @@ import hsp_control
 from hsp_control import load_experiment
 from hsp_control.cli.options.command_line import command_line
 from hsp_control.common.resources import bundled_configs, bundled_robots
+from hsp_control.companions.viewer import ShownItems
 from hsp_control.null_space.fields.weight import sample_weight
 from hsp_control.robot import RobotDescription
 from hsp_control.simulation import InitialState, StartPose
-from hsp_control.companions.viewer import ShownItems
 
 # No example starts a robot with a jump of its effort.
 pytestmark = pytest.mark.filterwarnings("error:the first effort of joint:UserWarning")

@@ -6,12 +6,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
-from hsp_control.cli.options.companions import added_commands, export_formats
+from hsp_control.cli.options.companions import (
+    AddedCommand,
+    add_page,
+    added_commands,
+)
 from hsp_control.cli.options.shared import (
     add_configuration,
-    add_host,
     add_import,
-    add_page,
     add_strict,
     complete,
 )
@@ -75,99 +77,19 @@ def command_line() -> argparse.ArgumentParser:
     run.add_argument(
         "--out", type=Path, default=Path("out"), metavar="DIR", help="default: out"
     )
-    run.add_argument(
-        "--view",
-        action=argparse.BooleanOptionalAction,
-        default=False,
-        help="show the run in a browser, while it is computed and after",
-    )
     run.add_argument("--json", action="store_true", help="print the summary as JSON")
-    add_page(run)
+    add_page("run", run)
 
     check = _command(commands, "check", "check a configuration without running it")
     add_configuration(check)
     add_import(check)
     check.add_argument("--json", action="store_true", help="print the summary as JSON")
 
-    play = _command(commands, "play", "touch a simulated robot in a browser")
-    add_configuration(play, "a robot's name, or ")
-    add_import(play)
-    play.add_argument(
-        "--out", type=Path, default=Path("out"), metavar="DIR", help="default: out"
-    )
-    add_host(play)
-    add_page(play)
-
-    view = _command(commands, "view", "play logs in a browser, one or several together")
-    view.add_argument(
-        "logs", nargs="+", type=Path, metavar="LOG", help="a log written by hsp run"
-    )
-    where = view.add_mutually_exclusive_group()
-    where.add_argument(
-        "--beside",
-        action="store_true",
-        default=None,
-        help="show several side by side; the default where their robots differ",
-    )
-    where.add_argument(
-        "--overlay",
-        action="store_false",
-        dest="beside",
-        help="show several over each other, all but the first as ghosts",
-    )
-    view.add_argument(
-        "--speed",
-        type=float,
-        metavar="X",
-        help="playback speed, 1 is real time; default: as the log says",
-    )
-    view.add_argument(
-        "--loop",
-        action=argparse.BooleanOptionalAction,
-        default=None,
-        help="repeat the run; default: as the log says",
-    )
-    add_page(view)
-    add_strict(view)
-
-    plot = _command(commands, "plot", "draw the figures of a log, or several together")
-    plot.add_argument(
-        "logs",
-        nargs="+",
-        type=Path,
-        metavar="LOG",
-        help="written by hsp run; several are drawn in the same panels",
-    )
-    plot.add_argument("--out", type=Path, metavar="DIR", help="default: beside the log")
-    plot.add_argument(
-        "--format",
-        action="append",
-        choices=["png", "pdf", "svg"],
-        dest="formats",
-        help="may be given more than once; default: png",
-    )
-    plot.add_argument(
-        "--panels",
-        default="",
-        metavar="NAME,...",
-        help="draw these only, such as errors,null_space; another name lists all",
-    )
-    plot.add_argument(
-        "--width", metavar="84mm", help="for a paper, without heading and foot"
-    )
-    plot.add_argument(
-        "--relative",
-        action="store_true",
-        help="draw joint angles, not absolute ones, where the robot has both",
-    )
-
-    add_export(_command(commands, "export", "write logs as a page, or one as a film"))
+    added = added_commands()
+    _add([each for each in added if each[1].place < 0], commands)
     add_live(_command(commands, "live", "control a simulated robot in another process"))
 
-    for called, added in added_commands().items():
-        command = _command(commands, called, added.help)
-        command.set_defaults(added=added)
-        added.add_options(command)
+    _add([each for each in added if each[1].place >= 0], commands)
 
     robots = _command(
         commands, "robots", "list the robots that can be loaded, or describe one"
@@ -196,26 +118,15 @@ def _command(
     )
 
 
-def add_export(export: argparse.ArgumentParser) -> None:
-    """Add all options of `hsp export`."""
-    export.add_argument(
-        "logs",
-        type=Path,
-        nargs="+",
-        metavar="LOG",
-        help="written by hsp run; several logs make one page with a switch",
-    )
-    add_strict(export)
-    export.add_argument(
-        "--html",
-        type=Path,
-        metavar="FILE",
-        help="a page that plays offline, with the plots",
-    )
-    for added in export_formats():
-        for ending, text in added.files.items():
-            export.add_argument(f"--{ending}", type=Path, metavar="FILE", help=text)
-        added.add_options(export)
+def _add(
+    added: Sequence[tuple[str, AddedCommand]],
+    commands: "argparse._SubParsersAction[Parser]",
+) -> None:
+    """Add commands of companions."""
+    for name, each in added:
+        command = _command(commands, name, each.help)
+        command.set_defaults(added=each)
+        each.add_options(command)
 
 
 def add_inspect(inspect: argparse.ArgumentParser) -> None:
@@ -279,13 +190,4 @@ def add_live(live: argparse.ArgumentParser) -> None:
         metavar="LEVEL",
         help="real-time priority of the loop (SCHED_FIFO), 1 to 99",
     )
-    live.add_argument(
-        "--steer",
-        nargs="?",
-        choices=("simulated", "hardware"),
-        const="simulated",
-        help="show a page that steers: drag targets and obstacles, turn settings; with "
-        "hardware, the robot moves only while a key is held on the page",
-    )
-    add_host(live)
-    add_page(live)
+    add_page("live", live)

@@ -2,14 +2,11 @@
 
 import argparse
 import sys
-from collections.abc import Callable, Iterator, Mapping
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any, NamedTuple
 
 from hsp_control.common.entry_points import entry_points
-
-if TYPE_CHECKING:
-    from hsp_control.companions.viewer.comparison import ComparedRun
 
 
 class AddedCommand(NamedTuple):
@@ -22,44 +19,46 @@ class AddedCommand(NamedTuple):
         add_options: Adds its options to its parser.
         run: Runs it; returns the exit status.
         own_interrupts: Whether it ends in order at Ctrl-C, instead of at once.
+        place: Where the help lists it: below zero before `hsp live`, smaller first.
     """
 
     help: str
     add_options: Callable[[argparse.ArgumentParser], object]
     run: Callable[[argparse.Namespace], int]
     own_interrupts: bool = False
+    place: int = 0
 
 
-class ExportFormat(NamedTuple):
-    """Formats of ``hsp export`` for one run: an entry point of ``hsp_control.exports``.
+class CommandPage(NamedTuple):
+    """A page that shows what `hsp run` or `hsp live` does.
+
+    It is an entry point of ``hsp_control.pages`` with the command's name, and imported
+    as an `AddedCommand` is.
 
     Attributes:
-        what: What such a file is called in a message, as in "a film".
-        files: The endings, which are the names of options, and what each is.
-        add_options: Adds the other options to the parser of `hsp export`.
-        write: Writes a file and returns its path, given the run, the path, the options
-            and what takes the share that is done.
+        add_options: Adds its options to the command's parser.
+        open: Opens it, given the options and what the command is about: a context with
+            what the command tells, or None if the options ask for no page.
     """
 
-    what: str
-    files: Mapping[str, str]
     add_options: Callable[[argparse.ArgumentParser], object]
-    write: Callable[
-        ["ComparedRun", Path, argparse.Namespace, Callable[[float], None]], Path
-    ]
+    open: Callable[..., AbstractContextManager[Any]]
 
 
-def added_commands() -> dict[str, AddedCommand]:
-    """Return the commands that companions and other packages add, by name."""
-    return dict(_loaded("commands"))
+def added_commands() -> list[tuple[str, AddedCommand]]:
+    """Return the commands that companions and other packages add, in their order."""
+    return sorted(loaded("commands"), key=lambda each: each[1].place)
 
 
-def export_formats() -> list[ExportFormat]:
-    """Return the formats that companions and other packages add to `hsp export`."""
-    return [each for _, each in _loaded("exports")]
+def add_page(command: str, parser: argparse.ArgumentParser) -> None:
+    """Add the options of a command's page, if a companion has one."""
+    page: CommandPage | None = dict(loaded("pages")).get(command)
+    if page is not None:
+        page.add_options(parser)
+    parser.set_defaults(open_page=page.open if page else lambda *_: nullcontext())
 
 
-def _loaded(group: str) -> Iterator[tuple[str, Any]]:
+def loaded(group: str) -> Iterator[tuple[str, Any]]:
     """Yield what can be imported; what cannot is told, and stops no other command."""
     for name, entry in sorted(entry_points(group).items()):
         try:

@@ -69,33 +69,6 @@ def add_import(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_host(parser: argparse.ArgumentParser) -> None:
-    """Add the address at which a page is opened."""
-    parser.add_argument(
-        "--host",
-        default="127.0.0.1",
-        metavar="ADDRESS",
-        help="the address of this computer at which another one, or a phone, opens the "
-        "page; default: only this computer may",
-    )
-
-
-def add_page(parser: argparse.ArgumentParser) -> None:
-    """Add where a page is served, and whether it is opened."""
-    parser.add_argument(
-        "--port",
-        type=int,
-        metavar="N",
-        help="the page's port on this machine; default: the first free one from 7000",
-    )
-    parser.add_argument(
-        "--browser",
-        action=argparse.BooleanOptionalAction,
-        default=True,
-        help="open the page in a browser; its address is printed in any case",
-    )
-
-
 def complete(action: argparse.Action, names: Callable[[], Iterable[str]]) -> None:
     """Have shells complete an argument by names and by files."""
 

@@ -21,6 +21,8 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HspControlError, StreamError
+from hsp_control.companions.play.knobs import Knob, knobs_of
+from hsp_control.companions.plots.palette import FIELD
 from hsp_control.control.changes import Changes
 from hsp_control.control.controller import Controller
 from hsp_control.control.targets import DELAY, RAMP, new_stream
@@ -29,14 +31,12 @@ from hsp_control.geometry.scene import Obstacle
 from hsp_control.null_space.fields import TargetPosture
 from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.fields.weight import sample_weight
-from hsp_control.companions.play.knobs import Knob, knobs_of
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import FrameOrientation, FramePose, FramePosition, Task
 from hsp_control.trajectories import Stream
 from hsp_control.trajectories.crossfade import AnyReference
 from hsp_control.trajectories.remembering import Written
 from hsp_control.trajectories.streams.stream import Streamed
-from hsp_control.companions.plots.palette import FIELD
 
 BACK = 1.5
 """Time over which a path of its own comes back [s]: half a metre at 0.6 m/s at most."""

@@ -10,11 +10,11 @@ from typing import Any, Literal
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HspControlError
+from hsp_control.companions.play.handles import Handles
 from hsp_control.config import Experiment
 from hsp_control.control.controller import Controller
 from hsp_control.control.targets import RAMP
 from hsp_control.live import OperatorRequests
-from hsp_control.companions.play.handles import Handles
 from hsp_control.simulation.journal import JournalReader
 from hsp_control.simulation.log_writer import LogWriter
 
@@ -90,8 +90,6 @@ class DeadMansKey:
         return self._clock() < self._until
 
 
-PAGE_ENDED = "the process of the page has ended"
-"""Why a loop stops that nobody can steer."""
 TOLD = 1.0 / 30.0  # time between two words to the page [s]
 _MESSAGES = 4  # messages that are taken in one period at most
 
@@ -139,7 +137,7 @@ class SteeredLoop:
                 case _ if self._requests.reason is None:
                     self.handles.receive(message)
         if self._channel.lost:  # nobody can steer it any more
-            self._requests.stop(PAGE_ENDED)
+            self._requests.stop("the process of the page has ended", fault=True)
 
     def tell(self) -> None:
         """Say where everything is, and what the knobs are set to."""

@@ -7,13 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.null_space.fields import FieldSum, NullSpaceField, Rest
-from hsp_control.null_space.fields.field import terms_of
-from hsp_control.null_space.fields.weight import sample_weight
 from hsp_control.companions.play.live_loop import Mirror
 from hsp_control.companions.play.session import Session
-from hsp_control.simulation import Rollout
-from hsp_control.simulation.log_series import distance_label, joint_names, unreached
 from hsp_control.companions.plots.palette import SERIES
 from hsp_control.companions.viewer import Viewer
 from hsp_control.companions.viewer.clearances import capsules, distances, influence
@@ -32,6 +27,11 @@ from hsp_control.companions.viewer.run_drawing import (
     all_layers,
     line_color,
 )
+from hsp_control.null_space.fields import FieldSum, NullSpaceField, Rest
+from hsp_control.null_space.fields.field import terms_of
+from hsp_control.null_space.fields.weight import sample_weight
+from hsp_control.simulation import Rollout
+from hsp_control.simulation.log_series import distance_label, joint_names, unreached
 
 FRAME = 1.0 / 30.0  # time between two pictures [s]
 _FIELD_LAYERS = ("influence", "distances", "capsules")

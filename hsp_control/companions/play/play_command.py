@@ -10,15 +10,20 @@ from types import FrameType
 
 from hsp_control.cli.consoles import out
 from hsp_control.cli.loading import run_imports
-from hsp_control.companions.viewer.pages import OpeningPage, draw_before, draw_empty, status_line
 from hsp_control.common.exceptions import HspControlError
-from hsp_control.config import Experiment
-from hsp_control.config.loaded_scenario import load_scenario
 from hsp_control.companions.play import Picture, Session
 from hsp_control.companions.play import play as play_in_real_time
 from hsp_control.companions.play.playable import playable_document
 from hsp_control.companions.viewer import Viewer
+from hsp_control.companions.viewer.pages import (
+    OpeningPage,
+    draw_before,
+    draw_empty,
+    status_line,
+)
 from hsp_control.companions.viewer.transport import PageServer
+from hsp_control.config import Experiment
+from hsp_control.config.loaded_scenario import load_scenario
 
 
 def play(options: argparse.Namespace) -> int:

@@ -9,15 +9,15 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ConfigError
 from hsp_control.common.resources import bundled_configs
 from hsp_control.common.suggestions import listing
+from hsp_control.companions.play.session import ROW
+from hsp_control.companions.plots.palette import STAGE
 from hsp_control.config import Experiment
 from hsp_control.config.document import Document
 from hsp_control.config.experiment import build
 from hsp_control.config.source import read_document
 from hsp_control.geometry.links import link_shapes
-from hsp_control.companions.play.session import ROW
 from hsp_control.robot import Robot
 from hsp_control.robot.description.sources import is_robot
-from hsp_control.companions.plots.palette import STAGE
 
 _PERIOD = 0.001  # control period where a configuration has none [s]
 

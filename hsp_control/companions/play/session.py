@@ -11,13 +11,14 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HspControlError, SimulationError
+from hsp_control.companions.play.handles import Handles
+from hsp_control.companions.play.knobs import Knob
+from hsp_control.companions.play.operational_space import ComparedCommand
+from hsp_control.companions.viewer.commands import path_element
 from hsp_control.config import Experiment
 from hsp_control.control.changes import Changes
 from hsp_control.control.controller import Controller
 from hsp_control.live.simulated_robot import sampled
-from hsp_control.companions.play.handles import Handles
-from hsp_control.companions.play.knobs import Knob
-from hsp_control.companions.play.operational_space import ComparedCommand
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.control_chain import ControlChain
@@ -25,7 +26,6 @@ from hsp_control.simulation.log_writer import LogWriter
 from hsp_control.simulation.loops import Instant, sampled_loop
 from hsp_control.simulation.plants import Plant
 from hsp_control.simulation.plants.push import Pushes, Spring
-from hsp_control.companions.viewer.commands import path_element
 
 ROW = 0.01
 """Time between two rows of the log, at which messages are taken [s]; whole periods."""

@@ -17,16 +17,8 @@ from typing import Any, NamedTuple, Self
 
 from hsp_control.cli.consoles import compiling_told, out
 from hsp_control.cli.live_experiment import live_period
-from hsp_control.companions.viewer.pages import OpeningPage, draw_before, draw_empty, status_line
 from hsp_control.cli.robot_process import end_process
 from hsp_control.common.exceptions import HspControlError, ViewerError
-from hsp_control.config import Experiment, Scenario, load_experiment
-from hsp_control.config.document import Document
-from hsp_control.config.loaded_scenario import LoadedScenario, load_scenario
-from hsp_control.config.streams import without_sources
-from hsp_control.control.controller import Controller
-from hsp_control.declaration.plain_data import plain_data
-from hsp_control.live import OperatorRequests
 from hsp_control.companions.play.handles import Handles
 from hsp_control.companions.play.live_loop import (
     Channel,
@@ -37,7 +29,20 @@ from hsp_control.companions.play.live_loop import (
 )
 from hsp_control.companions.play.picture import FRAME, Picture
 from hsp_control.companions.viewer import Viewer
+from hsp_control.companions.viewer.pages import (
+    OpeningPage,
+    draw_before,
+    draw_empty,
+    status_line,
+)
 from hsp_control.companions.viewer.transport import PageServer
+from hsp_control.config import Experiment, Scenario, load_experiment
+from hsp_control.config.document import Document
+from hsp_control.config.loaded_scenario import LoadedScenario, load_scenario
+from hsp_control.config.streams import without_sources
+from hsp_control.control.controller import Controller
+from hsp_control.declaration.plain_data import plain_data
+from hsp_control.live import OperatorRequests
 
 START = 60.0  # time in which the page's process must say its address [s]
 
@@ -124,16 +129,42 @@ class SteeringPage(NamedTuple):
     process: PageProcess
     opening: OpeningPage  # what opens it
 
+    def let_steer(
+        self, experiment: Experiment, requests: OperatorRequests, journal: Path
+    ) -> Callable[[float], object]:
+        """Return what the loop does in the rest of each period, so that it steers."""
+        # With a dead-man's key it returns when the key is held for the first time, or
+        # when the operator stops.
+        controller, period = experiment.controller, live_period(experiment)
+        controller.compute(0.0, experiment.q0, experiment.v0)
+        _rehearse(controller, period, experiment)
+        self.opening.ready()
+        page = self.process
+        page.begin(experiment, journal)
+        key = DeadMansKey() if page.held else None
+        loop = SteeredLoop(controller, period, page.channel, requests, key=key)
+        if key is not None:
+            out.print(
+                "It begins when the key is held: the space bar, or the page's button."
+            )
+            while not key.held and requests.reason is None:
+                loop.listen()
+                loop.tell()
+                sleep(_POLL)
+            if page.channel.lost:
+                raise ViewerError(
+                    "the loop's page has ended before anybody held its key; the loop "
+                    "did not begin"
+                )
+        return loop.on_period
+
 
 @contextmanager
 def steering_page(
     options: argparse.Namespace, scenario: Scenario
-) -> Iterator[SteeringPage | None]:
-    """Yield the page, if there is to be one; it shows the robot and the scene."""
+) -> Iterator[SteeringPage]:
+    """Yield the page, which shows the robot and the scene."""
     # It opens when a kernel has to be compiled, or when `let_steer` is called.
-    if options.steer is None:
-        yield None
-        return
     held = options.steer == "hardware"
     with PageProcess(port=options.port, host=options.host, held=held) as process:
         process.prepare(scenario)
@@ -145,39 +176,6 @@ def steering_page(
         )
         with opening.compiling():
             yield SteeringPage(process, opening)
-
-
-def let_steer(
-    steering: SteeringPage,
-    experiment: Experiment,
-    requests: OperatorRequests,
-    journal: Path,
-) -> Callable[[float], object]:
-    """Return what the loop does in the rest of each period, so that the page steers."""
-    # With a dead-man's key it returns when the key is held for the first time, or when
-    # the operator stops.
-    controller, period = experiment.controller, live_period(experiment)
-    controller.compute(0.0, experiment.q0, experiment.v0)
-    _rehearse(controller, period, experiment)
-    steering.opening.ready()
-    page = steering.process
-    page.begin(experiment, journal)
-    key = DeadMansKey() if page.held else None
-    loop = SteeredLoop(controller, period, page.channel, requests, key=key)
-    if key is not None:
-        out.print(
-            "It begins when the key is held: the space bar, or the page's button."
-        )
-        while not key.held and requests.reason is None:
-            loop.listen()
-            loop.tell()
-            sleep(_POLL)
-        if page.channel.lost:
-            raise ViewerError(
-                "the loop's page has ended before anybody held its key; the loop did "
-                "not begin"
-            )
-    return loop.on_period
 
 
 def _rehearse(controller: Controller, period: float, experiment: Experiment) -> None:

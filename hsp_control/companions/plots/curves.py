@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.transforms import ScaledTranslation
 
 from hsp_control.common.arrays import Array
+from hsp_control.companions.plots import palette
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.log_series import (
     LIMITED,
@@ -26,7 +27,6 @@ from hsp_control.simulation.log_series import (
     spans_of,
     task_errors,
 )
-from hsp_control.companions.plots import palette
 
 _HANDLE, _GAP, _LETTER = 2.2, 1.3, 0.55
 """Widths in a legend over its font size: handle, gap of columns, mean letter."""

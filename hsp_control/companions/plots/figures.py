@@ -25,15 +25,14 @@ from matplotlib.lines import Line2D
 
 from hsp_control.common.exceptions import PlotError
 from hsp_control.common.suggestions import did_you_mean, listing
-from hsp_control.simulation import Rollout, log_series
-from hsp_control.companions.plots import palette
-from hsp_control.companions.plots import curves
+from hsp_control.companions.plots import curves, palette
 from hsp_control.companions.plots.frames import (
     columns_for,
     draw_frames,
     draw_superimposed,
 )
 from hsp_control.companions.plots.paths import draw_end_effector
+from hsp_control.simulation import Rollout, log_series
 
 STYLE: dict[str, Any] = {
     "axes.axisbelow": True,

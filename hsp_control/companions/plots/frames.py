@@ -10,7 +10,6 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.patheffects import withStroke
 
 from hsp_control.common.arrays import Array
-from hsp_control.simulation import Rollout
 from hsp_control.companions.plots import palette
 from hsp_control.companions.plots.world import (
     View,
@@ -26,6 +25,7 @@ from hsp_control.companions.plots.world import (
     task_paths,
     view_of,
 )
+from hsp_control.simulation import Rollout
 
 _NEAR = 0.035  # width and height of a letter of a number, over the size of the scene
 MAX_TICKS = 10  # with more frames, their times are not the ticks of the time scale

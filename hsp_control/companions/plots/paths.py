@@ -8,7 +8,6 @@ from matplotlib.patches import Polygon
 from matplotlib.ticker import MaxNLocator
 
 from hsp_control.common.arrays import Array
-from hsp_control.simulation import Rollout
 from hsp_control.companions.plots import palette
 from hsp_control.companions.plots.curves import legend_below, literal_text, note
 from hsp_control.companions.plots.world import (
@@ -26,6 +25,7 @@ from hsp_control.companions.plots.world import (
     plane,
     task_paths,
 )
+from hsp_control.simulation import Rollout
 
 
 class _Edge(NamedTuple):

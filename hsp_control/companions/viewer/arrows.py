@@ -9,8 +9,6 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.identity_cache import IdentityCache
-from hsp_control.control.controller import Controller
-from hsp_control.robot import Robot, RobotState
 from hsp_control.companions.plots.palette import FIELD, TASK, WARNING
 from hsp_control.companions.viewer import threejs
 from hsp_control.companions.viewer.analysis import (
@@ -26,6 +24,8 @@ from hsp_control.companions.viewer.commands import (
     translucent,
 )
 from hsp_control.companions.viewer.motion import Layer, RunMotion, Track
+from hsp_control.control.controller import Controller
+from hsp_control.robot import Robot, RobotState
 
 _RADIUS = 0.007  # radius of an arrow's shaft, over the robot's size
 _FULL_WIDTH = 12.0  # length over radius from which an arrow has its full radius

@@ -7,17 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.control.controller import Controller
-from hsp_control.geometry.links import LinkShape
-from hsp_control.geometry.scene import Obstacle
-from hsp_control.geometry.shapes import HalfSpace, Shape
-from hsp_control.null_space.fields import (
-    Clearance,
-    NullSpaceField,
-    ObstacleClearance,
-    PointDistance,
-)
-from hsp_control.robot import RobotState
 from hsp_control.companions.plots.palette import COLLISION, OBSTACLE, SERIES, fractions
 from hsp_control.companions.viewer import threejs
 from hsp_control.companions.viewer.analysis import acts, terms_of_type
@@ -43,6 +32,17 @@ from hsp_control.companions.viewer.obstacles import (
     obstacle_tracks,
     surface_of,
 )
+from hsp_control.control.controller import Controller
+from hsp_control.geometry.links import LinkShape
+from hsp_control.geometry.scene import Obstacle
+from hsp_control.geometry.shapes import HalfSpace, Shape
+from hsp_control.null_space.fields import (
+    Clearance,
+    NullSpaceField,
+    ObstacleClearance,
+    PointDistance,
+)
+from hsp_control.robot import RobotState
 
 # -- the shapes of links --------------------------------------------------------------
 

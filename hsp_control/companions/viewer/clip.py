@@ -6,6 +6,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hsp_control.companions.plots import palette
+from hsp_control.companions.viewer.analysis import acts, from_the_start
+from hsp_control.companions.viewer.commands import (
+    CLIP,
+    Json,
+    PageCommand,
+    forget_clip,
+    page_command,
+    typed_array,
+)
+from hsp_control.companions.viewer.motion import Track
 from hsp_control.control.controller import Controller
 from hsp_control.null_space.fields import Clearance, NullSpaceField, SelfClearance
 from hsp_control.simulation import Rollout
@@ -19,17 +30,6 @@ from hsp_control.simulation.log_series import (
     spans_of,
     unreached,
 )
-from hsp_control.companions.plots import palette
-from hsp_control.companions.viewer.analysis import acts, from_the_start
-from hsp_control.companions.viewer.commands import (
-    CLIP,
-    Json,
-    PageCommand,
-    forget_clip,
-    page_command,
-    typed_array,
-)
-from hsp_control.companions.viewer.motion import Track
 
 CLOSED_SHARE = 1 / 200
 """Gaps up to this share of the whole run are closed: nobody would see them."""

@@ -6,9 +6,6 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.control.controller import Controller
-from hsp_control.robot import Robot
-from hsp_control.simulation import Rollout
 from hsp_control.companions.plots import palette
 from hsp_control.companions.viewer.arrows import SelfMotionLayer
 from hsp_control.companions.viewer.clip import Clip, bands_of
@@ -25,6 +22,9 @@ from hsp_control.companions.viewer.run_drawing import LAYERS, RunDrawing, all_la
 from hsp_control.companions.viewer.stage import in_sight
 from hsp_control.companions.viewer.targets import paths
 from hsp_control.companions.viewer.threejs import pose_at
+from hsp_control.control.controller import Controller
+from hsp_control.robot import Robot
+from hsp_control.simulation import Rollout
 
 GHOSTS = (palette.TASK, palette.SERIES[4], palette.WARNING)
 """Colours of the second run, the third and so on."""

@@ -11,8 +11,8 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from hsp_control.cli.consoles import errors, out, working
-from hsp_control.cli.options.companions import export_formats
 from hsp_control.common.exceptions import ExportError
+from hsp_control.companions.viewer.export_format import export_formats
 
 if TYPE_CHECKING:
     from hsp_control.companions.viewer.comparison import ComparedRun

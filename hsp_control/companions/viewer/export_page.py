@@ -6,9 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from hsp_control.common.exceptions import ExportError
-from hsp_control.control.controller import Controller
-from hsp_control.robot import Robot
-from hsp_control.simulation import Rollout
 from hsp_control.companions.viewer.commands import Json
 from hsp_control.companions.viewer.comparison import (
     GHOST_OPACITY,
@@ -22,6 +19,9 @@ from hsp_control.companions.viewer.page_plots import pack_panels
 from hsp_control.companions.viewer.replay import rebuild_run
 from hsp_control.companions.viewer.transport import SceneRecorder
 from hsp_control.companions.viewer.viewer import Viewer
+from hsp_control.control.controller import Controller
+from hsp_control.robot import Robot
+from hsp_control.simulation import Rollout
 
 
 def export_html(

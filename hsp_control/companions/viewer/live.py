@@ -7,10 +7,6 @@ from typing import Any
 import numpy as np
 
 from hsp_control.common.exceptions import HspControlError, LogError, ViewerError
-from hsp_control.config.experiment import Experiment
-from hsp_control.robot import RobotState
-from hsp_control.simulation import Rollout
-from hsp_control.simulation.log_writer import LogWriter
 from hsp_control.companions.viewer.clip import Clip, bands_of, extend_clip, set_clip
 from hsp_control.companions.viewer.commands import set_status
 from hsp_control.companions.viewer.motion import COARSEST, RunMotion, motion_of
@@ -18,6 +14,10 @@ from hsp_control.companions.viewer.page_plots import plots_so_far
 from hsp_control.companions.viewer.run_drawing import RunDrawing, all_layers
 from hsp_control.companions.viewer.targets import growing_paths
 from hsp_control.companions.viewer.viewer import Viewer
+from hsp_control.config.experiment import Experiment
+from hsp_control.robot import RobotState
+from hsp_control.simulation import Rollout
+from hsp_control.simulation.log_writer import LogWriter
 
 MIN_PERIOD = 0.1  # minimum time between two messages to the page [s]
 MAX_PERIOD = 1.0  # maximum time between two messages [s]

@@ -10,12 +10,6 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import SceneError
-from hsp_control.declaration.rotation import matrix_of
-from hsp_control.geometry import shapes
-from hsp_control.geometry.enclosing import hull_corners
-from hsp_control.geometry.scene import Scene
-from hsp_control.geometry.shapes import Shape, shape_from_log
-from hsp_control.simulation import Rollout
 from hsp_control.companions.plots.palette import MUTED, OBSTACLE, SOLID
 from hsp_control.companions.viewer import threejs
 from hsp_control.companions.viewer.commands import (
@@ -28,6 +22,12 @@ from hsp_control.companions.viewer.commands import (
 )
 from hsp_control.companions.viewer.motion import Layer, RunMotion, Track
 from hsp_control.companions.viewer.robot_drawing import robot_entry
+from hsp_control.declaration.rotation import matrix_of
+from hsp_control.geometry import shapes
+from hsp_control.geometry.enclosing import hull_corners
+from hsp_control.geometry.scene import Scene
+from hsp_control.geometry.shapes import Shape, shape_from_log
+from hsp_control.simulation import Rollout
 
 ROOT = "/obstacles"
 _OPACITY, _PALE = 0.75, 0.05

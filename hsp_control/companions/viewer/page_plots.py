@@ -6,11 +6,6 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.control.controller import Controller
-from hsp_control.robot import Robot
-from hsp_control.simulation import Rollout, log_series
-from hsp_control.simulation.log_writer import LogWriter, continuous_dofs
-from hsp_control.simulation.rollout import complete_columns
 from hsp_control.companions.plots import palette
 from hsp_control.companions.viewer.analysis import expected_floor
 from hsp_control.companions.viewer.commands import (
@@ -25,6 +20,11 @@ from hsp_control.companions.viewer.packing import (
     ArrayTable,
     keyframe_rows,
 )
+from hsp_control.control.controller import Controller
+from hsp_control.robot import Robot
+from hsp_control.simulation import Rollout, log_series
+from hsp_control.simulation.log_writer import LogWriter, continuous_dofs
+from hsp_control.simulation.rollout import complete_columns
 
 
 class Series(NamedTuple):

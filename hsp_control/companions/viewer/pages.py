@@ -6,17 +6,18 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager, suppress
 from typing import Self
 
-from hsp_control.cli.consoles import compiling_told, out
+from hsp_control.cli.consoles import compiling_told, errors, out
+from hsp_control.cli.interrupts import end_in_order
 from hsp_control.common.exceptions import HspControlError, ViewerError
+from hsp_control.companions.viewer import LiveView, Viewer, transport, view_logs
+from hsp_control.companions.viewer.commands import set_caption, set_status
+from hsp_control.companions.viewer.stage import draw_background
+from hsp_control.companions.viewer.transport import PageServer, SceneRecorder
 from hsp_control.config import Experiment
 from hsp_control.config.loaded_scenario import LoadedScenario
 from hsp_control.config.view_settings import ViewSettings
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.log_writer import LogWriter
-from hsp_control.companions.viewer import LiveView, Viewer, transport, view_logs
-from hsp_control.companions.viewer.commands import set_caption, set_status
-from hsp_control.companions.viewer.stage import draw_background
-from hsp_control.companions.viewer.transport import PageServer, SceneRecorder
 
 
 class OpeningPage:
@@ -105,22 +106,21 @@ PAGE_TIMEOUT = 15.0
 class Screen:
     """Shows a run: before it, while kernels are compiled, while it runs, and after."""
 
-    def __init__(self, viewer: Viewer, page: OpeningPage) -> None:
-        self._viewer, self._page = viewer, page
+    def __init__(self) -> None:
+        self._viewer: Viewer | None = None  # None if it failed, which was said
+        self._page: OpeningPage | None = None
         self._live: LiveView | None = None
 
     @classmethod
     @contextmanager
     def open(
-        cls,
-        loaded: LoadedScenario,
-        options: argparse.Namespace,
-        announce: Callable[[str], None],
-    ) -> Iterator[Self | None]:
+        cls, options: argparse.Namespace, loaded: LoadedScenario
+    ) -> Iterator[Self]:
         """Yield a screen that shows the robot and the scene."""
-        # The page opens when a kernel has to be compiled, or when `begin` is called. If
-        # that fails, print why and yield None.
-        view = loaded.scenario.view.all_fields()
+        # The page opens when a kernel has to be compiled, or when `begin` is called.
+        end_in_order()
+        screen, view = cls(), loaded.scenario.view.all_fields()
+        said = errors if options.json else out
         with ExitStack() as stack:
             try:
                 viewer = Viewer(loaded.robot, port=options.port, **view)
@@ -128,33 +128,42 @@ class Screen:
                 draw_before(viewer, loaded)
             except ViewerError as error:
                 _say_without(error)
-                yield None
-                return
-            say = status_line(viewer.transport)
-            page = OpeningPage(viewer.url, options, announce, say)
-            stack.enter_context(page.compiling())
-            yield cls(viewer, page)
+            else:
+                screen._viewer, screen._page = (
+                    viewer,
+                    OpeningPage(
+                        viewer.url,
+                        options,
+                        lambda url: said.print(f"View: {url}"),
+                        status_line(viewer.transport),
+                    ),
+                )
+                stack.enter_context(screen._page.compiling())
+            yield screen
 
-    def begin(self, experiment: Experiment) -> bool:
-        """Show what will run, and open the page; return False if that fails."""
+    def begin(self, experiment: Experiment) -> None:
+        """Show what will run, and open the page."""
+        if self._viewer is None or self._page is None:
+            return
         try:
             self._live = LiveView(self._viewer, experiment)
         except ViewerError as error:
             _say_without(error)
-            return False
-        self._page.open()
-        return True
+        else:
+            self._page.open()
 
     def on_row(self, recorder: LogWriter) -> None:
         """Show the rows computed so far."""
         if self._live is not None:
             self._live.on_row(recorder)
 
-    def finish(self, rollout: Rollout) -> None:
-        """Show the whole run until the user closes the view."""
-        if self._live is not None:
-            self._live.finish(rollout)
-            attend(self._viewer, opened=self._page.opened)
+    def finish(self, rollout: Rollout) -> int:
+        """Show the whole run until the user closes the view; 2 if there is none."""
+        if self._viewer is None or self._page is None or self._live is None:
+            return 2
+        self._live.finish(rollout)
+        attend(self._viewer, opened=self._page.opened)
+        return 0
 
 
 def _say_without(error: ViewerError) -> None:

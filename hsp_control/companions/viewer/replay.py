@@ -7,6 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from hsp_control.common.exceptions import AccessError, HspControlError, ViewerError
+from hsp_control.companions.viewer.comparison import ComparedRun
+from hsp_control.companions.viewer.offline_page import HEIGHT, InlineView
+from hsp_control.companions.viewer.transport import SceneRecorder
+from hsp_control.companions.viewer.viewer import Viewer
 from hsp_control.config.document import Document
 from hsp_control.config.experiment import build
 from hsp_control.config.loaded_scenario import load_robot
@@ -18,10 +22,6 @@ from hsp_control.robot import Robot
 from hsp_control.robot.description.access import ANYWHERE, Access, only_within
 from hsp_control.robot.description.sources import packaged_folders
 from hsp_control.simulation import Rollout
-from hsp_control.companions.viewer.comparison import ComparedRun
-from hsp_control.companions.viewer.offline_page import HEIGHT, InlineView
-from hsp_control.companions.viewer.transport import SceneRecorder
-from hsp_control.companions.viewer.viewer import Viewer
 
 _log = logging.getLogger(__name__)
 

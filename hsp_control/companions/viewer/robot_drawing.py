@@ -11,12 +11,6 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import ModelError, RobotNotFoundError
-from hsp_control.geometry.links import part_of
-from hsp_control.robot import Robot
-from hsp_control.robot.description.loading import RobotPart
-from hsp_control.robot.description.mesh_files import candidates, find_problem
-from hsp_control.robot.description.sources import BodyShape, RobotSource
-from hsp_control.robot.description.urdf import read_urdf
 from hsp_control.companions.plots.palette import JOINT, LINK
 from hsp_control.companions.viewer import threejs
 from hsp_control.companions.viewer.commands import (
@@ -28,6 +22,12 @@ from hsp_control.companions.viewer.commands import (
     set_transform,
 )
 from hsp_control.companions.viewer.motion import RunMotion, Track, pose_tracks
+from hsp_control.geometry.links import part_of
+from hsp_control.robot import Robot
+from hsp_control.robot.description.loading import RobotPart
+from hsp_control.robot.description.mesh_files import candidates, find_problem
+from hsp_control.robot.description.sources import BodyShape, RobotSource
+from hsp_control.robot.description.urdf import read_urdf
 
 _GREY = (0.72, 0.74, 0.76, 1.0)
 _MESHES = {".dae", ".obj", ".stl"}  # formats that the page can read

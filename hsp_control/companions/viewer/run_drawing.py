@@ -5,9 +5,6 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.config.view_settings import ShownItems
-from hsp_control.control.controller import Controller
-from hsp_control.robot import Robot
 from hsp_control.companions.plots import palette
 from hsp_control.companions.viewer.analysis import from_the_start
 from hsp_control.companions.viewer.arrows import contacts, ellipsoid, self_motion
@@ -32,6 +29,9 @@ from hsp_control.companions.viewer.targets import (
     paths,
     target_markers,
 )
+from hsp_control.config.view_settings import ShownItems
+from hsp_control.control.controller import Controller
+from hsp_control.robot import Robot
 
 LAYERS = tuple(name for name in ShownItems().all_fields() if name != "grid")
 """The layers: nodes of the scene tree, and keys of ``view: show``, in their order."""

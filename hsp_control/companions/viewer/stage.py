@@ -8,8 +8,6 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array, matrix_view
-from hsp_control.config.view_settings import ViewSettings
-from hsp_control.robot import Robot
 from hsp_control.companions.plots import palette
 from hsp_control.companions.viewer import threejs
 from hsp_control.companions.viewer.commands import (
@@ -23,6 +21,8 @@ from hsp_control.companions.viewer.commands import (
     set_transform,
     translucent,
 )
+from hsp_control.config.view_settings import ViewSettings
+from hsp_control.robot import Robot
 
 _HAZE = 0.19  # share of grey in the background's colour at the horizon
 _GRID = "#8794A1"

@@ -6,8 +6,6 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.simulation import Rollout
-from hsp_control.simulation.log_series import drawn_parts, task_names, task_path
 from hsp_control.companions.plots.palette import ACTUAL, DESIRED, OBSTACLE, TASK
 from hsp_control.companions.viewer import threejs
 from hsp_control.companions.viewer.commands import (
@@ -19,6 +17,8 @@ from hsp_control.companions.viewer.commands import (
     set_trail,
 )
 from hsp_control.companions.viewer.motion import Layer, RunMotion, Track
+from hsp_control.simulation import Rollout
+from hsp_control.simulation.log_series import drawn_parts, task_names, task_path
 
 AXES = (OBSTACLE, TASK, ACTUAL)
 """x, y and z axis of a target: like red, green, blue, but safe for colour blindness."""

@@ -10,12 +10,6 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ExportError, LogError, ViewerError
-from hsp_control.config.view_settings import ViewSettings
-from hsp_control.control.controller import Controller
-from hsp_control.declaration.language import check_kind
-from hsp_control.geometry.scene import Scene
-from hsp_control.robot import Robot, RobotState
-from hsp_control.simulation import Rollout
 from hsp_control.companions.viewer import transport
 from hsp_control.companions.viewer.clip import bands_of, remove_clip, set_clip
 from hsp_control.companions.viewer.commands import (
@@ -45,6 +39,12 @@ from hsp_control.companions.viewer.stage import (
     stage_legend,
 )
 from hsp_control.companions.viewer.transport import PageServer, SceneRecorder
+from hsp_control.config.view_settings import ViewSettings
+from hsp_control.control.controller import Controller
+from hsp_control.declaration.language import check_kind
+from hsp_control.geometry.scene import Scene
+from hsp_control.robot import Robot, RobotState
+from hsp_control.simulation import Rollout
 
 StageContent = RunDrawing | Comparison | SceneDrawing
 

@@ -5,22 +5,26 @@ from argparse import Namespace
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 import hsp_control as hsp
-from hsp_control.companions.play import steering
-from hsp_control.companions.viewer.pages import OpeningPage, draw_before
-from hsp_control.companions.play.steering import PageProcess, SteeringPage
+from hsp_control.cli import main
 from hsp_control.common import adapters, kernels
 from hsp_control.common.exceptions import SimulationError, ViewerError
+from hsp_control.companions.play import steering
+from hsp_control.companions.play.live_loop import channel_pair
+from hsp_control.companions.play.playable import playable
+from hsp_control.companions.play.steering import PageProcess, SteeringPage
+from hsp_control.companions.viewer import SceneRecorder, Viewer, transport
+from hsp_control.companions.viewer.commands import unpack
+from hsp_control.companions.viewer.pages import OpeningPage, draw_before
 from hsp_control.config.loaded_scenario import load_scenario
 from hsp_control.config.source import read_document
 from hsp_control.live import OperatorRequests
-from hsp_control.companions.play.live_loop import channel_pair
-from hsp_control.companions.play.playable import playable
-from hsp_control.companions.viewer import SceneRecorder, Viewer, transport
-from hsp_control.companions.viewer.commands import unpack
+
+PLAYED = "hsp_control.companions.play.play_command.play_in_real_time"
 
 
 class Said:
@@ -140,6 +144,20 @@ def test_a_page_that_dies_before_its_key_was_held(
     page = SteeringPage(process, opening)  # type: ignore[arg-type]
     monkeypatch.setattr(steering, "_rehearse", lambda *_: None)
     with pytest.raises(ViewerError, match="before anybody held its key"):
-        steering.let_steer(page, experiment, OperatorRequests(), tmp_path / "journal")
+        page.let_steer(experiment, OperatorRequests(), tmp_path / "journal")
     assert ready == [True]  # it was open
     channel.close()
+
+
+def test_a_play_that_failed_and_was_not_reset_says_so_with_its_status(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fail(session: Any, *_: Any) -> None:
+        session.over = "the arm is too fast; reset to go on"
+
+    monkeypatch.setattr(PLAYED, fail)
+    arguments = ["paper/4_moving_obstacle", "--out", str(tmp_path), "--no-browser"]
+    assert main(["play", *arguments]) == 2
+    assert capsys.readouterr().err.endswith("hsp: the arm is too fast\n")
+    monkeypatch.setattr(PLAYED, lambda *_: None)
+    assert main(["play", *arguments]) == 0

@@ -22,7 +22,8 @@ def log() -> Rollout:
 
 def test_logs_share_panels_and_a_legend_names_them(log: Rollout) -> None:
     half = changed(log, slice(50), {"tau": 2.0 * log.tau[:50]})
-    figure = log.plot(
+    figure = plots.diagnostics_figure(
+        log,
         half,
         names=["mine", "mine,null_space.gain=20"],
         panels=["null_space", "efforts"],
@@ -46,7 +47,7 @@ def test_a_figure_for_a_paper_has_its_width_and_chosen_panels(
     log: Rollout, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for width in ("84mm", 0.084):
-        figure = log.plot(panels=["speeds", "errors"], width=width)
+        figure = plots.diagnostics_figure(log, panels=["speeds", "errors"], width=width)
         assert figure.get_figwidth() == pytest.approx(84.0 / 25.4)
     assert figure._suptitle is figure._supxlabel is None
     titles = [axes.get_title(loc="left") for axes in figure.axes]
@@ -57,9 +58,9 @@ def test_a_figure_for_a_paper_has_its_width_and_chosen_panels(
         ({"width": 84.0}, "width is 84.0; needs"),
     ):
         with pytest.raises(PlotError, match=why):
-            log.plot(**wrong)
+            plots.diagnostics_figure(log, **wrong)
     with pytest.raises(PlotError, match="there are no distances to draw"):
-        spatial()["pose"].plot(panels=["distances"])
+        plots.diagnostics_figure(spatial()["pose"], panels=["distances"])
     files = [str(log.save(tmp_path / f"{name}.npz")) for name in ("a", "b")]
     assert main(["plot", *files, "--panels", "errors, field", "--width", "9cm"]) == 0
     assert (tmp_path / "a+b-errors-field.png").stat().st_size > 10_000
@@ -94,9 +95,11 @@ def test_determinants_of_different_sizes_are_not_compared(log: Rollout) -> None:
     values = log["singular_values"].copy()
     values[:40, 1] = np.nan
     steps = changed(log, columns={"singular_values": values})
-    titles = [axes.get_title(loc="left") for axes in steps.plot().axes]
-    assert not [title for title in titles if "Determinant" in title]
-    titles = [axes.get_title(loc="left") for axes in steps.plot(paper=True).axes]
-    assert "(c)  Singular values" in titles
+    paper, diagnostics = (
+        [axes.get_title(loc="left") for axes in figure(steps).axes]
+        for figure in (plots.paper_figure, plots.diagnostics_figure)
+    )
+    assert not [title for title in diagnostics if "Determinant" in title]
+    assert "(c)  Singular values" in paper
     with pytest.raises(PlotError, match="no determinant to draw, or none that compare"):
-        log.plot(steps, panels=["determinant"])
+        plots.diagnostics_figure(log, steps, panels=["determinant"])

@@ -29,6 +29,8 @@ from hsp_control import (
     Rollout,
     simulate,
 )
+from hsp_control.companions.plots import palette, world
+from hsp_control.companions.viewer.targets import read_targets
 from hsp_control.geometry import Scene
 from hsp_control.geometry.shapes import (
     Box,
@@ -46,9 +48,6 @@ from hsp_control.simulation.log_series import predicted_decay
 from hsp_control.tasks.feedback import ErrorPart
 from hsp_control.trajectories import Circle as Round
 from hsp_control.trajectories import Spin
-from hsp_control.companions.plots import palette
-from hsp_control.companions.plots import world
-from hsp_control.companions.viewer.targets import read_targets
 
 pytestmark = pytest.mark.slow
 A = np.tril(np.ones((3, 3)))

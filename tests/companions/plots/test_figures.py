@@ -19,6 +19,7 @@ from matplotlib.figure import Figure, SubFigure
 
 import hsp_control.companions.plots as plots
 from hsp_control import Rollout
+from hsp_control.cli import main
 from hsp_control.common.exceptions import PlotError
 
 pytestmark = pytest.mark.slow
@@ -71,6 +72,30 @@ def test_what_cannot_be_written_says_why(
     (tmp_path / "file").touch()
     with pytest.raises(PlotError, match=r"run-paper\.png: cannot write the picture"):
         plots.save_figures(logs["rest"], tmp_path / "file", "run")
+
+
+def test_plot_draws_beside_the_log(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = planar(4).save(tmp_path / "run.npz")
+    assert main(["plot", str(log)]) == 0
+    figures = list(tmp_path.glob("*.png"))
+    assert len(figures) >= 2
+    printed = capsys.readouterr().out
+    assert all(f"Figure: {figure}" in printed for figure in figures)
+    assert all(figure.stat().st_size > 10_000 for figure in figures)
+
+
+@pytest.mark.parametrize(("log", "message"), [
+    ("nowhere.npz", "hsp: nowhere.npz: no such file"),
+    (__file__, "not a complete .npz log"),
+    ("mine.yaml", "not a log; hsp run mine.yaml writes one"),
+])  # fmt: skip
+def test_what_is_no_log_is_not_drawn(
+    log: str, message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["plot", log]) == 2
+    assert message in capsys.readouterr().err
 
 
 @pytest.mark.system

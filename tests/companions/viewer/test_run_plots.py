@@ -3,8 +3,6 @@
 import pytest
 
 from hsp_control import Rollout, load_experiment
-from hsp_control.config import Experiment
-from hsp_control.simulation.log_writer import LogWriter as Rows
 from hsp_control.companions.viewer import (
     ComparedRun,
     InlineView,
@@ -17,6 +15,8 @@ from hsp_control.companions.viewer.page_plots import (
     plots_of,
     plots_so_far,
 )
+from hsp_control.config import Experiment
+from hsp_control.simulation.log_writer import LogWriter as Rows
 
 MOVING = "paper/4_moving_obstacle"
 

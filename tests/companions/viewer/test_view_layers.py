@@ -14,18 +14,6 @@ from hsp_control import (
     Rollout,
     load_experiment,
 )
-from hsp_control.geometry.shapes import (
-    Box,
-    Capsule,
-    Cylinder,
-    HalfSpace,
-    HeightField,
-    PointCloud,
-    Shape,
-    Sphere,
-)
-from hsp_control.null_space.fields import Clearance
-from hsp_control.null_space.metrics import MetricSample
 from hsp_control.companions.viewer import (
     ComparedRun,
     LiveView,
@@ -41,6 +29,18 @@ from hsp_control.companions.viewer.clearances import capsules, zone
 from hsp_control.companions.viewer.commands import CAPTION, CLIP, unpack
 from hsp_control.companions.viewer.motion import motion_of
 from hsp_control.companions.viewer.run_drawing import LAYERS
+from hsp_control.geometry.shapes import (
+    Box,
+    Capsule,
+    Cylinder,
+    HalfSpace,
+    HeightField,
+    PointCloud,
+    Shape,
+    Sphere,
+)
+from hsp_control.null_space.fields import Clearance
+from hsp_control.null_space.metrics import MetricSample
 
 PLANAR, SPATIAL = "paper/4_moving_obstacle", "panda_obstacle"
 

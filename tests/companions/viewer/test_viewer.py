@@ -11,6 +11,10 @@ from clips import Clip, Recorder, told
 
 from hsp_control import Obstacle, Robot, Rollout, load_experiment
 from hsp_control.common.exceptions import ViewerError
+from hsp_control.companions.viewer import Viewer, robot_of, view_logs
+from hsp_control.companions.viewer.commands import CAMERA, CAPTION, CLIP
+from hsp_control.companions.viewer.motion import motion_of
+from hsp_control.companions.viewer.threejs import _Y_TO_Z
 from hsp_control.geometry import Scene
 from hsp_control.geometry.shapes import (
     Box,
@@ -24,10 +28,6 @@ from hsp_control.geometry.shapes import (
     Sphere,
 )
 from hsp_control.trajectories import Hold
-from hsp_control.companions.viewer import Viewer, robot_of, view_logs
-from hsp_control.companions.viewer.commands import CAMERA, CAPTION, CLIP
-from hsp_control.companions.viewer.motion import motion_of
-from hsp_control.companions.viewer.threejs import _Y_TO_Z
 
 pytestmark = pytest.mark.process
 

@@ -23,7 +23,6 @@ from tornado.websocket import websocket_connect
 
 from hsp_control import Robot, Rollout, load_experiment
 from hsp_control.common.exceptions import ExportError, ViewerError
-from hsp_control.geometry import Scene
 from hsp_control.companions.viewer import (
     SceneRecorder,
     Viewer,
@@ -39,6 +38,7 @@ from hsp_control.companions.viewer.commands import (
     key_of,
 )
 from hsp_control.companions.viewer.transport import PageServer, page_key
+from hsp_control.geometry import Scene
 
 pytestmark = pytest.mark.process
 
