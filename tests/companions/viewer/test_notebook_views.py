@@ -13,7 +13,8 @@ import pytest
 from browsers import HARMLESS, until
 
 import hsp_control as hsp
-from hsp_control import Rollout, Viewer, load_experiment
+from hsp_control import Rollout, load_experiment
+from hsp_control.companions.viewer import Viewer
 from hsp_control.config.experiment import Experiment
 
 pytestmark = pytest.mark.browser
@@ -112,8 +113,10 @@ def test_a_viewer_is_shown_after_its_server_has_ended(
 def test_runs_are_shown_without_any_server(
     browser: Any, tmp_path: Path, experiment: Experiment, rollout: Rollout
 ) -> None:
-    first = hsp.show(rollout, controller=experiment.controller, speed=0.5)
-    second = hsp.show(rollout, robot=experiment.robot, height=300, background="#14202B")
+    first = hsp.viewer.show(rollout, controller=experiment.controller, speed=0.5)
+    second = hsp.viewer.show(
+        rollout, robot=experiment.robot, height=300, background="#14202B"
+    )
     assert repr(first).startswith("InlineView(0.")
     assert f"{first.size / 1e6:.1f} MB in this notebook" in first._repr_html_()
     assert "127.0.0.1" not in first._repr_html_()

@@ -1,4 +1,4 @@
-// The player's bar: buttons, the time line with its bands, and the keys of docs/view.md.
+// The player's bar: buttons, the time line with its bands, and the keys of docs/companions/view.md.
 // Bands on the time line tell when a limit, a singularity or an obstacle acted on the law: one row
 // per kind. A band under the pointer, or with the focus, is named with its times; a click goes to
 // its start. While the player's time is inside a band, its caption stands above the bar.

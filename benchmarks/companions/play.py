@@ -1,6 +1,6 @@
 """How well the loop of `hsp play` keeps pace while pages draw.
 
-    .venv/bin/python benchmarks/play.py
+    .venv/bin/python benchmarks/companions/play.py
 
 A row is due every 10 ms of real time. For each configuration the same session goes on
 without a page, with a page in a browser that draws by software, and with one that takes
@@ -15,7 +15,6 @@ from time import monotonic
 from typing import Any
 
 import numpy as np
-from marked_sections import RESULTS, replace_section
 
 from hsp_control.companions.film.chromium import headless_browser
 from hsp_control.companions.play import Picture, Session, play
@@ -23,7 +22,9 @@ from hsp_control.companions.play.playable import playable
 from hsp_control.companions.viewer import Viewer
 from hsp_control.companions.viewer.transport import PageServer
 
-sys.path.append(str(Path(__file__).parents[1] / "tests" / "support"))
+sys.path.append(str(Path(__file__).parents[1]))
+sys.path.append(str(Path(__file__).parents[2] / "tests/companions/support"))
+from marked_sections import RESULTS, replace_section
 from pages import Steering
 
 CONFIGURATIONS = ("panda_obstacle", "dual_panda", "whole_body/talos_circle")
