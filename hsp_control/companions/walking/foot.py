@@ -5,6 +5,7 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import PlanError
+from hsp_control.companions.walking.fed import Fed, FedOrientation
 from hsp_control.companions.walking.footsteps import Footstep, near
 from hsp_control.companions.walking.polygon import convex_hull
 from hsp_control.companions.walking.swing import Swing, turned
@@ -13,7 +14,6 @@ from hsp_control.control.controller import Controller
 from hsp_control.control.evolution import Switched
 from hsp_control.robot import RobotState
 from hsp_control.trajectories import ComposedPose
-from hsp_control.trajectories.fed import Fed, FedOrientation
 from hsp_control.trajectories.switch import Switch
 
 SLOPE = 0.02
