@@ -9,6 +9,7 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.companions.play.live_loop import Mirror
 from hsp_control.companions.play.session import Session
+from hsp_control.companions.plots.log_series import distance_label, joint_names
 from hsp_control.companions.plots.palette import SERIES
 from hsp_control.companions.viewer import Viewer
 from hsp_control.companions.viewer.clearances import capsules, distances, influence
@@ -31,7 +32,7 @@ from hsp_control.null_space.fields import FieldSum, NullSpaceField, Rest
 from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.fields.weight import sample_weight
 from hsp_control.simulation import Rollout
-from hsp_control.simulation.log_series import distance_label, joint_names, unreached
+from hsp_control.simulation.measures import unreached
 
 FRAME = 1.0 / 30.0  # time between two pictures [s]
 _FIELD_LAYERS = ("influence", "distances", "capsules")

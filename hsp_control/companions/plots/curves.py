@@ -8,12 +8,8 @@ from matplotlib.transforms import ScaledTranslation
 
 from hsp_control.common.arrays import Array
 from hsp_control.companions.plots import palette
-from hsp_control.simulation import Rollout
-from hsp_control.simulation.log_series import (
-    LIMITED,
+from hsp_control.companions.plots.log_series import (
     MAX_NAMED,
-    column_unit,
-    effort_units,
     field_terms,
     held_period,
     joint_names,
@@ -21,10 +17,16 @@ from hsp_control.simulation.log_series import (
     limit,
     lively,
     logged_distances,
-    position_units,
     predicted_decay,
-    rate_unit,
     spans_of,
+)
+from hsp_control.simulation import Rollout
+from hsp_control.simulation.measures import (
+    LIMITED,
+    column_unit,
+    effort_units,
+    position_units,
+    rate_unit,
     task_errors,
 )
 

@@ -25,14 +25,14 @@ from matplotlib.lines import Line2D
 
 from hsp_control.common.exceptions import PlotError
 from hsp_control.common.suggestions import did_you_mean, listing
-from hsp_control.companions.plots import curves, palette
+from hsp_control.companions.plots import curves, log_series, palette
 from hsp_control.companions.plots.frames import (
     columns_for,
     draw_frames,
     draw_superimposed,
 )
 from hsp_control.companions.plots.paths import draw_end_effector
-from hsp_control.simulation import Rollout, log_series
+from hsp_control.simulation import Rollout, measures
 
 STYLE: dict[str, Any] = {
     "axes.axisbelow": True,
@@ -149,7 +149,7 @@ def paper_figure(
         a.set_anchor("NW")
         curves.draw_joint_positions(b, rollout, absolute=absolute)
         third, title = PANELS[
-            "determinant" if log_series.rows_compare(rollout) else "singular_values"
+            "determinant" if measures.rows_compare(rollout) else "singular_values"
         ]
         third(c, rollout)
         strip, together = lower.subfigures(1, 2, width_ratios=(1.9, 1.0))
@@ -246,8 +246,8 @@ def diagnostics_figure(
 def _chosen_panels(runs: Sequence[Rollout], panels: Sequence[str]) -> list[str]:
     """Return the panels that are asked for, or all that can be drawn of all runs."""
     can = {
-        "determinant": all(map(log_series.rows_compare, runs)),
-        "distances": all(map(log_series.distances, runs)),
+        "determinant": all(map(measures.rows_compare, runs)),
+        "distances": all(map(measures.distances, runs)),
         "terms": all(len(log_series.field_terms(run)) > 1 for run in runs),
     }
     for name in panels:

@@ -25,7 +25,7 @@ from hsp_control.geometry import shapes
 from hsp_control.geometry.shapes import Shape
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
-from hsp_control.simulation.log_series import task_names
+from hsp_control.simulation.measures import task_names
 
 INSTALL = "pip install 'hsp_control[rerun]'"
 TIMELINE = "t"

@@ -6,13 +6,13 @@ from typing import TypeVar
 import numpy as np
 
 from hsp_control.common.arrays import Array
+from hsp_control.companions.plots.log_series import held_period
 from hsp_control.control.controller import Controller
 from hsp_control.law import MetricSample
 from hsp_control.null_space.fields import NullSpaceField
 from hsp_control.null_space.fields.field import terms_of
 from hsp_control.robot import RobotState
 from hsp_control.simulation import Rollout
-from hsp_control.simulation.log_series import held_period
 
 _Term = TypeVar("_Term", bound=NullSpaceField)
 

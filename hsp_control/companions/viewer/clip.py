@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsp_control.companions.plots import palette
+from hsp_control.companions.plots.log_series import spans_of
 from hsp_control.companions.viewer.analysis import acts, from_the_start
 from hsp_control.companions.viewer.commands import (
     CLIP,
@@ -22,14 +23,7 @@ from hsp_control.null_space.fields import Clearance, NullSpaceField, SelfClearan
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.limit_excess import POSITION, VELOCITY
 from hsp_control.simulation.log_columns import logged_terms
-from hsp_control.simulation.log_series import (
-    FAR,
-    LIMITED,
-    OUT,
-    Unreached,
-    spans_of,
-    unreached,
-)
+from hsp_control.simulation.measures import FAR, LIMITED, OUT, Unreached, unreached
 
 CLOSED_SHARE = 1 / 200
 """Gaps up to this share of the whole run are closed: nobody would see them."""

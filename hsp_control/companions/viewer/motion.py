@@ -8,10 +8,11 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
+from hsp_control.companions.plots.log_series import drawn_parts
 from hsp_control.companions.viewer.commands import LegendEntry, PageCommand
 from hsp_control.robot import Robot, RobotState
 from hsp_control.simulation import Rollout
-from hsp_control.simulation.log_series import drawn_parts, task_names
+from hsp_control.simulation.measures import task_names
 
 FINEST = 0.01  # minimum time between two drawn rows [s]
 COARSEST = 1 / 30

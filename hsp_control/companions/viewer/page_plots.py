@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.companions.plots import palette
+from hsp_control.companions.plots import log_series, palette
 from hsp_control.companions.viewer.analysis import expected_floor
 from hsp_control.companions.viewer.commands import (
     PLOTS,
@@ -22,7 +22,7 @@ from hsp_control.companions.viewer.packing import (
 )
 from hsp_control.control.controller import Controller
 from hsp_control.robot import Robot
-from hsp_control.simulation import Rollout, log_series
+from hsp_control.simulation import Rollout, measures
 from hsp_control.simulation.log_writer import LogWriter, continuous_dofs
 from hsp_control.simulation.rollout import complete_columns
 
@@ -62,7 +62,7 @@ def panels_of(
 ) -> Iterator[Panel]:
     """Yield the plots of a log, without those whose columns it lacks."""
     errors, kinds = [], list[str]()
-    for part in log_series.task_errors(rollout):
+    for part in measures.task_errors(rollout):
         name, color = f"{part.label} [{part.unit}]", palette.task(part.task)
         errors.append(Series(name, part.norm, color, part.unit == "rad"))
         kinds.append(part.unit)
@@ -72,7 +72,7 @@ def panels_of(
     period = log_series.held_period(rollout)
     yield Panel(
         "Null-space error ‖e_N‖",
-        log_series.rate_unit(rollout),
+        measures.rate_unit(rollout),
         list(_null_space(rollout, controller)),
         logarithmic=True,
         note=f"effort held for {1e3 * period:g} ms" if period else "",
@@ -89,18 +89,18 @@ def panels_of(
     named = len(log_series.lively(rollout.tau))
     some = f"{named} of {len(joints)}" if named < len(joints) else ""
     positions, what = log_series.joint_positions(rollout)
-    curves, unit = _lines(positions, joints, log_series.position_units(rollout))
+    curves, unit = _lines(positions, joints, measures.position_units(rollout))
     yield Panel(what.capitalize() + "s", unit, curves, note=some)
-    if log_series.rows_compare(rollout):
-        unit = log_series.column_unit(rollout, "manipulability")
+    if measures.rows_compare(rollout):
+        unit = measures.column_unit(rollout, "manipulability")
         curves = [Series("det(J W⁻¹ Jᵀ)", rollout["manipulability"], palette.TASK)]
         yield Panel("Determinant", unit, curves)
     name = str(rollout.meta.get("field", "field")).replace("_", " ")
     value = Series(name, rollout["field.value"], palette.FIELD)
-    unit = log_series.column_unit(rollout, "field.value")
+    unit = measures.column_unit(rollout, "field.value")
     if np.ptp(value.values) > 0.0:
         yield Panel("Value of the field", unit, [value])
-    curves, unit = _lines(rollout.tau, joints, log_series.effort_units(rollout))
+    curves, unit = _lines(rollout.tau, joints, measures.effort_units(rollout))
     yield Panel("Efforts τ", unit, curves, note=some)
 
 

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
+from hsp_control.companions.plots.log_series import drawn_parts, task_path
 from hsp_control.companions.plots.palette import ACTUAL, DESIRED, OBSTACLE, TASK
 from hsp_control.companions.viewer import threejs
 from hsp_control.companions.viewer.commands import (
@@ -18,7 +19,7 @@ from hsp_control.companions.viewer.commands import (
 )
 from hsp_control.companions.viewer.motion import Layer, RunMotion, Track
 from hsp_control.simulation import Rollout
-from hsp_control.simulation.log_series import drawn_parts, task_names, task_path
+from hsp_control.simulation.measures import task_names
 
 AXES = (OBSTACLE, TASK, ACTUAL)
 """x, y and z axis of a target: like red, green, blue, but safe for colour blindness."""

@@ -29,7 +29,8 @@ from hsp_control import (
     Rollout,
     simulate,
 )
-from hsp_control.companions.plots import palette, world
+from hsp_control.companions.plots import log_series, palette, world
+from hsp_control.companions.plots.log_series import predicted_decay
 from hsp_control.companions.viewer.targets import read_targets
 from hsp_control.geometry import Scene
 from hsp_control.geometry.shapes import (
@@ -43,8 +44,7 @@ from hsp_control.geometry.shapes import (
     Sphere,
 )
 from hsp_control.null_space.metrics import CoordinatesMetric
-from hsp_control.simulation import log_series
-from hsp_control.simulation.log_series import predicted_decay
+from hsp_control.simulation import measures
 from hsp_control.tasks.feedback import ErrorPart
 from hsp_control.trajectories import Circle as Round
 from hsp_control.trajectories import Spin
@@ -151,7 +151,7 @@ def test_a_task_of_a_user_s_own_says_itself_what_is_drawn() -> None:
     arm = Arm()
     tool = Tool(arm.tcp, arm.circle([1.0, 0.0, 0.0]), axes="xzy", gains=GAINS)
     log = arm.run(tool)
-    parts = log_series.task_errors(log)
+    parts = measures.task_errors(log)
     assert [(part.label, part.unit) for part in parts] == [
         ("panda_tcp x and z", "mm"),
         ("panda_tcp y", "m"),

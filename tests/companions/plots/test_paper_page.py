@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from places import ROOT
 
 from hsp_control import Rollout, load_experiment
+from hsp_control.companions.plots.log_series import joint_positions
 from hsp_control.config import Experiment
-from hsp_control.simulation.log_series import joint_positions
 
 Array = NDArray[np.float64]
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from hsp_control import Rollout, load_experiment
+from hsp_control.companions.plots.log_series import spans_of
 from hsp_control.companions.viewer.clip import bands_of
 from hsp_control.config.experiment import Experiment
-from hsp_control.simulation.log_series import spans_of
 
 FAST = (
     "simulation.control_period=null",

@@ -9,6 +9,7 @@ import hsp_control.companions.plots as plots
 from hsp_control import Rollout, load_experiment
 from hsp_control.cli import main
 from hsp_control.common.exceptions import ExportError
+from hsp_control.companions.plots.log_series import held_period
 from hsp_control.companions.viewer import ComparedRun, export_html
 from hsp_control.companions.viewer.analysis import expected_floor
 from hsp_control.companions.viewer.packing import ArrayTable
@@ -18,7 +19,6 @@ from hsp_control.companions.viewer.page_plots import (
     pack_panels,
     panels_of,
 )
-from hsp_control.simulation.log_series import held_period
 
 PLANAR = "paper/4_moving_obstacle"
 
