@@ -7,8 +7,7 @@ from importlib import import_module
 from typing import Any
 
 from hsp_control.cli.interrupts import INTERRUPTED, end_in_order, is_command
-from hsp_control.cli.options.command_line import command_line
-from hsp_control.cli.options.companions import AddedCommand
+from hsp_control.cli.options import AddedCommand, command_line
 from hsp_control.common.exceptions import HspControlError
 
 _OWN_FILES = {"check", "doctor", "inspect", "live"}

@@ -11,7 +11,7 @@ from places import ROOT
 
 import hsp_control
 from hsp_control import load_experiment
-from hsp_control.cli.options.command_line import command_line
+from hsp_control.cli.options import command_line
 from hsp_control.common.resources import bundled_configs, bundled_robots
 from hsp_control.config.view_settings import ShownItems
 from hsp_control.null_space.fields.weight import sample_weight

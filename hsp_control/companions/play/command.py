@@ -8,8 +8,12 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hsp_control.cli.options.companions import AddedCommand, CommandPage
-from hsp_control.cli.options.shared import add_configuration, add_import
+from hsp_control.cli.options import (
+    AddedCommand,
+    CommandPage,
+    add_configuration,
+    add_import,
+)
 from hsp_control.common.exceptions import LiveError
 from hsp_control.companions.viewer.command import add_page
 

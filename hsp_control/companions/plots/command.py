@@ -4,7 +4,7 @@ import argparse
 import re
 from pathlib import Path
 
-from hsp_control.cli.options.companions import AddedCommand
+from hsp_control.cli.options import AddedCommand
 
 
 def _add_options(plot: argparse.ArgumentParser) -> None:

@@ -8,8 +8,7 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
 
-from hsp_control.cli.options.companions import AddedCommand, CommandPage
-from hsp_control.cli.options.shared import add_strict
+from hsp_control.cli.options import AddedCommand, CommandPage, add_strict
 from hsp_control.companions.viewer.export_format import export_formats
 
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from hsp_control.cli.options.companions import loaded
+from hsp_control.cli.options import loaded
 
 if TYPE_CHECKING:
     from hsp_control.companions.viewer.comparison import ComparedRun

@@ -17,9 +17,8 @@ import pytest
 from places import ON_MUJOCO
 
 from hsp_control import Rollout, __version__
-from hsp_control.cli import doctor, main
+from hsp_control.cli import doctor, main, options
 from hsp_control.cli.interrupts import DeferredInterrupt
-from hsp_control.cli.options import companions
 
 MOVING = "paper/4_moving_obstacle"
 SHORT = ["--set", "simulation.duration=0.1"]
@@ -423,7 +422,7 @@ def test_a_package_whose_command_is_broken_stops_no_other(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     broken = EntryPoint("fly", "no_such_package.command:FLY", "hsp_control.commands")
-    monkeypatch.setattr(companions, "entry_points", lambda group: {"fly": broken})
+    monkeypatch.setattr(options, "entry_points", lambda group: {"fly": broken})
     assert main(["schema"]) == 0
     told = "hsp: 'fly' cannot be imported from no_such_package.command:FLY: No module"
     assert told in capsys.readouterr().err

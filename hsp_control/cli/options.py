@@ -1,23 +1,18 @@
-"""All commands and their options; nothing slow is imported: help comes at once."""
+"""All commands and their options; nothing slow is imported: help comes at once.
+
+What a companion adds is named by entry points; no import does.
+"""
 
 import argparse
 import re
-from collections.abc import Sequence
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
-from hsp_control.cli.options.companions import (
-    AddedCommand,
-    add_page,
-    added_commands,
-)
-from hsp_control.cli.options.shared import (
-    add_configuration,
-    add_import,
-    add_strict,
-    complete,
-)
-from hsp_control.common.resources import bundled_robots
+from hsp_control.common.entry_points import entry_points
+from hsp_control.common.resources import bundled_configs, bundled_robots
 from hsp_control.common.suggestions import did_you_mean
 from hsp_control.common.version import __version__
 
@@ -119,7 +114,7 @@ def _command(
 
 
 def _add(
-    added: Sequence[tuple[str, AddedCommand]],
+    added: "Sequence[tuple[str, AddedCommand]]",
     commands: "argparse._SubParsersAction[Parser]",
 ) -> None:
     """Add commands of companions."""
@@ -191,3 +186,142 @@ def add_live(live: argparse.ArgumentParser) -> None:
         help="real-time priority of the loop (SCHED_FIFO), 1 to 99",
     )
     add_page("live", live)
+
+
+# --- what several commands have -------------------------------------------------------
+
+
+def add_configuration(
+    parser: argparse.ArgumentParser, or_else: str = "", default: str | None = None
+) -> None:
+    """Add the configuration that a command is about, and what changes it."""
+    config = parser.add_argument(
+        "config",
+        nargs=None if default is None else "?",
+        default=default,
+        metavar="CONFIG",
+        help=f"{or_else}a bundled name such as paper/4_moving_obstacle, a YAML file, "
+        "or a log",
+    )
+    complete(config, bundled_configs)
+    add_overrides(parser)
+    add_strict(parser)
+
+
+def add_overrides(parser: argparse.ArgumentParser) -> None:
+    """Add `--set`."""
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        dest="overrides",
+        metavar="KEY=VALUE",
+        help="override a value, such as simulation.duration=2; may be repeated",
+    )
+
+
+def add_strict(parser: argparse.ArgumentParser) -> None:
+    """Add what files a configuration may name."""
+    parser.add_argument(
+        "--strict",
+        action="store_true",
+        help="for untrusted files: read only files beside them and bundled ones, and "
+        "admit only our own types",
+    )
+    parser.add_argument(
+        "--allow",
+        action="append",
+        default=[],
+        type=Path,
+        metavar="DIR|PACKAGE",
+        help="another folder to read from, or a package to admit types of; means "
+        "--strict; may be repeated",
+    )
+
+
+def add_import(parser: argparse.ArgumentParser) -> None:
+    """Add which Python files are run first."""
+    parser.add_argument(
+        "--import",
+        action="append",
+        default=[],
+        type=Path,
+        dest="imports",
+        metavar="FILE.py",
+        help="run this Python file first, whose functions and types the configuration "
+        "may name: it may do anything, so none with --strict; may be repeated",
+    )
+
+
+def complete(action: argparse.Action, names: Callable[[], Iterable[str]]) -> None:
+    """Have shells complete an argument by names and by files."""
+
+    def completer(prefix: str, **_: object) -> list[str]:
+        from argcomplete.completers import FilesCompleter
+
+        files = FilesCompleter(("yaml", "npz", "urdf", "xacro"))(prefix)
+        return [*(name for name in names() if name.startswith(prefix)), *files]
+
+    vars(action)["completer"] = completer
+
+
+# --- what companions add --------------------------------------------------------------
+
+
+class AddedCommand(NamedTuple):
+    """A command: an entry point of ``hsp_control.commands`` with the command's name.
+
+    Its module is imported for every help text: what is slow is imported by `run`.
+
+    Attributes:
+        help: What it does, in a line.
+        add_options: Adds its options to its parser.
+        run: Runs it; returns the exit status.
+        own_interrupts: Whether it ends in order at Ctrl-C, instead of at once.
+        place: Where the help lists it: below zero before `hsp live`, smaller first.
+    """
+
+    help: str
+    add_options: Callable[[argparse.ArgumentParser], object]
+    run: Callable[[argparse.Namespace], int]
+    own_interrupts: bool = False
+    place: int = 0
+
+
+class CommandPage(NamedTuple):
+    """A page that shows what `hsp run` or `hsp live` does.
+
+    It is an entry point of ``hsp_control.pages`` with the command's name, and imported
+    as an `AddedCommand` is.
+
+    Attributes:
+        add_options: Adds its options to the command's parser.
+        open: Opens it, given the options and what the command is about: a context with
+            what the command tells, or None if the options ask for no page.
+    """
+
+    add_options: Callable[[argparse.ArgumentParser], object]
+    open: Callable[..., AbstractContextManager[Any]]
+
+
+def added_commands() -> list[tuple[str, AddedCommand]]:
+    """Return the commands that companions and other packages add, in their order."""
+    return sorted(loaded("commands"), key=lambda each: each[1].place)
+
+
+def add_page(command: str, parser: argparse.ArgumentParser) -> None:
+    """Add the options of a command's page, if a companion has one."""
+    page: CommandPage | None = dict(loaded("pages")).get(command)
+    if page is not None:
+        page.add_options(parser)
+    parser.set_defaults(open_page=page.open if page else lambda *_: nullcontext())
+
+
+def loaded(group: str) -> Iterator[tuple[str, Any]]:
+    """Yield what can be imported; what cannot is told, and stops no other command."""
+    for name, entry in sorted(entry_points(group).items()):
+        try:
+            yield name, entry.load()
+        except (ImportError, AttributeError) as error:
+            told = f"hsp: {name!r} cannot be imported from {entry.value}: {error}"
+            print(told, file=sys.stderr)
