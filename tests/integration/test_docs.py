@@ -13,7 +13,7 @@ import hsp_control
 from hsp_control import load_experiment
 from hsp_control.cli.options import command_line
 from hsp_control.common.resources import bundled_configs, bundled_robots
-from hsp_control.config.view_settings import ShownItems
+from hsp_control.config.scenario import ShownItems
 from hsp_control.null_space.fields.weight import sample_weight
 from hsp_control.robot import RobotDescription
 from hsp_control.simulation import InitialState, StartPose

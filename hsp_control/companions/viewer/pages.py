@@ -15,7 +15,7 @@ from hsp_control.companions.viewer.stage import draw_background
 from hsp_control.companions.viewer.transport import PageServer, SceneRecorder
 from hsp_control.config import Experiment
 from hsp_control.config.loaded_scenario import LoadedScenario
-from hsp_control.config.view_settings import ViewSettings
+from hsp_control.config.scenario import ViewSettings
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.log_writer import LogWriter
 

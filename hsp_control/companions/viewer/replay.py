@@ -13,9 +13,8 @@ from hsp_control.companions.viewer.transport import SceneRecorder
 from hsp_control.companions.viewer.viewer import Viewer
 from hsp_control.config.document import Document
 from hsp_control.config.experiment import build
-from hsp_control.config.loaded_scenario import load_robot
+from hsp_control.config.loaded_scenario import load_robot, validate
 from hsp_control.config.scenario import Scenario
-from hsp_control.config.validation import validate
 from hsp_control.control.controller import Controller
 from hsp_control.declaration.language import check_kind
 from hsp_control.robot import Robot

@@ -29,7 +29,7 @@ from hsp_control.companions.viewer.targets import (
     paths,
     target_markers,
 )
-from hsp_control.config.view_settings import ShownItems
+from hsp_control.config.scenario import ShownItems
 from hsp_control.control.controller import Controller
 from hsp_control.robot import Robot
 

@@ -21,7 +21,7 @@ from hsp_control.companions.viewer.commands import (
     set_transform,
     translucent,
 )
-from hsp_control.config.view_settings import ViewSettings
+from hsp_control.config.scenario import ViewSettings
 from hsp_control.robot import Robot
 
 _HAZE = 0.19  # share of grey in the background's colour at the horizon

@@ -39,7 +39,7 @@ from hsp_control.companions.viewer.stage import (
     stage_legend,
 )
 from hsp_control.companions.viewer.transport import PageServer, SceneRecorder
-from hsp_control.config.view_settings import ViewSettings
+from hsp_control.config.scenario import ViewSettings
 from hsp_control.control.controller import Controller
 from hsp_control.declaration.language import check_kind
 from hsp_control.geometry.scene import Scene
