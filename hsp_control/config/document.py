@@ -18,9 +18,14 @@ from hsp_control.config.yaml_reader import (
     read_yaml,
 )
 from hsp_control.declaration.families import only_packages
-from hsp_control.declaration.keys import KeyPath, split_assignment, written
 from hsp_control.declaration.language import in_yaml, shortened, shown, spoken
-from hsp_control.declaration.located import locate, located
+from hsp_control.declaration.located import (
+    KeyPath,
+    locate,
+    located,
+    split_assignment,
+    written,
+)
 from hsp_control.robot.description.access import ANYWHERE
 
 

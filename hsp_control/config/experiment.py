@@ -31,8 +31,7 @@ from hsp_control.control.controller import Controller
 from hsp_control.control.estimator import Estimator, begun
 from hsp_control.control.plan import Plan
 from hsp_control.control.setup import Base
-from hsp_control.declaration.named import keyed
-from hsp_control.declaration.nested import parts_within, with_parts_replaced
+from hsp_control.declaration.nested import keyed, parts_within, with_parts_replaced
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.live.settings import LiveSettings

@@ -20,7 +20,7 @@ from hsp_control.control.compensation import Compensation
 from hsp_control.control.estimator import Estimators
 from hsp_control.control.plan import Plan
 from hsp_control.declaration import Part
-from hsp_control.declaration.named import BY_NAME
+from hsp_control.declaration.nested import BY_NAME
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.declaration.quantities import (
     READ_ONLY,
