@@ -21,9 +21,8 @@ from hsp_control.robot import Robot
 from hsp_control.robot.description.inertias import impossible_inertias
 from hsp_control.robot.description.urdf import read_urdf
 from hsp_control.simulation import Rollout
-from hsp_control.simulation.force_check import missed_forces
+from hsp_control.simulation.demand_check import missed_forces, out_of_reach
 from hsp_control.simulation.initial_state import posture_search
-from hsp_control.simulation.reach_check import out_of_reach
 
 ROUNDING = 1e-9
 """A singular value below this share of the largest one is zero but for rounding."""
