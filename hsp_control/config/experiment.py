@@ -19,10 +19,9 @@ from hsp_control.common.exceptions import (
     ModelError,
     SceneError,
 )
-from hsp_control.config.document import Document
+from hsp_control.config.document import Document, read_document
 from hsp_control.config.loaded_scenario import LoadedScenario, load_scenario
 from hsp_control.config.scenario import Scenario, ViewSettings
-from hsp_control.config.source import read_document
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits
 from hsp_control.control.changes import Change

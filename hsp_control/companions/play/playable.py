@@ -12,9 +12,8 @@ from hsp_control.common.suggestions import listing
 from hsp_control.companions.play.session import ROW
 from hsp_control.companions.plots.palette import STAGE
 from hsp_control.config import Experiment
-from hsp_control.config.document import Document
+from hsp_control.config.document import Document, read_document
 from hsp_control.config.experiment import build
-from hsp_control.config.source import read_document
 from hsp_control.geometry.links import link_shapes
 from hsp_control.robot import Robot
 from hsp_control.robot.description.sources import is_robot

@@ -12,7 +12,7 @@ from hsp_control.declaration import within
 from hsp_control.tasks import CenterOfMass, FrameOrientation, FramePose, Task
 from hsp_control.tasks.frame_task import TrackingTask
 from hsp_control.trajectories import ComposedPose
-from hsp_control.trajectories.switch import Switch
+from hsp_control.trajectories.schedule import Switch
 
 
 def composed(

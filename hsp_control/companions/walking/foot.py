@@ -14,7 +14,7 @@ from hsp_control.control.controller import Controller
 from hsp_control.control.evolution import Switched
 from hsp_control.robot import RobotState
 from hsp_control.trajectories import ComposedPose
-from hsp_control.trajectories.switch import Switch
+from hsp_control.trajectories.schedule import Switch
 
 SLOPE = 0.02
 """Slope that is none: a sole that stands is tilted by so little [-]."""

@@ -21,7 +21,7 @@ from hsp_control.control.falling import FallDetector
 from hsp_control.control.measurement import LogChannel, Measurement
 from hsp_control.control.plan import RunningPlan
 from hsp_control.robot import RobotState
-from hsp_control.trajectories.switch import Switch
+from hsp_control.trajectories.schedule import Switch
 
 LATE = 0.12
 """How long a foot without ground under it is waited for [s]."""

@@ -27,8 +27,7 @@ from hsp_control.declaration.quantities import (
 )
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import Task
-from hsp_control.trajectories.schedule import Intervals, Schedule
-from hsp_control.trajectories.switch import Switch
+from hsp_control.trajectories.schedule import Intervals, Schedule, Switch
 
 
 class SensedContact(Part, error=PlanError):

@@ -20,8 +20,8 @@ from hsp_control.companions.play.steering import PageProcess, SteeringPage
 from hsp_control.companions.viewer import SceneRecorder, Viewer, transport
 from hsp_control.companions.viewer.commands import unpack
 from hsp_control.companions.viewer.pages import OpeningPage, draw_before
+from hsp_control.config.document import read_document
 from hsp_control.config.loaded_scenario import load_scenario
-from hsp_control.config.source import read_document
 from hsp_control.live import OperatorRequests
 
 PLAYED = "hsp_control.companions.play.play_command.play_in_real_time"

@@ -10,7 +10,7 @@ from hsp_control import FramePose
 from hsp_control.common.exceptions import TrajectoryError
 from hsp_control.companions.walking.fed import Fed, FedOrientation
 from hsp_control.trajectories import ComposedPose, OrientationSample, TrajectorySample
-from hsp_control.trajectories.switch import Switch
+from hsp_control.trajectories.schedule import Switch
 
 H = 1e-6
 
