@@ -115,10 +115,7 @@ def test_it_fails_if_its_page_dies(arguments: list[str]) -> None:
     wait_until(lambda: moving(page), 120.0)
     pid = live.process.pid
     for child in map(int, Path(f"/proc/{pid}/task/{pid}/children").read_text().split()):
-        if (
-            "hsp_control.companions.play.steering"
-            in Path(f"/proc/{child}/cmdline").read_text()
-        ):
+        if "play.steering" in Path(f"/proc/{child}/cmdline").read_text():
             os.kill(child, signal.SIGKILL)
     text = live.text()
     assert live.process.returncode == 2, text
