@@ -84,3 +84,4 @@ def test_what_is_gone_is_not_known(core: Path) -> None:
     told = run(core, "hsp_control", "--help")
     assert "check" in told
     assert not {"sweep", "franka-box", "view", "play", "export"} & set(told.split())
+    assert "--view" not in run(core, "hsp_control", "run", "--help")

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from pydantic import Field
 
 from hsp_control.common.exceptions import LiveError
+from hsp_control.companions.shared import name_and_options
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import (
     ArrayField,
@@ -20,7 +21,6 @@ from hsp_control.declaration.quantities import (
     Vector3,
     read_only,
 )
-from hsp_control.live.hardware import name_and_options
 
 _Row3 = Annotated[list[Number], Field(min_length=3, max_length=3)]
 _Matrix3 = Annotated[

@@ -16,7 +16,7 @@ from hsp_control.companions.ros2.messages import (
     Time,
 )
 from hsp_control.companions.ros2.node import Node, TopicPublisher
-from hsp_control.live.hardware import rate_of
+from hsp_control.companions.shared import rate_of
 from hsp_control.simulation.control_chain import EffortSource
 from hsp_control.tasks import Task
 
