@@ -10,8 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import hsp_control as hsp
-from hsp_control.companions.plots import new_figure, paper_figure, styled
-from hsp_control.companions.plots.log_series import chosen_rows
+from hsp_control.companions.plots import chosen_rows, new_figure, paper_figure, styled
 from hsp_control.companions.plots.palette import DESIRED, INK, SERIES
 from hsp_control.companions.sweeps import sweep_figure
 from hsp_control.null_space import metrics

@@ -25,6 +25,7 @@ if TYPE_CHECKING:  # for type checkers; a help text must not import what is slow
     from .frames import draw_frame as draw_frame
     from .frames import draw_frames as draw_frames
     from .frames import draw_superimposed as draw_superimposed
+    from .log_series import chosen_rows as chosen_rows
     from .paths import draw_end_effector as draw_end_effector
 
 __getattr__, __dir__ = at_first_use(
@@ -40,6 +41,7 @@ __getattr__, __dir__ = at_first_use(
             "styled use_style"
         ),
         "frames": "draw_frame draw_frames draw_superimposed",
+        "log_series": "chosen_rows",
         "paths": "draw_end_effector",
     },
 )
