@@ -81,10 +81,10 @@ def command_line() -> argparse.ArgumentParser:
     check.add_argument("--json", action="store_true", help="print the summary as JSON")
 
     added = added_commands()
-    _add([each for each in added if each[1].place < 0], commands)
+    _add(commands, added, -1)
     add_live(_command(commands, "live", "control a simulated robot in another process"))
 
-    _add([each for each in added if each[1].place >= 0], commands)
+    _add(commands, added, 0)
 
     robots = _command(
         commands, "robots", "list the robots that can be loaded, or describe one"
@@ -96,9 +96,7 @@ def command_line() -> argparse.ArgumentParser:
     complete(name, bundled_robots)
     which.add_argument("--json", action="store_true", help="print JSON")
 
-    add_inspect(
-        _command(commands, "inspect", "say what is odd about a robot's URDF or MJCF")
-    )
+    _add(commands, added, 1)
     doctor = _command(commands, "doctor", "say what this machine lacks")
     doctor.add_argument("--json", action="store_true", help="print JSON")
     _command(commands, "schema", "print the JSON Schema of a configuration")
@@ -114,33 +112,16 @@ def _command(
 
 
 def _add(
-    added: "Sequence[tuple[str, AddedCommand]]",
     commands: "argparse._SubParsersAction[Parser]",
+    added: "Sequence[tuple[str, AddedCommand]]",
+    side: int,
 ) -> None:
-    """Add commands of companions."""
+    """Add the commands of companions whose place is on a side of zero."""
     for name, each in added:
-        command = _command(commands, name, each.help)
-        command.set_defaults(added=each)
-        each.add_options(command)
-
-
-def add_inspect(inspect: argparse.ArgumentParser) -> None:
-    """Add all options of `hsp inspect`."""
-    robot = inspect.add_argument(
-        "robot", metavar="ROBOT", help="a name, a URDF, a xacro file or an MJCF"
-    )
-    complete(robot, bundled_robots)
-    inspect.add_argument(
-        "args", nargs="*", metavar="NAME:=VALUE", help="arguments of a xacro file"
-    )
-    inspect.add_argument(
-        "--fix",
-        type=Path,
-        metavar="FILE",
-        help="write a URDF whose inertias are the nearest that a body can have",
-    )
-    inspect.add_argument("--json", action="store_true", help="print JSON")
-    add_strict(inspect)
+        if (each.place > 0) - (each.place < 0) == side:
+            command = _command(commands, name, each.help)
+            command.set_defaults(added=each)
+            each.add_options(command)
 
 
 def add_live(live: argparse.ArgumentParser) -> None:
@@ -278,7 +259,8 @@ class AddedCommand(NamedTuple):
         add_options: Adds its options to its parser.
         run: Runs it; returns the exit status.
         own_interrupts: Whether it ends in order at Ctrl-C, instead of at once.
-        place: Where the help lists it: below zero before `hsp live`, smaller first.
+        place: Where the help lists it, smaller first: below zero before `hsp live`,
+            above zero after `hsp robots`.
     """
 
     help: str

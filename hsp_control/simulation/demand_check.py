@@ -168,6 +168,18 @@ def target_of(task: FramePose | FramePosition, t: float) -> pin.SE3:
     return place
 
 
+def too_weak(robot: Robot, q: Array, limits: Array) -> Iterator[tuple[str, str]]:
+    """Yield the joints that cannot hold the robot at a configuration, and why."""
+    rest = np.zeros(robot.nv)
+    static = np.abs(robot.inverse_dynamics(q, rest, rest))
+    for k in np.flatnonzero(static > limits):
+        unit = "N·m" if robot.units[k] == "rad" else "N"
+        yield (
+            f"joint {robot.dof_names[k]!r}",
+            f"gravity asks {static[k]:.3g} {unit} of it, its limit is {limits[k]:.3g}",
+        )
+
+
 # --- commanded forces -----------------------------------------------------------------
 
 

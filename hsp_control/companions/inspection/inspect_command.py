@@ -11,8 +11,8 @@ from pathlib import Path
 from hsp_control.cli.consoles import out, working
 from hsp_control.cli.loading import robot_access
 from hsp_control.common.exceptions import ModelError
-from hsp_control.inspection import Inspection
-from hsp_control.inspection import inspect as inspect_robot
+from hsp_control.companions.inspection.findings import Inspection
+from hsp_control.companions.inspection.findings import inspect as inspect_robot
 from hsp_control.robot import RobotDescription
 from hsp_control.robot.description.access import XmlError, read_xml
 from hsp_control.robot.description.urdf import write_repaired

@@ -24,6 +24,7 @@ from hsp_control.robot.description.mesh_files import (
 )
 from hsp_control.robot.description.sources import RobotSource
 from hsp_control.robot.description.urdf import parse_urdf, problems
+from hsp_control.simulation.demand_check import too_weak
 
 Severity = Literal["error", "warning", "note"]
 """Of an error, the robot does not load; of a warning, something does not work well; a
@@ -257,18 +258,6 @@ def _cure(search: PostureSearch) -> str:
     except ConfigurationError as error:
         return str(error)
     return f"start: {search.start_line(found)}, or start: auto"
-
-
-def too_weak(robot: Robot, q: Array, limits: Array) -> Iterator[tuple[str, str]]:
-    """Yield the joints that cannot hold the robot at a configuration, and why."""
-    rest = np.zeros(robot.nv)
-    static = np.abs(robot.inverse_dynamics(q, rest, rest))
-    for k in np.flatnonzero(static > limits):
-        unit = "N·m" if robot.units[k] == "rad" else "N"
-        yield (
-            f"joint {robot.dof_names[k]!r}",
-            f"gravity asks {static[k]:.3g} {unit} of it, its limit is {limits[k]:.3g}",
-        )
 
 
 def check_strength(robot: Robot) -> Iterator[Finding]:

@@ -13,7 +13,7 @@ from robot_texts import ARM, INERTIA, joint, link, robot_xml
 
 from hsp_control import Robot
 from hsp_control.cli import main
-from hsp_control.inspection import Finding, inspect
+from hsp_control.companions.inspection.findings import Finding, inspect
 from hsp_control.robot import RobotDescription
 
 LIMIT = '<limit lower="-3" upper="3" effort="9" velocity="9"/>'
