@@ -106,9 +106,10 @@ PAGE_TIMEOUT = 15.0
 class Screen:
     """Shows a run: before it, while kernels are compiled, while it runs, and after."""
 
-    def __init__(self) -> None:
-        self._viewer: Viewer | None = None  # None if it failed, which was said
-        self._page: OpeningPage | None = None
+    def __init__(
+        self, viewer: Viewer | None = None, page: OpeningPage | None = None
+    ) -> None:
+        self._viewer, self._page = viewer, page  # None if it failed, which was said
         self._live: LiveView | None = None
 
     @classmethod
@@ -119,8 +120,8 @@ class Screen:
         """Yield a screen that shows the robot and the scene."""
         # The page opens when a kernel has to be compiled, or when `begin` is called.
         end_in_order()
-        screen, view = cls(), loaded.scenario.view.all_fields()
         said = errors if options.json else out
+        view = loaded.scenario.view.all_fields()
         with ExitStack() as stack:
             try:
                 viewer = Viewer(loaded.robot, port=options.port, **view)
@@ -128,18 +129,16 @@ class Screen:
                 draw_before(viewer, loaded)
             except ViewerError as error:
                 _say_without(error)
-            else:
-                screen._viewer, screen._page = (
-                    viewer,
-                    OpeningPage(
-                        viewer.url,
-                        options,
-                        lambda url: said.print(f"View: {url}"),
-                        status_line(viewer.transport),
-                    ),
-                )
-                stack.enter_context(screen._page.compiling())
-            yield screen
+                yield cls()
+                return
+            page = OpeningPage(
+                viewer.url,
+                options,
+                lambda url: said.print(f"View: {url}"),
+                status_line(viewer.transport),
+            )
+            stack.enter_context(page.compiling())
+            yield cls(viewer, page)
 
     def begin(self, experiment: Experiment) -> None:
         """Show what will run, and open the page."""
