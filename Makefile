@@ -32,12 +32,12 @@ LOOK := --set 'title=The same hand path. Only one elbow avoids the ball.' \
   --set 'view.background="\#10171E"'
 demo: $(USE) ## the paper's run, and a Panda under a ball, with and without its field
 	@echo "Running paper/4_moving_obstacle; the first run compiles its kernels, once ..."
-	@$(BIN)/hsp run paper/4_moving_obstacle --out out/demo --no-view
+	@$(BIN)/hsp run paper/4_moving_obstacle --out out/demo
 	@$(BIN)/hsp plot out/demo/4_moving_obstacle.npz --out out/demo
 	@echo "Running panda_obstacle, with its field and without ..."
-	@$(BIN)/hsp run panda_obstacle --out out/demo --no-view $(LOOK)
+	@$(BIN)/hsp run panda_obstacle --out out/demo $(LOOK)
 	@mv out/demo/panda_obstacle.npz 'out/demo/with the field.npz'
-	@$(BIN)/hsp run panda_obstacle --out out/demo --no-view $(LOOK) \
+	@$(BIN)/hsp run panda_obstacle --out out/demo $(LOOK) \
 	  --set null_space.fields.0.weight=0 --set null_space.fields.1.weight=0
 	@mv out/demo/panda_obstacle,*.npz out/demo/without.npz
 	@$(BIN)/hsp export 'out/demo/with the field.npz' out/demo/without.npz \
@@ -124,7 +124,7 @@ wheel-test: wheel ## build the wheel, install it elsewhere, use it from there
 	cd "$$dir/cwd"; export PATH="$$dir/venv/bin:$$PATH"; unset PYTHONPATH; \
 	hsp robots; \
 	hsp check paper/4_moving_obstacle; \
-	hsp run paper/4_moving_obstacle --set simulation.duration=1 --out out --no-view; \
+	hsp run paper/4_moving_obstacle --set simulation.duration=1 --out out; \
 	hsp export out/4_moving_obstacle,*.npz --html out/page.html; \
 	compiled=$$(find "$$dir/venv" -path '*/hsp_control/*/__pycache__/*.nbc'); \
 	if [ -n "$$compiled" ]; then echo "Compiled, though the wheel has code: $$compiled"; exit 1; fi; \

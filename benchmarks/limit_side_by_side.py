@@ -29,13 +29,13 @@ from standing import TALOS, Standing
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
+from hsp_control.companions.plots import new_figure, styled
+from hsp_control.companions.plots.palette import INK, SERIES
 from hsp_control.config import Experiment
 from hsp_control.constraints.limits import RobotLimits
 from hsp_control.control.actuation import Status
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants import RigidBodyPlant
-from hsp_control.visualization.palette import INK, SERIES
-from hsp_control.visualization.plots import new_figure, styled
 
 PERIOD = 1e-3  # [s]
 ARMS_STRENGTH = 0.2  # of two Pandas' efforts; at 0.25 one joint of each is at its limit

@@ -10,8 +10,8 @@ from matplotlib.colors import LogNorm
 from matplotlib.image import AxesImage
 from robustness import COLUMNS, ROWS, means
 
-from hsp_control.visualization.palette import INK
-from hsp_control.visualization.plots import new_figure, styled
+from hsp_control.companions.plots import new_figure, styled
+from hsp_control.companions.plots.palette import INK
 
 FILE = FIGURES / "robustness.png"
 SHOWN = {"error": "task error [mm]", "e_N": "‖e_N‖ [rad/s]"}

@@ -23,6 +23,8 @@ from timing import Compute, State, step_times
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
+from hsp_control.companions.plots import new_figure, styled
+from hsp_control.companions.plots.palette import SERIES as SERIES_COLORS
 from hsp_control.geometry.shapes import Sphere
 from hsp_control.null_space.fields import (
     InverseCondition,
@@ -35,8 +37,6 @@ from hsp_control.null_space.fields import (
     Transmission,
 )
 from hsp_control.trajectories import ComposedPose, HoldOrientation, TrajectorySample
-from hsp_control.visualization.palette import SERIES as SERIES_COLORS
-from hsp_control.visualization.plots import new_figure, styled
 
 DOCUMENT, FIGURE = RESULTS / "speed.md", FIGURES / "scaling.png"
 GAINS = hsp.Gains(natural_frequency=10.0)

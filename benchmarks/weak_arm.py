@@ -17,9 +17,9 @@ from matplotlib.figure import Figure
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
+from hsp_control.companions.plots import new_figure, styled
+from hsp_control.companions.plots.palette import INK, SERIES
 from hsp_control.control.actuation import Status
-from hsp_control.visualization.palette import INK, SERIES
-from hsp_control.visualization.plots import new_figure, styled
 
 NAME = "whole_body/talos_weak_arm"
 IDEAL = (

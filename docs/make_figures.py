@@ -10,14 +10,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import hsp_control as hsp
+from hsp_control.companions.plots import chosen_rows, new_figure, paper_figure, styled
+from hsp_control.companions.plots.palette import DESIRED, INK, SERIES
 from hsp_control.companions.sweeps import sweep_figure
 from hsp_control.null_space import metrics
 from hsp_control.null_space.fields import FunctionField
 from hsp_control.robot.integrators import Dop853, Rk4
-from hsp_control.simulation.log_series import chosen_rows
 from hsp_control.trajectories import ComposedPose, HoldOrientation
-from hsp_control.visualization.palette import DESIRED, INK, SERIES
-from hsp_control.visualization.plots import new_figure, paper_figure, styled
 
 FOLDER = Path(__file__).parent / "figures"
 GAIN, FREQUENCY = 4.0, 6.0

@@ -8,8 +8,8 @@ The names that most programs need are here. All others are in namespaces:
 ``hsp.trajectories``, ``hsp.tasks``, ``hsp.fields``, ``hsp.metrics``, ``hsp.contacts``,
 ``hsp.limits``, ``hsp.shapes``, ``hsp.changes``, ``hsp.compensation``,
 ``hsp.integrators``, ``hsp.robot``, ``hsp.plans``, ``hsp.estimation``, ``hsp.plants``,
-``hsp.simulation``, ``hsp.live``, ``hsp.config``, ``hsp.viewer`` and ``hsp.errors``;
-and each companion has one: ``hsp.walking``, ``hsp.sweeps``, ``hsp.franka`` ...
+``hsp.simulation``, ``hsp.live``, ``hsp.config`` and ``hsp.errors``; and each companion
+has one: ``hsp.viewer``, ``hsp.plots``, ``hsp.walking``, ``hsp.sweeps`` ...
 """
 
 from importlib import import_module
@@ -75,9 +75,6 @@ if TYPE_CHECKING:  # what a type checker reads; the names are looked up below
     from .trajectories import Stream as Stream
     from .trajectories import StreamOrientation as StreamOrientation
     from .trajectories import StreamPose as StreamPose
-    from .visualization import viewer as viewer
-    from .visualization.viewer import Viewer as Viewer
-    from .visualization.viewer import show as show
 
 _NAMES = {
     "robot": "Robot RobotState",
@@ -96,7 +93,6 @@ _NAMES = {
     "simulation": "Rollout simulate",
     "live": "run_loop",
     "config": "Experiment Recorder load_experiment",
-    "visualization.viewer": "Viewer show",
     "common.exceptions": "HspControlError",
 }
 """The public names, by the room from which each is imported at its first use."""
@@ -120,7 +116,6 @@ _NAMESPACES = {
     "simulation": "simulation",
     "tasks": "tasks",
     "trajectories": "trajectories",
-    "viewer": "visualization.viewer",
 }
 """The public namespaces, and the room that each stands for."""
 

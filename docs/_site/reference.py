@@ -10,7 +10,7 @@ from names import names_page, namespace_pages
 from sphinx.application import Sphinx
 from yaml_keys import yaml_page
 
-from hsp_control.cli.options.command_line import command_line
+from hsp_control.cli.options import command_line
 
 SCHEMA = "../configs/hsp_control.schema.json"
 RESULTS = "../benchmarks/results"

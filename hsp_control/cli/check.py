@@ -16,14 +16,12 @@ from hsp_control.common.suggestions import listing
 from hsp_control.config import Experiment
 from hsp_control.control import Controller, ControlOutput, Diagnostics
 from hsp_control.control.first_state import warn_of_jump, warn_of_slow_efforts
-from hsp_control.inspection.inspect import too_weak
 from hsp_control.robot import Robot
 from hsp_control.robot.description.inertias import impossible_inertias
 from hsp_control.robot.description.urdf import read_urdf
 from hsp_control.simulation import Rollout
-from hsp_control.simulation.force_check import missed_forces
+from hsp_control.simulation.demand_check import missed_forces, out_of_reach, too_weak
 from hsp_control.simulation.initial_state import posture_search
-from hsp_control.simulation.reach_check import out_of_reach
 
 ROUNDING = 1e-9
 """A singular value below this share of the largest one is zero but for rounding."""

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import asdict
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn, track
@@ -18,12 +18,11 @@ from rich.table import Table
 from hsp_control.cli import check as checks
 from hsp_control.cli import robot_table
 from hsp_control.cli.consoles import errors as _errors
-from hsp_control.cli.consoles import message_of, working
+from hsp_control.cli.consoles import message_of
 from hsp_control.cli.consoles import out as _out
 from hsp_control.cli.interrupts import INTERRUPTED, DeferredInterrupt
 from hsp_control.cli.loading import read
 from hsp_control.cli.run_summary import Stopwatch, summary
-from hsp_control.common.entry_points import entry_points
 from hsp_control.common.exceptions import LogError, SimulationError
 from hsp_control.config import Experiment, json_schema
 from hsp_control.config.loaded_scenario import LoadedScenario, load_scenario
@@ -33,8 +32,18 @@ from hsp_control.simulation import Rollout
 from hsp_control.simulation.log_writer import LogWriter
 from hsp_control.simulation.measures import measures
 
-if TYPE_CHECKING:
-    from hsp_control.cli.pages import Screen
+
+class _Page(Protocol):
+    """What a companion shows of a run."""
+
+    def begin(self, experiment: Experiment) -> None:
+        """Show what will run."""
+
+    def on_row(self, recorder: LogWriter) -> None:
+        """Show the rows computed so far."""
+
+    def finish(self, rollout: Rollout) -> int:
+        """Show the whole run until its user closes it; return the exit status."""
 
 
 def run(options: argparse.Namespace) -> int:
@@ -43,16 +52,11 @@ def run(options: argparse.Namespace) -> int:
     options.out.mkdir(parents=True, exist_ok=True)  # fails before the work, not after
     log = _log_of(Path(loaded.document.name), options)
     tell = _tell_json if options.json else _tell
-    if not options.view:
-        return _run_and_save(_built(loaded), log, tell, None)
-    from hsp_control.cli.pages import Screen
-
-    said = _errors if options.json else _out
-    with Screen.open(loaded, options, lambda url: said.print(f"View: {url}")) as screen:
+    with options.open_page(options, loaded) as page:
         experiment = _built(loaded)
-        if screen is not None and screen.begin(experiment):
-            return _run_and_save(experiment, log, tell, screen)
-        return max(_run_and_save(experiment, log, tell, None), 2)
+        if page is not None:
+            page.begin(experiment)
+        return _run_and_save(experiment, log, tell, page)
 
 
 _LONGEST = 120  # of a file's name, without its ending
@@ -92,11 +96,11 @@ def _run_and_save(
     experiment: Experiment,
     log: Path,
     tell: Callable[[Rollout, Path, Stopwatch], None],
-    screen: "Screen | None",
+    page: _Page | None,
 ) -> int:
     status, journal = 0, log.with_suffix(".journal")  # readable if we are killed
     stopwatch = Stopwatch()
-    on_row = screen.on_row if screen else None
+    on_row = page.on_row if page is not None else None
     with DeferredInterrupt() as interrupts:
         try:
             rollout = _run_with_progress(
@@ -127,8 +131,8 @@ def _run_and_save(
     tell(rollout, log, stopwatch)
     for line in checks.advice_of_run(experiment, rollout):
         print(f"hsp: {line}", file=sys.stderr)
-    if screen is not None:
-        screen.finish(rollout)
+    if page is not None:
+        status = max(status, page.finish(rollout))
     return status
 
 
@@ -157,46 +161,6 @@ def _saved_elsewhere(rollout: Rollout, log: Path, error: LogError) -> Path:
         raise error from None
     print(f"hsp: {message_of(error)}; the log is saved elsewhere", file=sys.stderr)
     return elsewhere
-
-
-def view(options: argparse.Namespace) -> int:
-    """Show logs in the browser."""
-    from hsp_control.cli.pages import show_logs
-
-    show_logs(options)
-    return 0
-
-
-def plot(options: argparse.Namespace) -> int:
-    """Draw the figures of logs, or of a file whose ending a companion knows."""
-    first = options.logs[0]
-    others = entry_points("plots")
-    if other := others.get(first.suffix.removeprefix(".")):
-        return int(other.load()(options))
-    from hsp_control.visualization import plots
-
-    runs = [Rollout.load(log) for log in options.logs]
-    folder, formats = options.out or first.parent, options.formats or ["png"]
-    names = [log.stem for log in options.logs]
-    panels, absolute = re.findall(r"[^,\s]+", options.panels), not options.relative
-    with working("Drawing"):
-        if runs[1:] or panels or options.width:
-            figure = plots.diagnostics_figure(
-                *runs,
-                names=names,
-                panels=panels,
-                width=options.width,
-                absolute=absolute,
-            )
-            stem = f"{'+'.join(names)}-{'-'.join(panels) or 'diagnostics'}"
-            files = plots.save_figure(figure, folder / file_name(stem), formats)
-        else:
-            files = plots.save_figures(
-                runs[0], folder, names[0], formats, absolute=absolute
-            )
-    for file in files:
-        _out.print(f"Figure: {file}")
-    return 0
 
 
 def robots(options: argparse.Namespace) -> int:

@@ -87,6 +87,12 @@ def end_quietly(_: int, __: FrameType | None) -> None:
     os._exit(INTERRUPTED)
 
 
+def end_in_order() -> None:
+    """From now on Ctrl-C raises `KeyboardInterrupt`: there is something to close."""
+    if signal.getsignal(signal.SIGINT) is end_quietly:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
 def guard_imports() -> None:
     """Let Ctrl-C end the process at once, if the process is ``hsp``."""
     unchanged = signal.getsignal(signal.SIGINT) is signal.default_int_handler

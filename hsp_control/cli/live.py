@@ -20,7 +20,6 @@ from hsp_control.cli.live_experiment import (
 from hsp_control.cli.loading import read
 from hsp_control.cli.robot_process import RobotProcess
 from hsp_control.cli.run_summary import excess_rows
-from hsp_control.cli.steering import let_steer, steering_page
 from hsp_control.common.exceptions import LiveError, LogError
 from hsp_control.config import Experiment
 from hsp_control.config.loaded_scenario import load_scenario
@@ -38,7 +37,6 @@ from hsp_control.live import (
 )
 from hsp_control.live.hardware import AdaptingHardware, LocatedHardware
 from hsp_control.live.operator_requests import stop_signals
-from hsp_control.play.live_loop import PAGE_ENDED
 from hsp_control.simulation import Rollout
 
 _DRY_RUN = 0.5  # duration of the run before that compiles the kernels [s]
@@ -58,13 +56,6 @@ def live(options: argparse.Namespace) -> int:
             "--faults and --cameras are for the simulated robot: leave them out with "
             "--robot"
         )
-    if options.robot is not None and options.steer == "simulated":
-        raise LiveError(
-            "--steer: a page that moves a real robot needs a dead-man's key; say "
-            "--steer hardware"
-        )
-    if options.steer is None and (options.port, options.host) != (None, "127.0.0.1"):
-        raise LiveError("--port and --host are those of a page: they need --steer")
     name = Path(loaded.document.name).stem
     loop_log = options.out / f"{name}-live.journal"
     robot_log = options.out / f"{name}-robot.journal"
@@ -72,7 +63,7 @@ def live(options: argparse.Namespace) -> int:
     on_period: list[Callable[[float], object]] = []
     publisher: Publisher | None = None
     with ExitStack() as stack:
-        page = stack.enter_context(steering_page(options, loaded.scenario))
+        page = stack.enter_context(options.open_page(options, loaded.scenario))
         experiment = Experiment.of(loaded)
         check_live(experiment)
         stack.enter_context(stop_signals(requests, takes_over=True))
@@ -129,7 +120,7 @@ def live(options: argparse.Namespace) -> int:
             publisher = publish(options.publish, command)
             on_period.append(publisher)
         if page is not None:
-            on_period.append(let_steer(page, experiment, requests, loop_log))
+            on_period.append(page.let_steer(experiment, requests, loop_log))
         if hardware is not None:
             report = run(hardware)
             out.print(_times(report, experiment))
@@ -137,7 +128,7 @@ def live(options: argparse.Namespace) -> int:
             _convert(loop_log)
             fault = getattr(hardware, "fault", None)
             ends = {"completed", "operator"}
-            if fault is None and report.ended in ends and report.reason != PAGE_ENDED:
+            if fault is None and report.ended in ends and not requests.fault:
                 return 0
             told = fault is None or fault in report.reason
             print(f"hsp: {report.reason if told else fault}", file=sys.stderr)
@@ -158,7 +149,7 @@ def live(options: argparse.Namespace) -> int:
     _print_ends(report, robot_report)
     _convert(loop_log, link=counts, injected=link.injected)
     _convert(robot_log)
-    asked = report.ended == "operator" and report.reason != PAGE_ENDED
+    asked = report.ended == "operator" and not requests.fault
     regular = report.ended == "completed" or (asked and duration == inf)
     if not regular:
         print(f"hsp: {report.reason}", file=sys.stderr)

@@ -5,9 +5,8 @@ from pathlib import Path
 
 from hsp_control.common.exceptions import AccessError
 from hsp_control.config import Experiment
-from hsp_control.config.document import Document
+from hsp_control.config.document import Document, read_document
 from hsp_control.config.experiment import build
-from hsp_control.config.source import read_document
 from hsp_control.declaration.imported import import_file
 from hsp_control.robot.description.access import ANYWHERE, Access, only_within
 from hsp_control.robot.description.sources import is_path

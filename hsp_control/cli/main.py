@@ -1,20 +1,16 @@
 """Parse the command line, run one command, and turn every error into one message."""
 
 import os
-import signal
 import sys
 from collections.abc import Sequence
 from importlib import import_module
 from typing import Any
 
-from hsp_control.cli.interrupts import INTERRUPTED, end_quietly, is_command
-from hsp_control.cli.options.command_line import command_line
-from hsp_control.cli.options.companions import AddedCommand
+from hsp_control.cli.interrupts import INTERRUPTED, end_in_order, is_command
+from hsp_control.cli.options import AddedCommand, command_line
 from hsp_control.common.exceptions import HspControlError
 
-_OWN_INTERRUPTS = {"export", "play", "view"}
-"""Commands that must close processes and pages, or save rows, at Ctrl-C."""
-_OWN_FILES = {"check", "doctor", "export", "inspect", "live", "play"}
+_OWN_FILES = {"check", "doctor", "live"}
 """Commands with a file of their own; `commands` has the others."""
 _PACKAGES = {"libgomp.so.1": "libgomp1 (Debian, Ubuntu) or libgomp (Fedora)"}
 """What has a library that the wheels of our dependencies expect."""
@@ -45,16 +41,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # Commands are imported only when needed, so that `hsp --help` answers at once.
         from hsp_control.cli import consoles
 
-        # With other commands Ctrl-C ends the process at once, as during start-up: there
-        # is nothing to save, and an exception may get lost in callbacks of libraries.
+        # Else Ctrl-C ends the process at once, as during start-up: there is nothing to
+        # save, and an exception may get lost in callbacks of libraries.
         added: AddedCommand | None = getattr(options, "added", None)
-        ends_in_order = (
-            added.own_interrupts
-            if added is not None
-            else options.command in _OWN_INTERRUPTS or getattr(options, "view", False)
-        )
-        if ends_in_order and signal.getsignal(signal.SIGINT) is end_quietly:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
+        if added is not None and added.own_interrupts:
+            end_in_order()
         run = _function_of(options.command) if added is None else added.run
         from hsp_control.declaration.language import in_yaml
 

@@ -8,7 +8,7 @@ from rich.table import Table
 
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.limit_excess import POSITION, VELOCITY
-from hsp_control.simulation.log_series import (
+from hsp_control.simulation.measures import (
     FAR,
     OUT,
     effort_units,

@@ -1,10 +1,9 @@
 """What installed packages add, and what companions in this one do: entry points."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from importlib import import_module, metadata
 from importlib.metadata import EntryPoint
 from pathlib import Path
-from typing import Any
 
 _PACKAGE = Path(__file__).parents[1]
 
@@ -28,25 +27,6 @@ def _is_there(entry: EntryPoint) -> bool:
     place = _PACKAGE.parent.joinpath(*entry.module.split("."))
     files = place.with_suffix(".py"), place / "__init__.py"
     return not is_ours(entry) or any(file.is_file() for file in files)
-
-
-def at_first_use(
-    package: str, names: Mapping[str, str]
-) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """Return a package's ``__getattr__`` and ``__dir__``: names are imported when used.
-
-    Args:
-        package: Its ``__name__``.
-        names: Its modules, each with the public names that it has, between spaces.
-    """
-    homes = {name: module for module, there in names.items() for name in there.split()}
-
-    def attribute(name: str) -> Any:
-        if name not in homes:
-            raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        return getattr(import_module(f"{package}.{homes[name]}"), name)
-
-    return attribute, lambda: sorted(homes)
 
 
 def own_names(module: str) -> Callable[[], list[str]]:

@@ -7,8 +7,8 @@ from .experiment import Experiment as Experiment
 from .experiment import load_experiment as load_experiment
 from .recorder import Recorder as Recorder
 from .scenario import Scenario as Scenario
+from .scenario import ShownItems as ShownItems
+from .scenario import ViewSettings as ViewSettings
 from .scenario import json_schema as json_schema
-from .view_settings import ShownItems as ShownItems
-from .view_settings import ViewSettings as ViewSettings
 
 __dir__ = own_names(__name__)

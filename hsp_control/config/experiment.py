@@ -19,11 +19,9 @@ from hsp_control.common.exceptions import (
     ModelError,
     SceneError,
 )
-from hsp_control.config.document import Document
+from hsp_control.config.document import Document, read_document
 from hsp_control.config.loaded_scenario import LoadedScenario, load_scenario
-from hsp_control.config.scenario import Scenario
-from hsp_control.config.source import read_document
-from hsp_control.config.view_settings import ViewSettings
+from hsp_control.config.scenario import Scenario, ViewSettings
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits
 from hsp_control.control.changes import Change
@@ -32,8 +30,7 @@ from hsp_control.control.controller import Controller
 from hsp_control.control.estimator import Estimator, begun
 from hsp_control.control.plan import Plan
 from hsp_control.control.setup import Base
-from hsp_control.declaration.named import keyed
-from hsp_control.declaration.nested import parts_within, with_parts_replaced
+from hsp_control.declaration.nested import keyed, parts_within, with_parts_replaced
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.live.settings import LiveSettings

@@ -30,7 +30,7 @@ class Recorder:
             while running:
                 output = controller.compute(t, q, v)
                 recorder.record(output)
-        recorder.rollout.plot()
+        hsp.plots.diagnostics_figure(recorder.rollout)
 
     `hsp run` repeats it in simulation, if the robot was loaded by `Robot.load`, the
     parts are data and no Python functions, and t begins at 0.

@@ -3,16 +3,16 @@
 Each ``type:`` selects a class of a family. Units are SI: metres, radians, seconds.
 """
 
+import re
 from collections.abc import Sequence
 from copy import deepcopy
 from dataclasses import KW_ONLY, field
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, TypeAdapter
+from pydantic import AfterValidator, BeforeValidator, Field, TypeAdapter
 from pydantic.json_schema import GenerateJsonSchema
 
-from hsp_control.common.exceptions import ConfigError
-from hsp_control.config.view_settings import ViewSettings
+from hsp_control.common.exceptions import ConfigError, ViewerError
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits, LimitsOrNone
 from hsp_control.control.changes import Change
@@ -20,9 +20,16 @@ from hsp_control.control.compensation import Compensation
 from hsp_control.control.estimator import Estimators
 from hsp_control.control.plan import Plan
 from hsp_control.declaration import Part
-from hsp_control.declaration.named import BY_NAME
+from hsp_control.declaration.nested import BY_NAME
 from hsp_control.declaration.plain_data import plain_data
-from hsp_control.declaration.quantities import READ_ONLY, Name, ReadOnlyDict
+from hsp_control.declaration.quantities import (
+    READ_ONLY,
+    Flag,
+    Name,
+    Positive,
+    ReadOnlyDict,
+    Vector3,
+)
 from hsp_control.geometry.scene import Scene
 from hsp_control.live.settings import LiveSettings
 from hsp_control.null_space.settings import NullSpaceSettings
@@ -31,6 +38,72 @@ from hsp_control.simulation.initial_state import InitialState, StartOrAuto
 from hsp_control.simulation.plants import AnyPlant, RigidBody
 from hsp_control.simulation.simulate import SimulationSettings
 from hsp_control.tasks import Task
+
+_COLOR = "^#[0-9A-Fa-f]{6}$"
+
+
+def _color(value: object) -> object:
+    if value is None:
+        raise ValueError(
+            'nothing given; write a colour in quotes, "#14202B": # begins a comment'
+        )
+    if isinstance(value, str) and not re.match(_COLOR, value):
+        raise ValueError(f"{value!r} is not a colour, such as '#14202B'")
+    return value
+
+
+Color = Annotated[str, Field(pattern=_COLOR), BeforeValidator(_color)]
+"""A colour as ``#RRGGBB``."""
+
+
+class ShownItems(Part, error=ViewerError):
+    """What is shown at first; the rows of the page's legend switch each."""
+
+    _: KW_ONLY
+    paths: Flag = True
+    """The past references of the tasks, and the past motion [-]."""
+    targets: Flag = True
+    """The present references of the tasks [-]."""
+    obstacles: Flag = True
+    """The obstacles [-]."""
+    solids: Flag = True
+    """The solid things of the plant, which the robot may touch [-]."""
+    influence: Flag = True
+    """The influence zones of the obstacles [-]."""
+    distances: Flag = True
+    """The shortest distances of the clearance fields [-]."""
+    capsules: Flag = False
+    """The shapes of the links that clearance fields and minimum distances measure
+    [-]."""
+    ellipsoid: Flag = False
+    """The manipulability ellipsoid of the tasks' frames [-]."""
+    self_motion: Flag = True
+    """Null-space velocity and projected field, at the joints that self-motion moves
+    most [-]."""
+    contacts: Flag = True
+    """The contacts and their forces [-]."""
+    grid: Flag = True
+    """The grid on the floor [-]."""
+
+
+class ViewSettings(Part, error=ViewerError):
+    """The 3-D view."""
+
+    _: KW_ONLY
+    camera: Vector3 | None = None
+    """Position of the camera [m]; by default the whole robot is visible."""
+    target: Vector3 | None = None
+    """Point that the camera looks at [m]; by default the centre of the scene."""
+    speed: Positive = 1.0
+    """Playback speed: seconds of motion in one second [-]."""
+    loop: Flag = False
+    """Whether playback repeats [-]."""
+    background: Color = "#FFFFFF"
+    """Background colour, as ``#RRGGBB`` [-]; text is light on a dark background."""
+    light: Positive = 1.0
+    """Brightness of the light [-]; 1 is a bright room."""
+    show: ShownItems = ShownItems()
+    """What is shown at first."""
 
 
 class Scenario(Part, error=ConfigError):

@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from hsp_control.declaration.keys import KeyPath
 from hsp_control.declaration.language import shown
+from hsp_control.declaration.located import KeyPath
 
 TAG = "tag:yaml.org,2002:"
 

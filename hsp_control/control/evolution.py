@@ -11,8 +11,7 @@ from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import RobotLimits
 from hsp_control.null_space.fields.weight import Weight
 from hsp_control.robot import RobotState
-from hsp_control.trajectories.schedule import smooth_step
-from hsp_control.trajectories.switch import Switch
+from hsp_control.trajectories.schedule import Switch, smooth_step
 
 Value = TypeVar("Value", float, Array)
 

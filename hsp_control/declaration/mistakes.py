@@ -19,8 +19,8 @@ from pydantic_core import ErrorDetails
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.common.suggestions import did_you_mean, listing, nearest
 from hsp_control.declaration.families import Declared
-from hsp_control.declaration.keys import KeyPath, written
 from hsp_control.declaration.language import joined, kind, misfit, shown, spoken
+from hsp_control.declaration.located import KeyPath, written
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.declaration.schema import (
     ValueTypes,

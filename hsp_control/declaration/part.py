@@ -23,10 +23,13 @@ from pydantic_core import CoreSchema
 from hsp_control.common.exceptions import HspControlError, ImmutableError
 from hsp_control.declaration.any_of import AnyOf
 from hsp_control.declaration.families import Declared, Family, same, value_fields
-from hsp_control.declaration.in_python import with_parts_made
+from hsp_control.declaration.in_python import (
+    PlainSignature,
+    with_fields,
+    with_parts_made,
+)
 from hsp_control.declaration.mistakes import Carrier, argument_error
 from hsp_control.declaration.plain_data import plain_data
-from hsp_control.declaration.signature import PlainSignature, with_fields
 
 
 def attribute_docstrings(cls: type) -> dict[str, str]:

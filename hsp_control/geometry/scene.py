@@ -12,8 +12,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SceneError, TrajectoryError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.declaration import Part
-from hsp_control.declaration.named import BY_NAME, stored
-from hsp_control.declaration.nested import parts_within
+from hsp_control.declaration.nested import BY_NAME, parts_within, stored
 from hsp_control.declaration.quantities import ArrayField, Name
 from hsp_control.geometry.shapes import Shape
 from hsp_control.trajectories import (

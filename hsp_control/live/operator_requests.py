@@ -12,16 +12,18 @@ class OperatorRequests:
 
     Attributes:
         reason: Why the operator requested a stop; None without a request.
+        fault: Whether it was no operator: nobody could have requested one any more.
     """
 
     def __init__(self) -> None:
         self.reason: str | None = None
+        self.fault = False
         self._changes: deque[Callable[[], object]] = deque()
 
-    def stop(self, reason: str = "the operator's stop") -> None:
+    def stop(self, reason: str = "the operator's stop", *, fault: bool = False) -> None:
         """Request a safe stop; the first reason is kept."""
         if self.reason is None:
-            self.reason = reason
+            self.reason, self.fault = reason, fault
 
     def call(self, change: Callable[[], object]) -> None:
         """Request that a change is made between two periods, for example a new task.

@@ -1,18 +1,213 @@
-"""Metrics: the numbers that summarise a run."""
+"""What a log says of a run: errors, forces, units, and the numbers that sum it up."""
 
-from typing import NamedTuple
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hsp_control.common.arrays import Array
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.limit_excess import POSITION, VELOCITY
-from hsp_control.simulation.log_series import (
-    column_unit,
-    distances,
-    effort_unit,
-    task_errors,
-)
+
+_EFFORT_UNITS = {"rad": "N·m", "m": "N"}
+
+
+class LoggedErrorPart(NamedTuple):
+    """The components of a task's error that have the same unit."""
+
+    # the task's name, and the name of the part if there are several, or if it has no
+    # unit
+    label: str
+    unit: str  # the components' unit
+    task: int  # the task's index among the tasks
+    norm: Array  # the components' Euclidean norm at every row, shape (N,)
+
+
+def task_names(rollout: Rollout) -> list[str]:
+    """Return the tasks' names in the controller's order."""
+    return list(rollout.meta.get("tasks", {}))
+
+
+def task_errors(rollout: Rollout) -> list[LoggedErrorPart]:
+    """Return the norms of all tasks' errors, with metres and radians separate."""
+    found = []
+    for index, name in enumerate(task_names(rollout)):
+        error, first = rollout[f"task.{name}.error"], 0
+        whole = ("", column_unit(rollout, f"task.{name}.error"), "", error.shape[1])
+        parts = rollout.meta["tasks"][name].get("error") or [whole]
+        for part, declared, _, size in parts:
+            unit = {"-": "–", "rad or m": position_unit(rollout)}.get(
+                declared, declared
+            )
+            label = f"{name} {part}" if len(parts) > 1 or unit == "–" else name
+            norm = np.linalg.norm(error[:, first : first + size], axis=1)
+            found.append(LoggedErrorPart(label.strip(), unit, index, norm))
+            first += size
+    return found
+
+
+def position_units(rollout: Rollout) -> list[str]:
+    """Return the unit of each dof's position: ``rad`` or ``m``."""
+    return list(map(str, rollout.meta["robot"]["units"]))
+
+
+def position_unit(rollout: Rollout) -> str:
+    """Return the unit of all joints' positions: ``rad``, ``m`` or ``rad, m``."""
+    return ", ".join(dict.fromkeys(position_units(rollout)))
+
+
+def rate_unit(rollout: Rollout) -> str:
+    """Return the unit of a norm of joint rates: ``rad/s``, ``m/s``, ``(rad, m)/s``."""
+    unit = position_unit(rollout)
+    return f"({unit})/s" if " " in unit else f"{unit}/s"
+
+
+def effort_units(rollout: Rollout) -> list[str]:
+    """Return the unit of each dof's effort: ``N·m`` or ``N``."""
+    return [_EFFORT_UNITS.get(unit, "–") for unit in position_units(rollout)]
+
+
+def effort_unit(rollout: Rollout) -> str:
+    """Return the unit of all efforts: ``N·m``, ``N``, or as the log has it."""
+    unit = position_unit(rollout)
+    return _EFFORT_UNITS.get(unit) or column_unit(rollout, "tau")
+
+
+def rows_compare(rollout: Rollout) -> bool:
+    """Return whether the tasks' rows are as many all the time.
+
+    Between determinants of different sizes there is nothing to compare.
+    """
+    sizes = np.isfinite(rollout["singular_values"]).sum(axis=1)
+    return len(np.unique(sizes)) == 1
+
+
+def distances(rollout: Rollout) -> list[str]:
+    """Return the names of the fields whose minimum distance is in the log."""
+    names = (name for name in rollout.columns if name.startswith("distance."))
+    return [name.removeprefix("distance.") for name in names]
+
+
+def column_unit(rollout: Rollout, name: str) -> str:
+    """Return the unit of a column in the log; a dash if it has none."""
+    unit = str(rollout.meta.get("columns", {}).get(name, {}).get("unit", "-"))
+    return "–" if unit == "-" else unit
+
+
+# --- targets that are far away or out of reach ---------------------------------------
+
+FAR, OUT = "target far away", "target out of reach"
+"""What is said of them, whoever says it."""
+REACHED = 0.01
+"""An error up to this length is not spoken of [m, rad or N]."""
+RESTING = 0.1
+"""An error rests if it changes by less than this share of itself in a second [1/s]."""
+STAYS = 0.3
+"""Time that it has to rest: a step begins at rest, too [s]."""
+LIMITED = 2  # the log's status from which on a limit changes the motion
+
+
+class Unreached(NamedTuple):
+    """A task and the rows in which its target is not reached."""
+
+    task: str  # its name in the log
+    # where the error is beyond the task's `largest_error` and not out of reach, shape
+    # (N,)
+    far: NDArray[np.bool_]
+    # the error that stays where the target is out of reach, else 0, shape (N,) [m or
+    # rad]: the first part of the error that is not reached
+    out: Array
+    unit: NDArray[np.object_]  # of each number of ``out``, shape (N,)
+
+    def length(self, row: int) -> str:
+        """Return the error that stays in a row."""
+        return f"{self.out[row]:.2f} {self.unit[row]}"
+
+    def words(self, row: int) -> str:
+        """Return what there is to say of a row; nothing if it is on the way there."""
+        if self.out[row] > 0.0:
+            return f"{OUT}, {self.length(row)}"
+        return FAR if self.far[row] else ""
+
+
+def unreached(
+    columns: Mapping[str, Array],
+    tasks: Mapping[str, Any],
+    moved: dict[str, float] | None = None,
+) -> Iterator[Unreached]:
+    """Yield the tasks of a log, with the rows in which they do not reach their targets.
+
+    A target is out of reach, of this robot within its limits, if an error stays that
+    the law would remove: it rests, and the law is damped at a singularity or a limit
+    binds. What friction or a load leaves, where the law is exact, is not meant; nor is
+    a target that moves on while the robot follows as near as it can. ``moved``, when
+    each part of an error moved last [s], is kept from these rows to the next ones.
+    """
+    moved = {} if moved is None else moved
+    times, none = columns["t"], np.zeros(len(columns["t"]))
+    held = (columns.get("damped", none) > 0.0) | (
+        columns.get("status", none) >= LIMITED
+    )
+    for task, described in tasks.items():
+        if f"task.{task}.error" not in columns:
+            continue
+        error, rate = columns[f"task.{task}.error"], columns[f"task.{task}.error_rate"]
+        out, units, first = none.copy(), np.full(len(times), "", object), 0
+        for part, unit, _, size in described["error"]:
+            rows = slice(first, first + size)
+            first += size
+            length = np.linalg.norm(error[:, rows], axis=1)
+            speed = np.linalg.norm(rate[:, rows], axis=1)
+            rests = held & (length > REACHED) & (speed < RESTING * length)
+            key = f"{task} {part}"
+            last = moved.get(key, times[0])
+            since = np.maximum.accumulate(np.where(rests, last, times))
+            moved[key] = float(since[-1])
+            here = rests & (times - since >= STAYS) & (out == 0.0)
+            out[here], units[here] = length[here], unit
+        # A log that says little has no such column.
+        far = columns.get(f"task.{task}.bounded", none) > 0.0
+        yield Unreached(task, far & (out == 0.0), out, units)
+
+
+# --- commanded forces ----------------------------------------------------------------
+
+
+class ForceKept(NamedTuple):
+    """What becomes of a contact's commanded force, in the rows that command one."""
+
+    contact: str  # its name
+    wanted: Array  # the commanded normal force, without feedback, shape (n,) [N]
+    planned: Array  # the planned one, likewise
+    felt: Array  # what the plant says of it, or else the planned one, shape (n,) [N]
+    lost: int  # in how many rows nothing is touched any more
+
+
+def forces_kept(rollout: Rollout) -> Iterator[ForceKept]:
+    """Yield how the contacts with a commanded force keep it."""
+    columns = rollout.columns
+    for column, about in rollout.meta["columns"].items():
+        if "normal" not in about:
+            continue
+        prefix, normal = column.removesuffix(".commanded"), np.array(about["normal"])
+        wanted = columns[column] @ normal  # NaN while the contact does not bear
+        rows = wanted > REACHED
+        if not rows.any():
+            continue
+        planned = columns[f"{prefix}.force"] @ normal
+        felt = columns.get(f"plant.contact.{about['frame']}.force")
+        felt = planned if felt is None else felt @ normal
+        added = columns.get(f"{prefix}.integral", np.zeros(len(rows)))
+        wanted, planned, felt = (
+            x[rows] for x in (wanted - added, planned - added, felt)
+        )
+        touched = felt > 0.0
+        lost = int((~touched[touched.argmax() :]).sum())
+        yield ForceKept(prefix.removeprefix("contact."), wanted, planned, felt, lost)
+
+
+# --- the numbers that sum a run up ---------------------------------------------------
 
 
 class Measure(NamedTuple):

@@ -5,7 +5,6 @@ import zipfile
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from importlib import import_module
 from pathlib import Path
 from typing import Any, Self
 
@@ -108,30 +107,6 @@ class Rollout:
         rows = zip(self.t.tolist(), self.q, self.v, strict=True)
         # Each update overwrites the state's arrays, so np.array must copy.
         return np.array([np.array(function(state.update(*row))) for row in rows])
-
-    def plot(self, *others: "Rollout", paper: bool = False, **options: Any) -> Any:
-        """Return a figure of the run, which Jupyter shows inline.
-
-        It compares the run with what the law predicts: errors, field and efforts. What
-        ``hsp plot`` saves is this and the paper's figure.
-
-        Args:
-            others: Other runs, drawn in the same panels.
-            paper: Whether it is the paper's five panels instead, of this run alone.
-            options: ``panels=["errors", "null_space"]``, ``width="84mm"`` for a figure
-                in a paper, and ``names`` of the runs; see `plots.diagnostics_figure`.
-
-        Returns:
-            The ``matplotlib.figure.Figure``.
-
-        Raises:
-            PlotError: If a log has no rows, or there is no such panel.
-        """
-        # Here: what draws is a room above, and takes long to import.
-        plots = import_module("hsp_control.visualization.plots")
-        if paper:
-            return plots.paper_figure(self, **options)
-        return plots.diagnostics_figure(self, *others, **options)
 
     def save(self, path: str | Path) -> Path:
         """Write one ``.npz`` without pickles, which NumPy can read by itself.

@@ -11,12 +11,12 @@ from places import ROOT
 
 import hsp_control
 from hsp_control import load_experiment
-from hsp_control.cli.options.command_line import command_line
+from hsp_control.cli.options import command_line
 from hsp_control.common.resources import bundled_configs, bundled_robots
+from hsp_control.config.scenario import ShownItems
 from hsp_control.null_space.fields.weight import sample_weight
 from hsp_control.robot import RobotDescription
 from hsp_control.simulation import InitialState, StartPose
-from hsp_control.visualization.viewer import ShownItems
 
 # No example starts a robot with a jump of its effort.
 pytestmark = pytest.mark.filterwarnings("error:the first effort of joint:UserWarning")
@@ -67,8 +67,8 @@ def test_the_page_of_compliance_is_true() -> None:
 
 
 PAGES_WITH_PYTHON = [
-    *("companions/sweeps", "development/kernels", "latency", "play", "robustness"),
-    "streams",
+    *("companions/play", "companions/sweeps", "development/kernels", "latency"),
+    *("robustness", "streams"),
 ]
 
 
@@ -149,7 +149,7 @@ def test_the_compensators_of_the_document_are_a_configuration() -> None:
 
 
 def test_the_view_s_document_is_true() -> None:
-    text = (ROOT / "docs" / "view.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs/companions/view.md").read_text(encoding="utf-8")
     (view,) = blocks(text, "yaml")
     configuration = {**yaml.safe_load(view), **yaml.safe_load(SMALL)}
     assert load_experiment(configuration).scenario.view.show.ellipsoid
@@ -168,7 +168,7 @@ def test_the_export_s_document_is_true(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    text = (ROOT / "docs" / "export.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs/companions/export.md").read_text(encoding="utf-8")
     known = command_line().parse_args(["export", "log.npz"])
     for option in re.findall(r"`--(?:no-)?(\w+)`", text):
         assert {"from": "first", "to": "last"}.get(option, option) in vars(known)

@@ -73,7 +73,7 @@ def test_a_joint_beyond_its_limit_is_told(case, tmp_path, capsys):
     if isinstance(config, str):
         words = [each for setting in brief for each in ("--set", setting)]
         folder = str(tmp_path)
-        assert main(["run", config, *words, "--no-view", "--out", folder]) == 0
+        assert main(["run", config, *words, "--out", folder]) == 0
         said = " ".join(capsys.readouterr().out.split())
         assert f"{name} is {told.max():.3g} rad beyond its position limit" in said
 

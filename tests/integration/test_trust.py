@@ -19,6 +19,8 @@ from hsp_control.common.exceptions import (
     SceneError,
     SimulationError,
 )
+from hsp_control.companions.plots.figures import diagnostics_figure
+from hsp_control.companions.viewer.threejs import collada_object
 from hsp_control.geometry.shapes import Mesh
 from hsp_control.robot.description.access import (
     ANYWHERE,
@@ -30,8 +32,6 @@ from hsp_control.robot.description.access import (
 )
 from hsp_control.robot.description.urdf import MAX_DOFS, MAX_LINKS
 from hsp_control.simulation import Rollout
-from hsp_control.visualization.plots.figures import diagnostics_figure
-from hsp_control.visualization.viewer.threejs import collada_object
 
 CONFIG = """robot: {name: ROBOT}
 tasks:

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, RootModel, model_validator
 
 from hsp_control.common.exceptions import ConfigError
 from hsp_control.config.document import Document
-from hsp_control.config.validation import validate
+from hsp_control.config.loaded_scenario import validate
 
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Vector3 = Annotated[list[float], Field(min_length=3, max_length=3)]

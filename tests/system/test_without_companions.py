@@ -73,7 +73,7 @@ def test_the_quick_tests_pass(core: Path) -> None:
 
 @pytest.mark.parametrize("name", ["paper/4_moving_obstacle", "panda_obstacle"])
 def test_the_demo_runs_as_before(core: Path, name: str) -> None:
-    run(core, "hsp_control", "run", name, "--out", "out", "--no-view")
+    run(core, "hsp_control", "run", name, "--out", "out")
     (log,) = (core / "out").glob(f"{Path(name).name}.npz")
     here = hsp.load_experiment(name).run()
     there = hsp.Rollout.load(log)
@@ -82,5 +82,6 @@ def test_the_demo_runs_as_before(core: Path, name: str) -> None:
 
 def test_what_is_gone_is_not_known(core: Path) -> None:
     told = run(core, "hsp_control", "--help")
-    assert "export" in told
-    assert not {"sweep", "franka-box", "franka-model"} & set(told.split())
+    assert "check" in told
+    assert not {"sweep", "franka-box", "view", "play", "export"} & set(told.split())
+    assert "--view" not in run(core, "hsp_control", "run", "--help")

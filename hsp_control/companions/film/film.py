@@ -16,10 +16,10 @@ from hsp_control.companions.film.encoding import (
     find_ffmpeg,
 )
 from hsp_control.companions.film.screenshots import frame_times, screenshots
+from hsp_control.companions.viewer.export_page import export_html
 from hsp_control.control.controller import Controller
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
-from hsp_control.visualization.viewer.export_page import export_html
 
 _MIN_SIZE, _MAX_SIZE = 64, 7680
 

@@ -3,8 +3,7 @@
 import argparse
 from pathlib import Path
 
-from hsp_control.cli.options.companions import AddedCommand
-from hsp_control.cli.options.shared import complete
+from hsp_control.cli.options import AddedCommand, complete
 from hsp_control.common.resources import bundled_robots
 
 

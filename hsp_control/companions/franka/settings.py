@@ -9,8 +9,8 @@ import yaml
 from numpy.typing import ArrayLike
 from pydantic import Field
 
-from hsp_control.common.addresses import name_and_options
 from hsp_control.common.exceptions import LiveError
+from hsp_control.companions.shared import name_and_options
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import (
     ArrayField,

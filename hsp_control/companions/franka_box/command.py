@@ -3,8 +3,7 @@
 import argparse
 from pathlib import Path
 
-from hsp_control.cli.options.companions import AddedCommand
-from hsp_control.cli.options.shared import add_configuration
+from hsp_control.cli.options import AddedCommand, add_configuration
 
 
 def _add_options(box: argparse.ArgumentParser) -> None:

@@ -12,7 +12,7 @@ from hsp_control.companions.franka.layouts import PERIOD, PORT, VERSION
 from hsp_control.companions.franka_box import Arm, Box, Server
 from hsp_control.companions.franka_box.log import BoxLog
 from hsp_control.config import Experiment
-from hsp_control.config.source import read_document
+from hsp_control.config.document import read_document
 from hsp_control.live import OperatorRequests
 from hsp_control.live.operator_requests import stop_signals
 from hsp_control.live.real_time import real_time_priority

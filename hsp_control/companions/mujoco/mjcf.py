@@ -23,7 +23,7 @@ from hsp_control.companions.mujoco.coordinates import (
     Joint,
 )
 from hsp_control.declaration import Part
-from hsp_control.declaration.named import BY_FRAME, BY_NAME, stored, stored_by_frame
+from hsp_control.declaration.nested import BY_FRAME, BY_NAME, stored, stored_by_frame
 from hsp_control.declaration.quantities import (
     ArrayField,
     Name,

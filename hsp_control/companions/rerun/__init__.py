@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from hsp_control.common.entry_points import at_first_use
+from hsp_control.companions.shared import at_first_use
 
 if TYPE_CHECKING:  # for type checkers; a help text must not import what is slow
     from .log import log_to_rerun as log_to_rerun

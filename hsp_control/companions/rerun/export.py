@@ -5,10 +5,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hsp_control.cli.options.companions import ExportFormat
+from hsp_control.companions.viewer.export_format import ExportFormat
 
 if TYPE_CHECKING:
-    from hsp_control.visualization.viewer.comparison import ComparedRun
+    from hsp_control.companions.viewer.comparison import ComparedRun
 
 
 def _write(

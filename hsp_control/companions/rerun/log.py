@@ -12,20 +12,20 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ExportError
+from hsp_control.companions.plots import palette
+from hsp_control.companions.viewer.commands import path_element
+from hsp_control.companions.viewer.motion import RunMotion
+from hsp_control.companions.viewer.obstacles import logged_shapes, triangles_of
+from hsp_control.companions.viewer.packed_scene import read_mesh
+from hsp_control.companions.viewer.replay import robot_of
+from hsp_control.companions.viewer.robot_drawing import Visual, read_visuals
+from hsp_control.companions.viewer.targets import read_targets
+from hsp_control.companions.viewer.threejs import collada_object, mesh_geometry
 from hsp_control.geometry import shapes
 from hsp_control.geometry.shapes import Shape
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
-from hsp_control.simulation.log_series import task_names
-from hsp_control.visualization import palette
-from hsp_control.visualization.viewer.commands import path_element
-from hsp_control.visualization.viewer.motion import RunMotion
-from hsp_control.visualization.viewer.obstacles import logged_shapes, triangles_of
-from hsp_control.visualization.viewer.packed_scene import read_mesh
-from hsp_control.visualization.viewer.replay import robot_of
-from hsp_control.visualization.viewer.robot_drawing import Visual, read_visuals
-from hsp_control.visualization.viewer.targets import read_targets
-from hsp_control.visualization.viewer.threejs import collada_object, mesh_geometry
+from hsp_control.simulation.measures import task_names
 
 INSTALL = "pip install 'hsp_control[rerun]'"
 TIMELINE = "t"

@@ -5,9 +5,9 @@ import re
 from collections.abc import Collection
 from typing import NamedTuple
 
-from hsp_control.common.addresses import name_and_options
 from hsp_control.common.exceptions import HardwareError
 from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.companions.shared import name_and_options
 
 SCHEME = "ros2://"
 _NAME = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from hsp_control.cli.live_experiment import of_a_robot, simulated_robot
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.companions.ros2.installed import check_installed
-from hsp_control.config.source import read_document
+from hsp_control.config.document import read_document
 from hsp_control.live import OperatorRequests
 from hsp_control.live.operator_requests import stop_signals
 from hsp_control.live.udp import CLOSED_BY_LOOP

@@ -2,7 +2,6 @@
 
 from time import time_ns
 
-from hsp_control.common.addresses import rate_of
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HardwareError
 from hsp_control.companions.ros2.address import checked_name, parse
@@ -17,6 +16,7 @@ from hsp_control.companions.ros2.messages import (
     Time,
 )
 from hsp_control.companions.ros2.node import Node, TopicPublisher
+from hsp_control.companions.shared import rate_of
 from hsp_control.simulation.control_chain import EffortSource
 from hsp_control.tasks import Task
 

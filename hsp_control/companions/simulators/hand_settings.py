@@ -8,8 +8,7 @@ from typing import Any
 
 from hsp_control.common.exceptions import ConfigError
 from hsp_control.config.document import Document
-from hsp_control.config.loaded_scenario import located_scene
-from hsp_control.config.validation import validate
+from hsp_control.config.loaded_scenario import located_scene, validate
 from hsp_control.constraints.limits import Limits, LimitsOrNone
 from hsp_control.control.compensation import Compensation
 from hsp_control.declaration import Part

@@ -10,7 +10,7 @@ import numpy as np
 from hsp_control.common.exceptions import SweepError
 from hsp_control.companions.sweeps.distributions import Choices, Distribution
 from hsp_control.companions.sweeps.spelling import values
-from hsp_control.declaration.keys import split_assignment, written
+from hsp_control.declaration.located import split_assignment, written
 
 
 @dataclass(frozen=True)

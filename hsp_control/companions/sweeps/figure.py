@@ -12,11 +12,11 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocato
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import PlotError
+from hsp_control.companions.plots import palette
+from hsp_control.companions.plots.curves import literal_text
+from hsp_control.companions.plots.figures import new_figure, save_figure, styled
 from hsp_control.companions.sweeps import Sensitivity, Sweep, sensitivity
 from hsp_control.companions.sweeps.sensitivities import has_order
-from hsp_control.visualization import palette
-from hsp_control.visualization.plots.curves import literal_text
-from hsp_control.visualization.plots.figures import new_figure, save_figure, styled
 
 MAX_PARAMETERS, MAX_OUTCOMES = 8, 6
 _LOG_RATIO = 30.0  # largest over smallest value, above which an axis is logarithmic

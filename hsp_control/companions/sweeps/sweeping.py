@@ -17,8 +17,8 @@ from hsp_control.companions.sweeps.plan import SweepPlan, document, insert
 from hsp_control.companions.sweeps.results import Sweep
 from hsp_control.companions.sweeps.running import read_result
 from hsp_control.companions.sweeps.store import Store
+from hsp_control.config.document import read_document
 from hsp_control.config.experiment import build
-from hsp_control.config.source import read_document
 
 
 def sweep(

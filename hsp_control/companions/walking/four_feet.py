@@ -8,6 +8,7 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FallError, PlanError
 from hsp_control.common.suggestions import listing
+from hsp_control.companions.walking.fed import Fed, FedOrientation
 from hsp_control.companions.walking.footsteps import Footstep, Velocity
 from hsp_control.companions.walking.legs import hip_height, leg_length
 from hsp_control.companions.walking.pendulum import GRAVITY
@@ -20,8 +21,7 @@ from hsp_control.control.falling import FallDetector
 from hsp_control.control.measurement import LogChannel, Measurement
 from hsp_control.control.plan import RunningPlan
 from hsp_control.robot import RobotState
-from hsp_control.trajectories.fed import Fed, FedOrientation
-from hsp_control.trajectories.switch import Switch
+from hsp_control.trajectories.schedule import Switch
 
 LATE = 0.12
 """How long a foot without ground under it is waited for [s]."""

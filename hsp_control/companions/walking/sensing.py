@@ -16,7 +16,7 @@ from hsp_control.control.evolution import Switched
 from hsp_control.control.measurement import LogChannel, Measurement
 from hsp_control.control.plan import Plan, PlanParts, RunningPlan
 from hsp_control.declaration import Part, within
-from hsp_control.declaration.named import BY_NAME
+from hsp_control.declaration.nested import BY_NAME
 from hsp_control.declaration.quantities import (
     READ_ONLY,
     Flag,
@@ -27,8 +27,7 @@ from hsp_control.declaration.quantities import (
 )
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import Task
-from hsp_control.trajectories.schedule import Intervals, Schedule
-from hsp_control.trajectories.switch import Switch
+from hsp_control.trajectories.schedule import Intervals, Schedule, Switch
 
 
 class SensedContact(Part, error=PlanError):

@@ -8,6 +8,7 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import PlanError
 from hsp_control.companions.walking.biped import BODY, TRUNK, BipedPlan
+from hsp_control.companions.walking.fed import Fed, FedOrientation
 from hsp_control.companions.walking.foot import Foot
 from hsp_control.companions.walking.footsteps import Footstep, Velocity, between
 from hsp_control.companions.walking.given_steps import GivenSteps
@@ -33,7 +34,6 @@ from hsp_control.control.falling import FallDetector
 from hsp_control.control.measurement import LogChannel, Measurement
 from hsp_control.control.plan import RunningPlan
 from hsp_control.robot import RobotState
-from hsp_control.trajectories.fed import Fed, FedOrientation
 
 FIRST_SHIFT = (0.4, 0.6)
 """Time to get ready, and time to shift the weight for the first step [s]."""

@@ -12,7 +12,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.control.measurement import LogChannel
 from hsp_control.declaration import Part, within
-from hsp_control.declaration.named import BY_FRAME, stored_by_frame
+from hsp_control.declaration.nested import BY_FRAME, stored_by_frame
 from hsp_control.declaration.quantities import ArrayField, NonNegative
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.integrators import Integrator

@@ -15,7 +15,7 @@ import hsp_control as hsp
 from hsp_control import Stream
 from hsp_control.cli.live_experiment import of_a_robot
 from hsp_control.common.exceptions import StreamError
-from hsp_control.config.source import read_document
+from hsp_control.config.document import read_document
 from hsp_control.trajectories.streams.inbox import Inbox
 from hsp_control.trajectories.streams.message import Space
 

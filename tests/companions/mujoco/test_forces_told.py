@@ -18,7 +18,7 @@ def test_a_wipe_that_loses_contact_is_told_before_and_after_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     fast = ["--set", "tasks.path.trajectory.angular_rate=3"]
-    short = ["--set", "simulation.duration=2", "--out", str(tmp_path), "--no-view"]
+    short = ["--set", "simulation.duration=2", "--out", str(tmp_path)]
     assert main(["run", *forced("panda_wipe", "wiper", 5), *fast, *short]) == 0
     told = capsys.readouterr()
     assert "it slides at 0.34 m/s, and the plant's surface pushes it off b" in told.err

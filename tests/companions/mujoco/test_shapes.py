@@ -9,10 +9,10 @@ from mjcf_texts import ARM, CELL
 
 from hsp_control import Robot
 from hsp_control.companions.mujoco import MujocoCoordinates
+from hsp_control.companions.viewer.robot_drawing import RobotDrawing, read_visuals
 from hsp_control.geometry import link_shapes
 from hsp_control.geometry.enclosing import enclosing_ellipsoid_capsule
 from hsp_control.geometry.links import self_pairs
-from hsp_control.visualization.viewer.robot_drawing import RobotDrawing, read_visuals
 
 mujoco = pytest.importorskip("mujoco")
 

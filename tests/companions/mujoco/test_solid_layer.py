@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from hsp_control import load_experiment
-from hsp_control.visualization.viewer.motion import motion_of
-from hsp_control.visualization.viewer.obstacles import (
+from hsp_control.companions.viewer.motion import motion_of
+from hsp_control.companions.viewer.obstacles import (
     points_around,
     solid_layer,
 )
-from hsp_control.visualization.viewer.run_drawing import LAYERS, all_layers
+from hsp_control.companions.viewer.run_drawing import LAYERS, all_layers
 
 pytest.importorskip("mujoco")
 

@@ -17,7 +17,7 @@ from hsp_control import Robot
 from hsp_control.cli import main
 from hsp_control.common.exceptions import ExportError
 from hsp_control.companions.rerun.log import _archetypes, log_to_rerun
-from hsp_control.visualization.viewer.robot_drawing import read_visuals
+from hsp_control.companions.viewer.robot_drawing import read_visuals
 
 Array = NDArray[np.float64]
 

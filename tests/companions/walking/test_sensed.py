@@ -10,7 +10,7 @@ from hsp_control.control.measurement import Measurement
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation import simulate
 from hsp_control.simulation.plants import RigidContact, RigidContacts
-from hsp_control.trajectories.switch import Switch
+from hsp_control.trajectories.schedule import Switch
 
 pytest.importorskip("example_robot_data")
 SWING, FOOT = "whole_body/solo12_swing", "FL_FOOT"

@@ -12,7 +12,7 @@ from hsp_control.companions.walking.quadruped import BANDWIDTH
 from hsp_control.constraints.contacts import BallContact, SurfaceContact
 from hsp_control.tasks import CenterOfMass
 from hsp_control.trajectories import Hold, Stops
-from hsp_control.trajectories.switch import Switch
+from hsp_control.trajectories.schedule import Switch
 
 pytest.importorskip("example_robot_data")
 TROT = "walking/solo12_trot"

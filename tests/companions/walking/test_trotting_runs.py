@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from hsp_control import Experiment, Rollout, Stream, TargetPosture, load_experiment
+from hsp_control.companions.play import Session
+from hsp_control.companions.play.playable import playable
 from hsp_control.companions.walking import Trot
-from hsp_control.play import Session
-from hsp_control.play.playable import playable
 
 pytest.importorskip("example_robot_data")
 pytest.importorskip("mujoco")

@@ -14,7 +14,7 @@ from hsp_control.constraints.contacts import BallContact, SurfaceContact
 from hsp_control.control.falling import FallDetector
 from hsp_control.tasks import CenterOfMass
 from hsp_control.trajectories import Hold, Schedule, Stops
-from hsp_control.trajectories.switch import Switch
+from hsp_control.trajectories.schedule import Switch
 
 pytest.importorskip("example_robot_data")
 WALK = "walking/talos_walk"

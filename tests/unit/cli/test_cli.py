@@ -11,16 +11,14 @@ from collections.abc import Callable
 from importlib import metadata
 from importlib.metadata import EntryPoint
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from places import ON_MUJOCO
 
 from hsp_control import Rollout, __version__
-from hsp_control.cli import doctor, main
+from hsp_control.cli import doctor, main, options
 from hsp_control.cli.interrupts import DeferredInterrupt
-from hsp_control.cli.options import companions
 
 MOVING = "paper/4_moving_obstacle"
 SHORT = ["--set", "simulation.duration=0.1"]
@@ -30,7 +28,7 @@ LOG = "4_moving_obstacle,simulation.duration=0.1.npz"
 def test_run_leaves_a_log_that_numpy_alone_reads(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["run", MOVING, "--out", str(tmp_path), "--no-view", *SHORT]) == 0
+    assert main(["run", MOVING, "--out", str(tmp_path), *SHORT]) == 0
     log = tmp_path / LOG
     assert f"Log: {log}" in capsys.readouterr().out
     with np.load(log, allow_pickle=False) as columns:
@@ -46,7 +44,7 @@ def test_run_tells_a_program_what_it_did(
 ) -> None:
     """The names are those of a sweep; what is told is what the log has."""
     arguments = ["run", MOVING, "--out", str(tmp_path), "--json", *SHORT]
-    assert main([*arguments, "--no-view"]) == 0
+    assert main(arguments) == 0
     told = json.loads(capsys.readouterr().out)
     rollout = Rollout.load(told["log"])
     assert (told["status"], told["rows"]) == ("completed", 11)
@@ -76,7 +74,7 @@ def test_a_log_is_not_replaced_by_its_repetition(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """It may be that of a robot; what else is set is in the name."""
-    run = ["run", "--out", str(tmp_path), "--no-view", "--json"]
+    run = ["run", "--out", str(tmp_path), "--json"]
     assert main([*run, MOVING, *SHORT]) == 0
     log = tmp_path / LOG
     before = log.read_bytes()
@@ -125,7 +123,7 @@ def test_the_summary_tells_of_a_target_out_of_reach(
         "{type: hold, point: [4, 0]}}}\n"
         "simulation: {duration: 4, control_period: 0.002}\n"
     )
-    assert main(["run", str(config), "--out", str(tmp_path), "--no-view"]) == 0
+    assert main(["run", str(config), "--out", str(tmp_path)]) == 0
     told = capsys.readouterr().out
     assert re.search(r"\d+ rows: target out of reach, 1\.\d\d m at the end", told)
 
@@ -205,33 +203,6 @@ def test_check_tells_of_targets_along_some_axes_and_of_hands_on_legs(
     assert main(["check", config, *options]) == 0
     warned = capsys.readouterr().err
     assert ("reach" not in warned) if told is None else re.search(told, warned)
-
-
-def test_a_play_that_failed_and_was_not_reset_says_so_with_its_status(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    def fail(session: Any, *_: Any) -> None:
-        session.over = "the arm is too fast; reset to go on"
-
-    monkeypatch.setattr("hsp_control.cli.play.play_in_real_time", fail)
-    arguments = [MOVING, "--out", str(tmp_path), "--no-browser"]
-    assert main(["play", *arguments]) == 2
-    assert capsys.readouterr().err.endswith("hsp: the arm is too fast\n")
-    monkeypatch.setattr("hsp_control.cli.play.play_in_real_time", lambda *_: None)
-    assert main(["play", *arguments]) == 0
-
-
-@pytest.mark.slow
-def test_plot_draws_beside_the_log(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    main(["run", MOVING, "--out", str(tmp_path), *SHORT])
-    assert main(["plot", str(tmp_path / LOG)]) == 0
-    figures = list(tmp_path.glob("*.png"))
-    assert len(figures) >= 2
-    printed = capsys.readouterr().out
-    assert all(f"Figure: {figure}" in printed for figure in figures)
-    assert all(figure.stat().st_size > 10_000 for figure in figures)
 
 
 def test_check_warns_of_motors_that_cannot_hold_the_robot(
@@ -321,8 +292,8 @@ def versions_without(package: str) -> Callable[[str], str]:
 @pytest.mark.parametrize(("typed", "told"), [
     (["rnu"], "there is no command 'rnu'; did you mean 'run'?"),
     (
-        ["run", MOVING, "--veiw"],
-        "there is no '--veiw' here; did you mean '--view'?",
+        ["run", MOVING, "--jsno"],
+        "there is no '--jsno' here; did you mean '--json'?",
     ),
     (["check", MOVING, "twice"], "'twice' is one argument too many"),
     # Not taken for --strict.
@@ -342,8 +313,6 @@ def test_what_was_mistyped_is_guessed(
     (["run", "nowhere.yaml"], "hsp: nowhere.yaml: no such file"),
     (["check", MOVING, "--set", "tasks.tip.frame=tpi"], "did you mean 'tip'?"),
     (["check", MOVING, "--set", "nonsense"], "--set nonsense"),
-    (["plot", "nowhere.npz"], "hsp: nowhere.npz: no such file"),
-    (["plot", __file__], "not a complete .npz log"),
     (["robots", "pand"], "did you mean 'panda'?"),
     (["run", MOVING, *SHORT, "--out", "/proc/nowhere"], "hsp: /proc/nowhere"),
 ])  # fmt: skip
@@ -453,7 +422,7 @@ def test_a_package_whose_command_is_broken_stops_no_other(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     broken = EntryPoint("fly", "no_such_package.command:FLY", "hsp_control.commands")
-    monkeypatch.setattr(companions, "entry_points", lambda group: {"fly": broken})
+    monkeypatch.setattr(options, "entry_points", lambda group: {"fly": broken})
     assert main(["schema"]) == 0
     told = "hsp: 'fly' cannot be imported from no_such_package.command:FLY: No module"
     assert told in capsys.readouterr().err

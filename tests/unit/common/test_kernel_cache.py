@@ -101,8 +101,8 @@ def test_only_an_edit_of_what_it_is_made_of_compiles_again(installed: Path) -> N
     assert loaded(installed) == COMPILED
     assert loaded(installed) == LOADED
     # Whatever is neither a kernel nor read by one.
-    viewer = package / "visualization" / "viewer" / "viewer.py"
-    viewer.write_text(viewer.read_text() + "\n# A comment.\n")
+    control = package / "control" / "controller.py"
+    control.write_text(control.read_text() + "\n# A comment.\n")
     version = package / "common" / "version.py"
     version.write_text(version.read_text() + '"""Another."""\n')
     # Comments, docstrings and lines that move, in the kernels' own files as well.

@@ -11,8 +11,8 @@ import pytest
 from hsp_control.cli import main
 from hsp_control.config import json_schema
 from hsp_control.config.document import Document
+from hsp_control.config.loaded_scenario import validate
 from hsp_control.config.scenario import Scenario
-from hsp_control.config.validation import validate
 from hsp_control.declaration.families import Family
 from hsp_control.declaration.part import Part
 

@@ -15,10 +15,10 @@ from hsp_control.common import exceptions
 from hsp_control.common.exceptions import ConfigError, HspControlError
 from hsp_control.common.resources import bundled_configs
 from hsp_control.config.document import Document
+from hsp_control.config.loaded_scenario import validate
 from hsp_control.config.scenario import Scenario
-from hsp_control.config.validation import validate
 from hsp_control.config.yaml_reader import read_yaml
-from hsp_control.declaration.keys import KeyPath, written
+from hsp_control.declaration.located import KeyPath, written
 
 BASE: dict[str, Any] = {
     "robot": {"name": "panda"},

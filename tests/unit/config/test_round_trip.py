@@ -27,8 +27,8 @@ from hsp_control.common.exceptions import ConfigError, HspControlError, SceneErr
 from hsp_control.common.resources import bundled_configs
 from hsp_control.config import json_schema
 from hsp_control.config.document import Document
+from hsp_control.config.loaded_scenario import validate
 from hsp_control.config.scenario import Scenario
-from hsp_control.config.validation import validate
 from hsp_control.constraints.limits import ObstacleDistance, Scaled
 from hsp_control.control.changes import ChangeGains
 from hsp_control.declaration.plain_data import plain_data

@@ -17,7 +17,7 @@ from hsp_control.control.actuation import Status, actuation
 from hsp_control.control.compensation import Command, Compensation, FrictionFeedForward
 from hsp_control.control.evolution import Switched
 from hsp_control.trajectories import HoldOrientation, Schedule
-from hsp_control.trajectories.switch import Switch
+from hsp_control.trajectories.schedule import Switch
 
 ROBOTS = ["planar3r", "panda", "iiwa14", "ur5", "xarm7"]
 START, RAMP = 0.2, 0.3

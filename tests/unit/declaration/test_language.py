@@ -116,7 +116,6 @@ def test_a_message_speaks_the_language_that_was_typed(
     [
         (["run", "panda"], "'panda' is a robot, and this needs a configuration; hsp "
          "play panda drives the robot"),
-        (["plot", "mine.yaml"], "not a log; hsp run mine.yaml writes one"),
     ],
 )  # fmt: skip
 def test_a_command_says_which_one_was_meant(

@@ -313,7 +313,7 @@ def test_ctrl_c_within_a_row_loses_none(
 def test_what_a_killed_hsp_run_leaves_is_a_log_for_all_commands(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    options = ["--no-view", "--out", str(tmp_path), "--set", "simulation.duration=1000"]
+    options = ["--out", str(tmp_path), "--set", "simulation.duration=1000"]
     process = subprocess.Popen(
         [sys.executable, "-m", "hsp_control", "run", "paper/2_rest", *options],
         stderr=subprocess.DEVNULL,
@@ -336,7 +336,7 @@ def test_what_a_killed_hsp_run_leaves_is_a_log_for_all_commands(
     assert main(["check", str(path)]) == 0
     capsys.readouterr()
     # One that is not killed leaves an `.npz` alone.
-    short = ["--no-view", "--out", str(tmp_path), "--set", "simulation.duration=0.02"]
+    short = ["--out", str(tmp_path), "--set", "simulation.duration=0.02"]
     assert main(["run", "paper/2_rest", *short]) == 0
     assert len(list(tmp_path.glob("*.journal"))) == 1
     with np.load(tmp_path / "2_rest,simulation.duration=0.02.npz") as log:

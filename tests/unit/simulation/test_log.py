@@ -280,7 +280,7 @@ def test_the_log_says_how_far_the_robot_is_beyond_its_limits(
     file = tmp_path / "pushed.yaml"
     plant = {"type": "rigid_body", "pushes": [push]}
     file.write_text(json.dumps({**config, "plant": plant}))
-    assert main(["run", str(file), "--no-view", "--out", str(tmp_path)]) == 0
+    assert main(["run", str(file), "--out", str(tmp_path)]) == 0
     rollout = Rollout.load(tmp_path / "pushed.npz")
     limits = load_experiment(config).controller.limits
     assert limits is not None

@@ -4,12 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from hsp_control.simulation.log_series import (
-    RESTING,
-    STAYS,
-    Unreached,
-    unreached,
-)
+from hsp_control.simulation.measures import RESTING, STAYS, Unreached, unreached
 
 HAND = {
     "hand": {"error": [["position", "m", "m/s", 3], ["orientation", "rad", "rad/s", 3]]}

@@ -1,1 +1,0 @@
-"""What stands behind ``hsp``: commands and their options."""

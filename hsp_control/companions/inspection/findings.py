@@ -1,0 +1,396 @@
+"""Look at a robot's description with all checks."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Literal
+from xml.etree.ElementTree import Element
+
+import numpy as np
+import pinocchio as pin
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import ConfigurationError, ModelError
+from hsp_control.common.suggestions import listing
+from hsp_control.geometry import Proximity, link_shapes, self_pairs
+from hsp_control.geometry.good_postures import PostureSearch, Rows
+from hsp_control.robot import Robot, RobotDescription
+from hsp_control.robot.description.access import ANYWHERE, Access
+from hsp_control.robot.description.inertias import impossible_inertias, tensor_of
+from hsp_control.robot.description.loading import load_model
+from hsp_control.robot.description.mesh_files import (
+    find_file,
+    find_problem,
+    where_to_put,
+)
+from hsp_control.robot.description.sources import RobotSource
+from hsp_control.robot.description.urdf import parse_urdf, problems
+from hsp_control.simulation.demand_check import too_weak
+
+Severity = Literal["error", "warning", "note"]
+"""Of an error, the robot does not load; of a warning, something does not work well; a
+note is good to know."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something odd in a robot's description."""
+
+    severity: Severity  # how bad it is
+    check: str  # which check found it, such as ``inertia``
+    element: str  # the link, joint, file or pair of links that it is about
+    message: str  # what is odd, with the value
+    cure: str = ""  # what would be right, or what to do; empty if nothing is to be done
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return asdict(self)
+
+
+_CURE = "project_inertias: true takes the nearest possible one, --fix writes it"
+
+
+def check_inertias(xml: Element) -> Iterator[Finding]:
+    """Yield the links whose inertia no body can have, and moments without a mass."""
+    for found in impossible_inertias(xml):
+        severity: Severity = "error" if found.negative else "warning"
+        yield Finding(severity, "inertia", f"link {found.link!r}", found.reason, _CURE)
+    for link in xml.findall("link"):
+        mass, inertia = link.find("inertial/mass"), link.find("inertial/inertia")
+        if mass is None or inertia is None or float(mass.get("value", 0.0)) > 0.0:
+            continue
+        if tensor_of(inertia).any():
+            yield Finding(
+                "warning",
+                "inertia",
+                f"link {link.get('name', '')!r}",
+                "it has an inertia, but its mass is 0",
+                "give it a mass",
+            )
+
+
+_WITHOUT = {
+    "collision": "distances do not see these links, if they have no other shape",
+    "visual": "capsules are drawn instead",
+}
+
+
+def check_meshes(xml: Element, source: RobotSource) -> Iterator[Finding]:
+    """Yield the meshes that are missing or cannot be read, by use and by cure."""
+    for use, without in _WITHOUT.items():
+        unusable: dict[tuple[str, str], dict[str, str]] = {}
+        for link in xml.findall("link"):
+            for mesh in (m for each in link.findall(use) for m in each.iter("mesh")):
+                name = mesh.get("filename", "")
+                file = find_file(source, name)
+                reason = "no such file" if file is None else find_problem(file)
+                if reason:
+                    cure = where_to_put(name) if file is None else "repair the file"
+                    links = unusable.setdefault((reason, cure), {})
+                    links.setdefault(link.get("name", ""), name)
+        for (reason, cure), names in unusable.items():
+            first = next(iter(names.values()))
+            meshes = f"{use} mesh{'es' * (len(names) > 1)} of {listing(names)}"
+            message = f"{reason}: {first}{', ...' * (len(names) > 1)}; {without}"
+            yield Finding("warning", "mesh", meshes, message, cure)
+
+
+_LIMITED = {"revolute", "prismatic"}
+_MOVING = {*_LIMITED, "continuous"}
+
+
+def check_limits(xml: Element) -> Iterator[Finding]:
+    """Yield the joints whose limits are missing, equal or reversed."""
+    for joint in xml.findall("joint"):
+        kind, name = joint.get("type", ""), f"joint {joint.get('name', '')!r}"
+        limit = joint.find("limit")
+        if kind not in _MOVING:
+            continue
+        if limit is None:
+            if kind in _LIMITED:
+                cure = "give it a <limit>"
+                cure += ", or type continuous" if kind == "revolute" else ""
+                yield Finding("error", "limit", name, f"{kind} without <limit>", cure)
+            else:
+                yield _no_maximum(name, ("effort", "velocity"))
+            continue
+        if kind in _LIMITED:
+            yield from _of_position(name, limit)
+        yield from _of_maxima(name, limit, follows=joint.find("mimic") is not None)
+
+
+def _of_position(name: str, limit: Element) -> Iterator[Finding]:
+    lower, upper = _number(limit, "lower"), _number(limit, "upper")
+    if lower > upper:
+        message = f"its lower limit {lower:g} is above its upper limit {upper:g}"
+        yield Finding("error", "limit", name, message, "exchange them")
+    elif lower == upper:
+        message = f"lower and upper limit are both {lower:g}: taken for no limit"
+        yield Finding("warning", "limit", name, message, "give lower and upper")
+
+
+def _of_maxima(name: str, limit: Element, *, follows: bool) -> Iterator[Finding]:
+    none = []
+    for which in ("effort", "velocity"):
+        value = _number(limit, which)
+        if limit.get(which) is None:
+            message = f"<limit> without {which}, which parsers refuse"
+            yield Finding("error", "limit", name, message, f'give {which}="0" or more')
+        elif value < 0.0:
+            message = f"its {which} limit {value:g} is negative"
+            yield Finding("error", "limit", name, message, f'give {which}="0" or more')
+        elif value == 0.0 and not follows:
+            none.append(which)
+    if none:
+        yield _no_maximum(name, none)
+
+
+def _no_maximum(name: str, which: Sequence[str]) -> Finding:
+    return Finding(
+        "note",
+        "limit",
+        name,
+        f"no {' and no '.join(which)} limit: none is kept",
+        "give it in the URDF, or under limits: in the configuration",
+    )
+
+
+def _number(limit: Element, name: str) -> float:
+    return float(limit.get(name, 0.0))
+
+
+_SAMPLES = 64
+_DOUBTFUL = 1e5
+"""Condition number above which efforts have few valid digits."""
+
+
+def worst_condition(robot: Robot) -> tuple[float, str]:
+    """Return M's worst condition number, and the dof that moves most there."""
+    rng, rest = np.random.default_rng(0), np.zeros(robot.nv)
+    worst, which = 0.0, 0
+    for sample in range(_SAMPLES + 1):
+        q: Array = robot.random_configuration(rng) if sample else robot.home()
+        values, vectors = np.linalg.eigh(robot.state(0.0, q, rest).mass_matrix)
+        condition = float(values[-1] / values[0]) if values[0] > 0.0 else np.inf
+        if condition > worst:
+            worst, which = condition, int(np.argmax(np.abs(vectors[:, 0])))
+    return worst, robot.dof_names[which]
+
+
+def check_mass_matrix(condition: float, dof: str) -> Iterator[Finding]:
+    """Yield the mass matrix if its `worst_condition` is doubtful."""
+    if condition > _DOUBTFUL:
+        yield Finding(
+            "warning",
+            "mass matrix",
+            f"joint {dof!r}",
+            f"the condition number of M reaches {condition:.1e}: hardly any mass moves "
+            "with this joint somewhere"
+            if np.isfinite(condition)
+            else "M is not positive definite everywhere",
+            "check the inertias beyond it, or lock it",
+        )
+
+
+def check_self_collisions(robot: Robot) -> Iterator[Finding]:
+    """Yield the pairs of links whose capsules overlap at the home posture."""
+    shapes = link_shapes(robot)
+    pairs = self_pairs(robot, shapes)
+    if not pairs:
+        return
+    home = robot.state(0.0, robot.home(), np.zeros(robot.nv))
+    proximity = Proximity(robot, shapes, (), pairs)
+    distances = proximity.measure(home)
+    deepest: dict[tuple[str, str], float] = {}
+    for (i, j), distance in zip(proximity.pairs, distances, strict=True):
+        links = shapes[i].link, shapes[j].link
+        deepest[links] = min(deepest.get(links, 0.0), float(distance))
+    for (first, second), distance in deepest.items():
+        if distance < 0.0:
+            yield Finding(
+                "note",
+                "self-collision",
+                f"{first!r} and {second!r}",
+                f"their capsules overlap at home by {-distance:.3g} m: self_clearance "
+                "leaves this pair out",
+                "if they can collide, bound their joints by limits: position",
+            )
+
+
+REGULAR = 0.03
+"""Singular value below which the law is damped by default."""
+
+
+def check_home(robot: Robot) -> Iterator[Finding]:
+    """Yield that home is singular for the end effector, or in collision."""
+    if robot.unactuated:
+        return
+    search = PostureSearch(robot, tracked_by_hand(robot))
+    home = search.judge(robot.home())
+    wrong = []
+    if home.regularity < REGULAR:
+        wrong.append(
+            f"singular for {robot.end_effector!r} (smallest singular value "
+            f"{home.regularity:.2g})"
+        )
+    depth, pair = search.overlap(robot.home())
+    if depth > 0.0:
+        wrong.append(f"in collision ({pair} overlap by {depth:.2g} m)")
+    if wrong:
+        message = f"it is {' and '.join(wrong)}"
+        yield Finding("warning", "home", "home posture", message, _cure(search))
+
+
+def tracked_by_hand(robot: Robot) -> list[Rows]:
+    """Return the rows of the end effector's pose that it can move independently."""
+    spread = np.random.default_rng(0).uniform(-1.0, 1.0, robot.nv)
+    q = robot.integrate(robot.home(), spread)
+    J = robot.state(0.0, q, np.zeros(robot.nv)).frame(robot.end_effector).jacobian
+    rows: list[int] = []
+    for row in range(6 if np.linalg.matrix_rank(J, tol=1e-6) == 6 else 3):
+        if np.linalg.matrix_rank(J[[*rows, row]], tol=1e-6) > len(rows):
+            rows.append(row)
+    return [(robot.end_effector, tuple(rows))] if rows else []
+
+
+def _cure(search: PostureSearch) -> str:
+    try:
+        found = search.find(REGULAR)
+    except ConfigurationError as error:
+        return str(error)
+    return f"start: {search.start_line(found)}, or start: auto"
+
+
+def check_strength(robot: Robot) -> Iterator[Finding]:
+    """Yield the joints whose limits are too low to hold the robot at home."""
+    if robot.unactuated:
+        return
+    own = np.array(robot.model.effortLimit)
+    limits = np.where(own > 0.0, own, np.inf)
+    for joint, why in too_weak(robot, robot.home(), limits):
+        cure = "begin elsewhere, or set its limit: limits: {effort: {joints: ...}}"
+        yield Finding("warning", "effort", joint, f"at home {why}", cure)
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """What was found about a robot."""
+
+    source: RobotSource  # where the robot comes from
+    findings: tuple[Finding, ...]  # what is odd, errors first
+    facts: Mapping[str, str]  # what can be said about it in general: names and texts
+
+    @property
+    def loads(self) -> bool:
+        """Whether the robot loads as it was described."""
+        return all(finding.severity != "error" for finding in self.findings)
+
+    def groups(self) -> dict[tuple[str, str, str], list[Finding]]:
+        """Return the findings by severity, check and cure."""
+        groups: dict[tuple[str, str, str], list[Finding]] = {}
+        for finding in self.findings:
+            key = finding.severity, finding.check, finding.cure
+            groups.setdefault(key, []).append(finding)
+        return groups
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return {
+            "facts": dict(self.facts),
+            "findings": [finding.to_dict() for finding in self.findings],
+        }
+
+
+def inspect(description: RobotDescription, access: Access = ANYWHERE) -> Inspection:
+    """Return what is odd about a robot.
+
+    Checks of a URDF come first. If it has no errors, or only inertias that projection
+    repairs, the robot is loaded and looked at.
+
+    Args:
+        description: Where it comes from, and how it is loaded.
+        access: Which files may be read.
+
+    Raises:
+        RobotNotFoundError: If its file cannot be read.
+        ModelError: If its file is not XML, no URDF or MJCF, or too large; or if an MJCF
+            is no robot.
+    """
+    findings: list[Finding] = []
+    facts: dict[str, str] = {}
+    if description.mjcf is not None:
+        robot = Robot.load(description, access=access)
+        source = robot.source
+        for sentence in source.omitted:
+            findings.append(Finding("note", "left out", source.name, sentence))
+        found, facts = _of_robot(robot)
+        findings += found
+    else:
+        source = description.find(access)
+        xml = parse_urdf(source)
+        # What is wrong with its elements: then the robot does not load.
+        findings += [Finding("error", "element", *each) for each in problems(xml)]
+        if not findings:
+            findings += [*check_inertias(xml), *check_limits(xml)]
+            findings += check_meshes(xml, source)
+        errors = [f for f in findings if f.severity == "error"]
+        if all(error.check == "inertia" for error in errors):
+            if errors:
+                description = replace(description, project_inertias=True)
+            try:
+                model = load_model(source, description, description.gravity)
+                found, facts = _of_robot(Robot(model, source, description=description))
+                findings += found
+            except ModelError as error:
+                reason = _reason(error, source)
+                findings.append(Finding("error", "robot", source.name, reason))
+    order = ("error", "warning", "note")
+    findings.sort(key=lambda finding: order.index(finding.severity))
+    return Inspection(source, tuple(findings), {"file": str(source.urdf)} | facts)
+
+
+def _of_robot(robot: Robot) -> tuple[list[Finding], dict[str, str]]:
+    """Return what is odd about a robot that was loaded, and the facts about it."""
+    condition, dof = worst_condition(robot)
+    findings = [*check_mass_matrix(condition, dof)]
+    try:
+        findings += check_self_collisions(robot)
+    except ModelError as error:
+        reason = _reason(error, robot.source).partition(";")[0]
+        message = f"not checked: {reason}"
+        findings.append(Finding("warning", "self-collision", "all links", message))
+    findings += [*check_home(robot), *check_strength(robot)]
+    root = "floating base" if robot.unactuated else "fixed base"
+    home = ", ".join(f"{x:.3g}" for x in robot.joint_positions(robot.home()) + 0.0)
+    far, turned = robot.largest_error
+    return findings, {
+        "robot": f"{robot.name}: nq = {robot.nq}, nv = {robot.nv}, {root}",
+        "end effector": f"{robot.end_effector} (by default)",
+        "reach": f"{robot.size:.3g} m from the first joint at most: the longest chain",
+        "bounds": f"an error counts up to {far:.3g} m and {turned:.3g} rad by default",
+        "effort rate": _rates(robot),
+        "springs": _springs(robot),
+        "mass": f"{pin.computeTotalMass(robot.model):.4g} kg move",
+        "mass matrix": f"condition number up to {condition:.2g}, by {dof}",
+        "home": f"[{home}]",
+    }
+
+
+def _rates(robot: Robot) -> str:
+    rates = robot.effort_rate[np.isfinite(robot.effort_rate)]
+    if not rates.size:
+        return "no effort limits, so none"
+    low, high = (f"{each:.3g}" for each in (rates.min(), rates.max()))
+    most = high if low == high else f"{low} to {high}"
+    return f"no effort changes by more than {most} N·m/s or N/s by default"
+
+
+def _springs(robot: Robot) -> str:
+    force, moment = robot.spring_force
+    if not np.isfinite(force):
+        return "no effort limits, so they pull with any force"
+    turned = f" and {moment:.3g} N·m" if np.isfinite(moment) else ""
+    return f"a hand's pull with at most {force:.3g} N{turned} by default"
+
+
+def _reason(error: ModelError, source: RobotSource) -> str:
+    return str(error).removeprefix(f"{source.urdf}: ")

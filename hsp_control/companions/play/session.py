@@ -1,0 +1,233 @@
+"""A simulation that goes on and on, and whoever plays with it; without a picture."""
+
+import gc
+import logging
+from collections.abc import Iterator, Mapping
+from copy import deepcopy
+from typing import Any, Literal
+
+import numpy as np
+import pinocchio as pin
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import HspControlError, SimulationError
+from hsp_control.companions.play.handles import Handles
+from hsp_control.companions.play.knobs import Knob
+from hsp_control.companions.play.operational_space import ComparedCommand
+from hsp_control.companions.viewer.commands import path_element
+from hsp_control.config import Experiment
+from hsp_control.control.changes import Changes
+from hsp_control.control.controller import Controller
+from hsp_control.live.simulated_robot import sampled
+from hsp_control.robot import Robot
+from hsp_control.simulation import Rollout
+from hsp_control.simulation.control_chain import ControlChain
+from hsp_control.simulation.log_writer import LogWriter
+from hsp_control.simulation.loops import Instant, sampled_loop
+from hsp_control.simulation.plants import Plant
+from hsp_control.simulation.plants.push import Pushes, Spring
+
+ROW = 0.01
+"""Time between two rows of the log, at which messages are taken [s]; whole periods."""
+LONGEST = 1200.0  # longest time that is recorded [s]
+LARGEST_LOG = 3e8  # largest log [bytes]
+PULL = 300.0  # stiffness of the spring of somebody who pulls at a link [N/m]
+LARGEST_PULL = 100.0  # largest force of that spring [N]
+
+_REHEARSED = 40  # rows of a rehearsal: beyond the ramps of changes
+
+_log = logging.getLogger(__name__)
+
+
+class Session:
+    """The sampled loop of `simulate`, row by row; between two, a page may change it.
+
+    All but the forces of a page is in the log, which repeats the run.
+    """
+
+    kind: Literal["simulated"] = "simulated"
+
+    def __init__(self, experiment: Experiment) -> None:
+        """Begin at the experiment's start."""
+        settings = experiment.scenario.simulation
+        if settings.control_period is None:
+            raise SimulationError("a session needs a control period")
+        self.experiment = experiment
+        self.period, self.row = settings.control_period, settings.log_period
+        self._plant = sampled(
+            experiment.plant, experiment.integrator, settings.control_period
+        )
+        self.pushes = pushes_of(self._plant)
+        if self.pushes is not None:
+            self.pushes.reachable = True
+        self._point: Array | None = None
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin anew: the robot at its start, and all as it was declared."""
+        experiment, robot = self.experiment, self.experiment.robot
+        memo: dict[int, Any] = {id(robot): robot}
+        self.controller: Controller = deepcopy(experiment.controller, memo)
+        self._command = ComparedCommand(self.controller, experiment.compensation)
+        self.let_go()
+        self._unrepeatable = ""
+        rows, plan = self._rows(), experiment.scenario.plan
+        times = [k * self.row for k in range(rows)]
+        chain = ControlChain(self._command, plan, experiment.scenario.estimators)
+        chain.begin(self._plant.inertial())
+        self._loop: Iterator[Instant] = sampled_loop(
+            chain, self._plant, round(self.row / self.period), times,
+            experiment.q0, experiment.v0,
+        )  # fmt: skip
+        scene = self.controller.scene
+        self.recorder = LogWriter(self.controller, scene, rows, chain.plan)
+        self.over = ""
+        self._step()
+        self.handles = Handles(self.controller, self.period)
+        law = Knob(
+            "operational", "Null space", "Operational-space law instead", "", False,
+            0.0, 1.0, self._compare, "Its null space follows late.",
+        )  # fmt: skip
+        if self.controller.field.controls:
+            self.handles.add(law)
+        gc.collect()  # what has been refers to itself, and would stay
+
+    def rehearse(self) -> None:
+        """Do everything once, and begin anew: no kernel is compiled in the play."""
+        self.handles.rehearse()
+        for _ in range(_REHEARSED):
+            self.advance()
+        self.reset()
+
+    @property
+    def t(self) -> float:
+        """The time of the present row [s]."""
+        return self.controller.state.t
+
+    def advance(self) -> None:
+        """Go on to the next row; what goes wrong ends the run, and not the session."""
+        if not self.over:
+            self._step()
+            self.handles.turn_knobs()
+
+    def _step(self) -> None:
+        try:
+            instant = next(self._loop, None)
+            if instant is None:
+                self.over = f"the log is full at t = {self.t:.0f} s; reset to go on"
+                return
+            state, output, tau, own = instant
+            others = self._plant.log_channels(state.t, state.q, state.v, tau)
+            self.recorder.record(state, output, tau, {**own, **others})
+        except HspControlError as error:
+            self.over = f"{error}; reset to go on"
+            _log.warning("%s", error)
+
+    # -- messages ---------------------------------------------------------------------
+
+    def receive(self, message: Mapping[str, Any]) -> None:
+        """Do what a page says: ``pull`` at a link and ``let_go``, or see `Handles`."""
+        try:
+            match message:
+                case {"do": "pull", "path": str(path), "point": list(point),
+                      "to": list(hand)}:  # fmt: skip
+                    self._pull(path, _vector(point), _vector(hand))
+                case {"do": "let_go" | "left"}:
+                    self.let_go()
+                case _:
+                    self.handles.receive(message)
+        except (ValueError, TypeError, OverflowError) as error:
+            self.handles.say(str(error), warning=True)
+
+    def _compare(self, _at: Changes, operational: bool) -> None:
+        """Follow another law; it is no part of the controller, nor of its log."""
+        self._command.operational = operational
+        if operational:
+            self._unrepeatable = "the operational-space law was tried"
+
+    # -- pulling ----------------------------------------------------------------------
+
+    def _pull(self, path: str, point: Array, hand: Array) -> None:
+        if self.pushes is None:
+            raise ValueError("in this simulated world nobody can pull at the robot")
+        if self._point is None or not np.array_equal(point, self._point):
+            joint = _joint_of(self.experiment.robot, path)
+            place = self.controller.state.data.oMi[joint]
+            self._point, self._unrepeatable = point, "somebody pulled at a link"
+            self.pushes.spring = Spring(
+                joint, place.actInv(point), hand, PULL, LARGEST_PULL
+            )
+        spring = self.pushes.spring
+        assert spring is not None
+        spring.hand = hand
+
+    def let_go(self) -> None:
+        """Pull no more."""
+        self._point = None
+        if self.pushes is not None:
+            self.pushes.spring = None
+
+    def pull(self) -> tuple[Array, Array, float] | None:
+        """Return where somebody pulls, the hand, both (3,) [m], and the force [N]."""
+        spring = None if self.pushes is None else self.pushes.spring
+        if spring is None:
+            return None
+        place: pin.SE3 = self.controller.state.data.oMi[spring.joint]
+        point = np.asarray(place.act(spring.point))
+        return point, spring.hand, float(np.linalg.norm(spring.force(point)))
+
+    # -- the log ----------------------------------------------------------------------
+
+    @property
+    def meta(self) -> dict[str, Any]:
+        """The meta data of the rows so far."""
+        return self.recorder.meta("", "", plant=self._plant.describe())
+
+    def rollout(self) -> Rollout:
+        """Return the log so far; `hsp run` repeats it, unless somebody pulled."""
+        experiment = self.experiment
+        config = experiment.config
+        if config is not None:
+            config["simulation"]["duration"] = max(self.t, self.row)
+        lost = {"changes_lost": self._unrepeatable} if self._unrepeatable else {}
+        return self.recorder.rollout(
+            "completed",
+            self.over,
+            name=f"{experiment.name}, played",
+            title=experiment.scenario.title,
+            config=config,
+            plant=self._plant.describe(),
+            **lost,
+        )
+
+    def _rows(self) -> int:
+        probe = LogWriter(self.controller, self.controller.scene, 1)
+        size = sum(8 * int(np.prod(a.shape[1:])) for a in probe.rows(0).values())
+        return int(min(LONGEST / self.row, LARGEST_LOG / size)) + 1
+
+
+def pushes_of(plant: Plant) -> Pushes | None:
+    """Return what pushes at the robot in a plant, or in the one that it contains."""
+    inner: object = plant
+    while inner is not None:
+        pushes = getattr(inner, "pushes", None)
+        if isinstance(pushes, Pushes):
+            return pushes
+        inner = getattr(inner, "plant", None)
+    return None
+
+
+def _vector(values: list[Any]) -> Array:
+    vector = np.array(values, dtype=float)
+    if vector.shape != (3,) or not (np.abs(vector) < 1e3).all():
+        raise ValueError(f"a point is x, y and z in metres; got {values}")
+    return vector
+
+
+def _joint_of(robot: Robot, path: str) -> int:
+    """Return the joint of a node of the scene, ``/robot/JOINT/...``."""
+    names = [path_element(name) for name in robot.model.names]
+    parts = path.strip("/").split("/")
+    if len(parts) < 2 or parts[0] != "robot" or parts[1] not in names[1:]:
+        raise ValueError(f"{path!r} is no link that could move")
+    return names.index(parts[1])

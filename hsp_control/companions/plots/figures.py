@@ -1,0 +1,399 @@
+"""Whole figures: the paper's five panels, diagnostics of a run, their style and files.
+
+No display is needed: figures have an Agg canvas, and pyplot is not imported.
+"""
+
+import textwrap
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
+from io import BytesIO
+from itertools import accumulate
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from cycler import cycler
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backend_bases import RendererBase
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.lines import Line2D
+
+from hsp_control.common.exceptions import PlotError
+from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.companions.plots import curves, log_series, palette
+from hsp_control.companions.plots.frames import (
+    columns_for,
+    draw_frames,
+    draw_superimposed,
+)
+from hsp_control.companions.plots.paths import draw_end_effector
+from hsp_control.simulation import Rollout, measures
+
+STYLE: dict[str, Any] = {
+    "axes.axisbelow": True,
+    "axes.edgecolor": palette.MUTED,
+    "axes.facecolor": palette.PAPER,
+    "axes.grid": True,
+    "axes.labelcolor": palette.INK,
+    "axes.labelsize": 9.0,
+    "axes.linewidth": 0.7,
+    "axes.prop_cycle": cycler(color=palette.SERIES),
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlecolor": palette.INK,
+    "axes.titlelocation": "left",
+    "axes.titlepad": 7.0,
+    "axes.titlesize": 10.0,
+    "axes.titleweight": "bold",
+    "axes.formatter.useoffset": False,
+    "figure.facecolor": palette.PAPER,
+    "figure.titlesize": 12.5,
+    "figure.titleweight": "bold",
+    "font.family": ["DejaVu Sans"],
+    "font.size": 9.0,
+    "grid.color": palette.GRID,
+    "grid.linewidth": 0.6,
+    "legend.borderaxespad": 0.0,
+    "legend.columnspacing": 1.3,
+    "legend.fontsize": 8.0,
+    "legend.frameon": False,
+    "legend.handlelength": 1.7,
+    "legend.handletextpad": 0.5,
+    "legend.labelspacing": 0.35,
+    "lines.linewidth": 1.4,
+    "lines.solid_capstyle": "round",
+    "mathtext.default": "regular",
+    "mathtext.fontset": "dejavusans",
+    "pdf.fonttype": 42,  # TrueType, which journals ask for
+    "savefig.dpi": 160,
+    "text.color": palette.INK,
+    "xtick.color": palette.MUTED,
+    "xtick.labelcolor": palette.INK,
+    "xtick.labelsize": 8.0,
+    "xtick.major.size": 3.0,
+    "xtick.minor.size": 1.5,
+    "ytick.color": palette.MUTED,
+    "ytick.labelcolor": palette.INK,
+    "ytick.labelsize": 8.0,
+    "ytick.major.size": 3.0,
+    "ytick.minor.size": 1.5,
+}
+
+NOTEBOOK_DPI = 100.0  # dots per inch of figures in notebooks, which store them as text
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """Set matplotlib's parameters to `STYLE` within the context."""
+    with mpl.rc_context(STYLE):  # type: ignore[arg-type]  # any str may be a key
+        yield
+
+
+def use_style() -> None:
+    """Set matplotlib's parameters to `STYLE` permanently, in a notebook or script."""
+    mpl.rcParams.update(STYLE)  # type: ignore[arg-type]  # any str may be a key
+
+
+class StyledFigure(Figure):
+    """A figure that is drawn in the style outside of `styled` too: ticks come late."""
+
+    def _repr_png_(self) -> bytes:
+        """Return the figure as PNG, for notebooks."""
+        image = BytesIO()
+        self.savefig(image, format="png", dpi=NOTEBOOK_DPI)
+        return image.getvalue()
+
+    def draw(self, renderer: RendererBase) -> None:
+        """Draw in the style."""
+        with styled():
+            super().draw(renderer)
+
+
+def new_figure(width: float, height: float) -> StyledFigure:
+    """Return an empty figure, width and height in inches; call it within `styled`."""
+    layout = ConstrainedLayoutEngine(w_pad=0.06, h_pad=0.06)
+    figure = StyledFigure(figsize=(width, height), layout=layout)
+    FigureCanvasAgg(figure)
+    return figure
+
+
+_HEADING = {"x": 0.01, "ha": "left", "fontsize": 10.0, "fontweight": "bold"}
+
+
+def paper_figure(
+    rollout: Rollout,
+    *,
+    absolute: bool = True,
+    frames: int = 8,
+    times: Sequence[float] | None = None,
+    title: str | None = None,
+) -> Figure:
+    """Return the paper's five panels: path, joints, determinant, frames twice."""
+    _check(rollout)
+    rows = log_series.chosen_rows(rollout, frames, times)
+    if not rows:
+        raise PlotError("no frame is requested; needs at least 1")
+    with styled():
+        figure = new_figure(11.0, 7.6)
+        _add_title(figure, rollout, title)
+        halves = figure.subfigures(2, 1, squeeze=False, height_ratios=(1.0, 1.05))
+        upper, lower = halves.ravel()
+        grid = upper.add_gridspec(1, 3, width_ratios=(0.85, 1.0, 1.0))
+        a, b, c = (upper.add_subplot(grid[k]) for k in range(3))
+        draw_end_effector(a, rollout)
+        a.set_anchor("NW")
+        curves.draw_joint_positions(b, rollout, absolute=absolute)
+        third, title = PANELS[
+            "determinant" if measures.rows_compare(rollout) else "singular_values"
+        ]
+        third(c, rollout)
+        strip, together = lower.subfigures(1, 2, width_ratios=(1.9, 1.0))
+        columns = columns_for(rollout, len(rows), 6.8, 2.7)
+        cells = strip.subplots(-(-len(rows) // columns), columns, squeeze=False)
+        draw_frames(cells.ravel().tolist(), rollout, rows)
+        for cell in cells.ravel():
+            cell.label_outer()
+        strip.suptitle("(d)  Selected frames", **_HEADING)
+        e = together.add_subplot()
+        draw_superimposed(e, rollout, rows)
+        e.set_anchor("N")
+        together.suptitle("(e)  Frames together", **_HEADING)
+        titles = ["End effector", "Joints", title]
+        _letter_titles([a, b, c], titles, pad=18.0)  # space for the frames' numbers
+        for over_time in (b, c):
+            curves.mark_frames(over_time, rollout.t[rows])
+    return figure
+
+
+PANELS: dict[str, tuple[Callable[[Axes, Rollout], None], str]] = {
+    "errors": (curves.draw_task_errors, "Task error"),
+    "null_space": (curves.draw_null_space_error, "Null-space error"),
+    "field": (curves.draw_field_value, "Null-space field"),
+    "efforts": (curves.draw_efforts, "Efforts"),
+    "singular_values": (curves.draw_singular_values, "Singular values"),
+    "determinant": (curves.draw_determinant, "Determinant"),
+    "distances": (curves.draw_distances, "Distances"),
+    "terms": (curves.draw_field_terms, "The field's terms"),
+    "joints": (curves.draw_joint_positions, "Joints"),
+    "speeds": (curves.draw_speeds, "Joint speeds"),
+}
+"""The panels of `diagnostics_figure`, by name: what draws each, and its title."""
+_SHAPE = 0.72, 0.55  # height of a panel over its width, and its legend's [inches]
+_LOG_DASHES: tuple[Any, ...] = ("-", (0, (6, 1.5)), "-.", ":")
+"""Of the first log, the second and so on."""
+_THIN, _REFERENCE = 1.3, 1.1  # predictions are thinner, limits thinner still [pt]
+
+
+def diagnostics_figure(
+    rollout: Rollout,
+    *others: Rollout,
+    names: Sequence[str] = (),
+    panels: Sequence[str] = (),
+    width: str | float | None = None,
+    absolute: bool = True,
+) -> Figure:
+    """Return a figure that compares runs with the law's predictions.
+
+    Args:
+        rollout: The run.
+        others: Runs to draw in the same panels.
+        names: What the runs are called; by default as their logs say.
+        panels: The names of the panels, of `PANELS`; by default most of them.
+        width: The width for a paper, such as ``84mm``, or in metres: without heading
+            and foot. By default it is that of a page.
+        absolute: Whether angles of joints are absolute where the robot has such.
+
+    Raises:
+        PlotError: If a log has no rows, or there is no such panel.
+    """
+    runs = [rollout, *others]
+    for each in runs:
+        _check(each)
+    chosen = _chosen_panels(runs, panels)
+    if width is None:
+        columns = -(-len(chosen) // (1 if len(chosen) <= 3 else 2))
+        wide, more = 3.6 * columns, 0.6
+    else:
+        wide, more = _inches(width), 0.0
+        columns = min(max(round(wide / 3.0), 1), len(chosen))
+    rows = -(-len(chosen) // columns)
+    high = rows * (_SHAPE[0] * wide / columns + _SHAPE[1]) + more
+    with styled():
+        figure = new_figure(wide, high)
+        if width is None:
+            _add_title(figure, rollout)
+        if others:
+            figure.suptitle("")  # the names of the logs stand there
+            own = [f"{k} {run.meta.get('name', '')}" for k, run in enumerate(runs, 1)]
+            _name_logs(figure, names or own)
+        axes = figure.subplots(rows, columns, squeeze=False).ravel().tolist()
+        for one, name in zip(axes, chosen, strict=False):
+            draw = PANELS[name][0]
+            if name == "joints":
+                draw = partial(curves.draw_joint_positions, absolute=absolute)
+            _draw_together(one, draw, runs)
+        for unused in axes[len(chosen) :]:
+            unused.set_axis_off()
+        _letter_titles(axes, [PANELS[name][1] for name in chosen])
+    return figure
+
+
+def _chosen_panels(runs: Sequence[Rollout], panels: Sequence[str]) -> list[str]:
+    """Return the panels that are asked for, or all that can be drawn of all runs."""
+    can = {
+        "determinant": all(map(measures.rows_compare, runs)),
+        "distances": all(map(measures.distances, runs)),
+        "terms": all(len(log_series.field_terms(run)) > 1 for run in runs),
+    }
+    for name in panels:
+        if name not in PANELS:
+            near = f"{did_you_mean(name, PANELS)} (there are {listing(PANELS)})"
+            raise PlotError(f"no panel {name!r}{near}")
+        if not can.get(name, True):
+            raise PlotError(f"there are no {name} to draw, or none that compare")
+    usual = [name for name in PANELS if name not in ("joints", "speeds")]
+    return [*dict.fromkeys(panels)] or [name for name in usual if can.get(name, True)]
+
+
+def _draw_together(
+    axes: Axes, draw: Callable[[Axes, Rollout], None], runs: Sequence[Rollout]
+) -> None:
+    """Draw runs in one panel: one or two curves by colour, more of them by dashes."""
+    spans, count = [], 0
+    for number, run in enumerate(runs):
+        known: set[Artist] = {*axes.lines, *axes.patches}
+        axes.autoscale(axis="y")
+        draw(axes, run)
+        spans.append((*axes.get_xlim(), *axes.get_ylim()))
+        if len(runs) == 1:
+            return
+        for artist in (*axes.lines, *axes.patches):
+            if number and artist not in known:
+                artist.set_label("_")  # the first log's legend is that of all
+        lines = [line for line in axes.lines if line not in known]
+        thick = [
+            line
+            for line in lines
+            if line.get_linewidth() > _THIN and line.get_linestyle() != "None"
+        ]
+        count = count or len(thick)
+        for line in lines:
+            if count <= 2 and line.get_linewidth() > _REFERENCE:
+                line.set(color=palette.series(number))
+            if count != 2 and line in thick:
+                line.set(linestyle=_LOG_DASHES[number % 4])
+    left, right, low, high = zip(*spans, strict=True)
+    axes.set_xlim(min(left), max(right))
+    axes.set_ylim(min(low), max(high))
+    curves.legend_below(axes)
+
+
+def _name_logs(figure: Figure, names: Sequence[str]) -> None:
+    """Add a legend that names the logs, above the panels, by what they do not share."""
+    words = [name.split(",") for name in names]
+    shared = sum(accumulate((len({*w}) == 1 for w in zip(*words, strict=False)), min))
+    names = [",".join(each[shared:] or each) for each in words]
+    samples = [
+        Line2D(
+            [], [], color=palette.series(k), linestyle=_LOG_DASHES[k % 4], label=name
+        )
+        for k, name in enumerate(map(curves.literal_text, names))
+    ]
+    long = sum(map(len, names)) > 14 * figure.get_figwidth()
+    figure.legend(
+        handles=samples,
+        loc="outside upper left",
+        ncols=1 if long else len(names),
+        handlelength=3.0,
+    )
+
+
+def _letter_titles(
+    axes: list[Axes], titles: list[str], pad: float | None = None
+) -> None:
+    y = None if pad is None else 1.0  # None: each title moves above its own ticks
+    for letter, one, title in zip("abcdefgh", axes, titles, strict=False):
+        one.set_title(f"({letter})  {title}", y=y, pad=pad)
+
+
+def _add_title(figure: Figure, rollout: Rollout, title: str | None = None) -> None:
+    """Add the title, and the facts of the run at the foot."""
+    meta, config = rollout.meta, rollout.config or {}
+    robot, field = meta["robot"]["name"], meta.get("field", "")
+    named = (title, config.get("title"), meta.get("title"), meta.get("name"))
+    shown = next(filter(None, named), f"{robot}, field: {field}")
+    figure.suptitle(curves.literal_text(textwrap.fill(str(shown), 100)))
+    version = meta.get("versions", {}).get("hsp_control", "")
+    parts = [f"robot {robot}", f"field {field}", f"metric {meta.get('metric', '')}"]
+    parts += [f"hsp_control {version}"] if version else []
+    if rollout.status != "completed":
+        parts.insert(0, f"{rollout.status}: {meta.get('message', '')}")
+    figure.supxlabel(
+        curves.literal_text(textwrap.fill("  ·  ".join(parts), 180)),
+        fontsize=7.5,
+        color=palette.MUTED if rollout.status == "completed" else palette.WARNING,
+        x=0.01,
+        ha="left",
+    )
+
+
+def _check(rollout: Rollout) -> None:
+    if len(rollout) == 0:
+        raise PlotError(f"the log has no rows to draw ({rollout.status})")
+
+
+_INCHES = {"mm": 1.0 / 25.4, "cm": 1.0 / 2.54, "in": 1.0}
+
+
+def _inches(width: str | float) -> float:
+    """Return a width in inches: of a text such as ``84mm``, or in metres."""
+    text = width if isinstance(width, str) else f"{1e3 * width}mm"
+    try:
+        found = float(text[:-2]) * _INCHES[text[-2:]]
+    except (KeyError, ValueError):
+        found = np.nan
+    if not 1.0 <= found <= 100.0:
+        raise PlotError(f"width is {width!r}; needs a length such as 84mm or 3.3in")
+    return found
+
+
+def save_figures(
+    rollout: Rollout,
+    folder: str | Path,
+    stem: str,
+    formats: Sequence[str] = ("png",),
+    *,
+    absolute: bool = True,
+) -> list[Path]:
+    """Write ``<stem>-paper`` and ``<stem>-diagnostics`` in every format."""
+    paper = paper_figure(rollout, absolute=absolute)
+    diagnostics = diagnostics_figure(rollout)
+    return [
+        *save_figure(paper, Path(folder) / f"{stem}-paper", formats),
+        *save_figure(diagnostics, Path(folder) / f"{stem}-diagnostics", formats),
+    ]
+
+
+def save_figure(figure: Figure, stem: Path, formats: Sequence[str]) -> list[Path]:
+    """Write one figure in every format; return its files."""
+    known = figure.canvas.get_supported_filetypes()
+    paths = [stem.with_name(f"{stem.name}.{suffix}") for suffix in formats]
+    for path, suffix in zip(paths, formats, strict=True):
+        if suffix not in known:
+            raise PlotError(
+                f"no picture format {suffix!r}{did_you_mean(suffix, known)} "
+                f"(there are {listing(known)})"
+            )
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with styled():
+                figure.savefig(path, format=suffix)
+        except OSError as error:
+            reason = error.strerror or str(error)
+            raise PlotError(f"{path}: cannot write the picture: {reason}") from error
+    return paths

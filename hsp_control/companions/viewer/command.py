@@ -1,0 +1,134 @@
+"""The pages of `hsp`: ``view``, ``export`` and ``run --view``, and their options.
+
+What is slow is imported when they run.
+"""
+
+import argparse
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
+from typing import Any
+
+from hsp_control.cli.options import AddedCommand, CommandPage, add_strict
+from hsp_control.companions.viewer.export_format import export_formats
+
+
+def _add_view_options(view: argparse.ArgumentParser) -> None:
+    view.add_argument(
+        "logs", nargs="+", type=Path, metavar="LOG", help="a log written by hsp run"
+    )
+    where = view.add_mutually_exclusive_group()
+    where.add_argument(
+        "--beside",
+        action="store_true",
+        default=None,
+        help="show several side by side; the default where their robots differ",
+    )
+    where.add_argument(
+        "--overlay",
+        action="store_false",
+        dest="beside",
+        help="show several over each other, all but the first as ghosts",
+    )
+    view.add_argument(
+        "--speed",
+        type=float,
+        metavar="X",
+        help="playback speed, 1 is real time; default: as the log says",
+    )
+    view.add_argument(
+        "--loop",
+        action=argparse.BooleanOptionalAction,
+        default=None,
+        help="repeat the run; default: as the log says",
+    )
+    add_page(view)
+    add_strict(view)
+
+
+def _view(options: argparse.Namespace) -> int:
+    from hsp_control.companions.viewer.pages import show_logs
+
+    show_logs(options)
+    return 0
+
+
+VIEW = AddedCommand(
+    help="play logs in a browser, one or several together",
+    add_options=_add_view_options,
+    run=_view,
+    own_interrupts=True,  # it closes a page
+    place=-3,
+)
+
+
+def _add_export_options(export: argparse.ArgumentParser) -> None:
+    export.add_argument(
+        "logs",
+        type=Path,
+        nargs="+",
+        metavar="LOG",
+        help="written by hsp run; several logs make one page with a switch",
+    )
+    add_strict(export)
+    export.add_argument(
+        "--html",
+        type=Path,
+        metavar="FILE",
+        help="a page that plays offline, with the plots",
+    )
+    for added in export_formats():
+        for ending, text in added.files.items():
+            export.add_argument(f"--{ending}", type=Path, metavar="FILE", help=text)
+        added.add_options(export)
+
+
+def _export(options: argparse.Namespace) -> int:
+    from hsp_control.companions.viewer.export_command import export
+
+    return export(options)
+
+
+EXPORT = AddedCommand(
+    help="write logs as a page, or one as a film",
+    add_options=_add_export_options,
+    run=_export,
+    own_interrupts=True,  # it closes a browser
+    place=-1,
+)
+
+
+def _add_run_options(run: argparse.ArgumentParser) -> None:
+    run.add_argument(
+        "--view",
+        action=argparse.BooleanOptionalAction,
+        default=False,
+        help="show the run in a browser, while it is computed and after",
+    )
+    add_page(run)
+
+
+def _open(options: argparse.Namespace, *about: Any) -> AbstractContextManager[Any]:
+    if not options.view:
+        return nullcontext()
+    from hsp_control.companions.viewer.pages import Screen
+
+    return Screen.open(options, *about)
+
+
+RUN_PAGE = CommandPage(add_options=_add_run_options, open=_open)
+
+
+def add_page(parser: argparse.ArgumentParser) -> None:
+    """Add where a page is served, and whether it is opened."""
+    parser.add_argument(
+        "--port",
+        type=int,
+        metavar="N",
+        help="the page's port on this machine; default: the first free one from 7000",
+    )
+    parser.add_argument(
+        "--browser",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="open the page in a browser; its address is printed in any case",
+    )

@@ -1,0 +1,327 @@
+"""The server of a page: it sends the scene to all open pages, from a thread of its own.
+
+Pages and their connections must name the server's own host, against DNS rebinding, and
+connections must come from one of its own pages. Pages and connections need a key in
+their address; one page at a time may steer the program.
+"""
+
+import asyncio
+import hmac
+import json
+import os
+import socket
+import struct
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from pathlib import Path
+from threading import Lock, Thread
+from typing import Any, NamedTuple, NoReturn
+
+import umsgpack  # type: ignore[import-untyped]
+from tornado.httpserver import HTTPServer
+from tornado.web import Application, HTTPError, RequestHandler
+from tornado.websocket import WebSocketClosedError, WebSocketHandler
+
+from hsp_control.companions.viewer.commands import (
+    PLAY,
+    LatestCommands,
+    PageCommand,
+    key_of,
+)
+
+_MAX_SIZE = 1_000_000  # bytes; the commands that move a robot are far smaller
+_LONGEST = 4000  # most bytes of a message of a page
+
+
+def batch_messages(commands: list[bytes]) -> list[bytes]:
+    """Return packed commands as messages, each an array in MessagePack."""
+    messages: list[bytes] = []
+    batch: list[bytes] = []
+    size = 0
+    for packed in commands:
+        if batch and size + len(packed) > _MAX_SIZE:
+            messages.append(_array(batch))
+            batch, size = [], 0
+        batch.append(packed)
+        size += len(packed)
+    return [*messages, _array(batch)] if batch else messages
+
+
+def _array(batch: list[bytes]) -> bytes:
+    return struct.pack(">BI", 0xDD, len(batch)) + b"".join(batch)
+
+
+def _refuse(word: str) -> NoReturn:
+    raise ValueError(f"{word} is no number")
+
+
+PORTS = (*range(7000, 7100), 0)  # 0: any free port
+TAKEN = "taken"  # a page's acknowledgement of a message
+
+_TYPES = {
+    ".html": "text/html",
+    ".js": "text/javascript",
+    ".css": "text/css",
+    ".txt": "text/plain",
+}
+_LOOPBACK_NAMES = {"127.0.0.1", "localhost"}
+
+
+class Door(NamedTuple):
+    """Who is let in."""
+
+    host: str  # the address that the server listens on
+    key: str  # what an address must contain
+
+    def check(self, handler: RequestHandler, *, needs_key: bool = True) -> None:
+        """Check a request."""
+        names = _LOOPBACK_NAMES if self.host in _LOOPBACK_NAMES else {self.host}
+        if handler.request.host_name not in names:
+            raise HTTPError(403, reason="Another host")
+        given = handler.get_query_argument("key", "")
+        if needs_key and not hmac.compare_digest(given.encode(), self.key.encode()):
+            raise HTTPError(403, reason="The address needs the key that was printed")
+
+
+class Hub:
+    """The scene, and the pages that show it: all that program and thread share."""
+
+    def __init__(self, scene: LatestCommands, *, steerable: bool) -> None:
+        """Begin without a page."""
+        self.scene, self.steerable = scene, steerable
+        self.lock = Lock()  # of all that is here, and of what is pending for pages
+        self.pages: set[Page] = set()
+        self.steering: Page | None = None  # the page that steers
+        self.said: dict[str, dict[str, Any]] = {}  # its newest words, by `say`
+        self.asked = 0
+
+    def keep(self, commands: Iterable[PageCommand]) -> None:
+        """Add commands to the scene, and to what each page gets next."""
+        commands = list(commands)
+        with self.lock:
+            self.scene.keep(commands)
+            for page in self.pages:
+                page.pending.keep(commands, told=True)
+
+    def say(self, message: dict[str, Any]) -> None:
+        """Keep a page's word: of each kind and object the newest, the newest last."""
+        about = [message.get(name, "") for name in ("do", "target", "name", "id")]
+        key = json.dumps(about)
+        with self.lock:
+            self.said.pop(key, None)
+            self.said[key] = message
+
+    def steer(self, page: "Page | None") -> None:
+        """Let a page steer from now on; what the last one held is let go."""
+        if self.steering is not None:
+            self.say({"do": "left"})
+        self.steering = page
+        self.tell_who_steers()
+
+    def tell_who_steers(self) -> None:
+        """Tell all pages whether they steer, and whether any page does."""
+        taken = self.steering is not None
+        for page in self.pages:
+            mine = self.steering is page
+            page.tell(PLAY, "drive", type="play_drive", mine=mine, taken=taken)
+
+    def wake(self) -> None:
+        """Let pages get what is pending."""
+        for page in self.pages:
+            page.has_pending.set()
+
+    def ask(self) -> None:
+        """Request that pages return a number once they show all that was sent."""
+        for page in self.pages:
+            page.ask()
+
+    def up_to_date(self, number: int) -> bool:
+        """Return whether a page shows all that was sent before this number."""
+        with self.lock:
+            return any(page.answered >= number for page in self.pages)
+
+
+class Page(WebSocketHandler):
+    """One open page. A newer command replaces one of its key that was not yet sent."""
+
+    def initialize(self, hub: Hub, door: Door) -> None:
+        """Store the hub, and who is let in; called by Tornado."""
+        self.hub, self._door = hub, door
+        self.has_pending, self._ready = asyncio.Event(), asyncio.Event()
+        self.answered = 0
+
+    def prepare(self) -> None:
+        """Check host and key, and that the connection comes from one of our pages.
+
+        Tornado compares the origin with the host, but lets in what names no origin:
+        programs, and not browsers.
+        """
+        self._door.check(self)
+        if "Origin" not in self.request.headers:
+            raise HTTPError(403, reason="The connection names no origin")
+
+    def open(self, *args: str, **kwargs: str) -> None:
+        """Send the page the stage, which must not wait for meshes, then all else."""
+        hub = self.hub
+        with hub.lock:
+            self.pending = hub.scene.copy()
+            stage = hub.scene.stage()
+            hub.pages.add(self)
+        self.ask()
+        self._delivery = asyncio.create_task(self._deliver(stage))
+        if hub.steerable:
+            hub.steering = hub.steering or self
+            hub.tell_who_steers()
+
+    def on_message(self, message: str | bytes) -> None:
+        """Process an answer, or what a page that steers says; hang up on others."""
+        try:
+            if message == TAKEN:
+                self._ready.set()
+            elif str(message).startswith("{") and self.hub.steerable:
+                self._hear(str(message))
+            else:
+                self.answered = max(self.answered, int(message))
+        except ValueError as error:
+            self.close(1008, str(error))
+
+    def _hear(self, text: str) -> None:
+        if len(text.encode()) > _LONGEST:
+            raise ValueError("the message is too long")
+        message = json.loads(text, parse_constant=_refuse)
+        if not isinstance(message, dict) or not isinstance(message.get("do"), str):
+            raise ValueError("a message is an object with a text `do`")
+        mine = self.hub.steering is self
+        if message["do"] == "take_over":
+            if not mine:
+                self.hub.steer(self)
+        elif mine:
+            self.hub.say(message)
+
+    def on_close(self) -> None:
+        """Remove the page."""
+        with self.hub.lock:
+            self.hub.pages.discard(self)
+        self._delivery.cancel()
+        if self.hub.steering is self:
+            self.hub.steer(None)
+
+    def ask(self) -> None:
+        """Request that the page returns a number once it shows all sent before."""
+        self.tell("", "ask", type="ask", number=self.hub.asked)
+
+    def tell(self, path: str, name: str, **command: Any) -> None:
+        """Tell this page something."""
+        packed = umsgpack.packb({"path": path, **command})
+        with self.hub.lock:
+            self.pending.keep([PageCommand(path, key_of(path, name), packed)])
+        self.has_pending.set()
+
+    async def _deliver(self, commands: list[bytes]) -> None:
+        """Send the stage, and from then on what is pending."""
+        while True:
+            for message in batch_messages(commands):
+                self._ready.clear()
+                try:
+                    await self.write_message(message, binary=True)
+                except WebSocketClosedError:
+                    return
+                # Meanwhile newer commands replace pending ones.
+                await self._ready.wait()
+            await self.has_pending.wait()
+            self.has_pending.clear()
+            with self.hub.lock:
+                commands = self.pending.pop_all()
+
+    def hang_up(self) -> None:
+        """Close the connection at once: the program ends, whatever the page does."""
+        if self.ws_connection is not None and self.ws_connection.stream is not None:
+            self.ws_connection.stream.close()
+
+
+class FileHandler(RequestHandler):
+    """Serves the page's files."""
+
+    def initialize(self, files: dict[str, tuple[str, bytes]], door: Door) -> None:
+        """Store the files, path -> (type, content), and the door; called by Tornado."""
+        self._files, self._door = files, door
+
+    def prepare(self) -> None:
+        """Check the host, and for the page itself the key."""
+        self._door.check(self, needs_key=self.request.path == "/")
+
+    def get(self, name: str) -> None:
+        """Send the file."""
+        if name not in self._files:
+            raise HTTPError(404)
+        kind, content = self._files[name]
+        self.set_header("Content-Type", f"{kind}; charset=utf-8")
+        self.set_header("Cache-Control", "no-cache")
+        self.set_header("Referrer-Policy", "no-referrer")  # the address has the key
+        self.finish(content)
+
+
+class ServerThread:
+    """Serves the page, and what a hub has for pages, until it is closed."""
+
+    def __init__(self, hub: Hub, door: Door, port: int, meshcat: Path) -> None:
+        """Begin to listen; the thread ends with the program."""
+        pages = (Path(__file__).parent / "page").iterdir()
+        files = {
+            file.name: (_TYPES[file.suffix], file.read_bytes())
+            for file in (*pages, meshcat / "main.min.js")
+        }
+        files[""] = files.pop("index.html")
+        self._hub = hub
+        self._routes: list[Any] = [
+            (r"/scene", Page, {"hub": hub, "door": door}),
+            (r"/(.*)", FileHandler, {"files": files, "door": door}),
+        ]
+        self._listener = _listen(door.host, port)
+        own = self._listener.getsockname()[1]
+        self.url = f"http://{door.host}:{own}/?key={door.key}"
+        self._loop, self._end = asyncio.new_event_loop(), asyncio.Event()
+        self._thread = Thread(target=self._run, name="page server", daemon=True)
+        self._thread.start()
+
+    def call(self, function: Callable[[], object]) -> None:
+        """Call a function in the thread, soon."""
+        self._loop.call_soon_threadsafe(function)
+
+    def close(self) -> None:
+        """End the thread, and all connections; a second call does nothing."""
+        with suppress(RuntimeError):  # its loop is closed
+            self.call(self._end.set)
+        self._thread.join()
+
+    def _run(self) -> None:
+        with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
+            runner.run(self._serve())
+
+    async def _serve(self) -> None:
+        server = HTTPServer(
+            Application(
+                self._routes,
+                websocket_ping_interval=20,
+                websocket_max_message_size=_LONGEST,
+            )
+        )
+        server.add_socket(self._listener)
+        await self._end.wait()
+        server.stop()
+        for page in list(self._hub.pages):
+            page.hang_up()
+        await server.close_all_connections()
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    candidates = (port,) if port else PORTS
+    for candidate in candidates:
+        try:
+            listener = socket.create_server((host, candidate))
+        except OSError as error:
+            reason = os.strerror(error.errno or 0)
+        else:
+            listener.setblocking(False)
+            return listener
+    raise OSError(f"cannot listen on {host}:{candidates[-1]}: {reason}")

@@ -1,0 +1,206 @@
+"""The pages of commands: they open at once, say what is compiled, and stay open."""
+
+import argparse
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing, contextmanager, suppress
+from typing import Self
+
+from hsp_control.cli.consoles import compiling_told, errors, out
+from hsp_control.cli.interrupts import end_in_order
+from hsp_control.common.exceptions import HspControlError, ViewerError
+from hsp_control.companions.viewer import LiveView, Viewer, transport, view_logs
+from hsp_control.companions.viewer.commands import set_caption, set_status
+from hsp_control.companions.viewer.stage import draw_background
+from hsp_control.companions.viewer.transport import PageServer, SceneRecorder
+from hsp_control.config import Experiment
+from hsp_control.config.loaded_scenario import LoadedScenario
+from hsp_control.config.scenario import ViewSettings
+from hsp_control.simulation import Rollout
+from hsp_control.simulation.log_writer import LogWriter
+
+
+class OpeningPage:
+    """Opens a page once: at the first kernel that has to be compiled, or when told to.
+
+    A mistake in a configuration is then said before, unless the cache is empty.
+    """
+
+    def __init__(
+        self,
+        url: str | None,
+        options: argparse.Namespace,
+        announce: Callable[[str], object],
+        say: Callable[[str], object],
+    ) -> None:
+        assert url is not None
+        self.opened = False  # whether it was opened in a browser
+        self._url, self._browser = url, options.browser
+        self._announce, self._say = announce, say
+        self._done = self._told = self._ready = False
+
+    def open(self) -> None:
+        """Print the address, and open the page in a browser."""
+        if self._done:
+            return
+        self._done = True
+        self._announce(self._url)
+        if self._browser:
+            self.opened = transport.open_browser(self._url)
+
+    def ready(self) -> None:
+        """Open the page, if it is not open; from now on it says nothing of kernels."""
+        self.open()
+        self._ready = True
+        if self._told:
+            self._say("")
+
+    @contextmanager
+    def compiling(self) -> Iterator[None]:
+        """Say on the page how many kernels are compiled; the first one opens it."""
+        # Where what is done then fails, an open page says why: it stays, and would
+        # count kernels for ever.
+
+        def tell(text: str) -> None:
+            if self._ready:
+                return
+            self._told = True
+            with suppress(ViewerError):  # who uses the page is told in any case
+                self._say(text)
+            self.open()
+
+        try:
+            with compiling_told(tell):
+                yield
+        except HspControlError as error:
+            if self._done and not self._ready:
+                with suppress(ViewerError):
+                    self._say(str(error))
+            raise
+
+
+def status_line(transport: SceneRecorder) -> Callable[[str], object]:
+    """Return what sets the status line of the pages of a transport."""
+    return lambda text: transport.send([set_status(text)])
+
+
+def draw_empty(transport: SceneRecorder, title: str) -> None:
+    """Show a title on an empty stage, before the robot is loaded."""
+    transport.send([*draw_background(ViewSettings()), set_caption(title, [])])
+
+
+def draw_before(viewer: Viewer, loaded: LoadedScenario) -> None:
+    """Show the robot at its start, and the scene, before a controller is composed."""
+    viewer.draw_scene(loaded.scene, title=loaded.scenario.title or None)
+    try:
+        start = loaded.start()
+    except HspControlError:  # `Experiment.of` says where the mistake is
+        start = loaded.robot.home()
+    viewer.show(start)
+
+
+PAGE_TIMEOUT = 15.0
+"""Time in which a started browser must show the page [s]."""
+
+
+class Screen:
+    """Shows a run: before it, while kernels are compiled, while it runs, and after."""
+
+    def __init__(
+        self, viewer: Viewer | None = None, page: OpeningPage | None = None
+    ) -> None:
+        self._viewer, self._page = viewer, page  # None if it failed, which was said
+        self._live: LiveView | None = None
+
+    @classmethod
+    @contextmanager
+    def open(
+        cls, options: argparse.Namespace, loaded: LoadedScenario
+    ) -> Iterator[Self]:
+        """Yield a screen that shows the robot and the scene."""
+        # The page opens when a kernel has to be compiled, or when `begin` is called.
+        end_in_order()
+        said = errors if options.json else out
+        view = loaded.scenario.view.all_fields()
+        with ExitStack() as stack:
+            try:
+                viewer = Viewer(loaded.robot, port=options.port, **view)
+                stack.enter_context(viewer)
+                draw_before(viewer, loaded)
+            except ViewerError as error:
+                _say_without(error)
+                yield cls()
+                return
+            page = OpeningPage(
+                viewer.url,
+                options,
+                lambda url: said.print(f"View: {url}"),
+                status_line(viewer.transport),
+            )
+            stack.enter_context(page.compiling())
+            yield cls(viewer, page)
+
+    def begin(self, experiment: Experiment) -> None:
+        """Show what will run, and open the page."""
+        if self._viewer is None or self._page is None:
+            return
+        try:
+            self._live = LiveView(self._viewer, experiment)
+        except ViewerError as error:
+            _say_without(error)
+        else:
+            self._page.open()
+
+    def on_row(self, recorder: LogWriter) -> None:
+        """Show the rows computed so far."""
+        if self._live is not None:
+            self._live.on_row(recorder)
+
+    def finish(self, rollout: Rollout) -> int:
+        """Show the whole run until the user closes the view; 2 if there is none."""
+        if self._viewer is None or self._page is None or self._live is None:
+            return 2
+        self._live.finish(rollout)
+        attend(self._viewer, opened=self._page.opened)
+        return 0
+
+
+def _say_without(error: ViewerError) -> None:
+    print(f"hsp: {error}; the run continues without a view", file=sys.stderr)
+
+
+def show_logs(options: argparse.Namespace) -> None:
+    """Play logs until the user closes the view."""
+    with ExitStack() as stack:
+        server = stack.enter_context(closing(PageServer(options.port)))
+        draw_empty(server, ", ".join(log.stem for log in options.logs))
+        page = OpeningPage(
+            server.url,
+            options,
+            lambda url: out.print(f"View: {url}"),
+            status_line(server),
+        )
+        with page.compiling():
+            viewer = view_logs(
+                options.logs,
+                beside=options.beside,
+                speed=options.speed,
+                loop=options.loop,
+                transport=server,
+                strict=options.strict or bool(options.allow),
+                allow=options.allow,
+            )
+        page.ready()
+        attend(viewer, opened=page.opened)
+
+
+def attend(viewer: Viewer, *, opened: bool) -> None:
+    """Keep a view open until the user closes it."""
+    # In a terminal: until Enter or Ctrl-C. Without a terminal: until the page is
+    # closed, if a browser was opened; otherwise return at once.
+    with suppress(KeyboardInterrupt):
+        if sys.stdin is not None and sys.stdin.isatty():
+            with suppress(EOFError):
+                input("Press Enter to close the view. ")
+        elif opened and viewer.wait_for_browser(PAGE_TIMEOUT):
+            viewer.wait_until_closed()

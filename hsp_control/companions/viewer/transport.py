@@ -1,0 +1,195 @@
+"""Where commands go: into a scene that is kept and, with a server, to its pages."""
+
+import importlib.util
+import logging
+import os
+import secrets
+import sys
+import threading
+import time
+import webbrowser
+from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from hsp_control.common.exceptions import ViewerError
+from hsp_control.companions.viewer.commands import (
+    LatestCommands,
+    PageCommand,
+)
+
+
+class SceneRecorder:
+    """Keeps the commands that build a scene: all that a viewer needs to draw.
+
+    Attributes:
+        scene: The commands.
+        url: The address of the page that shows it; None without a server.
+    """
+
+    def __init__(self) -> None:
+        """Start with an empty scene."""
+        self.scene = LatestCommands()
+        self.url: str | None = None
+
+    def send(self, commands: Iterable[PageCommand]) -> None:
+        """Send commands, to be shown together."""
+        self.scene.keep(commands)
+
+    def wait_for_page(self, timeout: float) -> bool:
+        """Wait until a page shows all that was sent; return whether one does."""
+        return False
+
+    def wait_until_closed(self) -> None:
+        """Wait until no page is open any more."""
+
+    def close(self) -> None:
+        """End the server, if there is one; the commands remain."""
+
+
+_log = logging.getLogger(__name__)
+
+
+def open_browser(url: str) -> bool:
+    """Open a page in the user's browser; return whether there is one."""
+    reason = _why_not()
+    if reason is not None:
+        _log.warning("%s; the view is at %s", reason, url)
+        return False
+    threading.Thread(target=webbrowser.open, args=(url, 2), daemon=True).start()
+    return True
+
+
+def _why_not() -> str | None:
+    """Return why no browser can be opened; None if one can."""
+    chosen = "BROWSER" in os.environ
+    display = os.environ.keys() & {"DISPLAY", "WAYLAND_DISPLAY"}
+    if sys.platform.startswith("linux") and not (display or chosen):
+        return "there is no display to open a browser on"
+    try:
+        browser = webbrowser.get()
+    except webbrowser.Error:
+        return "there is no browser to open"
+    if type(browser) is webbrowser.GenericBrowser and not chosen:
+        return f"{browser.name} would take over the terminal"
+    return None
+
+
+LOOPBACK = "127.0.0.1"
+RELOAD_TIMEOUT = 3.0  # s; a page that reconnects within it was reloaded
+_POLL = 0.05  # s
+
+
+class PageServer(SceneRecorder):
+    """A server for the page, see `page_server`: a thread that ends with the program."""
+
+    def __init__(
+        self, port: int | None = None, *, host: str = LOOPBACK, steerable: bool = False
+    ) -> None:
+        """Begin to listen."""
+        # Here: Tornado is only needed where there is a page.
+        from hsp_control.companions.viewer.page_server import Door, Hub, ServerThread
+
+        if port is not None and not 1 <= port <= 65535:
+            raise ViewerError(f"port {port} is not between 1 and 65535")
+        if host in {"", "0.0.0.0"}:
+            raise ViewerError(
+                f"host {host!r} is every address of this computer; give the one at "
+                "which the page is opened, such as 192.168.1.20"
+            )
+        super().__init__()
+        self._hub = Hub(self.scene, steerable=steerable)
+        door, meshcat = Door(host, page_key(host)), meshcat_page()
+        try:
+            self._thread = ServerThread(self._hub, door, port or 0, meshcat)
+        except OSError as error:
+            raise ViewerError(f"the viewer's server cannot start: {error}") from error
+        self.url = self._thread.url
+        self._closed = False
+
+    def send(self, commands: Iterable[PageCommand]) -> None:
+        """Send commands, to be shown together; never waits for a page."""
+        self._check_open()
+        self._hub.keep(commands)
+        self._thread.call(self._hub.wake)
+
+    def messages(self) -> list[dict[str, Any]]:
+        """Return the steering page's messages since the last call; never waits.
+
+        Of each kind and object it is the newest: no page holds the program up.
+        """
+        self._check_open()
+        with self._hub.lock:
+            found = list(self._hub.said.values())
+            self._hub.said.clear()
+        return found
+
+    def wait_for_page(self, timeout: float) -> bool:
+        """Wait until a page shows all that was sent; return whether one does."""
+        self._check_open()
+        deadline = time.monotonic() + timeout
+        number = self._hub.asked = self._hub.asked + 1
+        self._thread.call(self._hub.ask)
+        while not self._hub.up_to_date(number):
+            if time.monotonic() >= deadline:
+                return False
+            time.sleep(_POLL)
+        return True
+
+    def wait_until_closed(self) -> None:
+        """Wait until no page is open; a page that is reloaded counts as open."""
+        last_seen = time.monotonic()
+        while time.monotonic() < last_seen + RELOAD_TIMEOUT:
+            if self._hub.pages:
+                last_seen = time.monotonic()
+            time.sleep(RELOAD_TIMEOUT / 6.0)
+
+    def close(self) -> None:
+        """End the thread; a second call has no effect."""
+        self._closed = True
+        self._thread.close()
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise ViewerError("the viewer is closed")
+
+
+def page_key(host: str) -> str:
+    """Return what a page's address must contain.
+
+    On this computer it is the user's, in a file that nobody else can read, so that an
+    open page finds the next start. In a network it is new at each start.
+    """
+    fresh = secrets.token_urlsafe(16)
+    if host != LOOPBACK:
+        return fresh
+    try:
+        cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+        file = Path(cache) / "hsp_control" / "page-key"
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with suppress(FileExistsError):
+            opened = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+            os.write(opened, fresh.encode())
+            os.close(opened)
+        about, kept = file.stat(), file.read_text()
+    except (OSError, RuntimeError, UnicodeDecodeError):  # no place for it
+        return fresh
+    private = about.st_uid == os.getuid() and not about.st_mode & 0o077
+    return kept if private and len(kept) == len(fresh) else fresh
+
+
+def meshcat_page() -> Path:
+    """Return the folder of Meshcat's page, without importing Meshcat."""
+    spec = importlib.util.find_spec("meshcat")
+    if spec is None or spec.origin is None:
+        raise ViewerError(
+            "the view needs meshcat; install it with: pip install meshcat"
+        )
+    folder = Path(spec.origin).parent / "viewer" / "dist"
+    if not (folder / "main.min.js").is_file():
+        raise ViewerError(
+            f"meshcat is installed without its page ({folder / 'main.min.js'}); "
+            "reinstall it with: pip install --force-reinstall meshcat"
+        )
+    return folder

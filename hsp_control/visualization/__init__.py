@@ -1,1 +1,0 @@
-"""Visualization: figures of a log, and a robot in the browser."""

@@ -1,0 +1,163 @@
+"""When a page opens, and what it says before all is ready."""
+
+import sys
+from argparse import Namespace
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+import hsp_control as hsp
+from hsp_control.cli import main
+from hsp_control.common import adapters, kernels
+from hsp_control.common.exceptions import SimulationError, ViewerError
+from hsp_control.companions.play import steering
+from hsp_control.companions.play.live_loop import channel_pair
+from hsp_control.companions.play.playable import playable
+from hsp_control.companions.play.steering import PageProcess, SteeringPage
+from hsp_control.companions.viewer import SceneRecorder, Viewer, transport
+from hsp_control.companions.viewer.commands import unpack
+from hsp_control.companions.viewer.pages import OpeningPage, draw_before
+from hsp_control.config.document import read_document
+from hsp_control.config.loaded_scenario import load_scenario
+from hsp_control.live import OperatorRequests
+
+PLAYED = "hsp_control.companions.play.play_command.play_in_real_time"
+
+
+class Said:
+    """A page that keeps what happened."""
+
+    def __init__(self) -> None:
+        self.events: list[str] = []
+        options = Namespace(browser=True)
+        self.page = OpeningPage(
+            "http://x/", options, self.events.append, self.events.append
+        )
+
+
+@pytest.fixture
+def said(monkeypatch: pytest.MonkeyPatch) -> Said:
+    said = Said()
+
+    def open_browser(url: str) -> bool:
+        said.events.append("browser")
+        return True
+
+    monkeypatch.setattr(transport, "open_browser", open_browser)
+    return said
+
+
+def compiled() -> None:
+    kernels._watched(lambda: None)
+
+
+def transforms(recorder: SceneRecorder) -> dict[str, bytes]:
+    return {path: packed for path, kind, packed in recorder.scene.items()
+            if kind == "transform"}  # fmt: skip
+
+
+def test_it_opens_at_the_first_kernel_and_says_how_many(said: Said) -> None:
+    with said.page.compiling():
+        assert not said.page.opened
+        compiled()
+        compiled()
+    said.page.ready()
+    line = "Compiling kernels (once, 10 to 20 s) ... {} done"
+    assert said.events == [
+        line.format(0), "http://x/", "browser", *map(line.format, (1, 1, 2)), "",
+    ]  # fmt: skip
+    assert said.page.opened
+
+
+def fail_at_last(page: OpeningPage, *events: Callable[[], object]) -> None:
+    with page.compiling():
+        for event in events:
+            event()
+        raise SimulationError("why")
+
+
+def test_an_open_page_says_why_the_rest_failed(said: Said) -> None:
+    with pytest.raises(SimulationError):
+        fail_at_last(said.page)
+    assert said.events == []  # no page was opened
+    with pytest.raises(SimulationError):
+        fail_at_last(said.page, compiled)
+    assert said.events[-1] == "why"
+
+
+def test_the_robot_is_drawn_at_its_start_before_any_kernel_is_compiled(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def compile_none(*_: object) -> int:
+        raise AssertionError("a kernel was asked for")
+
+    monkeypatch.setattr(adapters, "adapter", compile_none)
+    document = read_document("panda_obstacle")
+    document.override("start={joints: {panda_joint4: -1.0}}")
+    loaded = load_scenario(document)
+    recorder = SceneRecorder()
+    viewer = Viewer(loaded.robot, transport=recorder)
+    draw_before(viewer, loaded)
+    captions = [unpack(packed)["title"] for _, kind, packed in recorder.scene.items()
+                if kind == "caption"]  # fmt: skip
+    assert captions == [loaded.scenario.title]
+    drawn = transforms(recorder)
+    viewer.show(loaded.robot.home())
+    home = transforms(recorder)
+    moved = {path for path in drawn if drawn[path] != home[path]}
+    assert "/robot/panda_joint5" in moved
+    assert "/robot/panda_joint3" not in moved
+
+
+@pytest.fixture(scope="module")
+def experiment() -> hsp.Experiment:
+    return playable("planar3r")
+
+
+def test_a_page_that_says_nothing_ends_the_wait(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    silent = tmp_path / "python"
+    silent.write_text("#!/bin/sh\nexec sleep 600\n")
+    silent.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(silent))
+    monkeypatch.setattr(steering, "START", 0.05)
+    page = PageProcess(port=None, host="127.0.0.1", held=True)
+    with pytest.raises(ViewerError, match=r"did not start within 0\.05 s"):
+        page.__enter__()
+    assert page._process.poll() is not None
+
+
+def test_a_page_that_dies_before_its_key_was_held(
+    experiment: hsp.Experiment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing has moved, and nobody has stopped it: that is an error."""
+    channel, there = channel_pair()
+    process = SimpleNamespace(
+        channel=channel, held=True, begin=lambda *_: there.close()
+    )
+    ready: list[bool] = []
+    opening = SimpleNamespace(ready=lambda: ready.append(True))
+    page = SteeringPage(process, opening)  # type: ignore[arg-type]
+    monkeypatch.setattr(steering, "_rehearse", lambda *_: None)
+    with pytest.raises(ViewerError, match="before anybody held its key"):
+        page.let_steer(experiment, OperatorRequests(), tmp_path / "journal")
+    assert ready == [True]  # it was open
+    channel.close()
+
+
+def test_a_play_that_failed_and_was_not_reset_says_so_with_its_status(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fail(session: Any, *_: Any) -> None:
+        session.over = "the arm is too fast; reset to go on"
+
+    monkeypatch.setattr(PLAYED, fail)
+    arguments = ["paper/4_moving_obstacle", "--out", str(tmp_path), "--no-browser"]
+    assert main(["play", *arguments]) == 2
+    assert capsys.readouterr().err.endswith("hsp: the arm is too fast\n")
+    monkeypatch.setattr(PLAYED, lambda *_: None)
+    assert main(["play", *arguments]) == 0

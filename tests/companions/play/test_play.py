@@ -1,0 +1,447 @@
+"""A session that is played with, without a page: what is said becomes motion."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from clips import Recorder, told
+from numpy.typing import NDArray
+
+import hsp_control as hsp
+from hsp_control.common.exceptions import ConfigError
+from hsp_control.companions.play import Picture, Session, play
+from hsp_control.companions.play.knobs import _scaled, knobs_of
+from hsp_control.companions.play.playable import playable
+from hsp_control.companions.viewer import Viewer
+
+Array = NDArray[np.float64]
+PANDA = "panda_obstacle"
+
+
+@pytest.fixture(scope="module")
+def experiment() -> hsp.Experiment:
+    return playable(PANDA, "simulation.log_period=0.01")
+
+
+@pytest.fixture
+def session(experiment: hsp.Experiment) -> Session:
+    return Session(experiment)
+
+
+@pytest.fixture
+def still() -> Session:
+    """A hand that holds its pose, beside a ball that rests."""
+    return Session(playable("panda"))
+
+
+def go(session: Session, seconds: float) -> None:
+    for _ in range(round(seconds / session.row)):
+        session.advance()
+    assert not session.over
+
+
+def pose_of(session: Session, name: str = "hand") -> Array:
+    return np.array(session.handles.targets[name].where(session.controller.state))
+
+
+def test_what_is_dragged_is_reached_and_the_log_repeats_it(
+    session: Session, tmp_path: Path
+) -> None:
+    go(session, 0.5)
+    wanted = pose_of(session)
+    for k in range(20):  # a drag, picture by picture
+        wanted[:3] += [0.002, -0.004, 0.005]
+        session.receive({"do": "move", "target": "hand", "pose": wanted.tolist()})
+        session.receive(
+            {"do": "obstacle", "name": "ball", "position": [0.1, 0.3, 0.7 - 0.005 * k]}
+        )
+        go(session, 0.03)
+    session.receive({"do": "release", "target": "hand"})
+    session.receive({"do": "set", "id": "null_space_gain", "value": 20.0})
+    session.receive({"do": "set", "id": "weight.target_posture", "value": 3.0})
+    session.receive({"do": "set", "id": "frequency.hand", "value": 15.0})
+    go(session, 1.5)
+    assert not session.handles.message
+    frame = session.controller.state.frame("panda_tcp")
+    np.testing.assert_allclose(frame.position, wanted[:3], atol=1e-4)
+    ball = session.controller.scene["ball"].placement(session.t).translation
+    np.testing.assert_allclose(ball, [0.1, 0.3, 0.605], atol=1e-9)
+    assert session.handles.values["frequency.hand"] == 15.0
+    log = session.rollout()
+    # The error of the law is that of a held effort, however the hand was dragged.
+    assert np.abs(log["task.hand.error"][log.t > 0.5]).max() < 1e-3
+    log.save(tmp_path / "played.npz")
+    again = hsp.load_experiment(tmp_path / "played.npz").run()
+    np.testing.assert_array_equal(again.q, log.q)
+    np.testing.assert_array_equal(again.tau, log.tau)
+
+
+def test_its_own_path_comes_back(session: Session) -> None:
+    untouched = Session(session.experiment)
+    go(session, 0.5)
+    pose = pose_of(session)
+    pose[2] += 0.1
+    session.receive({"do": "move", "target": "hand", "pose": pose.tolist()})
+    session.receive({"do": "obstacle", "name": "ball", "position": [0.5, 0.5, 0.5]})
+    go(session, 0.5)
+    assert abs(pose_of(session)[2] - pose[2]) < 1e-3
+    session.receive({"do": "resume", "target": "hand"})
+    session.handles.obstacles["ball"].resume(session.t)
+    go(session, 2.0)
+    go(untouched, 3.0)
+    np.testing.assert_allclose(pose_of(session), pose_of(untouched), atol=1e-9)
+    for each in (session, untouched):
+        assert each.controller.scene["ball"].placement(2.0).translation[2] < 0.9
+    session.receive(
+        {"do": "move", "target": "hand", "pose": pose.tolist()}
+    )  # once more
+    go(session, 0.8)
+    np.testing.assert_allclose(pose_of(session)[:3], pose[:3], atol=1e-3)
+
+
+def test_the_elbow_of_the_posture_leads_the_null_space(tmp_path: Path) -> None:
+    """The elbow follows as the theorem says, the hand does not notice; and back."""
+    session = Session(playable("panda"))
+    go(session, 0.3)
+    start = pose_of(session, "posture")
+    wanted, elbow = start.copy(), session.controller.state.data.oMi[3].copy()
+    for _ in range(20):
+        wanted[1] += 0.005
+        session.receive({"do": "move", "target": "posture", "pose": wanted.tolist()})
+        go(session, 0.03)
+    go(session, 2.0)
+    # The elbow stays at its distance from the shoulder: not quite there.
+    np.testing.assert_allclose(pose_of(session, "posture")[1], wanted[1], atol=0.01)
+    moved = session.controller.state.data.oMi[3].translation - elbow.translation
+    assert moved[1] > 0.05
+    log = session.rollout()
+    assert np.abs(log["task.hand.error"]).max() < 1e-4
+    assert log["null_space_norm"].max() < 0.05  # of a motion of 1 rad/s, held for 1 ms
+    session.receive({"do": "resume", "target": "posture"})
+    go(session, 2.0)
+    np.testing.assert_allclose(pose_of(session, "posture"), start, atol=1e-9)
+    log = session.rollout()
+    log.save(tmp_path / "led.npz")
+    again = hsp.load_experiment(tmp_path / "led.npz").run()
+    np.testing.assert_array_equal(again.q, log.q)
+
+
+def test_a_return_is_no_jolt(still: Session) -> None:
+    """A target and an obstacle that were led far away return at a bearable speed."""
+    go(still, 0.1)
+    targets, obstacles = still.handles.places()
+    far = np.add(targets["hand"], [0.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0])
+    still.receive({"do": "move", "target": "hand", "pose": far.tolist()})
+    away = np.add(obstacles["ball"], [0.0, 0.0, 0.5])
+    still.receive({"do": "obstacle", "name": "ball", "position": away.tolist()})
+    go(still, 2.0)
+    first = still.recorder.count
+    still.receive({"do": "resume", "target": "hand"})
+    still.receive({"do": "resume", "name": "ball"})
+    go(still, 2.0)
+    np.testing.assert_allclose(still.handles.places()[1]["ball"], obstacles["ball"])
+    np.testing.assert_allclose(pose_of(still)[:3], targets["hand"][:3], atol=1e-4)
+    rows = still.recorder.rows(first)
+    for column in ("task.hand.actual", "obstacle.ball"):
+        steps = np.linalg.norm(np.diff(rows[column][:, :3], axis=0), axis=1)
+        assert steps.max() < 0.65 * still.row  # 15/8 of half a metre in 1.5 s
+    assert not rows["status"].any()
+
+
+LINK = "/robot/panda_joint4"
+BAD: list[dict[str, Any]] = [
+    {"do": "move", "target": "foot", "pose": [0.0] * 7},
+    {"do": "move", "target": "hand", "pose": [0.4, 0.0, 0.4]},
+    {"do": "move", "target": "hand", "pose": [0.4, 0.0, 0.4, 0.0, 0.0, 0.0, 0.0]},
+    {"do": "move", "target": "hand", "pose": [1e9, 0.0, 0.4, 0.0, 0.0, 0.0, 1.0]},
+    {"do": "move", "target": "hand", "pose": ["a"] * 7},
+    {"do": "move", "target": "hand"},
+    {"do": "obstacle", "name": "ball", "position": [10**400, 0, 0]},
+    {"do": "pull", "path": "/robot/nothing", "point": [0, 0, 0], "to": [0, 0, 0]},
+    {"do": "pull", "path": "/obstacles/ball", "point": [0, 0, 0], "to": [0, 0, 0]},
+    {"do": "pull", "path": LINK, "point": [0, 0, 0], "to": [1e6, 0, 0]},
+    {"do": "set", "id": "null_space_gain", "value": math.nan},
+    {"do": "set", "id": "null_space_gain", "value": True},
+    {"do": "set", "id": "field", "value": 1.0},
+    {"do": "set", "id": "nothing", "value": 1.0},
+    {"do": "resume", "target": "ball"},
+    {"do": "resume", "name": "hand"},
+    {"do": "dance"},
+    {},
+]
+
+
+@pytest.mark.parametrize("message", BAD, ids=repr)
+def test_nonsense_is_answered_and_moves_nothing(
+    session: Session, message: dict[str, Any]
+) -> None:
+    session.receive(message)
+    assert session.handles.message
+    assert session.handles.warning
+    assert not session.controller.changes
+    assert session.pull() is None
+    go(session, 0.05)
+
+
+class Told:
+    """Keeps the gains that a knob asks for."""
+
+    def gains(self, name: str, gains: hsp.Gains) -> None:
+        self.made = gains.matrices(6)
+
+
+def test_knobs_keep_damping_ratios() -> None:
+    own = "tasks.hand.gains={natural_frequency: 5, damping_ratio: 0.7}"
+    controller, told = hsp.load_experiment(PANDA, own).controller, Told()
+    knob = knobs_of(controller, 0.001)["frequency.hand"]
+    knob.turn(told, 20.0)  # type: ignore[arg-type]
+    np.testing.assert_allclose(told.made[0], 20.0**2 * np.eye(6))
+    np.testing.assert_allclose(told.made[1], 2.0 * 0.7 * 20.0 * np.eye(6))
+    softer = _scaled(hsp.Impedance(100.0, damping=30.0), 0.25)
+    assert (softer.stiffness, softer.damping) == (25.0, 15.0)
+    # Up to ten times the rate, or to a fifth per period; never below what it is.
+    for period, high in ((0.001, 50.0), (0.02, 10.0), (1.0, 5.0)):
+        knob = knobs_of(controller, period)["frequency.hand"]
+        assert (knob.low, knob.high) == pytest.approx((0.5, high))
+
+
+def test_a_slider_that_is_dragged_makes_few_changes(session: Session) -> None:
+    for k in range(100):
+        session.receive({"do": "set", "id": "null_space_gain", "value": 10.0 + 0.1 * k})
+        session.advance()
+    go(session, 0.2)
+    assert session.handles.values["null_space_gain"] == pytest.approx(19.9)
+    assert len(session.controller.changes) <= 12
+
+
+def test_somebody_pulls_at_the_elbow_and_the_hand_goes_on(
+    session: Session, tmp_path: Path
+) -> None:
+    go(session, 0.2)
+    q = session.controller.state.q.copy()
+    place = session.controller.state.data.oMi[4]
+    on_link = np.array([0.02, -0.03, 0.05])
+    point = np.array(place.act(on_link))
+    path = "/robot/panda_joint4/panda_link4"
+    hand = point + np.array([0.0, 0.15, 0.0])
+    message = {"do": "pull", "path": path, "point": point.tolist()}
+    for _ in range(100):
+        session.receive(message | {"to": hand.tolist()})
+        session.advance()
+    pull = session.pull()
+    assert pull is not None
+    at, hand, newtons = pull
+    assert newtons == pytest.approx(300.0 * np.linalg.norm(hand - at))
+    assert 1.0 < newtons < 45.0
+    moved = session.controller.state.data.oMi[4].act(on_link)
+    np.testing.assert_allclose(at, moved, atol=1e-9)
+    assert moved[1] - point[1] > 0.01
+    assert np.abs(session.controller.state.q - q).max() > 0.05
+    session.receive({"do": "let_go"})
+    assert session.pull() is None
+    go(session, 0.5)
+    log = session.rollout().save(tmp_path / "pulled.npz")
+    with pytest.raises(ConfigError, match="somebody pulled at a link"):
+        hsp.load_experiment(log)
+
+
+def test_it_begins_anew(session: Session) -> None:
+    go(session, 0.3)
+    first = session.rollout().q
+    session.receive({"do": "set", "id": "null_space_gain", "value": 30.0})
+    session.receive({"do": "obstacle", "name": "ball", "position": [0.4, 0.4, 0.4]})
+    go(session, 0.3)
+    session.reset()
+    assert session.handles.values["null_space_gain"] == 10.0
+    assert not session.controller.changes
+    go(session, 0.3)
+    np.testing.assert_array_equal(session.rollout().q, first)
+    session.rehearse()
+    go(session, 0.3)
+    np.testing.assert_array_equal(session.rollout().q, first)
+
+
+def test_what_goes_wrong_ends_the_run_and_not_the_session(
+    experiment: hsp.Experiment,
+) -> None:
+    push = "{type: rigid_body, pushes: [{frame: panda_tcp, force: [1.0e9, 0, 0]}]}"
+    wild = playable(PANDA, f"plant={push}")
+    session = Session(wild)
+    for _ in range(50):
+        session.advance()
+    assert "diverged" in session.over or "finite" in session.over
+    rows = len(session.rollout())
+    session.advance()
+    assert len(session.rollout()) == rows
+    session.reset()
+    assert not session.over
+
+
+def test_the_log_has_an_end(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("hsp_control.companions.play.session.LONGEST", 0.1)
+    session.reset()
+    for _ in range(20):
+        session.advance()
+    assert session.over == "the log is full at t = 0 s; reset to go on"
+    assert len(session.rollout()) == 11
+
+
+# --- the picture and the loop --------------------------------------------------------
+
+
+def test_the_picture_follows_what_is_dragged(session: Session) -> None:
+    viewer = Viewer(session.experiment.robot, transport=Recorder())
+    picture = Picture(session, viewer)
+    recorder = viewer.transport
+    assert isinstance(recorder, Recorder)
+    setup = told(recorder, "/play", "setup")
+    assert [each["name"] for each in setup["targets"]] == ["hand", "posture"]
+    assert [each["name"] for each in setup["obstacles"]] == ["ball"]
+    assert [each["title"] for each in setup["plots"]] == [
+        "Null-space error ‖e_N‖", "Clearance", "Efforts τ", "Task error", "Task error",
+    ]  # fmt: skip
+    assert {each["id"] for each in setup["controls"]} == set(session.handles.knobs)
+    session.receive({"do": "obstacle", "name": "ball", "position": [0.2, 0.4, 0.5]})
+    go(session, 1.5)
+    picture.draw(running=True, rate=1.0)
+    pose = told(recorder, "/play", "pose")
+    shown = {(t["path"], t["property"]): t["values"] for t in pose["tracks"]}
+    for path in ("/obstacles/ball", "/influence/ball"):
+        np.testing.assert_allclose(shown[path, "position"], [0.2, 0.4, 0.5], atol=1e-6)
+    elbow = session.controller.state.data.oMi[4].translation
+    np.testing.assert_allclose(
+        shown["/robot/panda_joint4", "position"], elbow, atol=1e-6
+    )
+    targets = told(recorder, "/play", "targets")
+    np.testing.assert_allclose(targets["poses"]["hand"], pose_of(session))
+    # In a pause it is where it is wanted, and goes there afterwards.
+    session.receive({"do": "obstacle", "name": "ball", "position": [0.2, 0.5, 0.5]})
+    assert session.handles.places()[1]["ball"] == [0.2, 0.5, 0.5]
+    session.advance()
+    assert session.handles.places()[1]["ball"][1] < 0.41
+    samples = told(recorder, "/play", "samples 2")
+    assert len(samples["times"]) == 150
+    session.receive({"do": "set", "id": "field", "value": False})
+    go(session, 0.25)  # past the ramp: its zone is no longer one
+    picture.draw(running=True, rate=1.0)
+    assert not recorder.paths("/influence")
+    session.receive({"do": "set", "id": "field", "value": True})
+    go(session, 0.25)
+    picture.draw(running=True, rate=1.0)
+    assert recorder.paths("/influence")
+
+
+def test_a_target_out_of_reach_is_said_and_by_how_much(still: Session) -> None:
+    """Half a metre too high; within reach again nothing is said."""
+    recorder = Recorder()
+    picture = Picture(still, Viewer(still.experiment.robot, transport=recorder))
+
+    def said() -> str:
+        picture.draw(running=True, rate=1.0)
+        return str(told(recorder, "/play", "targets")["away"].get("hand", ""))
+
+    wanted = pose_of(still)
+    assert said() == ""
+    wanted[2] += 1.0
+    still.receive({"do": "move", "target": "hand", "pose": wanted.tolist()})
+    heard = []
+    for _ in range(130):
+        go(still, 0.03)
+        heard.append(said())
+    away = np.linalg.norm(still.rollout()["task.hand.error"][-1, :3])
+    assert list(dict.fromkeys(heard)) == [
+        "",
+        "target far away",
+        f"target out of reach, {away:.2f} m",
+    ]
+    still.receive({"do": "resume", "target": "hand"})
+    go(still, 3.0)
+    assert said() == ""
+
+
+def test_the_loop_does_what_the_page_says_about_time(session: Session) -> None:
+    viewer = Viewer(session.experiment.robot, transport=Recorder())
+    said: list[list[dict[str, Any]]] = [
+        [{"do": "pause"}],
+        [],
+        [{"do": "step"}],
+        [{"do": "step"}, {"do": "step"}],
+        [{"do": "save"}],
+        [{"do": "go"}],
+    ]
+    times: list[float] = []
+    saved: list[float] = []
+
+    def messages() -> list[dict[str, Any]]:
+        times.append(session.t)
+        return said.pop(0) if said else []
+
+    def save() -> str:
+        saved.append(session.t)
+        return "saved"
+
+    play(session, Picture(session, viewer), messages, save,
+         end=lambda: session.t > 0.05)  # fmt: skip
+    assert times[:6] == pytest.approx([0.0, 0.0, 0.0, 0.01, 0.03, 0.03])
+    assert saved == pytest.approx([0.03])
+    assert session.t > 0.05
+
+
+# --- what can be played with ---------------------------------------------------------
+
+
+def test_any_fixed_robot_is_a_playground() -> None:
+    experiment = playable("ur5", "null_space.gain=4")
+    assert experiment.controller.null_space_gain[0, 0] == 4.0
+    assert experiment.scenario.simulation.control_period == 0.001
+    session = Session(experiment)
+    assert list(session.handles.targets) == ["hand", "posture"]
+    assert list(session.handles.obstacles) == ["ball"]
+
+
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        ("talos", "talos has a free-flyer root, which needs contacts: give a "
+                  "configuration, for example forces/"),
+        ("pandaa", "no configuration 'pandaa'"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_played_with_is_said(source: str, message: str) -> None:
+    with pytest.raises(ConfigError, match=message):
+        playable(source)
+
+
+def test_the_operational_space_law_keeps_the_tasks_and_not_the_field(
+    experiment: hsp.Experiment,
+) -> None:
+    """Both laws meet the tasks; the moving field is followed by the exact one alone."""
+    logs = []
+    for operational in (False, True):
+        session = Session(experiment)
+        session.receive({"do": "set", "id": "operational", "value": operational})
+        go(session, 3.0)
+        logs.append(session.rollout())
+    exact, compared = logs
+    for log in logs:
+        assert np.abs(log["task.hand.error"]).max() < 2e-3
+    late = exact.t > 1.5
+    # What is left of the exact one is the effort that is held for a millisecond.
+    assert exact["null_space_norm"][late].max() < 0.02
+    assert compared["null_space_norm"][late].max() > 0.3
+    assert "operational" in compared.meta["changes_lost"]
+    assert "changes_lost" not in exact.meta
+
+
+def test_a_robot_that_walks_can_be_pulled_but_not_led(tmp_path: Path) -> None:
+    """The feet and the trunk are the plan's; its run is that of `simulate`."""
+    session = Session(playable("walking/talos_walk"))
+    assert [*session.handles.targets] == ["posture"]
+    go(session, 0.5)
+    log = session.rollout()
+    assert log["plan.phase"][-1] >= 1.0
+    log.save(tmp_path / "walked.npz")
+    again = hsp.load_experiment(tmp_path / "walked.npz").run()
+    np.testing.assert_array_equal(again.q, log.q)

@@ -1,0 +1,281 @@
+"""Check that what is drawn is what the log says, predictions of e_N among it."""
+
+import matplotlib as mpl
+import numpy as np
+import pinocchio as pin
+import pytest
+from drawn_logs import (
+    GAINS,
+    PAPER,
+    Arm,
+    both,
+    changed,
+    drawn,
+    legend_texts,
+    lines,
+    planar,
+    spatial,
+)
+from matplotlib.axes import Axes
+
+import hsp_control.companions.plots as plots
+from hsp_control import (
+    Controller,
+    FramePosition,
+    Hold,
+    Obstacle,
+    Rest,
+    Robot,
+    Rollout,
+    simulate,
+)
+from hsp_control.companions.plots import log_series, palette, world
+from hsp_control.companions.plots.log_series import predicted_decay
+from hsp_control.companions.viewer.targets import read_targets
+from hsp_control.geometry import Scene
+from hsp_control.geometry.shapes import (
+    Box,
+    Capsule,
+    Cylinder,
+    HalfSpace,
+    HeightField,
+    PointCloud,
+    Shape,
+    Sphere,
+)
+from hsp_control.null_space.metrics import CoordinatesMetric
+from hsp_control.simulation import measures
+from hsp_control.tasks.feedback import ErrorPart
+from hsp_control.trajectories import Circle as Round
+from hsp_control.trajectories import Spin
+
+pytestmark = pytest.mark.slow
+A = np.tril(np.ones((3, 3)))
+SHADOW = mpl.colors.to_rgba(palette.SHADOW)
+NAMES = ("uncontrolled", "rest", "obstacle", "space", "pose", "several", "posture")
+
+
+@pytest.fixture(scope="module")
+def logs() -> dict[str, Rollout]:
+    return {name: planar(number) for name, number in PAPER.items()} | spatial()
+
+
+@pytest.fixture(params=NAMES)
+def log(logs: dict[str, Rollout], request: pytest.FixtureRequest) -> Rollout:
+    return logs[request.param]
+
+
+def named(axes: Axes, label: str) -> np.ndarray:
+    """Return x and y of the one line whose label begins so, shape (N, 2)."""
+    found = [line for line in axes.lines if str(line.get_label()).startswith(label)]
+    assert len(found) == 1, (label, [line.get_label() for line in axes.lines])
+    return np.column_stack(found[0].get_data())
+
+
+def sample_inside(shape: Shape, rng: np.random.Generator) -> np.ndarray:
+    """Return points of a shape in its own frame, extreme ones among them."""
+    directions = rng.standard_normal((200, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    match shape:
+        case Sphere():
+            return shape.radius * directions
+        case Capsule():
+            ends = rng.choice([-0.5, 0.5], 200)[:, None] * [0.0, 0.0, shape.length]
+            return shape.radius * directions + ends
+        case Box():
+            return rng.choice([-0.5, 0.5], (200, 3)) * shape.size
+        case Cylinder():
+            angle = rng.uniform(0.0, 2.0 * np.pi, 200)
+            ring = shape.radius * np.stack([np.cos(angle), np.sin(angle)])
+            height = rng.choice([-0.5, 0.5], 200) * shape.length
+            return np.column_stack([*ring, height])
+        case PointCloud():
+            return np.asarray(shape.points)
+        case HeightField():
+            return shape._vertices()
+    raise AssertionError(shape)
+
+
+# --- what is drawn is what the log says ----------------------------------------------
+
+
+def test_joints_are_absolute_angles_of_the_planar_arm(logs: dict[str, Rollout]) -> None:
+    log = logs["uncontrolled"]
+    expected = log["joint_positions"] @ A.T
+    for k, (t, y) in enumerate(lines(drawn(plots.draw_joint_positions, log))):
+        np.testing.assert_array_equal(t, log.t)
+        np.testing.assert_allclose(y, expected[:, k], rtol=1e-14)
+    own = lines(drawn(plots.draw_joint_positions, log, absolute=False))
+    for k, (_, y) in enumerate(own):
+        np.testing.assert_array_equal(y, log["joint_positions"][:, k])
+    assert len(own) == 3
+
+
+def test_curves_over_time_are_columns(log: Rollout) -> None:
+    efforts = lines(drawn(plots.draw_efforts, log))
+    values = lines(drawn(plots.draw_singular_values, log))
+    for found, column in ((efforts, log.tau), (values, log["singular_values"])):
+        assert len(found) == column.shape[1]
+        for k, (t, y) in enumerate(found):
+            np.testing.assert_array_equal(t, log.t)
+            np.testing.assert_array_equal(y, column[:, k])
+    axes = drawn(plots.draw_field_value, log)
+    np.testing.assert_array_equal(axes.lines[0].get_ydata(), log["field.value"])
+    axes = drawn(plots.draw_null_space_error, log)
+    np.testing.assert_array_equal(named(axes, "actual")[:, 1], log["null_space_norm"])
+
+
+def test_metres_and_radians_of_a_pose_are_apart(logs: dict[str, Rollout]) -> None:
+    log = logs["pose"]
+    axes = drawn(plots.draw_task_errors, log)
+    error = log["task.panda_tcp.error"]
+    for label, rows in (
+        ("panda_tcp position [m]", slice(3)),
+        ("panda_tcp orientation [rad]", slice(3, 6)),
+    ):
+        norm = np.linalg.norm(error[:, rows], axis=1)
+        np.testing.assert_allclose(named(axes, label)[:, 1], norm, rtol=1e-14)
+    assert axes.get_ylabel().endswith("[m, rad]")
+    assert axes.get_yscale() == "log"
+
+
+def test_a_task_of_a_user_s_own_says_itself_what_is_drawn() -> None:
+    class Tool(FramePosition):
+        @property
+        def error_parts(self) -> tuple[ErrorPart, ...]:
+            return (
+                ErrorPart("x and z", "mm", "mm/s", 2),
+                ErrorPart("y", "m", "m/s", 1),
+            )
+
+    arm = Arm()
+    tool = Tool(arm.tcp, arm.circle([1.0, 0.0, 0.0]), axes="xzy", gains=GAINS)
+    log = arm.run(tool)
+    parts = measures.task_errors(log)
+    assert [(part.label, part.unit) for part in parts] == [
+        ("panda_tcp x and z", "mm"),
+        ("panda_tcp y", "m"),
+    ]
+    np.testing.assert_array_equal(
+        parts[1].norm, np.abs(log["task.panda_tcp.error"][:, 2])
+    )
+    (path,) = world.task_paths(log)
+    desired = log["task.panda_tcp.reference"]
+    np.testing.assert_array_equal(path.desired[:, [0, 2, 1]], desired)
+    (target,) = read_targets(log)
+    np.testing.assert_array_equal(target.desired, path.desired)
+
+
+def test_frames_are_even_in_time_or_where_they_are_asked_for(
+    logs: dict[str, Rollout],
+) -> None:
+    log = logs["rest"]
+    rows = log_series.chosen_rows(log)
+    assert len(rows) == 8
+    assert (rows[0], rows[-1]) == (0, 100)
+    assert np.ptp(np.diff(rows)) <= 1
+    assert log_series.chosen_rows(log, times=[0.25, -3.0, 99.0, 0.251]) == [0, 25, 100]
+    together = drawn(plots.draw_superimposed, log, rows)
+    arms = [line for line in together.lines if len(line.get_xdata()) == 9]
+    np.testing.assert_array_equal(
+        [arm.get_xydata()[-2] for arm in arms], log["skeleton"][rows, -1, :2]
+    )
+    brightness = [sum(mpl.colors.to_rgb(arm.get_color())) for arm in arms]
+    assert sorted(brightness, reverse=True) == brightness
+
+
+def test_obstacles_are_their_outlines(logs: dict[str, Rollout]) -> None:
+    turned = Spin([0.0, 0.0, 1.0], 2.0, rotation=pin.utils.rotate("x", 0.5))
+    bumps = [[0.0, 0.1], [0.1, 0.0]]
+    scene = Scene(
+        [
+            Obstacle("ball", Sphere(0.1), Hold([0.5, 0.0, 0.5])),
+            Obstacle("rod", Capsule(0.05, 0.3), Hold([0.4, 0.3, 0.5]), turned),
+            Obstacle("crate", Box((0.1, 0.2, 0.3)), Hold([0.5, 0.3, 0.2]), turned),
+            Obstacle("can", Cylinder(0.05, 0.2), Hold([0.5, -0.3, 0.2])),
+            Obstacle("cloud", PointCloud([[0, 0, 0], [0.1, 0, 0]]), Hold([0, 0.4, 1])),
+            Obstacle("land", HeightField((0.2, 0.2), bumps), Hold([0.2, 0.0, 0.0])),
+            Obstacle("table", Box((9.0, 9.0, 0.1)), Hold([0.0, 0.0, -0.1])),
+            Obstacle("floor", HalfSpace(), Hold([0.0, 0.0, 0.0])),
+        ]
+    )
+    arm = Arm()
+    task = FramePosition(arm.tcp, arm.circle([1.0, 0.0, 1.0]), gains=GAINS)
+    log = arm.run(task, scene=scene)
+    found = {body.name: body for body in world.logged_obstacles(log)}
+    assert [name for name, body in found.items() if body.oversized] == [
+        "table",
+        "floor",
+    ]
+    assert [name for name, body in found.items() if body.moves] == ["rod", "crate"]
+    rng = np.random.default_rng(5)
+    for name, body in found.items():
+        if name in ("table", "floor"):
+            continue
+        shape, row = scene[name].shape, 30
+        inside = sample_inside(shape, rng)
+        placement = scene[name].placement(log.t[row])
+        world_points = inside @ placement.rotation.T + placement.translation
+        low, high = (
+            body.enclosing_points().min(axis=0),
+            body.enclosing_points().max(axis=0),
+        )
+        assert np.all(world_points >= low - 1e-9)
+        assert np.all(world_points <= high + 1e-9)
+        for view in (world.oblique(), world.plane("xz")):
+            corners = body.outline(view, row)  # anticlockwise
+            edges = np.roll(corners, -1, axis=0) - corners
+            page = np.column_stack(view.project(world_points))
+            off = page[:, None] - corners
+            left = edges[:, 0] * off[..., 1] - edges[:, 1] * off[..., 0]
+            assert np.all(left >= -1e-3 * np.linalg.norm(edges, axis=1))
+    everything = world.enclosing_points(log)
+    assert np.ptp(everything, axis=0).max() < 2.0  # the table does not shrink the arm
+    for view in ("xz", "xy"):
+        axes = drawn(plots.draw_end_effector, log, names=view)
+        floors = [p for p in axes.patches if p.get_facecolor() == SHADOW]
+        assert len(floors) == (view == "xz")  # seen edge-on
+    for figure in both(log):
+        figure.canvas.draw()
+
+
+# --- the prediction of e_N -----------------------------------------------------------
+
+
+def test_a_scalar_gain_predicts_a_line_and_the_log_lies_on_it(
+    logs: dict[str, Rollout],
+) -> None:
+    log = logs["obstacle"]
+    norm = log["null_space_norm"]
+    predicted = named(drawn(plots.draw_null_space_error, log), "predicted")
+    np.testing.assert_allclose(predicted[:, 1], norm[0] * np.exp(-10.0 * log.t))
+    np.testing.assert_allclose(predicted[:, 1], norm, rtol=1e-3)
+    late = changed(log, columns={"t": log.t + 5.0})  # the clock need not start at 0
+    np.testing.assert_allclose(predicted_decay(late).slow, predicted[:, 1])
+
+
+def test_a_matrix_gain_predicts_a_band_and_the_log_lies_in_it(
+    logs: dict[str, Rollout],
+) -> None:
+    robot = Robot.load("planar3r", gravity=(0, 0, 0))
+    task = FramePosition("tip", Round(1, 3, [1, 1]), gains=GAINS, axes="xy")
+    q0 = robot.integrate(robot.neutral(), np.array([-0.44, 0.9, 0.9]))
+    controller = Controller(
+        robot,
+        [task],
+        Rest(),
+        null_space_gain=[5.0, 10.0, 15.0],
+        metric=CoordinatesMetric(A),
+    )
+    run = simulate(controller, q0, [1.0, 0.0, -1.0], duration=1.0)
+    for log in (run, logs["space"]):
+        decay, norm = predicted_decay(log), log["null_space_norm"]
+        assert decay.gains[0] < decay.gains[1]
+        assert np.all(norm <= decay.slow * (1.0 + 1e-6))
+        assert np.all(norm >= decay.fast * (1.0 - 1e-6))
+        texts = legend_texts(drawn(plots.draw_null_space_error, log))
+        assert texts[0].startswith("predicted: between exp(−")
+    assert predicted_decay(logs["space"]).gains == pytest.approx((5.0, 15.0))
+    untold = changed(run, metric_matrix=None)
+    (unknown, *_) = legend_texts(drawn(plots.draw_null_space_error, untold))[::-1]
+    assert unknown == "no prediction: $K_N$ is a matrix, $W$ not in the log"

@@ -1,0 +1,152 @@
+"""``hsp view`` and ``hsp run --view`` as a person uses them, with a browser or none."""
+
+import socket
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import pytest
+from pages import Page
+from played import wait_until
+
+from hsp_control import Experiment, Rollout
+from hsp_control.cli import main
+from hsp_control.common import kernels
+from hsp_control.companions.viewer import transport
+from hsp_control.config.loaded_scenario import LoadedScenario
+
+pytestmark = pytest.mark.process
+
+MOVING = "paper/4_moving_obstacle"
+SHORT = ["--set", "simulation.duration=0.2"]
+
+
+@pytest.fixture(autouse=True)
+def nobody_looks(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(transport.sys, "platform", "linux")
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("logs")
+    assert main(["run", MOVING, "--out", str(folder), *SHORT]) == 0
+    return next(folder.glob("*.npz"))
+
+
+@pytest.fixture
+def taken() -> Iterator[int]:
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        yield other.getsockname()[1]
+
+
+def refused(port: int) -> bool:
+    with socket.socket() as client:
+        return client.connect_ex(("127.0.0.1", port)) != 0
+
+
+def address(printed: str) -> int:
+    (line,) = [line for line in printed.splitlines() if line.startswith("View: ")]
+    port = urlsplit(line.removeprefix("View: ").strip()).port
+    assert port is not None
+    return port
+
+
+def test_view_prints_its_address_and_keeps_no_script_waiting(
+    log: Path, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+) -> None:
+    begin = time.monotonic()
+    assert main(["view", str(log)]) == 0
+    assert time.monotonic() - begin < 10.0
+    port = address(capsys.readouterr().out)
+    assert refused(port)  # it left nothing behind
+    assert f"the view is at http://127.0.0.1:{port}/" in caplog.text
+    caplog.clear()
+    assert main(["view", "--no-browser", str(log), str(log), "--beside"]) == 0
+    assert not caplog.records
+
+
+@pytest.mark.smoke
+def test_run_shows_what_it_computes_and_keeps_its_log(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["run", MOVING, "--view", "--out", str(tmp_path), *SHORT]) == 0
+    assert refused(address(capsys.readouterr().out))
+    assert len(Rollout.load(next(tmp_path.glob("*.npz")))) == 21
+
+
+def test_the_page_of_a_run_opens_before_its_kernels_are_compiled(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It shows the robot and its title, and says what is being done."""
+    pages: list[Page] = []
+
+    def of(loaded: LoadedScenario) -> Experiment:
+        def compile_one() -> None:
+            line = "Compiling kernels (once, 10 to 20 s) ... 0 done"
+            wait_until(lambda: line in [c.get("text") for c in pages[0].commands])
+
+        kernels._watched(compile_one)
+        assert pages[0].last("caption", "/caption")["title"] == loaded.scenario.title
+        assert pages[0].last("set_object", "/robot/joint3/link3")
+        return made(loaded)
+
+    made = Experiment.of
+    monkeypatch.setattr(Experiment, "of", of)
+    monkeypatch.setattr(
+        transport, "open_browser", lambda url: pages.append(Page(url)) or False
+    )
+    assert main(["run", MOVING, "--view", "--out", str(tmp_path), *SHORT]) == 0
+    assert any(c["type"] == "clip" for c in pages[0].commands)
+
+
+def test_a_port_in_use_is_said_and_the_run_goes_on(
+    tmp_path: Path, log: Path, taken: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    port = ["--port", str(taken)]
+    assert main(["view", str(log), *port]) == 2
+    message = f"cannot listen on 127.0.0.1:{taken}: Address already in use"
+    assert message in capsys.readouterr().err
+    out = ["--out", str(tmp_path)]
+    assert main(["run", MOVING, "--view", *port, *out, *SHORT]) == 2
+    captured = capsys.readouterr()
+    assert f"{message}; the run continues without a view" in captured.err
+    assert "completed" in captured.out
+    assert len(Rollout.load(next(tmp_path.glob("*.npz")))) == 21
+
+
+def test_what_makes_no_sense_is_refused(
+    log: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["view", str(log), "--speed", "0"]) == 2
+    assert "speed 0.0 must be positive" in capsys.readouterr().err
+    assert main(["view", str(log).replace("obstacle", "obstacel")]) == 2
+    assert f"did you mean '{log}'" in capsys.readouterr().err
+
+
+def test_with_a_browser_it_stays_until_the_page_is_closed(
+    log: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(transport, "RELOAD_TIMEOUT", 0.5)
+    monkeypatch.setenv("DISPLAY", ":0")
+    graphical = transport.webbrowser.BackgroundBrowser("firefox")
+    monkeypatch.setattr(transport.webbrowser, "get", lambda: graphical)
+    pages: list[Page] = []
+    left: list[float] = []
+
+    def look(url: str, new: int) -> None:
+        page = Page(url)
+        pages.append(page)
+        time.sleep(1.5)
+        left.append(time.monotonic())
+        page.leave()
+
+    monkeypatch.setattr(transport.webbrowser, "open", look)
+    assert main(["view", str(log)]) == 0
+    assert time.monotonic() > left[0]  # not before the page was closed
+    (page,) = pages
+    assert ("clip", "/clip") in [(c["type"], c.get("path")) for c in page.commands]

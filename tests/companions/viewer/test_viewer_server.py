@@ -1,0 +1,401 @@
+"""Check the view's server: to this machine alone, and it leaves nothing behind."""
+
+import asyncio
+import socket
+import subprocess
+import sys
+import threading
+import time
+import urllib.error
+import urllib.request
+import webbrowser
+from collections.abc import Iterator
+from contextlib import closing
+from http.client import HTTPConnection
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pages import Page, Steering, scene_request
+from played import wait_until
+from tornado.httpclient import HTTPClientError, HTTPRequest
+from tornado.websocket import websocket_connect
+
+from hsp_control import Robot, Rollout, load_experiment
+from hsp_control.common.exceptions import ExportError, ViewerError
+from hsp_control.companions.viewer import (
+    SceneRecorder,
+    Viewer,
+    offline_page,
+    transport,
+)
+from hsp_control.companions.viewer.commands import (
+    CAMERA,
+    CAPTION,
+    CLIP,
+    LatestCommands,
+    PageCommand,
+    key_of,
+)
+from hsp_control.companions.viewer.transport import PageServer, page_key
+from hsp_control.geometry import Scene
+
+pytestmark = pytest.mark.process
+
+MOVING = "paper/4_moving_obstacle"
+LINUX = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+
+
+@pytest.fixture(scope="module")
+def run() -> Rollout:
+    return load_experiment(MOVING, "simulation.duration=1.5").run()
+
+
+@pytest.fixture(scope="module")
+def arm() -> Robot:
+    return Robot.load("planar3r")
+
+
+@pytest.fixture
+def recorder() -> SceneRecorder:
+    return SceneRecorder()
+
+
+@pytest.fixture
+def started() -> Iterator[PageServer]:
+    server = PageServer()
+    yield server
+    server.close()
+
+
+# --- the server ----------------------------------------------------------------------
+
+
+def port_of(url: str | None) -> int:
+    assert url is not None
+    return int(url.partition("?")[0].rsplit(":", 1)[1].strip("/"))
+
+
+def answers(port: int) -> bool:
+    with socket.socket() as client:
+        client.settimeout(1.0)
+        return client.connect_ex(("127.0.0.1", port)) == 0
+
+
+@LINUX
+def test_it_listens_on_the_loopback_address_alone(started: PageServer) -> None:
+    port = f":{port_of(started.url):04X}"
+    listening = []
+    for table in ("tcp", "tcp6", "udp", "udp6"):
+        for line in Path(f"/proc/self/net/{table}").read_text().splitlines()[1:]:
+            _, local, _, state, *_ = line.split()
+            if local.endswith(port) and state in {"0A", "07"}:
+                listening.append((table, local))
+    assert listening == [("tcp", f"0100007F{port}")]  # 127.0.0.1, and only there
+
+
+def test_closing_leaves_nothing(arm: Robot) -> None:
+    with Viewer(arm) as viewer:
+        port = port_of(viewer.url)
+        assert answers(port)
+        viewer.show(arm.home())
+    assert not answers(port)
+    assert not any(each.name == "page server" for each in threading.enumerate())
+    viewer.close()  # again is no error
+    with pytest.raises(ViewerError, match="the viewer is closed"):
+        viewer.show(arm.home())
+
+
+def test_closing_ends_connections_and_so_does_the_program(arm: Robot) -> None:
+    with Viewer(arm) as viewer:
+        assert viewer.url is not None
+        page = Page(viewer.url)
+        assert viewer.wait_for_browser(200.0)
+    page.join(5.0)
+    assert not page.is_alive()
+    code = """if True:
+        from hsp_control.companions.viewer.transport import PageServer
+        print(PageServer().url, flush=True)
+    """
+    run = [sys.executable, "-c", code]
+    ended = subprocess.run(run, capture_output=True, text=True, timeout=60.0)
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert not answers(port_of(ended.stdout.strip()))
+
+
+@LINUX
+def test_without_a_browser_nothing_waits(
+    arm: Robot, run: Rollout, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begin = time.monotonic()
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"):
+        monkeypatch.delenv(name, raising=False)
+    with Viewer(arm, open_browser=True) as viewer:
+        viewer.play(run)
+        for _ in range(5000):  # more than any pipe holds
+            viewer.show(arm.home())
+        assert not viewer.wait_for_browser(0.0)
+    assert time.monotonic() - begin < 10.0
+
+
+def test_a_notebook_holds_what_is_shown(arm: Robot, recorder: SceneRecorder) -> None:
+    with Viewer(arm) as viewer:
+        shown = viewer._repr_html_()
+    assert shown.startswith("<iframe srcdoc=")
+    assert f'href="{viewer.url}"' in shown
+    assert "127.0.0.1" not in Viewer(arm, transport=recorder)._repr_html_()
+
+
+def test_without_what_reads_meshes_a_notebook_shows_the_live_page(
+    arm: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise ExportError("it needs trimesh <here>")
+
+    monkeypatch.setattr(offline_page, "reduce_scene", fail)
+    with Viewer(arm) as viewer:
+        shown = viewer._repr_html_()
+        assert f'<iframe src="{viewer.url}"' in shown
+        assert "trimesh &lt;here&gt;" in shown
+
+
+def test_a_page_that_opens_late_sees_everything(arm: Robot, run: Rollout) -> None:
+    with Viewer(arm) as viewer:
+        assert viewer.url is not None
+        viewer.draw_scene(run)
+        viewer.show(arm.home())
+        viewer.transport.send([])
+        first = Page(viewer.url)
+        assert viewer.wait_for_browser(200.0)
+        kinds = [(command["type"], command.get("path")) for command in first.commands]
+        assert ("set_object", "/robot/joint3/link3") in kinds
+        assert ("trail", "/paths/tip/desired") in kinds
+        assert ("clip", CLIP) in kinds
+        assert ("camera", CAMERA) in kinds
+        stage, whole = first.messages[0], [c for m in first.messages[1:] for c in m]
+        kinds = [(command["type"], command.get("path")) for command in whole]
+        assert len(kinds) == len(set(kinds)) + 1  # the background's two colours
+        assert all(command in whole for command in stage)
+        found = {(command["type"], command["path"]) for command in stage}
+        assert {
+            ("caption", CAPTION),
+            ("status", CAPTION),
+            ("camera", CAMERA),
+            ("set_property", "/Background"),
+            ("set_object", "/lights/key"),
+            ("set_object", "/floor/grid"),
+            ("set_transform", "/robot/joint3"),
+        } <= found
+        assert not any(kind == "set_object" and path.startswith("/robot")
+                       for kind, path in found)  # fmt: skip
+        viewer.draw_scene(Scene())
+        second = Page(viewer.url)
+        assert viewer.wait_for_browser(200.0)
+        wait_until(lambda: second.commands and first.commands[-1] == {
+            **second.commands[-1]})  # fmt: skip
+        assert ("delete", "/paths") in [
+            (c["type"], c.get("path")) for c in first.commands
+        ]
+        paths = [command.get("path", "") for command in second.commands]
+        assert not any(path.startswith("/paths") for path in paths)
+    first.join(5.0)
+    second.join(5.0)
+
+
+def test_a_connection_names_host_and_origin(started: PageServer) -> None:
+    """No page of another site, no name that resolves here, no program without both."""
+    assert started.url is not None
+    with pytest.raises(HTTPClientError) as refused:
+        asyncio.run(connect(started.url, Host="evil.example"))
+    assert refused.value.code == 403
+    with pytest.raises(HTTPClientError) as refused:
+        asyncio.run(connect(started.url, Origin="http://evil.example"))
+    assert refused.value.code == 403
+    request = scene_request(started.url)
+    del request.headers["Origin"]
+    with pytest.raises(HTTPClientError) as refused:
+        asyncio.run(opened(request))
+    assert refused.value.code == 403
+
+
+async def connect(url: str, **headers: str) -> None:
+    await opened(scene_request(url, **headers))
+
+
+async def opened(request: HTTPRequest) -> None:
+    page = await websocket_connect(request)
+    protocol = page.protocol
+    page.close()
+    if protocol is not None and protocol.stream is not None:
+        protocol.stream.close()  # the loop ends before the other side could confirm
+
+
+# --- pages that steer ----------------------------------------------------------------
+
+
+@pytest.fixture
+def steered() -> Iterator[PageServer]:
+    server = PageServer(steerable=True)
+    yield server
+    server.close()
+
+
+def heard(server: PageServer, last: str) -> list[dict[str, Any]]:
+    """What the pages say, up to a message of a kind."""
+    found: list[dict[str, Any]] = []
+    wait_until(
+        lambda: found.extend(server.messages()) or (found and found[-1]["do"] == last),
+        20.0,
+    )
+    return found
+
+
+HANDSHAKE = {
+    "Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Version": "13",
+    "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ==",
+}  # fmt: skip
+
+
+def test_a_page_needs_the_key(steered: PageServer) -> None:
+    assert steered.url is not None
+    address, key = steered.url.split("?key=")
+    assert len(key) >= 20
+    with urllib.request.urlopen(steered.url) as answer:
+        assert answer.headers["Referrer-Policy"] == "no-referrer"
+        assert "connect();" in answer.read().decode()
+    for query in ("", "?key=", "?key=x", f"?key={key[:-1]}", f"?k={key}"):
+        with pytest.raises(urllib.error.HTTPError) as refused:
+            urllib.request.urlopen(address + query)
+        refused.value.close()
+        assert refused.value.code == 403
+        with pytest.raises(HTTPClientError):
+            asyncio.run(connect(address + query))
+    # Another site's page, that knows the key.
+    port = int(address.rpartition(":")[2].strip("/"))
+    with closing(HTTPConnection("127.0.0.1", port)) as connection:
+        evil = HANDSHAKE | {"Origin": "http://evil.example"}
+        connection.request("GET", f"/scene?key={key}", headers=evil)
+        with connection.getresponse() as answer:
+            assert answer.status == 403
+    asyncio.run(connect(steered.url))
+    # On this computer it is the user's own.
+    assert page_key("127.0.0.1") == key != page_key("192.168.1.20")
+
+
+def test_a_key_that_others_can_read_is_not_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    key, file = page_key("127.0.0.1"), tmp_path / "hsp_control" / "page-key"
+    assert file.read_text() == key == page_key("127.0.0.1")
+    file.chmod(0o644)
+    assert page_key("127.0.0.1") != key
+
+
+def test_one_page_steers_at_a_time(steered: PageServer) -> None:
+    assert steered.url is not None
+    first = Steering(steered.url)
+    wait_until(lambda: first.drives() == (True, True))
+    second = Steering(steered.url)
+    wait_until(lambda: second.drives() == (False, True))
+    second.say(do="pause")  # it may not
+    first.say(do="go")
+    assert heard(steered, "go") == [{"do": "go"}]
+    second.say(do="take_over")
+    assert heard(steered, "left") == [{"do": "left"}]
+    wait_until(lambda: first.drives() == (False, True))
+    wait_until(lambda: second.drives() == (True, True))
+    second.say(do="step")
+    assert heard(steered, "step") == [{"do": "step"}]
+    second.leave()
+    assert heard(steered, "left") == [{"do": "left"}]
+    wait_until(lambda: first.drives() == (False, False))
+    third = Steering(steered.url)
+    wait_until(lambda: third.drives() == (True, True))
+
+
+def test_a_flood_is_no_more_than_its_newest_words(steered: PageServer) -> None:
+    """10,000 messages while nobody listens: the last of each kind is what counts."""
+    assert steered.url is not None
+    page = Steering(steered.url)
+    wait_until(lambda: page.drives() == (True, True))
+    for k in range(10_000):
+        page.say(do="move", target="hand", pose=[k] * 7)
+    page.say(do="obstacle", name="ball", position=[1, 2, 3])
+    with urllib.request.urlopen(steered.url) as answer:
+        assert answer.status == 200
+    found = heard(steered, "obstacle")
+    assert found[-1] == {"do": "obstacle", "name": "ball", "position": [1, 2, 3]}
+    moves = [each for each in found if each["do"] == "move"]
+    assert moves[-1]["pose"] == [9999] * 7
+    assert len(moves) < 100
+
+
+def test_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(transport.importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(ViewerError, match="pip install meshcat"):
+        PageServer()
+
+
+def test_a_server_that_cannot_start_says_why(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(transport, "meshcat_page", lambda: tmp_path)
+    with pytest.raises(ViewerError, match=r"cannot start: .*main\.min\.js"):
+        PageServer()
+
+
+def test_a_port_that_is_taken_is_said(started: PageServer) -> None:
+    with pytest.raises(ViewerError, match=r"cannot start: cannot listen on 127\.0"):
+        PageServer(port_of(started.url))
+
+
+def test_a_browser_is_opened_only_where_there_is_one(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    url, opened = "http://127.0.0.1:7000/", threading.Event()
+    monkeypatch.setattr(transport.webbrowser, "open", lambda url, new: opened.set())
+    monkeypatch.setattr(transport.sys, "platform", "linux")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"):
+        monkeypatch.delenv(name, raising=False)
+    assert not transport.open_browser(url)
+    assert f"no display to open a browser on; the view is at {url}" in caplog.text
+    monkeypatch.setenv("DISPLAY", ":0")
+    terminal = webbrowser.GenericBrowser("w3m")
+    monkeypatch.setattr(transport.webbrowser, "get", lambda: terminal)
+    assert not transport.open_browser(url)
+    assert "w3m would take over the terminal" in caplog.text
+    assert not opened.is_set()
+    graphical = webbrowser.BackgroundBrowser("firefox")
+    monkeypatch.setattr(transport.webbrowser, "get", lambda: graphical)
+    assert transport.open_browser(url)
+    assert opened.wait(5.0)
+
+
+# --- its parts -----------------------------------------------------------------------
+
+
+def test_the_newest_word_counts_and_order_is_kept() -> None:
+    kept = LatestCommands()
+    for path, word in (("/a", b"1"), ("/a/b", b"2"), ("/ab", b"3"), ("/a", b"4")):
+        kept.keep([PageCommand(path, key_of(path, "object"), word)])
+    told, gone = kept.copy(), PageCommand("/a", key_of("/a", "delete"), b"5", True)
+    assert kept.copy().pop_all() == [b"2", b"3", b"4"]
+    kept.keep([gone])
+    assert [item[0] for item in kept.items()] == ["/ab"]
+    told.keep([gone], told=True)
+    assert told.pop_all() == [b"3", b"5"]
+
+
+def test_importing_the_package_pulls_in_no_viewer_and_that_no_meshcat() -> None:
+    code = """if True:
+        import sys, hsp_control
+        print(*sys.modules)
+        import hsp_control.companions.viewer
+        print(*sys.modules)
+    """
+    run = [sys.executable, "-c", code]
+    printed = subprocess.run(run, capture_output=True, text=True, check=True).stdout
+    package, viewer = (set(line.split()) for line in printed.splitlines())
+    assert not {"tornado", "umsgpack", "hsp_control.companions.viewer"} & package
+    assert not {"meshcat", "tornado", "zmq", "IPython", "matplotlib"} & viewer
