@@ -68,7 +68,7 @@ class Following(NamedTuple):
     def of(cls, size: float, *, on_legs: bool) -> Self:
         """Return it for a robot of a size [m]."""
         if size == 0.0:
-            return NOT
+            return cls(*NOT)
         modest = MODEST_ON_LEGS if on_legs else MODEST
         return cls(STIFFNESS / size, size * modest, BELOW / size, size / TURNING)
 

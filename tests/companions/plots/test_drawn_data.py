@@ -32,17 +32,7 @@ from hsp_control import (
 from hsp_control.companions.plots import log_series, palette, world
 from hsp_control.companions.plots.log_series import predicted_decay
 from hsp_control.companions.viewer.targets import read_targets
-from hsp_control.geometry import Scene
-from hsp_control.geometry.shapes import (
-    Box,
-    Capsule,
-    Cylinder,
-    HalfSpace,
-    HeightField,
-    PointCloud,
-    Shape,
-    Sphere,
-)
+from hsp_control.geometry import Scene, shapes
 from hsp_control.null_space.metrics import CoordinatesMetric
 from hsp_control.simulation import measures
 from hsp_control.tasks.feedback import ErrorPart
@@ -72,26 +62,26 @@ def named(axes: Axes, label: str) -> np.ndarray:
     return np.column_stack(found[0].get_data())
 
 
-def sample_inside(shape: Shape, rng: np.random.Generator) -> np.ndarray:
+def sample_inside(shape: shapes.Shape, rng: np.random.Generator) -> np.ndarray:
     """Return points of a shape in its own frame, extreme ones among them."""
     directions = rng.standard_normal((200, 3))
     directions /= np.linalg.norm(directions, axis=1)[:, None]
     match shape:
-        case Sphere():
+        case shapes.Sphere():
             return shape.radius * directions
-        case Capsule():
+        case shapes.Capsule():
             ends = rng.choice([-0.5, 0.5], 200)[:, None] * [0.0, 0.0, shape.length]
             return shape.radius * directions + ends
-        case Box():
+        case shapes.Box():
             return rng.choice([-0.5, 0.5], (200, 3)) * shape.size
-        case Cylinder():
+        case shapes.Cylinder():
             angle = rng.uniform(0.0, 2.0 * np.pi, 200)
             ring = shape.radius * np.stack([np.cos(angle), np.sin(angle)])
             height = rng.choice([-0.5, 0.5], 200) * shape.length
             return np.column_stack([*ring, height])
-        case PointCloud():
+        case shapes.PointCloud():
             return np.asarray(shape.points)
-        case HeightField():
+        case shapes.HeightField():
             return shape._vertices()
     raise AssertionError(shape)
 
@@ -189,14 +179,20 @@ def test_obstacles_are_their_outlines(logs: dict[str, Rollout]) -> None:
     bumps = [[0.0, 0.1], [0.1, 0.0]]
     scene = Scene(
         [
-            Obstacle("ball", Sphere(0.1), Hold([0.5, 0.0, 0.5])),
-            Obstacle("rod", Capsule(0.05, 0.3), Hold([0.4, 0.3, 0.5]), turned),
-            Obstacle("crate", Box((0.1, 0.2, 0.3)), Hold([0.5, 0.3, 0.2]), turned),
-            Obstacle("can", Cylinder(0.05, 0.2), Hold([0.5, -0.3, 0.2])),
-            Obstacle("cloud", PointCloud([[0, 0, 0], [0.1, 0, 0]]), Hold([0, 0.4, 1])),
-            Obstacle("land", HeightField((0.2, 0.2), bumps), Hold([0.2, 0.0, 0.0])),
-            Obstacle("table", Box((9.0, 9.0, 0.1)), Hold([0.0, 0.0, -0.1])),
-            Obstacle("floor", HalfSpace(), Hold([0.0, 0.0, 0.0])),
+            Obstacle("ball", shapes.Sphere(0.1), Hold([0.5, 0.0, 0.5])),
+            Obstacle("rod", shapes.Capsule(0.05, 0.3), Hold([0.4, 0.3, 0.5]), turned),
+            Obstacle(
+                "crate", shapes.Box((0.1, 0.2, 0.3)), Hold([0.5, 0.3, 0.2]), turned
+            ),
+            Obstacle("can", shapes.Cylinder(0.05, 0.2), Hold([0.5, -0.3, 0.2])),
+            Obstacle(
+                "cloud", shapes.PointCloud([[0, 0, 0], [0.1, 0, 0]]), Hold([0, 0.4, 1])
+            ),
+            Obstacle(
+                "land", shapes.HeightField((0.2, 0.2), bumps), Hold([0.2, 0.0, 0.0])
+            ),
+            Obstacle("table", shapes.Box((9.0, 9.0, 0.1)), Hold([0.0, 0.0, -0.1])),
+            Obstacle("floor", shapes.HalfSpace(), Hold([0.0, 0.0, 0.0])),
         ]
     )
     arm = Arm()

@@ -15,18 +15,7 @@ from hsp_control.companions.viewer import Viewer, robot_of, view_logs
 from hsp_control.companions.viewer.commands import CAMERA, CAPTION, CLIP
 from hsp_control.companions.viewer.motion import motion_of
 from hsp_control.companions.viewer.threejs import _Y_TO_Z
-from hsp_control.geometry import Scene
-from hsp_control.geometry.shapes import (
-    Box,
-    Capsule,
-    Cylinder,
-    HalfSpace,
-    HeightField,
-    Mesh,
-    PointCloud,
-    Shape,
-    Sphere,
-)
+from hsp_control.geometry import Scene, shapes
 from hsp_control.trajectories import Hold
 
 pytestmark = pytest.mark.process
@@ -85,7 +74,7 @@ def test_every_visual_stands_where_pinocchio_puts_it(name: str) -> None:
             path = f"/robot/{joint}/{link}"
             thing = children(recorder, path)[int(number)]
             expected = geometry_data.oMg[k].homogeneous
-            if type(item.geometry).__name__ == "Cylinder":
+            if type(item.geometry).__name__ == "shapes.Cylinder":
                 expected = expected @ _Y_TO_Z
             shown = recorder.transform(path) @ matrix(thing)
             np.testing.assert_allclose(shown, expected, atol=1e-12)
@@ -171,20 +160,20 @@ def test_a_state_is_shown_with_what_the_run_did_then(
     assert clock["text"] == "t = 0.25 s"
 
 
-SHAPES: list[Shape] = [
-    Sphere(0.1),
-    Capsule(0.1, 0.3),
-    Cylinder(0.1, 0.3),
-    Box((0.1, 0.2, 0.3)),
-    HalfSpace(),
-    PointCloud([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]]),
-    HeightField((1.0, 1.0), [[0.0, 0.1], [0.2, 0.0]]),
+SHAPES: list[shapes.Shape] = [
+    shapes.Sphere(0.1),
+    shapes.Capsule(0.1, 0.3),
+    shapes.Cylinder(0.1, 0.3),
+    shapes.Box((0.1, 0.2, 0.3)),
+    shapes.HalfSpace(),
+    shapes.PointCloud([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]]),
+    shapes.HeightField((1.0, 1.0), [[0.0, 0.1], [0.2, 0.0]]),
 ]
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: type(shape).__name__)
 def test_every_shape_of_obstacle_is_drawn(
-    shape: Shape, arm: Robot, run: Rollout, recorder: Recorder
+    shape: shapes.Shape, arm: Robot, run: Rollout, recorder: Recorder
 ) -> None:
     viewer = Viewer(arm, transport=recorder)
     viewer.draw_scene(Scene([Obstacle("it", shape, Hold([1.0, 0.0, 0.2]))]))
@@ -207,10 +196,10 @@ def test_a_mesh_is_drawn_and_one_that_is_gone_becomes_a_ball(
     file = tmp_path / "triangle.obj"
     file.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 3 4\n")
     viewer = Viewer(arm, transport=recorder)
-    viewer.draw_scene(Scene([Obstacle("it", Mesh(file), Hold([1.0, 0.0, 0.2]))]))
+    viewer.draw_scene(Scene([Obstacle("it", shapes.Mesh(file), Hold([1.0, 0.0, 0.2]))]))
     (thing,) = geometries(recorder, "/obstacles/it")
     assert len(thing["data"]["attributes"]["position"]["array"]) == 3 * 3 * 3
-    about = {"shape": "Mesh", "parameters": {"file": "gone.obj"}, "radius": 0.4}
+    about = {"shape": "shapes.Mesh", "parameters": {"file": "gone.obj"}, "radius": 0.4}
     columns = {**run.columns, "obstacle.it": run["obstacle.disk"]}
     viewer.draw_scene(Rollout(columns, {**run.meta, "obstacles": {"it": about}}))
     (thing,) = geometries(recorder, "/obstacles/it")

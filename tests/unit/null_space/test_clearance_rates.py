@@ -17,17 +17,7 @@ from odd_robots import FACES, OCTAHEDRON, write_stl
 from oracles import gradient
 
 from hsp_control import Controller, Cost, FramePosition, Gains, Obstacle, simulate
-from hsp_control.geometry import Proximity, link_shapes
-from hsp_control.geometry.shapes import (
-    Box,
-    Capsule,
-    Cylinder,
-    HalfSpace,
-    HeightField,
-    Mesh,
-    PointCloud,
-    Sphere,
-)
+from hsp_control.geometry import Proximity, link_shapes, shapes
 from hsp_control.null_space.fields import ObstacleClearance
 from hsp_control.robot import Dop853
 from hsp_control.robot.integrators import Integrator
@@ -48,19 +38,21 @@ RIPPLES = (
 )
 CLOUD = 0.5 * OCTAHEDRON
 OBSTACLES: dict[str, Callable[[Path], Obstacle]] = {
-    "sphere": lambda _: Obstacle("it", Sphere(0.15), AIR, TURNING),
-    "point": lambda _: Obstacle("it", Sphere(0.0), AIR, TURNING),
-    "capsule": lambda _: Obstacle("it", Capsule(0.08, 0.3), AIR, TURNING),
-    "cylinder": lambda _: Obstacle("it", Cylinder(0.1, 0.3), AIR, TURNING),
-    "box": lambda _: Obstacle("it", Box((0.2, 0.3, 0.25)), AIR, TURNING),
+    "sphere": lambda _: Obstacle("it", shapes.Sphere(0.15), AIR, TURNING),
+    "point": lambda _: Obstacle("it", shapes.Sphere(0.0), AIR, TURNING),
+    "capsule": lambda _: Obstacle("it", shapes.Capsule(0.08, 0.3), AIR, TURNING),
+    "cylinder": lambda _: Obstacle("it", shapes.Cylinder(0.1, 0.3), AIR, TURNING),
+    "box": lambda _: Obstacle("it", shapes.Box((0.2, 0.3, 0.25)), AIR, TURNING),
     "plane": lambda _: Obstacle(
-        "it", HalfSpace(), LOW, HoldOrientation(turned(0.1, 0.1, 0.0))
+        "it", shapes.HalfSpace(), LOW, HoldOrientation(turned(0.1, 0.1, 0.0))
     ),
-    "mesh": lambda octa: Obstacle("it", Mesh(octa), AIR, TURNING),
-    "hull": lambda octa: Obstacle("it", Mesh(octa, convex=True), AIR, TURNING),
-    "cloud": lambda _: Obstacle("it", PointCloud(CLOUD.tolist(), 0.02), AIR, TURNING),
+    "mesh": lambda octa: Obstacle("it", shapes.Mesh(octa), AIR, TURNING),
+    "hull": lambda octa: Obstacle("it", shapes.Mesh(octa, convex=True), AIR, TURNING),
+    "cloud": lambda _: Obstacle(
+        "it", shapes.PointCloud(CLOUD.tolist(), 0.02), AIR, TURNING
+    ),
     "height field": lambda _: Obstacle(
-        "it", HeightField((2.0, 2.0), RIPPLES.tolist()), LOW
+        "it", shapes.HeightField((2.0, 2.0), RIPPLES.tolist()), LOW
     ),
 }
 
@@ -114,7 +106,7 @@ def test_gradient_and_rate_for_every_shape(
 def test_gradient_by_hulls_is_as_good_as_gjk() -> None:
     """The Panda's cylinders and a cylinder: 1e-4, with Coal's own tolerance 1e-2."""
     robot = load("panda")
-    obstacle = Obstacle("it", Cylinder(0.1, 0.3), AIR, TURNING)
+    obstacle = Obstacle("it", shapes.Cylinder(0.1, 0.3), AIR, TURNING)
     field = ObstacleClearance([obstacle], influence=0.4, proxy="hulls")
     rng = np.random.default_rng(16)
     agreed = 0
@@ -142,7 +134,7 @@ def test_a_floor_has_no_edge_where_links_lie_level() -> None:
     third there, from one step to the next.
     """
     robot = load("panda")
-    floor = Obstacle("floor", HalfSpace(), Hold([0.0, 0.0, 0.0]))
+    floor = Obstacle("floor", shapes.HalfSpace(), Hold([0.0, 0.0, 0.0]))
     field = ObstacleClearance([floor], influence=0.9, links=["panda_link5"])
     links = [s for s in link_shapes(robot) if s.link == "panda_link5"]
     capsules = Proximity(
@@ -172,10 +164,10 @@ def test_a_floor_has_no_edge_where_links_lie_level() -> None:
 
 PASSING = Lissajous([0.1, 0.1, 0.2], [2.0, 3.0, 2.5], center=[0.1, 0.45, 0.7])
 LOOPS = {
-    "ball": Obstacle("ball", Sphere(0.1), PASSING),
-    "box": Obstacle("box", Box((0.2, 0.15, 0.25)), PASSING,
+    "ball": Obstacle("ball", shapes.Sphere(0.1), PASSING),
+    "box": Obstacle("box", shapes.Box((0.2, 0.15, 0.25)), PASSING,
      Spin([0.0, 0.6, 0.8], 1.0, rotation=np.eye(3))),
-    "floor": Obstacle("floor", HalfSpace(),
+    "floor": Obstacle("floor", shapes.HalfSpace(),
      Lissajous([0.0, 0.0, 0.05], [0.0, 0.0, 3.0], center=[0.0, 0.0, 0.15]),
      HoldOrientation(turned(0.2, -0.1, 0.0))),
 }  # fmt: skip
