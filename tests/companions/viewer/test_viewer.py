@@ -20,18 +20,6 @@ from hsp_control.trajectories import Hold
 
 pytestmark = pytest.mark.process
 
-MOVING = "paper/4_moving_obstacle"
-
-
-@pytest.fixture(scope="module")
-def run() -> Rollout:
-    return load_experiment(MOVING, "simulation.duration=1.5").run()
-
-
-@pytest.fixture(scope="module")
-def arm() -> Robot:
-    return Robot.load("planar3r")
-
 
 @pytest.fixture
 def recorder() -> Recorder:

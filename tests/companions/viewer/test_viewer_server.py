@@ -21,7 +21,7 @@ from played import wait_until
 from tornado.httpclient import HTTPClientError, HTTPRequest
 from tornado.websocket import websocket_connect
 
-from hsp_control import Robot, Rollout, load_experiment
+from hsp_control import Robot, Rollout
 from hsp_control.common.exceptions import ExportError, ViewerError
 from hsp_control.companions.viewer import (
     SceneRecorder,
@@ -42,18 +42,7 @@ from hsp_control.geometry import Scene
 
 pytestmark = pytest.mark.process
 
-MOVING = "paper/4_moving_obstacle"
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
-
-
-@pytest.fixture(scope="module")
-def run() -> Rollout:
-    return load_experiment(MOVING, "simulation.duration=1.5").run()
-
-
-@pytest.fixture(scope="module")
-def arm() -> Robot:
-    return Robot.load("planar3r")
 
 
 @pytest.fixture

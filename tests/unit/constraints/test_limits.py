@@ -5,6 +5,7 @@
 
 from collections.abc import Sequence
 from functools import cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -276,3 +277,15 @@ def test_distance_rows_are_its_second_derivative(kind: str) -> None:
         scale = 1e-2 * np.linalg.norm(wanted)
         np.testing.assert_allclose(A @ wanted, asked[chosen], rtol=0, atol=scale)
         np.testing.assert_allclose(b, least[chosen], rtol=0, atol=2e-2)
+
+
+def test_a_row_turns_no_corner_in_one_step() -> None:
+    """A capsule's side ends: d'' jumps by 3.3 m/s², and efforts have to follow."""
+    robot, rng = panda(), np.random.default_rng(6)
+    limit = ObstacleDistance().placed(at_home(robot, [ball(), table()]))
+    v = rng.standard_normal(7)
+    q = robot.integrate(robot.home(), 0.2 * rng.standard_normal(7))
+    way = [robot.integrate(q, s * v) for s in np.arange(-0.15, 0.15, 1e-3)]
+    rows = [limit.rows(robot.state(0.4, at, v), 10.0, 1e2 * v)[1] for at in way]
+    steps = [b - a for a, b in pairwise(rows) if len(a) == len(b)]
+    assert max(np.abs(step).max() for step in steps) < 1.0

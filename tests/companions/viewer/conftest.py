@@ -1,0 +1,15 @@
+"""What tests of the view share: a short run, and an arm."""
+
+import pytest
+
+from hsp_control import Robot, Rollout, load_experiment
+
+
+@pytest.fixture(scope="module")
+def run() -> Rollout:
+    return load_experiment("paper/4_moving_obstacle", "simulation.duration=1.5").run()
+
+
+@pytest.fixture(scope="module")
+def arm() -> Robot:
+    return Robot.load("planar3r")
