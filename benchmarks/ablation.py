@@ -53,7 +53,7 @@ INGREDIENTS: dict[str, tuple[Edit, ...]] = {
     ),
     "threshold that follows": ((_EDGE, "STIFFNESS = 200.0", "STIFFNESS = 1e12"),),
     "f₀": ((_EDGE, "ON_LEGS = 1.0, 10.0", "ON_LEGS = 0.0, 0.0"),),
-    "threshold of the field": ((_EDGE, "QUARTER = 50.0,", "QUARTER = 1e12,"),),
+    "threshold of the field": ((_EDGE, "QUICKEST = 50.0,", "QUICKEST = 1e12,"),),
     "threshold below a held level": ((_EDGE, "BELOW = 4.0", "BELOW = 1e12"),),
     "what those above it draw": (
         ("law/hierarchy.py", "opposed[k] -= J[start", "opposed[k] -= 0.0 * J[start"),

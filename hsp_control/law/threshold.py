@@ -49,10 +49,10 @@ MODEST, MODEST_ON_LEGS = 1.0, 10.0
 """f_0 over the robot's size [1/s²]: what a position 1 % of the size away asks for at
 10 rad/s; and with a floating base, whose feet ask for more where they land."""
 
-TURNING, QUARTER = 50.0, 0.25
+TURNING, QUARTER, QUICKEST = 50.0, 0.25, 7.0
 """How fast what a field asks for may change as its null space turns [1/s]: what is held
 for a period h is stable below 2/h, and periods are up to 10 ms. A velocity counts for a
-quarter."""
+quarter, and nothing for more than 7 rad/s: no field costs the task all that it has."""
 
 
 class Following(NamedTuple):
@@ -87,7 +87,7 @@ def turning_threshold(g: Array, v: Array, following: Following) -> float:
         following: What they count.
     """
     quickest = max(np.sqrt(squared_norm(g)), QUARTER * np.sqrt(squared_norm(v)))
-    return float(following.turning * quickest)
+    return float(following.turning * min(quickest, QUICKEST))
 
 
 @kernel
@@ -123,14 +123,14 @@ def write_thresholds(
                 square += asked[k] * asked[k]
                 more += (yields[k] - 1.0) * asked[k] * asked[k]
         norm, share = np.sqrt(square), np.sqrt(pull)
+        if following.modest > 0.0:
+            share = max(share, norm / following.modest)
         beyond = max(norm - following.modest, 0.0)
         if beyond > 0.0:
             beyond *= 1.0 + more / square
-            share = 1.0
-        elif norm > 0.0:
-            share = max(share, norm / following.modest)
         follows = np.sqrt(beyond / following.steepest)
-        thresholds[level] = max(least, follows, min(share, 1.0) * turning)
+        turns = min(share, 1.0) * turning
+        thresholds[level] = max(least, follows, turns)
         largest = max(largest, thresholds[level])
         start = ends[level]
     return float(largest)

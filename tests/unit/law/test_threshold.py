@@ -22,6 +22,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.law.threshold import (
     MODEST,
     NOT,
+    QUICKEST,
     STIFFNESS,
     TURNING,
     Following,
@@ -207,7 +208,7 @@ def test_no_target_makes_it_steep_in_v(name: str, seed: int) -> None:
     (epsilon,) = resolution.thresholds
     speeds = 3.0 * np.linalg.norm(v) + np.linalg.norm(g - v)
     if np.linalg.norm(resolution.problem.asked) >= MODEST * robot.size:
-        assert epsilon >= robot.size * np.linalg.norm(g) / TURNING
+        assert epsilon >= robot.size * min(np.linalg.norm(g), QUICKEST) / TURNING
     bound = max(Kv, K_N) + 1.0 + 1.09 * speeds * bends / epsilon  # ∂g/∂q = -1
     assert np.linalg.norm(slope_in_v(controller, q, v), 2) <= bound * (1.0 + 1e-6)
 
