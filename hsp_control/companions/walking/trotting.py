@@ -132,7 +132,8 @@ class RunningTrot(RunningQuadruped):
                 self._mode = "two"
                 for foot in self._pair:
                     self._lift_off(foot, t)
-        elif all(self._has_landed(foot, measured) for foot in self._pair):
+        # Each foot is asked, also while the other one is in the air.
+        elif all([self._has_landed(foot, measured) for foot in self._pair]):
             self._swings += 1
             self._idle = self._idle + 1 if self._velocity.is_zero else 0
             if wanted.is_zero and self._idle >= CLOSING:
