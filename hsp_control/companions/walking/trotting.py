@@ -132,8 +132,7 @@ class RunningTrot(RunningQuadruped):
                 self._mode = "two"
                 for foot in self._pair:
                     self._lift_off(foot, t)
-        # Each foot is asked, also while the other one is in the air.
-        elif all([self._has_landed(foot, measured) for foot in self._pair]):
+        elif self._pair_has_landed(measured):
             self._swings += 1
             self._idle = self._idle + 1 if self._velocity.is_zero else 0
             if wanted.is_zero and self._idle >= CLOSING:
@@ -146,6 +145,11 @@ class RunningTrot(RunningQuadruped):
     def _pair(self) -> list[PointFoot]:
         """The feet that swing, or swing next."""
         return self._pairs[self._swings % 2]
+
+    def _pair_has_landed(self, measured: Measurement) -> bool:
+        """Return whether both bear; one does while the other is still in the air."""
+        landed = [self._has_landed(foot, measured) for foot in self._pair]
+        return all(landed)
 
     def _unload(self, t: float) -> None:
         """Let the force of the next pair fade while all feet bear."""

@@ -26,10 +26,7 @@ pytestmark = pytest.mark.process
     (["--over", "null_space.gain=1:2", "--design", "latin"], "'latin_hypercube'?"),
     (["--over", "null_space.gain=1:2", "--design", "random"], "needs --samples"),
     (["--over", "null_space.gain=1:2", "--samples", "0"], "0 samples"),
-    (
-        ["--over", "null_space.gain=1:2", "--samples", "9", "--seed", "-1"],
-        "seed is",
-    ),
+    (["--over", "null_space.gain=1:2", "--samples", "9", "--seed", "-1"], "seed is"),
     (["--over", "null_space.gain=1,2", "--workers", "0"], "0 workers"),
 ])  # fmt: skip
 def test_each_mistake_gets_one_message_and_status_2(

@@ -15,10 +15,8 @@ FEET = [BallContact(name, radius=0.0165) for name in NAMES]
 
 @pytest.mark.parametrize(("contacts", "message"), [
     (FEET[:3], r"^plan: a quadruped crawls on four feet; there are 3 \(FL_FOOT"),
-    (
-        [*FEET[:3], SurfaceContact("HR_FOOT", length=0.1, width=0.1)],
-        "^plan: contact 'HR_FOOT' is a surface; a quadruped crawls on feet of type",
-    ),
+    ([*FEET[:3], SurfaceContact("HR_FOOT", length=0.1, width=0.1)],
+     "^plan: contact 'HR_FOOT' is a surface; a quadruped crawls on feet of type"),
 ])  # fmt: skip
 def test_what_does_not_fit_is_said(contacts, message):
     with pytest.raises(HspControlError, match=message):

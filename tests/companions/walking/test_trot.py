@@ -8,6 +8,7 @@ import pytest
 from hsp_control import Limits, Robot, load_experiment
 from hsp_control.common.exceptions import HspControlError, PlanError
 from hsp_control.companions.walking import Trot
+from hsp_control.companions.walking.composing import FRICTION
 from hsp_control.companions.walking.quadruped import BANDWIDTH
 from hsp_control.constraints.contacts import BallContact, SurfaceContact
 from hsp_control.tasks import CenterOfMass
@@ -38,40 +39,24 @@ def test_it_adds_what_it_needs(solo):
     assert tasks["center_of_mass"].trajectory.dimension == 2
     assert tasks["height"].trajectory.dimension == 1
     assert all(isinstance(each.schedule, Switch) for each in made.contacts)
+    assert {each.friction for each in made.contacts} == {FRICTION}
+    sure = Trot().parts(solo, [], [replace(foot, friction=0.9) for foot in FEET])
+    assert {each.friction for each in sure.contacts} == {0.9}
+
+
+TURNED = BallContact("HR_FOOT", radius=0.0165, normal=[1, 0, 0])
 
 
 @pytest.mark.parametrize(("trot", "tasks", "contacts", "message"), [
     (Trot(), [], [], "^plan: a quadruped trots on four feet; there are 0 .declare"),
-    (
-        Trot(),
-        [],
-        FEET[:3],
-        "^plan: a quadruped trots on four feet; there are 3 .FL",
-    ),
-    (
-        Trot(feet=["FL_FOO"]),
-        [],
-        FEET,
-        "no contact 'FL_FOO'; did you mean 'FL_FOOT'",
-    ),
-    (
-        Trot(),
-        [],
-        [*FEET[:3], SurfaceContact("HR_FOOT", length=0.1, width=0.1)],
-        "^plan: contact 'HR_FOOT' is a surface; a quadruped trots on feet of type",
-    ),
-    (
-        Trot(),
-        [CenterOfMass()],
-        FEET,
-        "^tasks.center_of_mass: its axes are 'xyz'; the plan needs 'xy'",
-    ),
-    (
-        Trot(),
-        [],
-        [*FEET[:3], BallContact("HR_FOOT", radius=0.0165, normal=[1, 0, 0])],
-        r"^plan: contact 'HR_FOOT' has the normal \[1.0, 0.0, 0.0\]; a quadrup",
-    ),
+    (Trot(), [], FEET[:3], "^plan: a quadruped trots on four feet; there are 3 .FL"),
+    (Trot(feet=["FL_FOO"]), [], FEET, "no contact 'FL_FOO'; did you mean 'FL_FOOT'"),
+    (Trot(), [], [*FEET[:3], SurfaceContact("HR_FOOT", length=0.1, width=0.1)],
+     "^plan: contact 'HR_FOOT' is a surface; a quadruped trots on feet of type"),
+    (Trot(), [CenterOfMass()], FEET,
+     "^tasks.center_of_mass: its axes are 'xyz'; the plan needs 'xy'"),
+    (Trot(), [], [*FEET[:3], TURNED],
+     r"^plan: contact 'HR_FOOT' has the normal \[1.0, 0.0, 0.0\]; a quadrup"),
 ])  # fmt: skip
 def test_what_does_not_fit_is_said(solo, trot, tasks, contacts, message):
     with pytest.raises(HspControlError, match=message):
