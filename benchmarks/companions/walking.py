@@ -24,7 +24,8 @@ PUSH = 200.0
 """Force of a push [N], for a tenth of a second."""
 ESTIMATED = {
     "estimators": "{base: true}",
-    "plant.sensors": "{imu: imu_link, position_noise: 1.0e-4, velocity_noise: 0.01}",
+    "plant.sensors.position_noise": 1e-4,
+    "plant.sensors.velocity_noise": 0.01,
 }
 """An ADIS16448's noise, and that of encoders: 0.1 mrad, 0.01 rad/s."""
 SLIPPERY = {"plant.ground.friction": 0.35}
