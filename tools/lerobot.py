@@ -13,9 +13,7 @@ import sys
 from pathlib import Path
 
 PLUGIN = Path(__file__).resolve().parent.parent / "plugins" / "lerobot_robot_hsp"
-LEROBOT = (  # 0.4.4 is the newest for Python 3.11
-    "lerobot[dataset]==0.6.1" if sys.version_info >= (3, 12) else "lerobot==0.4.4"
-)
+LEROBOT = f"lerobot{'[dataset]==0.6.1' if sys.version_info > (3, 12) else '==0.4.4'}"
 
 
 def main() -> int:
