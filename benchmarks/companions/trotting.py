@@ -1,4 +1,4 @@
-"""Six quadrupeds trot and crawl on MuJoCo, with one set of parameters.
+"""Eight quadrupeds trot and crawl on MuJoCo, with one set of parameters.
 
     python benchmarks/companions/trotting.py [--estimated] [--case WORD] [robot ...]
 
@@ -26,6 +26,8 @@ FEET = {
     "anymal": ("LF_FOOT RF_FOOT LH_FOOT RH_FOOT", 0.03, "base"),
     "b1": ("FL_foot FR_foot RL_foot RR_foot", 0.035, "trunk"),
     "hyq": ("lf_foot rf_foot lh_foot rh_foot", 0.021, "trunk"),
+    "go1": ("FL_foot FR_foot RL_foot RR_foot", 0.02, "trunk"),
+    "anymal_c": ("LF_FOOT RF_FOOT LH_FOOT RH_FOOT", 0.03, "base"),
 }
 """The frames of the feet, their radius [m], and the frame of the unit."""
 STEPS = {
