@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 PLUGIN = Path(__file__).resolve().parent.parent / "plugins" / "lerobot_robot_hsp"
-LEROBOT = "lerobot==0.4.4"  # the newest for Python 3.11
+LEROBOT = f"lerobot{'[dataset]==0.6.1' if sys.version_info > (3, 12) else '==0.4.4'}"
 
 
 def main() -> int:

@@ -1,4 +1,4 @@
-"""Six quadrupeds trot and crawl on MuJoCo, with one set of parameters.
+"""Eight quadrupeds trot and crawl on MuJoCo, with one set of parameters.
 
     python benchmarks/companions/trotting.py [--estimated] [--case WORD] [robot ...]
 
@@ -26,6 +26,8 @@ FEET = {
     "anymal": ("LF_FOOT RF_FOOT LH_FOOT RH_FOOT", 0.03, "base"),
     "b1": ("FL_foot FR_foot RL_foot RR_foot", 0.035, "trunk"),
     "hyq": ("lf_foot rf_foot lh_foot rh_foot", 0.021, "trunk"),
+    "go1": ("FL_foot FR_foot RL_foot RR_foot", 0.02, "trunk"),
+    "anymal_c": ("LF_FOOT RF_FOOT LH_FOOT RH_FOOT", 0.03, "base"),
 }
 """The frames of the feet, their radius [m], and the frame of the unit."""
 STEPS = {
@@ -37,10 +39,10 @@ STEPS = {
 """Plates of 2 cm, up and down again."""
 
 
-def ramp(degrees: float, edge: float) -> dict[str, Any]:
+def ramp(degrees: float, edge: float, friction: float = 0.7) -> dict[str, Any]:
     """Return a platform up to an edge [m], and a ramp beyond it that goes down."""
     slope = radians(degrees)
-    box = {"shape": {"type": "box", "size": [6.0, 4.0, 0.2]}, "friction": 0.7}
+    box = {"shape": {"type": "box", "size": [6.0, 4.0, 0.2]}, "friction": friction}
     x = edge + 3.0 * cos(slope) - 0.1 * sin(slope)
     middle = [x, 0.0, -3.0 * sin(slope) - 0.1 * cos(slope)]
     return {
@@ -54,13 +56,18 @@ CASES: dict[str, dict[str, Any]] = {
     "0.6 m/s": {"plan": {"speed": 0.6}},
     "0.2 m/s, 0.4 rad/s": {"plan": {"speed": 0.2, "turn": 0.4}},
     "0.2 m/s sideways": {"plan": {"sideways": 0.2}},
-    "0.3 m/s, friction 0.4": {"plan": {"speed": 0.3}, "friction": 0.4},
+    "0.3 m/s, friction 0.35": {"plan": {"speed": 0.3}, "friction": 0.35},
     "0.3 m/s, steps of 2 cm": {"plan": {"speed": 0.3}, "solids": {"steps": STEPS}},
     "0.3 m/s, down 5°": {"plan": {"speed": 0.3}, "solids": ramp(5.0, 0.5)},
     "0.3 m/s, down 10°": {"plan": {"speed": 0.3}, "solids": ramp(10.0, 0.5)},
+    "down 10°, friction 0.35": {
+        "plan": {"speed": 0.3},
+        "solids": ramp(10.0, 0.5, 0.35),
+        "friction": 0.35,
+    },
     "crawl, 0.06 m/s": {"plan": {"type": "crawl", "speed": 0.06}, "duration": 9.0},
 }
-"""What is different in each case."""
+"""What is different in each case. No plan is told the friction."""
 NOISE = {"position_noise": 1e-4, "velocity_noise": 0.01}
 """Noise of the encoders [rad, rad/s]; that of the unit is an ADIS16448's."""
 UNTIL, DURATION = 4.0, 6.0
@@ -71,21 +78,12 @@ def configuration(
     robot: str, case: dict[str, Any], *, estimated: bool
 ) -> dict[str, Any]:
     """Return the configuration of a robot in a case."""
-    friction = case.get("friction", 0.7)
     feet, radius, trunk = FEET[robot]
     frames, shape = feet.split(), {"type": "sphere", "radius": radius}
     return {
         "robot": {"name": robot},
         "start": {"ground": 0},
-        "contacts": {
-            f: {
-                "type": "ball",
-                "frame": f,
-                "radius": radius,
-                "friction": friction - 0.03,
-            }
-            for f in frames
-        },
+        "contacts": {f: {"type": "ball", "frame": f, "radius": radius} for f in frames},
         "plan": {"type": "trot", "until": UNTIL, **case["plan"]},
         "null_space": {"fields": [{"type": "target_posture", "target": "start"}]},
         "simulation": {
@@ -95,7 +93,7 @@ def configuration(
         "plant": {
             "type": "mujoco",
             "contacts": {f: {"shape": shape} for f in frames},
-            "ground": {"friction": friction} | _below(case),
+            "ground": {"friction": case.get("friction", 0.7)} | _below(case),
             "solids": case.get("solids", {}),
             "sensors": {"imu": trunk, **(NOISE if estimated else {})},
         },

@@ -1,11 +1,11 @@
 """Talos walks on MuJoCo: far, fast, turning, pushed, with other masses and friction.
 
-    python benchmarks/companions/walking.py [--estimated] [part of a case's name ...]
+    python benchmarks/companions/walking.py [--estimated] [--robot g1] [WORD ...]
 
 Prints one line for each case: whether it stood at the end, how far it came, and how
-well the plan was followed. Each case is ``walking/talos_walk`` with other values;
-``--estimated`` with an estimated base, from a noisy inertial measurement unit and noisy
-encoders.
+well the plan was followed; with words only those whose names contain one. Each case is
+``walking/talos_walk`` (or ``g1_walk``) with other values; ``--estimated`` with an
+estimated base, from a noisy inertial measurement unit and noisy encoders.
 """
 
 import argparse
@@ -19,14 +19,17 @@ from trotting import ramp
 from hsp_control import Rollout, load_experiment
 from hsp_control.common.exceptions import SimulationError
 
-WALK = "walking/talos_walk"
+WALKS = {"talos": "walking/talos_walk", "g1": "walking/g1_walk"}
 PUSH = 200.0
 """Force of a push [N], for a tenth of a second."""
 ESTIMATED = {
     "estimators": "{base: true}",
-    "plant.sensors": "{imu: imu_link, position_noise: 1.0e-4, velocity_noise: 0.01}",
+    "plant.sensors.position_noise": 1e-4,
+    "plant.sensors.velocity_noise": 0.01,
 }
 """An ADIS16448's noise, and that of encoders: 0.1 mrad, 0.01 rad/s."""
+SLIPPERY = {"plant.ground.friction": 0.35}
+"""A ground of which the plan does not know."""
 
 
 def cases() -> Iterator[tuple[str, dict[str, Any]]]:
@@ -41,10 +44,12 @@ def cases() -> Iterator[tuple[str, dict[str, Any]]]:
     yield "turns right", turn | {"plan.steps": 9, "plan.turn": -0.3}
     left = {"plan.speed": 0, "plan.sideways": 0.1}
     yield "sideways", left | {"plan.steps": 7, "simulation.duration": 9}
-    yield "friction 0.4", {"plan.steps": 8, "simulation.duration": 10} | slippery()
-    for edge in (0.2, 0.3, 0.4):
-        down = {"plan.steps": 8, "simulation.duration": 9, "plant.ground.height": -3}
+    yield "friction 0.35", {"plan.steps": 8, "simulation.duration": 10} | SLIPPERY
+    down = {"plan.steps": 8, "simulation.duration": 10, "plant.ground.height": -3}
+    for edge in (0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5):
         yield f"down 5° from {edge} m on", down | {"plant.solids": ramp(5.0, edge)}
+        slope = down | {"plant.solids": ramp(5.0, edge, 0.35)}
+        yield f"down 5° from {edge} m on, friction 0.35", slope
     for seed in range(3):
         yield (
             f"masses +5 % ± 10 %, seed {seed}",
@@ -61,20 +66,14 @@ def cases() -> Iterator[tuple[str, dict[str, Any]]]:
             values = {"plan.steps": 6, "simulation.duration": 12}
             values |= {"plant.pushes": f"[{{{push}}}]"}
             yield f"push {phase}, {45 * k}°", values
-            other = values | other_masses(0) | slippery()
-            yield f"push {phase}, {45 * k}°, other masses, friction 0.4", other
+            other = values | other_masses(0) | SLIPPERY
+            yield f"push {phase}, {45 * k}°, other masses, friction 0.35", other
 
 
 def other_masses(seed: int) -> dict[str, Any]:
     """Return a robot of other masses, of which the controller does not know."""
     draw = "{mass_factor: 1.05, random_mass: 0.1}"
     return {"plant.inertias": draw, "plant.seed": seed}
-
-
-def slippery() -> dict[str, Any]:
-    """Return a ground of friction 0.4, of which the contacts know."""
-    known = {f"contacts.{side}_foot.friction": 0.38 for side in ("left", "right")}
-    return known | {"plant.ground.friction": 0.4}
 
 
 def summary(run: Rollout) -> str:
@@ -110,6 +109,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("words", nargs="*", help="parts of names of cases")
     parser.add_argument("--estimated", action="store_true", help="estimate the base")
+    parser.add_argument("--robot", choices=WALKS, default="talos", help="who walks")
     options = parser.parse_args()
     for name, values in cases():
         if options.words and not any(word in name for word in options.words):
@@ -118,7 +118,7 @@ def main() -> None:
             values = values | ESTIMATED
         overrides = [f"{key}={value}" for key, value in values.items()]
         try:
-            said = summary(load_experiment(WALK, *overrides).run())
+            said = summary(load_experiment(WALKS[options.robot], *overrides).run())
         except SimulationError as error:
             said = str(error)
         print(f"{name:32} | {said}", flush=True)

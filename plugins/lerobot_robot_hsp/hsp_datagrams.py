@@ -12,6 +12,7 @@ import json
 import socket
 from collections.abc import Sequence
 from math import atan2, cos, hypot, pi, sin
+from select import select
 from threading import Condition, Thread
 from time import monotonic
 from typing import Any
@@ -53,6 +54,7 @@ class Loop:
         self._in.settimeout(_POLL)
         self._newest: dict[str, Any] | None = None
         self._heard = -float("inf")
+        self._opening: float | None = None
         self._changed, self._open = Condition(), True
         self._thread = Thread(target=self._listen, name="states", daemon=True)
         self._thread.start()
@@ -93,6 +95,16 @@ class Loop:
         """Send waypoints and their times from now [s]; they replace earlier ones."""
         rows = [[float(each) for each in row] for row in values]
         self._send(to, {"values": rows, "times": [float(each) for each in times]})
+
+    def opening(self, gripper: str, wait: float = 0.0) -> float | None:
+        """Return how far a finger of a Franka's gripper was open when it told that.
+
+        It answers between its motions, at ``HOST:PORT``; None: never yet.
+        """
+        self._out.sendto(b"{}", _address(gripper))
+        while select([self._out], [], [], wait)[0]:
+            self._opening, wait = json.loads(self._out.recv(_LARGEST))["value"][0], 0.0
+        return self._opening
 
     def close(self) -> None:
         """Stop listening; a second call does nothing."""

@@ -6,6 +6,7 @@ no thread of the same process could help. Its destructors may end the process. S
 runs here, where the loop can kill it.
 
 It does one request at a time, and needs nothing of hsp_control: it starts at once.
+Asked to listen somewhere, it drives the gripper instead.
 """
 
 import gc
@@ -14,6 +15,8 @@ import os
 import socket
 import struct
 import sys
+from select import select
+from time import monotonic
 from typing import Any
 
 REQUEST = struct.Struct("=c7d")
@@ -25,6 +28,12 @@ CONNECT, READ, START, EFFORT, FINISH = b"C", b"R", b"S", b"E", b"F"
 ANSWER, ERROR = b"A", b"X"
 LONGEST = 1 << 16
 """Longest message [bytes]."""
+SPEED, FORCE = 0.1, 30.0
+"""With which the gripper moves [m/s] and grasps [N]."""
+_SAME = 0.001
+"""Openings of a finger that are one [m]."""
+_SILENCE = 2.0
+"""After how much another sender is heard [s]."""
 
 
 class Client:
@@ -32,6 +41,7 @@ class Client:
 
     def __init__(self) -> None:
         """Wait for the first request."""
+        self.fingers: GripperClient | None = None
         self.library: Any = None
         self.robot: Any = None
         self.control: Any = None
@@ -58,6 +68,9 @@ class Client:
 
     def connect(self, wanted: dict[str, Any]) -> dict[str, Any]:
         """Connect, set what is wanted, and return the robot's state and model."""
+        if (listens := wanted.get("gripper")) is not None:
+            self.fingers = GripperClient(wanted["address"], *listens)
+            return {"value": self.fingers.opening}
         import pylibfranka
 
         self.library = pylibfranka
@@ -121,6 +134,77 @@ def described(state: Any) -> dict[str, Any]:
     }
 
 
+class GripperClient:
+    """Moves the gripper as JSON datagrams say, ``{"value": [0.02]}``: a finger [m].
+
+    Of what comes during a motion the newest counts. A smaller opening grasps what is
+    there. Who sends, or asks by ``{}``, hears how it stands.
+    """
+
+    def __init__(self, address: str, host: str, port: int) -> None:
+        """Connect and listen."""
+        import pylibfranka
+
+        self.gripper: Any = pylibfranka.Gripper(address)
+        self.opening: float = 0.5 * self.gripper.read_once().width
+        self.inbox = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.inbox.bind((host, port))
+        self.sender, self.heard, self.said = ("", 0), -_SILENCE, ""
+
+    def serve(self, link: socket.socket) -> None:
+        """Do what comes until the loop ends; the fingers stay as they are then."""
+        while True:
+            wanted, waiting, listeners = self.opening, None, set()
+            while ready := select([self.inbox, link], [], [], waiting)[0]:
+                if link in ready:
+                    return
+                text, sender = self.inbox.recvfrom(LONGEST)
+                listeners.add(sender)
+                waiting = 0.0
+                try:
+                    wanted = self.read(json.loads(text), sender, wanted)
+                except (ValueError, TypeError, LookupError) as error:
+                    self.say(f"a message is dropped: {error}")
+            try:
+                self.move(wanted)
+                state = self.gripper.read_once()
+            except Exception as error:
+                self.say(str(error))
+                continue
+            told = {"value": [0.5 * state.width], "grasped": state.is_grasped}
+            for listener in listeners:
+                self.inbox.sendto(json.dumps(told).encode(), listener)
+
+    def read(self, message: Any, sender: tuple[str, int], wanted: float) -> float:
+        """Return the opening that a message asks for, if it does."""
+        value = message["values"][-1] if "values" in message else message.get("value")
+        if value is None:
+            return wanted
+        if sender != self.sender and monotonic() - self.heard < _SILENCE:
+            known, other = (":".join(map(str, who)) for who in (self.sender, sender))
+            raise ValueError(f"{other} sends while {known} does")
+        self.sender, self.heard = sender, monotonic()
+        if not 0.0 <= (opening := float(value[0])) <= 1.0:
+            raise ValueError(f"the opening is {opening} m")
+        return opening
+
+    def move(self, opening: float) -> None:
+        """Open, or close and grasp what is there."""
+        last = self.opening
+        if abs(opening - last) > _SAME:
+            self.opening = opening
+            if opening < last:
+                self.gripper.grasp(2.0 * opening, SPEED, FORCE, 0.1, 0.1)
+            else:
+                self.gripper.move(2.0 * opening, SPEED)
+
+    def say(self, line: str) -> None:
+        """Print a line once."""
+        if line != self.said:
+            self.said = line
+            print(f"The gripper: {line}", flush=True)
+
+
 def main(descriptor: int) -> None:
     """Answer requests from a socket until its other end is closed."""
     gc.disable()  # nothing here makes cycles
@@ -128,6 +212,8 @@ def main(descriptor: int) -> None:
     client = Client()
     while message := link.recv(LONGEST):
         link.send(client.answer(message))
+        if client.fingers is not None:
+            client.fingers.serve(link)
     os._exit(0)  # without libfranka's destructors, which may wait without end
 
 

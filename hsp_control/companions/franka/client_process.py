@@ -38,7 +38,6 @@ class ClientProcess:
         self._process = subprocess.Popen(
             [sys.executable, "-P", client.__file__, str(theirs.fileno())],
             stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
             stderr=self._errors,
             pass_fds=[theirs.fileno()],
             start_new_session=True,

@@ -42,13 +42,21 @@ def connect(
     _check(robot, period)
     chosen = postures(robot)
     process, found = reached(settings, chosen, moves=True)
+    gripper: ClientProcess | None = None
     try:
         q = np.vstack([found["q"], chosen])
         masses = np.array(found["masses"]).reshape(-1, 7, 7)
         models = difference(robot, q, masses, np.array(found["gravities"]))
         models.check(found["total"]["mass"])
+        if settings.gripper is not None:
+            host, port = settings.gripper.removeprefix("udp://").split(":")
+            given = {"address": settings.address, "gripper": (host, int(port))}
+            gripper = ClientProcess()
+            gripper.asked(client.CONNECT + json.dumps(given).encode(), _TIMEOUT)
     except BaseException:
         process.close()
+        if gripper is not None:
+            gripper.close()
         raise
     lines = [
         f"The robot at {settings.address}: end effector "
@@ -58,7 +66,7 @@ def connect(
         f"and forces of {_listed(settings.collision_force)} N and N·m",
         str(models)[0].upper() + str(models)[1:],
     ]
-    return FrankaHardware(robot, process, settings, q[0], lines)
+    return FrankaHardware(robot, process, settings, q[0], lines, gripper)
 
 
 def reached(

@@ -48,6 +48,7 @@ class FrankaHardware:
         settings: FrankaSettings,
         q: Array,
         lines: Sequence[str],
+        gripper: ClientProcess | None = None,
     ) -> None:
         """Take over a process that is connected to the arm.
 
@@ -57,8 +58,9 @@ class FrankaHardware:
             settings: Those of the filter count here.
             q: Its configuration, shape (7,) [rad].
             lines: What was found and set.
+            gripper: The process that drives its gripper; the loop never waits for it.
         """
-        self._robot, self._process = robot, process
+        self._robot, self._process, self._gripper = robot, process, gripper
         self.q, self.lines = q, lines
         self._reads, self._origin = 0, 0.0
         self._running = self._closed = False
@@ -150,6 +152,8 @@ class FrankaHardware:
             pass  # it is kept: `fault`
         finally:
             process.close()
+            if self._gripper is not None:
+                self._gripper.close()
 
     def _send(self, kind: bytes) -> None:
         self._process.ask(client.REQUEST.pack(kind, *self._effort.tolist()))

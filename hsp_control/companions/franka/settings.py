@@ -86,6 +86,8 @@ class FrankaSettings(Part, error=LiveError):
     """External force and moment at the hand that stop the robot [N, N·m]."""
     cutoff_frequency: Positive | None = None
     """Of a first-order filter between loop and robot [Hz]; None: no filter."""
+    gripper: Annotated[str, Field(pattern=r"^udp://[^/:]+:\d+$")] | None = None
+    """Where it hears openings of a finger, ``udp://HOST:PORT``; None: nowhere."""
 
     @classmethod
     def parse(cls, text: str) -> Self:

@@ -80,7 +80,7 @@ class Server:
         self.client: Connection | None = None
         self.overrun = 0.0
         self._due = monotonic()
-        self._listener = _listen(host)
+        self._listener = listen(host, PORT)
 
     def __enter__(self) -> Self:
         return self
@@ -246,7 +246,8 @@ def _check_times(deadline: float, patience: float, cut: float | None) -> None:
         raise LiveError(f"cut {cut:g} s; must not be negative")
 
 
-def _listen(host: str) -> socket.socket:
+def listen(host: str, port: int) -> socket.socket:
+    """Return a socket that listens on loopback."""
     try:
         loopback = ipaddress.IPv4Address(host).is_loopback
     except ValueError:
@@ -259,11 +260,11 @@ def _listen(host: str) -> socket.socket:
     listener = socket.socket()
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
-        listener.bind((host, PORT))
+        listener.bind((host, port))
     except OSError as error:
         listener.close()
         raise HardwareError(
-            f"{host}:{PORT}: {error.strerror}; libfranka knows no other port: give "
+            f"{host}:{port}: {error.strerror}; libfranka knows no other port: give "
             "another address, such as 127.0.0.2"
         ) from None
     listener.listen()

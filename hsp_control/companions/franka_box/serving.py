@@ -10,6 +10,7 @@ from hsp_control.cli.loading import robot_access
 from hsp_control.common.exceptions import LiveError
 from hsp_control.companions.franka.layouts import PERIOD, PORT, VERSION
 from hsp_control.companions.franka_box import Arm, Box, Server
+from hsp_control.companions.franka_box.gripper import Gripper
 from hsp_control.companions.franka_box.log import BoxLog
 from hsp_control.config import Experiment
 from hsp_control.config.document import read_document
@@ -56,6 +57,7 @@ def franka_box(options: argparse.Namespace) -> int:
         BoxLog(options.log, experiment, box) if options.log else nullcontext() as log,
     ):
         terminal.server = server
+        Gripper(terminal.say, options.host)
         time = "in lockstep" if options.lockstep else "in real time"
         terminal.say(
             f"{experiment.robot.name} behind {options.host}:{PORT}, research interface "

@@ -127,7 +127,9 @@ def _log_robot(rerun: Any, recording: Any, motion: RunMotion) -> None:
     nodes = [f"/robot/{path_element(name)}" for name in robot.model.names]
     for k, visual in enumerate(read_visuals(robot)):
         path = f"{nodes[visual.joint]}/{path_element(visual.link)}/{k}"
-        recording.log(path, _transform(rerun, visual.pose), static=True)
+        place, turned = visual.pose[:3, 3], visual.pose[:3, :3]
+        pose = rerun.Transform3D(translation=place, mat3x3=turned)
+        recording.log(path, pose, static=True)
         for i, shape in enumerate(_archetypes(rerun, visual, path)):
             recording.log(f"{path}/{i}", shape, static=True)
     poses = motion.joint_poses()
@@ -257,10 +259,6 @@ def _normals(vertices: Array, triangles: Any) -> Array:
 def _rgb(color: str) -> list[float]:
     """Return the channels of ``#RRGGBB``, from 0 to 1."""
     return [int(color[k : k + 2], 16) / 255.0 for k in (1, 3, 5)]
-
-
-def _transform(rerun: Any, pose: Array) -> Any:
-    return rerun.Transform3D(translation=pose[:3, 3], mat3x3=pose[:3, :3])
 
 
 def _curves(rollout: Rollout) -> Iterator[tuple[str, Array]]:

@@ -30,7 +30,7 @@ _NUMBER = re.compile(r"-?[0-9][0-9.]*(e[-+]?[0-9]+)?")
 
 
 def sweep(options: argparse.Namespace) -> int:
-    """Run a configuration many times, save the results and print a summary."""
+    """Run a configuration many times and save it; return 2 if a run fails."""
     if (
         options.strict or options.allow
     ):  # the runs use the same files as this experiment
@@ -80,7 +80,10 @@ def sweep(options: argparse.Namespace) -> int:
         return INTERRUPTED
     if options.plot:
         _draw(swept, file.parent, file.stem, ["png"])
-    return 0
+    failed = len(swept) - int(swept.completed.sum())
+    if failed:
+        print(f"hsp: {failed} of {len(swept)} runs did not complete", file=sys.stderr)
+    return 2 if failed else 0
 
 
 def plot(options: argparse.Namespace) -> int:

@@ -14,6 +14,10 @@ from hsp_control.tasks.frame_task import TrackingTask
 from hsp_control.trajectories import ComposedPose
 from hsp_control.trajectories.schedule import Switch
 
+FRICTION = 0.35
+"""What a foot counts on whose contact declares no friction: nobody knows the ground to
+which a robot comes [-]."""
+
 
 def composed(
     own: Sequence[TrackingTask],
@@ -37,7 +41,9 @@ def composed(
                 raise PlanError(
                     "it has a schedule, but the plan switches it; give only one"
                 )
-        fed.append(replace(contact, schedule=Switch()))
+        declared = "friction" in contact.changed_fields()
+        friction = contact.friction if declared else FRICTION
+        fed.append(replace(contact, schedule=Switch(), friction=friction))
     return PlanParts((*given.values(), *made), tuple(fed))
 
 

@@ -45,15 +45,11 @@ def last_inside(corners: Array, start: Array, end: Array) -> Array:
 
 def _chain(points: Sequence[tuple[float, ...]]) -> list[tuple[float, ...]]:
     chain: list[tuple[float, ...]] = []
-    for p in points:
-        while len(chain) > 1 and _turns_right(chain[-2], chain[-1], p):
+    for c in points:
+        while len(chain) > 1:
+            a, b = chain[-2:]
+            if (b[0] - a[0]) * (c[1] - a[1]) > (b[1] - a[1]) * (c[0] - a[0]):
+                break  # the way from a over b to c turns left
             chain.pop()
-        chain.append(p)
+        chain.append(c)
     return chain
-
-
-def _turns_right(
-    a: tuple[float, ...], b: tuple[float, ...], c: tuple[float, ...]
-) -> bool:
-    """Return whether the way from a over b to c does not turn left."""
-    return (b[0] - a[0]) * (c[1] - a[1]) <= (b[1] - a[1]) * (c[0] - a[0])

@@ -10,10 +10,11 @@ from hsp_control.trajectories.schedule import smooth_step
 
 APPROACH = 0.92
 """Share of the swing after which the foot is above its place, and only descends."""
-DESCENT = 0.3
-"""How fast a foot descends that has not touched the ground in time [m/s]."""
-_SETTLING = 0.06
-"""How long it takes to reach that speed [s]."""
+DESCENT = 3.6
+"""How fast a foot descends that has not touched the ground in time, in lifts per swing
+[-]: as fast as it was lifted. On two legs the body falls while it waits."""
+_SETTLING = 0.1
+"""How long it takes to reach that speed, in swings [-]."""
 _LEVEL = np.zeros(2)
 
 
@@ -47,6 +48,7 @@ class Swing:
         log3(goal @ rotation.T, self._axis)  # in world axes
         self._slope, self._level = slope, height - float(slope @ target.point)
         self._top = max(float(position[2]), height) + lift
+        self._descent, self._settling = DESCENT * lift / duration, _SETTLING * duration
         along = at_rest([position[0], position[1], 0.0])
         self._along = to_rest(along, self._there, t, APPROACH * duration)
         self._up = to_rest(at_rest(position[2:]), [self._top], t, 0.5 * duration)
@@ -113,15 +115,16 @@ class Swing:
             return self._up.sample(t)
         if t < self._down.end:
             return self._down.sample(t)
-        s, s_dot, _ = smooth_step(t, self._down.end, _SETTLING)
+        settling, speed = self._settling, self._descent
+        s, s_dot, _ = smooth_step(t, self._down.end, settling)
         late = t - self._down.end
-        u = min(late / _SETTLING, 1.0)
+        u = min(late / settling, 1.0)
         # The integral of the smooth step.
-        fallen = u**4 * (2.5 + u * (u - 3.0)) * _SETTLING + max(late - _SETTLING, 0.0)
+        fallen = u**4 * (2.5 + u * (u - 3.0)) * settling + max(late - settling, 0.0)
         return FootMotion(
-            np.array([self._height - DESCENT * fallen]),
-            np.array([-DESCENT * s]),
-            np.array([-DESCENT * s_dot]),
+            np.array([self._height - speed * fallen]),
+            np.array([-speed * s]),
+            np.array([-speed * s_dot]),
         )
 
 

@@ -55,7 +55,8 @@ class RunningTrot(RunningQuadruped):
     def _start_gait(self, state: RobotState) -> None:
         """Begin standing; see `RunningQuadruped`."""
         mass = state.centroidal.position
-        self._pairs = self._diagonals()
+        front_left, front_right, hind_left, hind_right = self._corners()
+        self._pairs = [front_left, hind_right], [front_right, hind_left]
         lowest = min(foot.height for foot in self._feet)
         self._time_constant = float(np.sqrt((mass[2] - lowest) / GRAVITY))
         self._check_stride(state, 0.5 * (self.gait.swing + 2.0 * self.gait.stance))
@@ -65,11 +66,6 @@ class RunningTrot(RunningQuadruped):
     def _combinations(self) -> Sequence[Sequence[PointFoot]]:
         """Return the pairs, and each of their feet: one may land before the other."""
         return [aloft for pair in self._pairs for aloft in (pair, pair[:1], pair[1:])]
-
-    def _diagonals(self) -> tuple[list[PointFoot], list[PointFoot]]:
-        """Return the two pairs of diagonal feet."""
-        front_left, front_right, hind_left, hind_right = self._corners()
-        return [front_left, hind_right], [front_right, hind_left]
 
     def _phase(self) -> tuple[float, str]:
         """Return what to log of the phase; see `RunningQuadruped`."""
@@ -132,7 +128,10 @@ class RunningTrot(RunningQuadruped):
                 self._mode = "two"
                 for foot in self._pair:
                     self._lift_off(foot, t)
-        elif all(self._has_landed(foot, measured) for foot in self._pair):
+        else:  # one foot may bear while the other is still in the air
+            landed = [self._has_landed(foot, measured) for foot in self._pair]
+            if not all(landed):
+                return
             self._swings += 1
             self._idle = self._idle + 1 if self._velocity.is_zero else 0
             if wanted.is_zero and self._idle >= CLOSING:

@@ -254,7 +254,9 @@ class RunningWalk(RunningPlan):
             if self._has_landed(measured):
                 self._land(t)
         elif self._mode == "standing":
-            if self._is_calm() and self._planner.sets_out(t, self._taken):
+            # A walk that was held waits until it is calm.
+            error = np.abs(self._dcm - self._dcm_wanted).max() if self._held else 0.0
+            if error < _CALM and self._planner.sets_out(t, self._taken):
                 self._set_out(t)
         elif self._index + 1 == len(self._phases):
             self._mode = "standing"
@@ -297,12 +299,6 @@ class RunningWalk(RunningPlan):
         rest = standing.place.point
         self._follow(t, [DcmPhase(1.0, rest, rest)], [True])
         self._hull = standing.corners(_HELD)
-
-    def _is_calm(self) -> bool:
-        """Return whether a walk that was held may go on."""
-        if not self._held:
-            return True
-        return float(np.abs(self._dcm - self._dcm_wanted).max()) < _CALM
 
     def _lift_off(self, t: float) -> None:
         """Let the foot swing that bears no more."""

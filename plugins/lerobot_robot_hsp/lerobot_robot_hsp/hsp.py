@@ -14,6 +14,8 @@ from .config_hsp import HspLeaderConfig, HspRobotConfig, LoopConfig
 _POSE = ("ee.x", "ee.y", "ee.z", "ee.wx", "ee.wy", "ee.wz")
 _WRENCH = ("ee.fx", "ee.fy", "ee.fz", "ee.mx", "ee.my", "ee.mz")
 GRIPPER = "gripper.pos"
+_ANSWER = 2.0
+"""How long a Franka's gripper may take to answer: a motion of its fingers [s]."""
 
 
 class Arm:
@@ -41,13 +43,13 @@ class Arm:
         """Listen, and wait for the first state."""
         if self._loop is not None:
             raise DeviceAlreadyConnectedError("the loop is already connected")
-        loop = Loop(self._config.states, self._config.timeout)
+        loop = self._loop = Loop(self._config.states, self._config.timeout)
         try:
             self._check(loop.state())
         except Exception:
-            loop.close()
+            self.disconnect()
             raise
-        self._loop, self._turn = loop, None
+        self._turn = None
 
     def disconnect(self) -> None:
         """Stop listening; the loop goes on."""
@@ -59,13 +61,11 @@ class Arm:
         """A state of the loop, for names: LeRobot asks for them before it connects."""
         if self._loop is not None:
             return self._loop.state()
-        loop = Loop(self._config.states, self._config.timeout)
+        self.connect()
         try:
-            state = loop.state()
-            self._check(state)
-            return state
+            return self.loop.state()
         finally:
-            loop.close()
+            self.disconnect()
 
     @property
     def action_features(self) -> dict[str, type]:
@@ -95,7 +95,7 @@ class Arm:
         found["ee.bounded"] = state["bounded"].get(config.task, 0.0)
         found["limited"] = float(state["status"] in {"limited", "relaxed"})
         if config.gripper_task:
-            found[GRIPPER] = state["tasks"][config.gripper_task]["actual"][0]
+            found[GRIPPER] = self._opening(state)
         return {
             name: float("nan") if value is None else float(value)
             for name, value in found.items()
@@ -116,7 +116,7 @@ class Arm:
             where = state["tasks"][config.task]["actual"]
             found = dict(zip(self._joints(state), where, strict=True))
         if config.gripper_task:
-            found[GRIPPER] = state["tasks"][config.gripper_task]["actual"][0]
+            found[GRIPPER] = self._opening(state)
         return found
 
     def values(self, action: dict[str, Any]) -> list[float]:
@@ -129,17 +129,29 @@ class Arm:
         numbers = [float(action[name]) for name in _POSE]
         return numbers[:3] + quaternion_of(numbers[3:])
 
+    def _opening(self, state: dict[str, Any]) -> float | None:
+        """Return that of the gripper's task, or what a Franka's gripper tells."""
+        task = state["tasks"].get(self._config.gripper_task)
+        if task is not None or self._loop is None:
+            return task["actual"][0] if task else None
+        return self._loop.opening(self._config.gripper_targets)
+
     def _joints(self, state: dict[str, Any]) -> list[str]:
         return [f"{each}.pos" for each in state["tasks"][self._config.task]["joints"]]
 
     def _frame(self, state: dict[str, Any]) -> str:
         return self._config.frame or next(iter(state["frames"]))
 
+    def _has_gripper(self) -> bool:
+        """Whether a Franka's gripper answers where openings are heard."""
+        there = getattr(self._config, "gripper_targets", "")
+        return bool(there) and self.loop.opening(there, _ANSWER) is not None
+
     def _check(self, state: dict[str, Any]) -> None:
         """Refuse a loop without the tasks and the frame that are asked for."""
         config, tasks = self._config, state["tasks"]
         for task in filter(None, (config.task, config.gripper_task)):
-            if task not in tasks:
+            if task not in tasks and not (task != config.task and self._has_gripper()):
                 raise LoopError(f"the loop has no task {task!r}; it has {[*tasks]}")
         if config.action == "joints" and "joints" not in tasks[config.task]:
             raise LoopError(f"task {config.task!r} moves no joints; action is joints")

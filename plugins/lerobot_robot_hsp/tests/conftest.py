@@ -36,7 +36,7 @@ LOOPS = {  # a configuration, what is set of it, and options
     "franka": (
         ROOT / "examples/stream/panda.yaml",
         {"live.missing": 2000, "live.age": 10},
-        ["--robot", "franka://127.0.0.2?realtime=ignore"],
+        ["--robot", "franka://127.0.0.2?realtime=ignore&gripper=udp://{gripper}"],
     ),
 }
 
@@ -57,11 +57,6 @@ class Running(NamedTuple):
     cameras: str
     log: Path
 
-    @property
-    def has_gripper(self) -> bool:
-        """Whether its fingers move."""
-        return "fingers.displacement" in " ".join(self.process.args)
-
     def stop(self) -> Path:
         """End it as Ctrl-C does, and return its log."""
         self.process.send_signal(signal.SIGINT)
@@ -78,7 +73,8 @@ def run_live(kind: str, out: Path) -> Iterator[Running]:
     if kind != "franka":
         given["tasks.fingers.displacement.source"] = f"udp://{gripper}"
     command = [HSP, "live", str(config), "--duration", "inf", "--out", str(out)]
-    command += [*options, "--publish", f"udp://{states}"]
+    command += [option.format(gripper=gripper) for option in options]
+    command += ["--publish", f"udp://{states}"]
     cameras = f"http://{pictures}"
     if kind == "seen":
         command += ["--cameras", cameras]

@@ -116,15 +116,14 @@ def lerobot(command: str, home: Path, options: dict) -> str:
 
 
 def words_of(arm: Running) -> tuple[dict, dict]:
-    """Return the options of a robot, and those of its gripper or of the leader's."""
+    """Return the options of a robot, and those of the leader's gripper."""
     robot = {
         "robot.type": "hsp",
         "robot.states": arm.states,
         "robot.targets": arm.targets,
+        "robot.gripper_task": "fingers",
+        "robot.gripper_targets": arm.gripper,
     }
-    if not arm.has_gripper:
-        return robot, {}
-    robot |= {"robot.gripper_task": "fingers", "robot.gripper_targets": arm.gripper}
     return robot, {"teleop.gripper_task": "fingers"}
 
 
@@ -157,8 +156,7 @@ def test_lerobot_s_commands_teleoperate_record_and_replay(
     action, state = (
         np.array(table[key].to_pylist()) for key in ("action", "observation.state")
     )
-    fingers = ["gripper.pos"] if gripper else []
-    assert names["action"]["names"] == POSE + fingers
+    assert names["action"]["names"] == [*POSE, "gripper.pos"]
     at = [names["observation.state"]["names"].index(name) for name in POSE]
     recorded = state[:, at]
     assert np.ptp(recorded[:, 1]) > 0.1
@@ -172,7 +170,9 @@ def test_lerobot_s_commands_teleoperate_record_and_replay(
     away = np.linalg.norm(replayed[:, :, None] - path, axis=1).min(axis=1)
     print(f"the replay is within {1e3 * away.max():.2f} mm of what was recorded")
     assert away.max() < 0.01  # on a machine that does more besides
-    if gripper:
+    opening = state[:, names["observation.state"]["names"].index("gripper.pos")]
+    assert np.ptp(opening) > 0.01
+    if kind == "arm":
         assert np.ptp(log["task.fingers.actual"][t > begin + 1.0]) > 0.01
     assert log["stream.hand.rejected"][-1] == 0
 

@@ -36,16 +36,10 @@ def test_a_films_moments_are_evenly_spread() -> None:
     ("film.mp4", FilmStyle(size=(10, 400)), "10x400 pixels: width and height must"),
     ("film.gif", FilmStyle(frame_rate=0.5), "frame rate 0.5 Hz"),
     ("film.gif", FilmStyle(speed=0.0), "speed 0 must be positive"),
-    (
-        "film.gif",
-        FilmStyle(start=2, end=1),
-        "from 2 to 1 s: must lie within the run, 0 to",
-    ),
-    (
-        "film.gif",
-        FilmStyle(end=3.5),
-        "0 to 3.5 s: must lie within the run, 0 to 3 s",
-    ),
+    ("film.gif",
+     FilmStyle(start=2, end=1),
+     "from 2 to 1 s: must lie within the run, 0 to"),
+    ("film.gif", FilmStyle(end=3.5), "0 to 3.5 s: must lie within the run, 0 to 3 s"),
 ])  # fmt: skip
 def test_a_film_that_cannot_be_is_refused(
     planar: Rollout, tmp_path: Path, name: str, style: FilmStyle, message: str

@@ -4,6 +4,7 @@ All in lockstep: the box waits for each command. The client has a process of its
 and what hangs there is killed.
 """
 
+import json
 import os
 import re
 import shlex
@@ -12,6 +13,7 @@ import socket
 import subprocess
 import sys
 import threading
+from contextlib import closing
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
@@ -34,6 +36,7 @@ from hsp_control.companions.franka import (
     connect,
     connecting,
 )
+from hsp_control.companions.franka_box.gripper import Gripper
 from hsp_control.live import (
     InProcessRobot,
     LiveSettings,
@@ -221,6 +224,41 @@ def test_the_load_is_in_both_models(tmp_path: Path) -> None:
     run = Rollout.load(log)
     circling = (run.t > 0.6) & (run.t < 1.0)
     assert np.abs(run["task.hand.error"][circling]).max() < 1e-3
+
+
+def test_the_gripper_goes_where_openings_say_and_tells_where_it_is() -> None:
+    said: list[str] = []
+    with serving(circle()) as box, closing(udp()) as policy, closing(udp()) as other:
+        gripper = Gripper(said.append, box.host)
+        gripper.thing = 0.03
+        other.bind((box.host, 0))
+        port = other.getsockname()[1]
+        settings = f"{box.address}&gripper=udp://{box.host}:{port}"
+        with pytest.raises(HardwareError, match="Address already in use"):
+            connect(settings, circle().robot, PERIOD)
+        other.close()
+        with closing(connect(settings, circle().robot, PERIOD)):
+
+            def told(message: dict[str, Any], sender: socket.socket) -> Any:
+                sender.sendto(json.dumps(message).encode(), (box.host, port))
+                return json.loads(sender.recv(999))
+
+            assert told({}, policy) == {"value": [0.04], "grasped": False}
+            assert told({"value": [0.0]}, policy) == {"value": [0.015], "grasped": True}
+            assert told({"value": [np.nan]}, policy)["grasped"]
+            with closing(udp()) as second:
+                assert told({"value": [0.04]}, second)["grasped"]
+            opened = told({"values": [[0.0], [0.03]]}, policy)
+            assert opened == {"value": [0.03], "grasped": False}
+    assert said == [
+        "the gripper grasps with 30 N to 0 mm", "the gripper goes to 60 mm"
+    ]  # fmt: skip
+
+
+def udp() -> socket.socket:
+    made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    made.settimeout(20.0)
+    return made
 
 
 def test_the_arm_has_seven_joints_and_a_millisecond() -> None:

@@ -268,11 +268,9 @@ def test_contacts_and_collisions_follow_the_thresholds() -> None:
 
 @pytest.mark.parametrize(("controller", "kind", "stiffness"), [
     (Controller.JOINT_IMPEDANCE, Command.SET_JOINT_IMPEDANCE, [200.0] * 7),
-    (
-        Controller.CARTESIAN_IMPEDANCE,
-        Command.SET_CARTESIAN_IMPEDANCE,
-        [500.0, 500.0, 500.0, 300.0, 300.0, 300.0],
-    ),
+    (Controller.CARTESIAN_IMPEDANCE,
+     Command.SET_CARTESIAN_IMPEDANCE,
+     [500.0, 500.0, 500.0, 300.0, 300.0, 300.0]),
 ])  # fmt: skip
 def test_an_unknown_payload_stretches_the_springs_that_are_set(
     controller: Controller, kind: Command, stiffness: list[float]

@@ -26,10 +26,7 @@ pytestmark = pytest.mark.process
     (["--over", "null_space.gain=1:2", "--design", "latin"], "'latin_hypercube'?"),
     (["--over", "null_space.gain=1:2", "--design", "random"], "needs --samples"),
     (["--over", "null_space.gain=1:2", "--samples", "0"], "0 samples"),
-    (
-        ["--over", "null_space.gain=1:2", "--samples", "9", "--seed", "-1"],
-        "seed is",
-    ),
+    (["--over", "null_space.gain=1:2", "--samples", "9", "--seed", "-1"], "seed is"),
     (["--over", "null_space.gain=1,2", "--workers", "0"], "0 workers"),
 ])  # fmt: skip
 def test_each_mistake_gets_one_message_and_status_2(
@@ -81,8 +78,9 @@ def test_reasons_that_differ_in_numbers_alone_are_told_once(
     options = [word for setting in settings for word in ("--set", setting)]
     over = ["--over", "null_space.gain=10,900,1100,-1,-2.5"]
     out = ["--out", str(tmp_path / "failing.parquet"), "--workers", "1"]
-    assert main(["sweep", MOVING, *options, *over, *out]) == 0
-    printed = capsys.readouterr().out
+    assert main(["sweep", MOVING, *options, *over, *out]) == 2
+    printed, error = capsys.readouterr()
+    assert error.endswith("hsp: 4 of 5 runs did not complete\n")
     assert "5 of 5 runs: 2 diverged, 2 refused, 1 completed" in printed
     assert printed.count("  2 x refused: --over null_space.gain: ") == 1
     assert printed.count("  2 x diverged: the motion diverged before t = ") == 1

@@ -300,10 +300,8 @@ def test_a_state_with_sensors_comes_back() -> None:
     ({"wrenches": {"a": np.full(6, np.nan)}}, r"not finite: wrench at a\[0\]"),
     ({"wrenches": {"a": np.zeros(3)}}, r"wrench at a has shape \(3,\)"),
     ({"inertial": (1, 2, 3)}, "inertial is of type tuple; needs an Inertial"),
-    (
-        {"inertial": Inertial("a", np.zeros(3), np.full(3, 1e9))},
-        r"absurd: specific force\[0\] is 1e\+09",
-    ),
+    ({"inertial": Inertial("a", np.zeros(3), np.full(3, 1e9))},
+     r"absurd: specific force\[0\] is 1e\+09"),
 ])  # fmt: skip
 def test_a_sensor_that_cannot_be_right_is_refused(
     changed: dict[str, object], message: str

@@ -1,4 +1,4 @@
-"""A trot is a value; what does not fit it is said before the first swing."""
+"""A trot is a value, as is a crawl; what does not fit is said before a foot swings."""
 
 from dataclasses import replace
 
@@ -7,7 +7,8 @@ import pytest
 
 from hsp_control import Limits, Robot, load_experiment
 from hsp_control.common.exceptions import HspControlError, PlanError
-from hsp_control.companions.walking import Trot
+from hsp_control.companions.walking import Crawl, Trot
+from hsp_control.companions.walking.composing import FRICTION
 from hsp_control.companions.walking.quadruped import BANDWIDTH
 from hsp_control.constraints.contacts import BallContact, SurfaceContact
 from hsp_control.tasks import CenterOfMass
@@ -38,40 +39,25 @@ def test_it_adds_what_it_needs(solo):
     assert tasks["center_of_mass"].trajectory.dimension == 2
     assert tasks["height"].trajectory.dimension == 1
     assert all(isinstance(each.schedule, Switch) for each in made.contacts)
+    assert {each.friction for each in made.contacts} == {FRICTION}
+    sure = Trot().parts(solo, [], [replace(foot, friction=0.9) for foot in FEET])
+    assert {each.friction for each in sure.contacts} == {0.9}
+
+
+TURNED = BallContact("HR_FOOT", radius=0.0165, normal=[1, 0, 0])
 
 
 @pytest.mark.parametrize(("trot", "tasks", "contacts", "message"), [
     (Trot(), [], [], "^plan: a quadruped trots on four feet; there are 0 .declare"),
-    (
-        Trot(),
-        [],
-        FEET[:3],
-        "^plan: a quadruped trots on four feet; there are 3 .FL",
-    ),
-    (
-        Trot(feet=["FL_FOO"]),
-        [],
-        FEET,
-        "no contact 'FL_FOO'; did you mean 'FL_FOOT'",
-    ),
-    (
-        Trot(),
-        [],
-        [*FEET[:3], SurfaceContact("HR_FOOT", length=0.1, width=0.1)],
-        "^plan: contact 'HR_FOOT' is a surface; a quadruped trots on feet of type",
-    ),
-    (
-        Trot(),
-        [CenterOfMass()],
-        FEET,
-        "^tasks.center_of_mass: its axes are 'xyz'; the plan needs 'xy'",
-    ),
-    (
-        Trot(),
-        [],
-        [*FEET[:3], BallContact("HR_FOOT", radius=0.0165, normal=[1, 0, 0])],
-        r"^plan: contact 'HR_FOOT' has the normal \[1.0, 0.0, 0.0\]; a quadrup",
-    ),
+    (Trot(), [], FEET[:3], "^plan: a quadruped trots on four feet; there are 3 .FL"),
+    (Crawl(), [], FEET[:3], r"^plan: a quadruped crawls on four feet; there are 3 .FL"),
+    (Trot(feet=["FL_FOO"]), [], FEET, "no contact 'FL_FOO'; did you mean 'FL_FOOT'"),
+    (Trot(), [], [*FEET[:3], SurfaceContact("HR_FOOT", length=0.1, width=0.1)],
+     "^plan: contact 'HR_FOOT' is a surface; a quadruped trots on feet of type"),
+    (Trot(), [CenterOfMass()], FEET,
+     "^tasks.center_of_mass: its axes are 'xyz'; the plan needs 'xy'"),
+    (Trot(), [], [*FEET[:3], TURNED],
+     r"^plan: contact 'HR_FOOT' has the normal \[1.0, 0.0, 0.0\]; a quadrup"),
 ])  # fmt: skip
 def test_what_does_not_fit_is_said(solo, trot, tasks, contacts, message):
     with pytest.raises(HspControlError, match=message):
@@ -84,6 +70,8 @@ def test_a_leg_needs_three_joints(solo):
     trunk = BallContact("base_link", radius=0.0165)
     with pytest.raises(PlanError, match=r"^plan: the leg of 'base_link' has 0 joints"):
         Trot().parts(solo, [], [*FEET[:3], trunk])
+    with pytest.raises(PlanError, match=r"^plan: panda cannot crawl: it has no free-f"):
+        Crawl().parts(Robot.load("panda"), [], [])
 
 
 def test_barriers_let_legs_swing():
@@ -106,6 +94,8 @@ def test_what_the_robot_cannot_do_is_said_before_it_runs():
         load_experiment(TROT, "plan.turn=9")
     with pytest.raises(PlanError, match=r"lift is 0.5 m, but the hip of 'front_left' "):
         load_experiment(TROT, "plan.lift=0.5")
+    with pytest.raises(PlanError, match=r"a foot is 0.48 m before and .* Crawl slower"):
+        load_experiment(TROT, "plan={type: crawl, speed: 0.3}")
     shared = "contacts.hind_right.frame=HL_FOOT"
     with pytest.raises(PlanError, match=r"plan: the feet do not stand at the four cor"):
         load_experiment(TROT, shared)

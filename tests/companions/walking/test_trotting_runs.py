@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from ramps import ramp
 
 from hsp_control import Experiment, Rollout, Stream, TargetPosture, load_experiment
 from hsp_control.companions.play import Session
@@ -44,6 +45,17 @@ def test_it_returns_to_its_line_after_a_push():
     assert np.abs(beside[run.t > 4.2]).max() < 0.03
     fast = (run.t > 2.5) & (run.t < 3.5)
     assert np.ptp(run.q[fast, 0]) == pytest.approx(0.3, abs=0.05)
+
+
+def test_down_a_ramp_a_foot_bears_while_the_other_one_still_looks_for_ground():
+    """A hind foot on the platform, the diagonal one above ground that is not there."""
+    until = "plan.until=2", "simulation.duration=4"
+    run = load_experiment("walking/solo12_trot", *ramp(10.0, 0.4), *until).run()
+    assert run.status == "completed"
+    assert run["plan.phase"][-1] == 0
+    assert run["task.front_left.actual"][-1, 2] < -0.04
+    front, hind = (run[f"contact.{n}.weight"] for n in ("front_right", "hind_left"))
+    assert ((hind > 0.5) & (front == 0.0) & (run["plan.phase"] == 3)).any()
 
 
 def test_a_robot_that_is_nowhere_named_trots_within_its_limits():

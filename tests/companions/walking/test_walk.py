@@ -123,24 +123,15 @@ def test_a_velocity_is_given_once_and_has_three_numbers():
 
 
 @pytest.mark.parametrize(("overrides", "message"), [
-    (
-        ["plan.speed=1.2"],
-        "talos_walk.yaml:12: plan: 1.2 m/s with 0.75 s per step are strides of "
-        "0.9 m; the legs of talos reach 0.715 m. Walk slower",
-    ),
-    (
-        ["plan.crouch=0.9"],
-        "plan: crouch is 0.9 m; the centre of mass is only 0.877",
-    ),
-    (
-        ["start.joints={leg_left_5_joint: -0.5}"],
-        "plan: the sole of 'left_foot' does not lie on flat ground at the start",
-    ),
-    (
-        ["contacts.left_foot.width=0.2", "contacts.right_foot.width=0.2"],
-        "plan: the feet 'left_foot' and 'right_foot' stand 0.17 m apart; their "
-        "soles are 0.2 m wide and would meet",
-    ),
+    (["plan.speed=1.2"],
+     "talos_walk.yaml:12: plan: 1.2 m/s with 0.75 s per step are strides of "
+     "0.9 m; the legs of talos reach 0.715 m. Walk slower"),
+    (["plan.crouch=0.9"], "plan: crouch is 0.9 m; the centre of mass is only 0.877"),
+    (["start.joints={leg_left_5_joint: -0.5}"],
+     "plan: the sole of 'left_foot' does not lie on flat ground at the start"),
+    (["contacts.left_foot.width=0.2", "contacts.right_foot.width=0.2"],
+     "plan: the feet 'left_foot' and 'right_foot' stand 0.17 m apart; their "
+     "soles are 0.2 m wide and would meet"),
 ])  # fmt: skip
 def test_what_the_robot_cannot_do_is_said_before_it_runs(overrides, message):
     with pytest.raises(HspControlError) as caught:
@@ -217,10 +208,8 @@ def test_footsteps_are_taken_from_the_middle_between_the_feet():
 
 
 @pytest.mark.parametrize(("rows", "message"), [
-    (
-        "[[0.2, 0.085, 0], [1.2, -0.085, 0]]",
-        r"footsteps\[1\] is 1 m ahead and 0.17 m beside the standing foot; talos r",
-    ),
+    ("[[0.2, 0.085, 0], [1.2, -0.085, 0]]",
+     r"footsteps\[1\] is 1 m ahead and 0.17 m beside the standing foot; talos r"),
     ("[[0.2, -0.085, 0]]", r"footsteps\[0\] is 0.2 m ahead and -?0(.0\d+)? m besi"),
     ("[[0.2, 0.085]]", "footsteps"),
     ("[[0.2, 0.085, 0]], speed: 0.2", "give either footsteps or speed, not both"),

@@ -2,12 +2,13 @@
 
 import re
 from functools import cache
-from math import cos, radians, sin, tan
+from math import radians, tan
 
 import numpy as np
 import pytest
 import yaml
 from places import ROOT
+from ramps import ramp
 
 from hsp_control import Rollout, load_experiment
 from hsp_control.companions.walking import Sensed, Walk
@@ -56,17 +57,10 @@ def test_it_walks_and_stands_again():
 
 def test_it_walks_down_a_ramp_of_which_it_does_not_know():
     """Of -5 degrees, from a platform: the soles lie on it, the mass stays above it."""
-    slope = radians(5.0)
-    middle = [0.3 + 2.0 * cos(slope) - 0.1 * sin(slope), 0.0]
-    middle += [-2.0 * sin(slope) - 0.1 * cos(slope)]
-    box = "shape: {type: box, size: [4, 4, 0.2]}, position"
-    solids = f"{{flat: {{{box}: [-1.7, 0, -0.1]}}, ramp: {{{box}: {middle}, "
-    solids += f"rotation: [0, {slope}, 0]}}}}"
-    settings = f"plant.solids={solids}", "plant.ground={height: -3}"
-    run = load_experiment("walking/talos_walk", *settings).run()
+    run = load_experiment("walking/talos_walk", *ramp(5.0, 0.3)).run()
     assert run.status == "completed"
     assert run["plan.phase"][-1] == 0
-    fallen = tan(slope) * (run.q[-1, 0] - 0.3)
+    fallen = tan(radians(5.0)) * (run.q[-1, 0] - 0.3)
     assert fallen > 0.05
     sunk = run["task.center_of_mass.actual"][[110, -1], 2]
     assert sunk[0] - sunk[1] == pytest.approx(fallen, abs=0.03)

@@ -1,0 +1,99 @@
+"""A Franka Hand, as libfranka knows it: its fingers open, close and hold something.
+
+Transcribed from libfranka-common (Apache-2.0, Franka Robotics),
+``research_interface/gripper/types.h``.
+"""
+
+import socket
+import struct
+import time
+from contextlib import suppress
+from select import select
+from threading import Thread
+
+from hsp_control.companions.franka_box.box import Say
+from hsp_control.companions.franka_box.server import listen
+
+PORT = 1338
+"""The TCP port that libfranka connects to; it has no option for another one."""
+WIDEST = 0.08
+"""How far the fingers open [m]."""
+_PERIOD = 0.02
+"""Time between two states [s]."""
+_HEADER, _STATE = struct.Struct("<HII"), struct.Struct("<IddBH")
+_CONNECT, _HOMING, _GRASP, _MOVE, _STOP = range(5)
+_NUMBERS = {_CONNECT: "<HH", _HOMING: "<", _GRASP: "<5d", _MOVE: "<2d", _STOP: "<"}
+_FAILED = 2
+"""The status of what did not come about; that of success is 0."""
+
+
+class Gripper(Thread):
+    """Serves one client after another, in real time and beside the arm.
+
+    Attributes:
+        width: How far it is open [m].
+        thing: How wide what lies between the fingers is [m]; 0: there is nothing.
+        grasped: Whether it holds that.
+    """
+
+    def __init__(self, say: Say, host: str = "127.0.0.1") -> None:
+        """Listen; raises a HardwareError where it cannot."""
+        super().__init__(name="gripper", daemon=True)
+        self.width, self.thing, self.grasped = WIDEST, 0.0, False
+        self._say, self._count, self._peer = say, 0, ("", 0)
+        self._udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._listener = listen(host, PORT)
+        self.start()
+
+    def run(self) -> None:
+        """Serve until the process ends."""
+        while True:
+            tcp, self._peer = self._listener.accept()[0], ("", 0)
+            with tcp, suppress(OSError, struct.error, KeyError):
+                self._serve(tcp)
+
+    def _serve(self, tcp: socket.socket) -> None:
+        """Answer requests, until one cannot be read."""
+        while True:
+            if not select([tcp], [], [], _PERIOD)[0]:
+                self._tell()
+                continue
+            header = tcp.recv(_HEADER.size, socket.MSG_WAITALL)
+            command, number, size = _HEADER.unpack(header)
+            payload = tcp.recv(size - _HEADER.size, socket.MSG_WAITALL)
+            given = struct.unpack(_NUMBERS[command], payload)
+            if command == _CONNECT:  # the client's version is ours
+                self._peer = tcp.getpeername()[0], given[1]
+                answer = struct.pack("<HH", 0, given[0])
+            else:
+                answer = struct.pack("<H", 0 if self._obey(command, given) else _FAILED)
+            size = _HEADER.size + len(answer)
+            tcp.sendall(_HEADER.pack(command, number, size) + answer)
+
+    def _obey(self, command: int, given: tuple[float, ...]) -> bool:
+        """Move, and return whether what was to be came about."""
+        if command == _STOP:
+            return True
+        goal, speed = (WIDEST, 0.05) if command == _HOMING else (given[0], given[1])
+        if command == _GRASP:
+            goal, inner, outer, speed, force = given
+        does = f"grasps with {force:g} N" if command == _GRASP else "goes"
+        self._say(f"the gripper {does} to {1e3 * goal:.0f} mm")
+        end = min(max(goal, self.thing if goal < self.width else 0.0), WIDEST)
+        self.grasped = False
+        while self.width != end:
+            most = speed * _PERIOD
+            self.width += min(max(end - self.width, -most), most)
+            self._tell()
+            time.sleep(_PERIOD)
+        if command != _GRASP:
+            return end == goal
+        self.grasped = end == self.thing and goal - inner < end < goal + outer
+        return self.grasped
+
+    def _tell(self) -> None:
+        """Send a state to who has said where; it may be lost."""
+        self._count += 1
+        state = _STATE.pack(self._count, self.width, WIDEST, self.grasped, 30)
+        if self._peer[1]:
+            self._udp.sendto(state, self._peer)
