@@ -15,6 +15,7 @@ from hsp_control.companions.franka.hardware import FrankaHardware
 from hsp_control.companions.franka.model_check import difference, postures
 from hsp_control.companions.franka.reflexes import MODES, about
 from hsp_control.companions.franka.settings import FrankaSettings
+from hsp_control.declaration import within
 from hsp_control.robot import Robot
 
 _KERNEL = Path("/sys/kernel/realtime")
@@ -52,7 +53,8 @@ def connect(
             host, port = settings.gripper.removeprefix("udp://").split(":")
             given = {"address": settings.address, "gripper": (host, int(port))}
             gripper = ClientProcess()
-            gripper.asked(client.CONNECT + json.dumps(given).encode(), _TIMEOUT)
+            with within("gripper"):
+                gripper.asked(client.CONNECT + json.dumps(given).encode(), _TIMEOUT)
     except BaseException:
         process.close()
         if gripper is not None:
