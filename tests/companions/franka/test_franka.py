@@ -234,7 +234,7 @@ def test_the_gripper_goes_where_openings_say_and_tells_where_it_is() -> None:
         other.bind((box.host, 0))
         port = other.getsockname()[1]
         settings = f"{box.address}&gripper=udp://{box.host}:{port}"
-        with pytest.raises(HardwareError, match="gripper: .*Address already in use"):
+        with pytest.raises(HardwareError, match=r"gripper: .*Address already in use"):
             connect(settings, circle().robot, PERIOD)
         other.close()
         with closing(connect(settings, circle().robot, PERIOD)):
