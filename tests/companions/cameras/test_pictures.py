@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from mjcf_texts import ARM, CELL
 from PIL import Image
+from played import wait_until
 
 import hsp_control as hsp
 from hsp_control.cli.robot_process import RobotProcess
@@ -88,15 +89,9 @@ def test_a_picture_shows_the_scene_as_it_is_then(
 def test_a_robot_in_its_own_process_is_seen(cell: hsp.Experiment, address: str) -> None:
     with RobotProcess(cell, cameras=f"http://{address}") as robot:
         assert seen(address, "above.jpg")[0] == 0.0
-        later: list[float] = []
-
-        def look(t: float) -> None:
-            if t > 0.05 and not later:
-                later.append(seen(address, "above.jpg")[0])
-
-        options = {"settings": cell.scenario.live, "on_period": look}
-        run_loop(cell.controller, robot.hardware, duration=0.1, **options)
-        assert later[0] >= 0.05
+        options = {"settings": cell.scenario.live, "duration": 0.1}
+        run_loop(cell.controller, robot.hardware, **options)
+        wait_until(lambda: seen(address, "above.jpg")[0] >= 0.05)
     with pytest.raises(OSError, match="refused"):
         seen(address, "above.jpg")
 

@@ -62,7 +62,7 @@ def test_every_visual_stands_where_pinocchio_puts_it(name: str) -> None:
             path = f"/robot/{joint}/{link}"
             thing = children(recorder, path)[int(number)]
             expected = geometry_data.oMg[k].homogeneous
-            if type(item.geometry).__name__ == "shapes.Cylinder":
+            if type(item.geometry).__name__ == "Cylinder":
                 expected = expected @ _Y_TO_Z
             shown = recorder.transform(path) @ matrix(thing)
             np.testing.assert_allclose(shown, expected, atol=1e-12)
@@ -187,7 +187,7 @@ def test_a_mesh_is_drawn_and_one_that_is_gone_becomes_a_ball(
     viewer.draw_scene(Scene([Obstacle("it", shapes.Mesh(file), Hold([1.0, 0.0, 0.2]))]))
     (thing,) = geometries(recorder, "/obstacles/it")
     assert len(thing["data"]["attributes"]["position"]["array"]) == 3 * 3 * 3
-    about = {"shape": "shapes.Mesh", "parameters": {"file": "gone.obj"}, "radius": 0.4}
+    about = {"shape": "Mesh", "parameters": {"file": "gone.obj"}, "radius": 0.4}
     columns = {**run.columns, "obstacle.it": run["obstacle.disk"]}
     viewer.draw_scene(Rollout(columns, {**run.meta, "obstacles": {"it": about}}))
     (thing,) = geometries(recorder, "/obstacles/it")
