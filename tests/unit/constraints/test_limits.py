@@ -269,7 +269,7 @@ def test_distance_rows_are_its_second_derivative(kind: str) -> None:
     rate = (room(h, rest) - room(-h, rest)) / (2.0 * h)
     least = -second(rest) - 20.0 * rate - 100.0 * near
     close = near + 0.5 * np.minimum(rate, 0.0) < 0.2
-    for wanted in (a, 1000.0 * a):  # one that far pairs permit, and one that they do not
+    for wanted in (a, 1e3 * a):  # what far pairs permit, and what they do not
         asked = second(wanted) - second(rest)
         chosen = close | (asked < 0.5 * least)
         A, b = limit.rows(state, 10.0, wanted)
