@@ -4,7 +4,6 @@ from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
-from scipy.linalg import expm
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.compensation.compensation import Compensation
@@ -37,6 +36,8 @@ class ElasticJoint:
 
         The acceleration u is held: the state becomes Φ s + Γ u.
         """
+        from scipy.linalg import expm  # here: SciPy takes long to import
+
         spring = np.array(
             [-self.stiffness, -self.damping, self.stiffness, self.damping]
         )

@@ -34,6 +34,30 @@ def _elements(a: Array, b: Array) -> float:
 
 
 @kernel
+def _total(part: Array) -> float:
+    value = float(part.shape[0])
+    for i in range(part.shape[0] - 1, -1, -1):
+        for j in range(part.shape[1]):
+            value += part[i, j] * (i + 10 * j + 1)
+    return value
+
+
+@kernel
+def _parts(a: Array, b: Array) -> float:
+    """Sum parts between bounds of any sign; loops count up and down in steps."""
+    value = a[0].size + 10.0 * a[1:, 1].size
+    for k in range(3):
+        value += a[1:, 1][k // 2] + 3.0 * a[-1, :-1][k // 2]
+    for step in range(-2, 3, 4):
+        for i in range(-9 * step, 9 * step, step):
+            value = 3.0 * value % 1048576.0 + _total(a[i:-1]) + _total(a[:i])
+            for j in range(9, -10, -3):
+                value += _total(a[i:j]) - 2.0 * _total(a[1:, i:j]) * j
+    b[1:3] = value
+    return value
+
+
+@kernel
 def _swapped(pair: Pair) -> Pair:
     a, b, scale = pair
     return Pair(b, a[1:], scale + 1.0)
@@ -67,9 +91,9 @@ def test_elements_lie_where_numpy_has_them(layout: str) -> None:
         "reversed": whole[::-1, ::-1],
     }[layout]
     written, expected = np.zeros(a.shape), np.zeros(a.shape)
-    value = _elements(a, written)
-    assert value == _plain(_elements)(a, expected)
-    np.testing.assert_array_equal(written, expected)
+    for function in (_elements, _parts):
+        assert function(a, written) == _plain(function)(a, expected)
+        np.testing.assert_array_equal(written, expected)
 
 
 @pytest.mark.parametrize("scale", [1.0, 2.0])
