@@ -15,7 +15,7 @@ from hsp_control.control.actuation.support import Support
 from hsp_control.control.setup import PlannedTask
 from hsp_control.law import CONSTANT, FieldSample, Outcome, Resolution, TaskSample
 from hsp_control.law.resolution import outcome_of
-from hsp_control.law.threshold import WHOLE, Following
+from hsp_control.law.threshold import Following
 from hsp_control.null_space.fields import FieldSum, NullSpaceField
 from hsp_control.null_space.metrics import Metric
 from hsp_control.robot import Robot, RobotState
@@ -111,9 +111,9 @@ class ActiveStack:
             elif len(in_force.feedback.largest):
                 away = partial(beyond_largest, largest=in_force.feedback.largest)
                 self.bounds.append((each.task.name, here, away))
-                parts = np.array([part.size for part in each.task.error_parts])
-                yields = np.maximum(WHOLE / parts, 1.0)
-                self.resolution.problem.yields[here] = np.repeat(yields, parts)
+                parts = each.task.error_parts
+                yields = [part.yields for part in parts for _ in range(part.size)]
+                self.resolution.problem.yields[here] = yields
             # Who is about to fall needs the balance whatever it costs.
             balances = robot.unactuated and each.task.keeps_balance(robot)
             follows = each.key in below or len(in_force.feedback.largest)

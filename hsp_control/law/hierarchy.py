@@ -110,13 +110,20 @@ def resolve_levels(
             least_here = threshold_below(opposed[: end - start], held, following)
             threshold = max(threshold, least_here)
         smallest = _open_level(J[block], Q, QJ[:, block], G_inv, square, threshold)
-        if smallest < threshold * threshold:
-            held = max(held, how_held(smallest, threshold, least))
-            if damped == 0:
-                damped = level + 1
         thresholds[level] = threshold
         _add_level(QJ[:, block], G_inv, rest, pushed, a)
         _add_level(QJ[:, block], G_inv, opposed, pushed, drawn)
+        if smallest < threshold * threshold:
+            wanted = lacking = 0.0
+            for k in range(start, end):
+                lack = asked[k]
+                for i in range(n):
+                    lack -= J[k, i] * drawn[i]
+                wanted += asked[k] * asked[k]
+                lacking += lack * lack
+            held = max(held, how_held(lacking, wanted, threshold, least))
+            if damped == 0:
+                damped = level + 1
         _close_level(Q, QJ[:, block], G_inv, pushed)
         start = end
 
@@ -143,20 +150,20 @@ def resolve_levels(
     multiply(Q, Wx, e_N)
     if not controls:
         return damped
-    wanted = rows[4, :n]
-    multiply(K_N, e_N, wanted)
+    rate = rows[4, :n]
+    multiply(K_N, e_N, rate)
     for i in range(n):
-        wanted[i] += g_dot[i]
-    multiply(W, wanted, Y)
+        rate[i] += g_dot[i]
+    multiply(W, rate, Y)
     for i in range(n):
         Y[i] -= bent[i]
     if form == VARYING:
         for i in range(n):
             for j in range(n):
                 Y[i] += W_dot[i, j] * (x[j] - 0.5 * e_N[j])
-    multiply(Q, Y, wanted)
+    multiply(Q, Y, rate)
     for i in range(n):
-        a[i] += wanted[i]
+        a[i] += rate[i]
     return damped
 
 

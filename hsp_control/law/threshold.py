@@ -20,7 +20,7 @@ A level that is held at its edge leaves to those below the very directions in wh
 is drawn there: along them its spring must outweigh what they ask for. They ask for
 f - J a_f, with a_f what those above draw at rest: a task that is met undoes it. So a
 level below follows that with an L that is a fiftieth: it is as steep as it is strong,
-and the nearer to the edge the level above is held, the less it gets there.
+and the less the level above gets of what it asks for, the less it gets there.
 
 What is left to the null space turns with the robot, by at most 1.09 |∂J/∂q|/ε, and what
 a field g asks for there changes with it. So where an arm is held ε grows with g, also
@@ -40,8 +40,10 @@ STIFFNESS = 200.0
 posture by a spring of at most 2 L |∂s/∂q| ≤ 100 1/s² of its own inertia, 10 rad/s: slow
 beside periods of up to 10 ms and what motors can give, and damped by a null-space gain
 of 10 1/s."""
-WHOLE = 3
-"""Components of an error to which all of L belongs; one of m < 3 gets L m/3."""
+WHOLE, TURNS = 3, 0.8
+"""Components of an error to which all of L belongs, one of m < 3 gets L m/3; and by how
+much L is less for an orientation, whose error of 1 rad asks for thrice as much as the
+largest of a position."""
 BELOW = 4.0
 """L times the robot's size below a held level [1/s²]. Its feedback then accelerates a
 joint by at most 2 L s, 1/50 of the spring of the level above."""
@@ -153,13 +155,16 @@ def threshold_below(asked: Array, held: float, following: Following) -> float:
 
 
 @kernel
-def how_held(smallest: float, threshold: float, least: float) -> float:
+def how_held(lacking: float, wanted: float, threshold: float, least: float) -> float:
     """Return how much a level is held at the edge, from 0 (exact) to nearly 1.
 
     Args:
-        smallest: The smallest x = s² of the level, below ε².
+        lacking: ‖f - J a_f‖², what the level does not get of what it asks for at rest.
+        wanted: ‖f‖²; a level of springs, which asks for nothing, is not held.
         threshold: ε; of a level that asks for little ε_0, so that it is not held.
         least: ε_0.
     """
-    z = smallest / (threshold * threshold)
-    return float((1.0 - z * z * z) * (1.0 - (least / threshold) ** 2))
+    if wanted == 0.0:
+        return 0.0
+    got = 1.0 - min(np.sqrt(lacking / wanted), 1.0)
+    return float((1.0 - got * got * got) * (1.0 - (least / threshold) ** 2))

@@ -405,10 +405,10 @@ class RobotModel:
     def largest_error(self) -> tuple[float, float]:
         """The largest error of a task by default, of a position and an angle [m, rad].
 
-        At ω0 = 10 rad/s the hand of an arm of 1 m then approaches at 1.5 m/s, about as
+        At ω0 = 10 rad/s the hand of an arm of 1 m then approaches at 1.75 m/s, about as
         fast as its joints can.
         """
-        return 0.3 * self.size, 1.0
+        return 0.35 * self.size, 1.0
 
     @cached_property
     def spring_force(self) -> tuple[float, float]:
@@ -416,8 +416,8 @@ class RobotModel:
 
         The force is what the strongest motor holds at half of `size`, the moment half
         of that motor's effort. Only motors that slide count as they are. Without a
-        maximum effort it is what moves the robot's mass as gains of 100 1/s² do at
-        `largest_error`.
+        maximum effort it is what moves the robot's mass as gains of 100 1/s² do at 0.3
+        of its size.
         """
         effort, lever = self._largest_effort(), 0.5 * self.size
         turns = np.array(self.units) == "rad"
@@ -427,7 +427,7 @@ class RobotModel:
             return float(turns.max()) / lever, 0.5 * float(turns.max())
         if slides.size:
             return float(slides.max()), np.inf
-        moves = 100.0 * pin.computeTotalMass(self.model) * self.largest_error[0]
+        moves = 30.0 * pin.computeTotalMass(self.model) * self.size
         return moves or np.inf, 0.5 * moves * lever or np.inf
 
     def _largest_effort(self) -> Array:

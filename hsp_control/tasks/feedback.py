@@ -10,6 +10,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HspControlError, TaskError
 from hsp_control.common.kernels import kernel
 from hsp_control.declaration.quantities import Positive, plain
+from hsp_control.law.threshold import TURNS, WHOLE
 from hsp_control.robot import Robot
 
 UNBOUNDED = np.zeros((0, 3))
@@ -99,6 +100,11 @@ class ErrorPart(NamedTuple):
     unit: str
     rate_unit: str
     size: int
+
+    @property
+    def yields(self) -> float:
+        """By how much L is less for it; see `hsp_control.law.threshold`."""
+        return TURNS if self.unit == "rad" else max(WHOLE / self.size, 1.0)
 
 
 LargestError = Annotated[

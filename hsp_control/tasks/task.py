@@ -300,7 +300,7 @@ class SecondOrderTask(Task):
     """Error whose feedback is the largest: a longer one counts as if it were as long,
     so that a target far away, or out of reach, asks for no more [m or rad]. One number,
     or one for each part of the error; "none": no bound, and near a singularity the
-    paper's law down to the controller's threshold. By default 0.3 of the robot's size
+    paper's law down to the controller's threshold. By default 0.35 of the robot's size
     for a position (`Robot.size`), 1 rad for an orientation, and none for joints."""
 
     def feedback(self) -> Feedback:

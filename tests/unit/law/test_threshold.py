@@ -69,15 +69,15 @@ def test_it_bounds_what_the_feedback_asks_for_over_its_square(
 
 @given(seeds, st.floats(0.0, 1.0), st.floats(0.03, 1.0))
 def test_a_level_below_a_held_one_asks_for_less_than_draws_that_one(
-    seed: int, nearness: float, threshold: float
+    seed: int, lacks: float, threshold: float
 ) -> None:
     """It gets 2 s ‖f‖/ε² at most along s; held for good, that is 2 L s/50."""
     rng, least = np.random.default_rng(seed), 0.03
     following = Following(150.0, 1.3, 3.0, 0.0)
     asked = 10.0 ** rng.uniform(-1.0, 4.0) * unit(rng, 3)
-    held = how_held(nearness * threshold**2, threshold, least)
+    held = how_held(lacks**2 * (asked @ asked), asked @ asked, threshold, least)
     assert 0.0 <= held <= 1.0
-    assert held == 0.0 or (nearness < 1.0 and threshold > least)
+    assert held == 0.0 or (lacks > 0.0 and threshold > least)
     below = threshold_below(asked, held, following)
     assert held * (np.linalg.norm(asked) - 1.3) <= 3.0 * below**2 * (1.0 + 1e-12)
     if np.linalg.norm(asked) <= 1.3:
