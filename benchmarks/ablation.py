@@ -39,7 +39,7 @@ ROLLOUTS, WAYS, POINTS = 24, 6, 1000  # of a robot; of a way
 _LIMITS = "constraints/limits/acceleration_bounds.py"
 _COST = "control/actuation/deviation_cost.py"
 _EDGE = "law/threshold.py"
-_SENT = "control/actuation/sent_effort.py"
+_SENT = "control/actuation/limits_in_force.py"
 _MODEL = "robot/model.py"
 
 Edit = tuple[str, str, str]
@@ -47,9 +47,10 @@ Edit = tuple[str, str, str]
 
 INGREDIENTS: dict[str, tuple[Edit, ...]] = {
     "nothing": (),
-    "bounded error": (("tasks/task.py", "_ANGLE = 0.3, 1.0", "_ANGLE = 1e3, 1e3"),),
+    "bounded error": ((_MODEL, "return 0.35 * self.size, 1.0", "return 1e3, 1e3"),),
     "bounded force of springs": (
-        (_MODEL, "return strongest / (0.5 * self.size), 0.5", "return np.inf, np.inf"),
+        (_MODEL, "return float(turns.max()) / lever, 0.5 * float(turns.max())",
+         "return np.inf, np.inf"),
     ),
     "threshold that follows": ((_EDGE, "STIFFNESS = 200.0", "STIFFNESS = 1e12"),),
     "f₀": ((_EDGE, "ON_LEGS = 1.0, 10.0", "ON_LEGS = 0.0, 0.0"),),
@@ -72,7 +73,7 @@ INGREDIENTS: dict[str, tuple[Edit, ...]] = {
     "position's drift": ((_LIMITS, "_SHIFT = 0.1", "_SHIFT = 0.0"),),
     "steady force": (
         (_SENT, "steady[i] = max(", "steady[i] = 0.0 * max("),
-        (_SENT, "+ min(max(drift[i], present)", "+ 0.0 * min(max(drift[i], present)"),
+        (_SENT, "+ min(max(drift[i], present), 0.0)", ""),
     ),
     "null space dearer with the error": (
         (_COST, "_OF_ERROR, _MOST = 0.2", "_OF_ERROR, _MOST = 0.0"),

@@ -26,7 +26,8 @@ from hsp_control.common.arrays import Array
 from hsp_control.trajectories import ComposedPose, HoldOrientation
 
 HERE = Path(__file__).resolve().parent
-ROBOTS, KINDS, PERIOD, LONG = ("panda", "ur5", "iiwa14"), (3, 6, 33), 1e-3, 4.0
+ROBOTS = "panda", "ur5", "iiwa14", "xarm7"
+KINDS, PERIOD, LONG = (3, 6, 33), 1e-3, 4.0
 NAMES = {3: "position", 6: "pose", 33: "position above orientation"}
 NEAR = 5e-3, 10e-3  # [m, rad]
 

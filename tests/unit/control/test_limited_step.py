@@ -201,7 +201,7 @@ def test_contacts_are_relaxed_less_than_distances() -> None:
 
 
 @pytest.mark.skipif(PLAIN, reason="about what Numba compiles")
-@pytest.mark.parametrize("strength", [0.5, 0.01])
+@pytest.mark.parametrize("strength", [0.7, 0.01])
 def test_one_native_call_is_the_same_as_its_parts(strength: float) -> None:
     """A modifier that changes nothing takes the other way: check, and then deliver."""
     made, rng, seen = arm(strength), np.random.default_rng(0), set()

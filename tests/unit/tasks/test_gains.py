@@ -45,10 +45,10 @@ def test_an_error_up_to_the_largest_counts_in_full(case: Case) -> None:
 
 
 def test_the_largest_errors_of_a_robot() -> None:
-    """0.3 of its size for positions, 1 rad for orientations, none for joints."""
+    """0.35 of its size for positions, 1 rad for orientations, none for joints."""
     robot = panda()
     pose = placed(hsp.FramePose("panda_tcp"), robot)
-    assert pose.largest_error == (0.3 * robot.size, 1.0)
+    assert pose.largest_error == (0.35 * robot.size, 1.0)
     assert placed(hsp.JointPosture("home"), robot).largest_error == (None,)
     one = placed(hsp.FramePose("panda_tcp", largest_error=0.2), robot)
     assert one.largest_error == (0.2, 0.2)
