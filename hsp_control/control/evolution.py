@@ -1,4 +1,4 @@
-"""Values, contacts and limits as functions of time, and what switches contacts."""
+"""Values, contacts and limits as functions of time."""
 
 from bisect import insort
 from dataclasses import dataclass, field
@@ -11,7 +11,7 @@ from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import RobotLimits
 from hsp_control.null_space.fields.weight import Weight
 from hsp_control.robot import RobotState
-from hsp_control.trajectories.schedule import Switch, smooth_step
+from hsp_control.trajectories.schedule import smooth_step
 
 Value = TypeVar("Value", float, Array)
 
@@ -165,44 +165,6 @@ class PlannedContact:
         """Return when its schedule, near t, lifts it, or lifted it last [s]."""
         schedule = self.contact.schedule
         return t if schedule is None else schedule.edge(t)
-
-
-class Switched:
-    """The switches of a contact and of the task that takes its place.
-
-    Each begins where the other ends, so that the law goes over from one to the other
-    while the force fades or rises; see `PlannedTask.weight_beyond`.
-    """
-
-    contact: Switch
-    task: Switch | None  # that moves its link
-
-    def reset(self) -> None:
-        """Return to the state before the first switch."""
-        for switch in (self.contact, self.task):
-            if switch is not None:
-                switch.reset()
-
-    def unload(self, t: float, ramp: float) -> None:
-        """Let the force fade from a time on [s]; then the task moves the link."""
-        self.contact.throw(False, t, ramp)
-        if self.task is not None:
-            self.task.throw(True, t + ramp)
-
-    def lift(self, t: float) -> None:
-        """Let the task move the link now [s]."""
-        self.unload(t, 0.0)
-
-    def bear(self, t: float, ramp: float) -> None:
-        """Let the force rise from now on [s], while the task ends."""
-        if self.task is not None:
-            self.task.throw(True, t)  # it may wait for the end of a ramp
-            self.task.throw(False, t)
-        self.contact.throw(True, t, ramp)
-
-    def rests(self, t: float) -> bool:
-        """Return whether the contact alone counts at time t [s], and its task ends."""
-        return self.contact.is_on and self.contact.weight(t) >= HELD
 
 
 @dataclass(frozen=True)

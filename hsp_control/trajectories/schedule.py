@@ -1,4 +1,4 @@
-"""Intervals in which something is active, with smooth ramps; and a thrown switch."""
+"""Intervals in which something is active, with smooth ramps."""
 
 from collections.abc import Sequence
 from functools import cached_property
@@ -8,12 +8,10 @@ from typing import Annotated
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field
 
-from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ScheduleError
 from hsp_control.common.kernels import kernel
 from hsp_control.declaration import Part
-from hsp_control.declaration.quantities import Flag, NonNegative, Number, plain
-from hsp_control.trajectories.remembering import Written
+from hsp_control.declaration.quantities import NonNegative, Number, plain
 
 
 def _finite_or_none(value: object) -> object:
@@ -150,60 +148,3 @@ def smooth_step(
     s_dot = 30.0 * u * u * rest * rest / duration
     s_ddot = 60.0 * u * rest * (rest - u) / (duration * duration)
     return s, s_dot, s_ddot
-
-
-class Switch(Written, Schedule):
-    """w(t) in [0, 1] that a plan throws: on, off, each with a ramp.
-
-    Off, it is active until its ramp ends: the force of a contact fades before the
-    contact goes. On, it is active at once: the force of a contact rises from zero. A
-    throw during a ramp continues from the weight of that time.
-    """
-
-    intervals: Intervals = ((None, None),)
-    """Not used: events say when it is active."""
-    ramp: NonNegative = 0.0
-    """Not used: each throw has its own."""
-    on: Flag = True
-    """Whether it is on before the first throw [-]."""
-
-    @property
-    def constant(self) -> bool:
-        """Whether it never changes: False."""
-        return False
-
-    def _unwritten(self) -> Array:
-        weight = float(self.on)
-        return np.array([-np.inf, 0.0, weight, weight])
-
-    def throw(self, on: bool, t: float, ramp: float = 0.0) -> None:
-        """Turn it on or off, from a time on."""
-        self.memory[:] = t, ramp, self.weight(t), float(on)
-
-    def reset(self) -> None:
-        """Return to the state before the first throw."""
-        self.memory[:] = self._unwritten()
-
-    @property
-    def is_on(self) -> bool:
-        """Whether it was last thrown on, or is on from the beginning."""
-        return bool(self.memory[3] > 0.0)
-
-    def active(self, t: float) -> bool:
-        """Return whether it counts at time t [s]."""
-        start, ramp, _, target = map(float, self.memory)
-        return target > 0.0 or t < start + ramp
-
-    def edge(self, t: float) -> float:
-        """Return when it is not active, just before or after the last throw [s]."""
-        start, ramp, _, target = map(float, self.memory)
-        return nextafter(start, -inf) if target > 0.0 else start + ramp
-
-    def weight(self, t: float) -> float:
-        """Return w(t), t in s; in a ramp it is C² in t."""
-        start, ramp, origin, target = map(float, self.memory)
-        if t >= start + ramp:
-            return target
-        if t <= start:
-            return origin
-        return origin + (target - origin) * smooth_step(t, start, ramp)[0]

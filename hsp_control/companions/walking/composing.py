@@ -6,13 +6,13 @@ from typing import Any
 
 from hsp_control.common.exceptions import PlanError
 from hsp_control.companions.walking.fed import Fed, FedOrientation
+from hsp_control.companions.walking.switch import Switch
 from hsp_control.constraints.contacts import Contact
 from hsp_control.control.plan import PlanParts
 from hsp_control.declaration import within
 from hsp_control.tasks import CenterOfMass, FrameOrientation, FramePose, Task
 from hsp_control.tasks.frame_task import TrackingTask
 from hsp_control.trajectories import ComposedPose
-from hsp_control.trajectories.schedule import Switch
 
 FRICTION = 0.35
 """What a foot counts on whose contact declares no friction: nobody knows the ground to

@@ -9,12 +9,11 @@ from hsp_control.companions.walking.fed import Fed, FedOrientation
 from hsp_control.companions.walking.footsteps import Footstep, near
 from hsp_control.companions.walking.polygon import convex_hull
 from hsp_control.companions.walking.swing import Swing, turned
+from hsp_control.companions.walking.switch import Switch, Switched
 from hsp_control.constraints.contacts import SurfaceContact
 from hsp_control.control.controller import Controller
-from hsp_control.control.evolution import Switched
 from hsp_control.robot import RobotState
 from hsp_control.trajectories import ComposedPose
-from hsp_control.trajectories.schedule import Switch
 
 SLOPE = 0.02
 """Slope that is none: a sole that stands is tilted by so little [-]."""

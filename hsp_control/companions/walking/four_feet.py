@@ -15,13 +15,12 @@ from hsp_control.companions.walking.pendulum import GRAVITY
 from hsp_control.companions.walking.quadruped import QuadrupedPlan
 from hsp_control.companions.walking.quintic import at_rest, to_rest
 from hsp_control.companions.walking.swing import Swing, turned
+from hsp_control.companions.walking.switch import Switch, Switched
 from hsp_control.control.controller import Controller
-from hsp_control.control.evolution import Switched
 from hsp_control.control.falling import FallDetector
 from hsp_control.control.measurement import LogChannel, Measurement
 from hsp_control.control.plan import RunningPlan
 from hsp_control.robot import RobotState
-from hsp_control.trajectories.schedule import Switch
 
 LATE = 0.12
 """How long a foot without ground under it is waited for [s]."""

@@ -10,9 +10,9 @@ from pydantic import Field
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import PlanError
 from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.companions.walking.switch import Switch, Switched
 from hsp_control.constraints.contacts import Contact
 from hsp_control.control.controller import Controller
-from hsp_control.control.evolution import Switched
 from hsp_control.control.measurement import LogChannel, Measurement
 from hsp_control.control.plan import Plan, PlanParts, RunningPlan
 from hsp_control.declaration import Part, within
@@ -27,7 +27,7 @@ from hsp_control.declaration.quantities import (
 )
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import Task
-from hsp_control.trajectories.schedule import Intervals, Schedule, Switch
+from hsp_control.trajectories.schedule import Intervals, Schedule
 
 
 class SensedContact(Part, error=PlanError):

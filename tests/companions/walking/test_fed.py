@@ -9,8 +9,8 @@ import pytest
 from hsp_control import FramePose
 from hsp_control.common.exceptions import TrajectoryError
 from hsp_control.companions.walking.fed import Fed, FedOrientation
+from hsp_control.companions.walking.switch import Switch
 from hsp_control.trajectories import ComposedPose, OrientationSample, TrajectorySample
-from hsp_control.trajectories.schedule import Switch
 
 H = 1e-6
 

@@ -6,11 +6,11 @@ import pytest
 from hsp_control import load_experiment
 from hsp_control.common.exceptions import HspControlError, PlanError
 from hsp_control.companions.walking import Sensed, SensedContact
+from hsp_control.companions.walking.switch import Switch
 from hsp_control.control.measurement import Measurement
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation import simulate
 from hsp_control.simulation.plants import RigidContact, RigidContacts
-from hsp_control.trajectories.schedule import Switch
 
 pytest.importorskip("example_robot_data")
 SWING, FOOT = "whole_body/solo12_swing", "FL_FOOT"

@@ -10,10 +10,10 @@ from hsp_control.common.exceptions import HspControlError, PlanError
 from hsp_control.companions.walking import Crawl, Trot
 from hsp_control.companions.walking.composing import FRICTION
 from hsp_control.companions.walking.quadruped import BANDWIDTH
+from hsp_control.companions.walking.switch import Switch
 from hsp_control.constraints.contacts import BallContact, SurfaceContact
 from hsp_control.tasks import CenterOfMass
 from hsp_control.trajectories import Hold, Stops
-from hsp_control.trajectories.schedule import Switch
 
 pytest.importorskip("example_robot_data")
 TROT = "walking/solo12_trot"

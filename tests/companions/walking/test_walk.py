@@ -10,11 +10,11 @@ from hsp_control import Controller, FramePose, Gains, Robot, load_experiment
 from hsp_control.common.exceptions import FallError, HspControlError, PlanError
 from hsp_control.companions.walking import Walk
 from hsp_control.companions.walking.foot import Foot
+from hsp_control.companions.walking.switch import Switch
 from hsp_control.constraints.contacts import BallContact, SurfaceContact
 from hsp_control.control.falling import FallDetector
 from hsp_control.tasks import CenterOfMass
 from hsp_control.trajectories import Hold, Schedule, Stops
-from hsp_control.trajectories.schedule import Switch
 
 pytest.importorskip("example_robot_data")
 WALK = "walking/talos_walk"

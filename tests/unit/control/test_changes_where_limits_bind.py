@@ -15,9 +15,7 @@ import hsp_control as hsp
 from hsp_control.common.arrays import Array
 from hsp_control.control.actuation import Status, actuation
 from hsp_control.control.compensation import Command, Compensation, FrictionFeedForward
-from hsp_control.control.evolution import Switched
 from hsp_control.trajectories import HoldOrientation, Schedule
-from hsp_control.trajectories.schedule import Switch
 
 ROBOTS = ["planar3r", "panda", "iiwa14", "ur5", "xarm7"]
 START, RAMP = 0.2, 0.3
@@ -285,8 +283,9 @@ def standing(seed: int, **schedules: Schedule) -> tuple[hsp.Controller, Array, A
 @many
 def test_a_foot_that_a_plan_switches(seed: int) -> None:
     """Whenever it lets it go, and puts it down, also before it has let it go."""
-    foot = Switched()
-    foot.contact, foot.task = Switch(), Switch(on=False)
+    walking = pytest.importorskip("hsp_control.companions.walking.switch")
+    foot = walking.Switched()
+    foot.contact, foot.task = walking.Switch(), walking.Switch(on=False)
     controller, q, v = standing(seed, contact=foot.contact, task=foot.task)
 
     def effort(t: float) -> Array:

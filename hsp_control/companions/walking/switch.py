@@ -1,0 +1,106 @@
+"""What a plan switches: a contact, and the task that takes its place."""
+
+from math import inf, nextafter
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.control.evolution import HELD
+from hsp_control.declaration.quantities import Flag, NonNegative
+from hsp_control.trajectories.remembering import Written
+from hsp_control.trajectories.schedule import Intervals, Schedule, smooth_step
+
+
+class Switch(Written, Schedule):
+    """w(t) in [0, 1] that a plan throws: on, off, each with a ramp.
+
+    Off, it is active until its ramp ends: the force of a contact fades before the
+    contact goes. On, it is active at once: the force of a contact rises from zero. A
+    throw during a ramp continues from the weight of that time.
+    """
+
+    intervals: Intervals = ((None, None),)
+    """Not used: events say when it is active."""
+    ramp: NonNegative = 0.0
+    """Not used: each throw has its own."""
+    on: Flag = True
+    """Whether it is on before the first throw [-]."""
+
+    @property
+    def constant(self) -> bool:
+        """Whether it never changes: False."""
+        return False
+
+    def _unwritten(self) -> Array:
+        weight = float(self.on)
+        return np.array([-np.inf, 0.0, weight, weight])
+
+    def throw(self, on: bool, t: float, ramp: float = 0.0) -> None:
+        """Turn it on or off, from a time on."""
+        self.memory[:] = t, ramp, self.weight(t), float(on)
+
+    def reset(self) -> None:
+        """Return to the state before the first throw."""
+        self.memory[:] = self._unwritten()
+
+    @property
+    def is_on(self) -> bool:
+        """Whether it was last thrown on, or is on from the beginning."""
+        return bool(self.memory[3] > 0.0)
+
+    def active(self, t: float) -> bool:
+        """Return whether it counts at time t [s]."""
+        start, ramp, _, target = map(float, self.memory)
+        return target > 0.0 or t < start + ramp
+
+    def edge(self, t: float) -> float:
+        """Return when it is not active, just before or after the last throw [s]."""
+        start, ramp, _, target = map(float, self.memory)
+        return nextafter(start, -inf) if target > 0.0 else start + ramp
+
+    def weight(self, t: float) -> float:
+        """Return w(t), t in s; in a ramp it is C² in t."""
+        start, ramp, origin, target = map(float, self.memory)
+        if t >= start + ramp:
+            return target
+        if t <= start:
+            return origin
+        return origin + (target - origin) * smooth_step(t, start, ramp)[0]
+
+
+class Switched:
+    """The switches of a contact and of the task that takes its place.
+
+    Each begins where the other ends, so that the law goes over from one to the other
+    while the force fades or rises; see `PlannedTask.weight_beyond`.
+    """
+
+    contact: Switch
+    task: Switch | None  # that moves its link
+
+    def reset(self) -> None:
+        """Return to the state before the first switch."""
+        for switch in (self.contact, self.task):
+            if switch is not None:
+                switch.reset()
+
+    def unload(self, t: float, ramp: float) -> None:
+        """Let the force fade from a time on [s]; then the task moves the link."""
+        self.contact.throw(False, t, ramp)
+        if self.task is not None:
+            self.task.throw(True, t + ramp)
+
+    def lift(self, t: float) -> None:
+        """Let the task move the link now [s]."""
+        self.unload(t, 0.0)
+
+    def bear(self, t: float, ramp: float) -> None:
+        """Let the force rise from now on [s], while the task ends."""
+        if self.task is not None:
+            self.task.throw(True, t)  # it may wait for the end of a ramp
+            self.task.throw(False, t)
+        self.contact.throw(True, t, ramp)
+
+    def rests(self, t: float) -> bool:
+        """Return whether the contact alone counts at time t [s], and its task ends."""
+        return self.contact.is_on and self.contact.weight(t) >= HELD
