@@ -16,6 +16,7 @@ Each frame is one `write`. After that the operating system has it, and a killed 
 loses nothing that it wrote. Reading stops at the first incomplete frame.
 """
 
+import fcntl
 import json
 import math
 import os
@@ -45,15 +46,21 @@ class JournalWriter:
     """Writes a journal."""
 
     def __init__(self, path: Path) -> None:
-        """Begin a journal; an existing file is overwritten."""
+        """Begin a journal; an existing file is overwritten, unless a run writes it."""
         self.path = path  # the file
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_APPEND
+            flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND
             self._file = os.open(path, flags, 0o644)
+        except OSError as error:
+            raise self._failure(error) from error
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            os.ftruncate(self._file, 0)
             self._put(MAGIC)
             self._size = len(MAGIC)
         except OSError as error:
+            self.close()
             raise self._failure(error) from error
 
     def write_heading(self, shapes: Shapes, meta: Mapping[str, Any]) -> None:
@@ -94,6 +101,8 @@ class JournalWriter:
 
     def _failure(self, error: OSError) -> LogError:
         reason = error.strerror or str(error)
+        if isinstance(error, BlockingIOError):
+            reason = "another run is writing it; wait for it, or give another --out"
         return LogError(f"{self.path}: cannot write the journal: {reason}")
 
 

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import simpson
 
 import hsp_control as hsp
 from hsp_control import Controller, FramePose, FramePosition, Robot, Rollout
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ControllerError
 from hsp_control.control.compensation import Compensation, MomentumObserver
 from hsp_control.control.compensation.linear_loop import LinearLoop
@@ -23,8 +23,6 @@ from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric, Met
 from hsp_control.robot.integrators import Dop853, Rk4
 from hsp_control.simulation.plants import Push, RigidBody
 from hsp_control.tasks import Impedance
-
-Array = NDArray[np.float64]
 
 PRECISE = Dop853(rtol=1e-11, atol=1e-11)
 FORCE, MOMENT = np.array([25.0, -15.0, 20.0]), np.array([1.5, -1.0, 0.7])

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from numpy.typing import NDArray
 
 from hsp_control import (
     Controller,
@@ -28,12 +27,11 @@ from hsp_control import (
 )
 from hsp_control.cli import robot_table
 from hsp_control.cli.robot_table import FLOATING, LOAD_OPTIONS
+from hsp_control.common.arrays import Array
 from hsp_control.common.resources import bundled_robots
 from hsp_control.robot.description.sources import example_robots
 from hsp_control.robot.integrators import Rk4
 from hsp_control.trajectories import HoldPose
-
-Array = NDArray[np.float64]
 
 BUNDLED = list(bundled_robots())
 EXAMPLES = {k: v for k, v in example_robots().items() if k not in BUNDLED}

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from hsp_control import (
     CenterOfMass,
@@ -22,12 +21,12 @@ from hsp_control import (
     TargetPosture,
     simulate,
 )
+from hsp_control.common.arrays import Array
 from hsp_control.constraints.limits import ObstacleDistance
 from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants import Push, RigidBodyPlant
 
-Array = NDArray[np.float64]
 MASS, LEVER, INERTIA, LENGTH = 2.0, 0.2, 0.1, 0.4
 PENDULUM = f"""<robot name="pendulum">
   <link name="base"/>

@@ -9,18 +9,16 @@ Pinocchio and the short form of the law. Nothing is shared but the paper.
 import numpy as np
 import planar_arm as arm
 import pytest
-from numpy.typing import NDArray
 from planar_arm import A, PlanarSimulation, simulate_paper
 
 from hsp_control import (
     Rollout,
     load_experiment,
 )
+from hsp_control.common.arrays import Array
 from hsp_control.common.resources import bundled_configs
 from hsp_control.config import Experiment
 from hsp_control.null_space.metrics import MetricSample
-
-Array = NDArray[np.float64]
 
 CONFIGURATIONS = {int(name[6]): name for name in bundled_configs() if "paper/" in name}
 NUMBERS = (1, 2, 3, 4)

@@ -11,7 +11,6 @@ from functools import cache
 import numpy as np
 import pinocchio as pin
 import pytest
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from hsp_control import (
@@ -31,6 +30,7 @@ from hsp_control import (
     Task,
     simulate,
 )
+from hsp_control.common.arrays import Array
 from hsp_control.geometry.shapes import Sphere
 from hsp_control.null_space.fields import EqualJointAngles, FunctionField, PointDistance
 from hsp_control.null_space.metrics import (
@@ -48,8 +48,6 @@ from hsp_control.trajectories import (
     Lissajous,
     Spin,
 )
-
-Array = NDArray[np.float64]
 
 FRAMES = {"planar3r": "tip", "panda": "panda_tcp", "iiwa14": "iiwa_link_ee"}
 NEAR = {

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from numpy.typing import NDArray
 
 from hsp_control import (
     Controller,
@@ -30,6 +29,7 @@ from hsp_control import (
     Task,
     simulate,
 )
+from hsp_control.common.arrays import Array
 from hsp_control.robot.integrators import Rk4
 from hsp_control.trajectories import (
     CallableOrientation,
@@ -37,8 +37,6 @@ from hsp_control.trajectories import (
     ComposedPose,
     MinimumJerk,
 )
-
-Array = NDArray[np.float64]
 
 DEFAULT = 0.03
 FREQUENCY = 10.0  # of the tasks [rad/s], and K_N [1/s]

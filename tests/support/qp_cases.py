@@ -11,9 +11,9 @@ import daqp
 import numpy as np
 from numpy.typing import NDArray
 
+from hsp_control.common.arrays import Array
 from hsp_control.control.actuation.dual_active_set import QP, Workspace, minimise
 
-Array = NDArray[np.float64]
 Generator = np.random.Generator
 
 

@@ -221,8 +221,11 @@ class Position(Family):
     ) -> Task:
         target = self.coordinates(None, motion)(0.0)
         target = target + error * unit(np.random.default_rng(seed), self.rows)
+        return self.task(wobble(target), gains)
+
+    def task(self, target: Any, gains: Gains) -> Task:
         return FramePosition(
-            self.frame, wobble(target), gains=gains, axes=self.axes, name="here"
+            self.frame, target, gains=gains, axes=self.axes, name="here"
         )
 
     def coordinates(self, task: Any, motion: Motion) -> Callable[[float], Array]:
@@ -316,21 +319,13 @@ class Seen(Pose):
 
 
 @dataclass(frozen=True)
-class Mass(Family):
+class Mass(Position):
     """The centre of mass."""
 
-    axes: str = "xyz"
+    frame: str = ""
 
-    @property
-    def rows(self) -> int:  # type: ignore[override]
-        return len(self.axes)
-
-    def make(
-        self, robot: Robot, motion: Motion, error: float, gains: Gains, seed: int
-    ) -> Task:
-        target = self.coordinates(None, motion)(0.0)
-        target = target + error * unit(np.random.default_rng(seed), self.rows)
-        return CenterOfMass(wobble(target), gains=gains, axes=self.axes)
+    def task(self, target: Any, gains: Gains) -> Task:
+        return CenterOfMass(target, gains=gains, axes=self.axes)
 
     def coordinates(self, task: Any, motion: Motion) -> Callable[[float], Array]:
         model, data = motion.robot.model, motion.robot.model.createData()
@@ -548,11 +543,11 @@ CASES = [
             ("ur5", "base_link", "free_flyer"),
         )
     ),
-    Case("planar3r", Mass("xy")),
-    Case("panda", Mass("yz")),
-    Case("tiago_no_hand", Mass("xy"), "planar"),
-    Case("ur5", Mass("xyz"), "free_flyer"),
-    Case("ur5", Mass("yx"), "planar"),
+    Case("planar3r", Mass(axes="xy")),
+    Case("panda", Mass(axes="yz")),
+    Case("tiago_no_hand", Mass(axes="xy"), "planar"),
+    Case("ur5", Mass(axes="xyz"), "free_flyer"),
+    Case("ur5", Mass(axes="yx"), "planar"),
     Case("planar3r", Posture(None, False)),
     Case("planar3r", Posture(None, True)),
     Case("planar3r", Posture(("joint3", "joint1"), True)),

@@ -4,9 +4,9 @@ from math import pi
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from hsp_control import Robot
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HardwareError
 from hsp_control.companions.franka import (
     FrankaHardware,
@@ -19,7 +19,6 @@ from hsp_control.companions.franka.client_process import ClientProcess
 from hsp_control.live import Hardware, Measurement
 from hsp_control.live.hardware import AdaptingHardware
 
-Array = NDArray[np.float64]
 APPLIED = np.linspace(-0.6, 0.6, 7)
 
 

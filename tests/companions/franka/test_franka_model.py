@@ -7,14 +7,13 @@ from xml.etree import ElementTree
 import numpy as np
 import pinocchio as pin
 import pytest
-from numpy.typing import NDArray
 
 from hsp_control import Robot
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HardwareError, ModelError
 from hsp_control.companions.franka.model_check import difference, postures
 from hsp_control.companions.franka.robot_model import calibrated, own_model
 
-Array = NDArray[np.float64]
 TOOL = pin.SE3(pin.rpy.rpyToMatrix(0.1, -0.2, 0.8), np.array([0.0, 0.01, 0.1]))
 CARRIED = pin.Inertia(0.9, np.array([0.01, -0.02, 0.06]), np.diag([3e-3, 2e-3, 2e-3]))
 

@@ -7,16 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 from clips import Recorder, told
-from numpy.typing import NDArray
 
 import hsp_control as hsp
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ConfigError
 from hsp_control.companions.play import Picture, Session, play
 from hsp_control.companions.play.knobs import _scaled, knobs_of
 from hsp_control.companions.play.playable import playable
 from hsp_control.companions.viewer import Viewer
 
-Array = NDArray[np.float64]
 PANDA = "panda_obstacle"
 
 

@@ -6,14 +6,12 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from places import ROOT
 
 from hsp_control import Rollout, load_experiment
+from hsp_control.common.arrays import Array
 from hsp_control.companions.plots.log_series import joint_positions
 from hsp_control.config import Experiment
-
-Array = NDArray[np.float64]
 
 DOCS = ROOT / "docs"
 FIGURES = (2, 3, 4, 5)

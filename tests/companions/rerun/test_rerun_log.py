@@ -9,17 +9,15 @@ import mujoco
 import numpy as np
 import pytest
 import rerun
-from numpy.typing import NDArray
 from rerun.chunk import RrdReader
 
 import hsp_control as hsp
 from hsp_control import Robot
 from hsp_control.cli import main
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ExportError
 from hsp_control.companions.rerun.log import _archetypes, log_to_rerun
 from hsp_control.companions.viewer.robot_drawing import read_visuals
-
-Array = NDArray[np.float64]
 
 
 @pytest.fixture(scope="module")

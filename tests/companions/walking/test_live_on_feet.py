@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from live_rigs import panda, start
-from numpy.typing import NDArray
 
 import hsp_control as hsp
 from hsp_control.cli.live_experiment import check_live, simulated_robot
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import (
     CompensationError,
     EstimationError,
@@ -35,7 +35,6 @@ from hsp_control.live.udp import SensorLayout
 
 pytest.importorskip("example_robot_data")
 pytest.importorskip("mujoco")
-Array = NDArray[np.float64]
 FEET = ("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT")
 BRIEF = ("live.stop.coming_to_rest=0", "simulation.log_period=0.001")
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from hsp_control.common import linalg
+from hsp_control.common.arrays import Array
 from hsp_control.common.linalg import (
     cholesky,
     multiply,
@@ -26,7 +26,6 @@ from hsp_control.law import CONSTANT, law
 from hsp_control.robot import kinematics, motion
 from hsp_control.tasks import TaskSample
 
-Array = NDArray[np.float64]
 EPS = float(np.finfo(float).eps)
 
 seeds = st.integers(0, 2**32 - 1)

@@ -10,15 +10,12 @@ from clearance_cases import ends, load, outside
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from numpy.typing import NDArray
 from odd_robots import collision, odd_robot
 
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ModelError
 from hsp_control.geometry import link_shapes
 from hsp_control.geometry.enclosing import enclosing_capsule
-
-Array = NDArray[np.float64]
-
 
 # --- capsules around points ----------------------------------------------------------
 

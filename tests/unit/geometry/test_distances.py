@@ -8,10 +8,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from clearance_cases import load, placed
-from numpy.typing import NDArray
 from odd_robots import FACES, OCTAHEDRON, write_stl
 
 from hsp_control import Obstacle, Robot
+from hsp_control.common.arrays import Array
 from hsp_control.geometry import LinkShape, Proximity
 from hsp_control.geometry.shapes import (
     Box,
@@ -26,8 +26,6 @@ from hsp_control.geometry.shapes import (
 )
 from hsp_control.null_space.fields import ObstacleClearance
 from hsp_control.trajectories import Hold, HoldOrientation
-
-Array = NDArray[np.float64]
 
 
 def nearest_on_segments(

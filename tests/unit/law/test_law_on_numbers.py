@@ -7,7 +7,6 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from law_cases import pseudo_inverse
 from law_numbers import Numbers, jacobian, numbers, positive, resolve
-from numpy.typing import NDArray
 
 from hsp_control.common.arrays import Array
 from hsp_control.law import CONSTANT, IDENTITY, VARYING, Resolution, singular_values
@@ -101,8 +100,6 @@ def test_singular_values_of_stacks_of_any_shape(
     assert (least if expected[-1] > error else 0.0) <= determinant <= most
     np.testing.assert_allclose(length, np.sqrt(x.g @ x.W @ x.g), rtol=1e-13)
 
-
-Array = NDArray[np.float64]
 
 BOUND = np.sqrt(32.0 / 27.0)  # max of s q(s²) threshold, at s = threshold √(2/3)
 

@@ -18,7 +18,6 @@ from live_rigs import (
     start,
     watched,
 )
-from numpy.typing import NDArray
 
 import hsp_control as hsp
 from hsp_control import (
@@ -30,6 +29,7 @@ from hsp_control import (
     TargetPosture,
     simulate,
 )
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HardwareError, LiveError
 from hsp_control.constraints.limits import PositionRange
 from hsp_control.control.changes import Changes
@@ -46,7 +46,6 @@ from hsp_control.live import (
     run_loop,
 )
 
-Array = NDArray[np.float64]
 AT_REST = 0.02
 """Speeds of a robot that holds: below twice the speed at which damping ends [rad/s]."""
 

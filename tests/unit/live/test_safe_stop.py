@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from live_rigs import PERIOD, gravity, panda, start, watched
-from numpy.typing import NDArray
 
+from hsp_control.common.arrays import Array
 from hsp_control.live import LiveSettings, Phase, SafeStop, StopSettings
 from hsp_control.live.report import Deadlines
 from hsp_control.live.safe_stop import largest_scale
@@ -15,7 +15,6 @@ from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants import IntegratedPlant, RigidBodyPlant
 from hsp_control.simulation.plants.model_changes import Inertias, changed
 
-Array = NDArray[np.float64]
 FREE = np.full(7, np.inf)
 LIMITED = np.array([87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0])
 seeds = st.integers(0, 2**32 - 1)

@@ -12,19 +12,16 @@ from typing import Any
 import numpy as np
 import pytest
 from clearance_cases import AIR, agree, barrier_at, flowing, load, turned
-from numpy.typing import NDArray
 from odd_robots import FACES, OCTAHEDRON, write_stl
 from oracles import gradient
 
 from hsp_control import Controller, Cost, FramePosition, Gains, Obstacle, simulate
+from hsp_control.common.arrays import Array
 from hsp_control.geometry import Proximity, link_shapes, shapes
 from hsp_control.null_space.fields import ObstacleClearance
 from hsp_control.robot import Dop853
 from hsp_control.robot.integrators import Integrator
 from hsp_control.trajectories import Hold, HoldOrientation, Lissajous, Spin
-
-Array = NDArray[np.float64]
-
 
 # --- gradient and rate on whole robots -----------------------------------------------
 

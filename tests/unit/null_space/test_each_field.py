@@ -13,7 +13,6 @@ from field_oracles import (
     swirl_field,
     target,
 )
-from numpy.typing import NDArray
 
 from hsp_control import (
     Controller,
@@ -25,6 +24,7 @@ from hsp_control import (
     RobotState,
     TargetPosture,
 )
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
 from hsp_control.law import IDENTITY, FieldSample, MetricSample
 from hsp_control.null_space.fields import (
@@ -40,8 +40,6 @@ from hsp_control.null_space.fields import (
 )
 from hsp_control.null_space.fields.weight import Product
 from hsp_control.trajectories import Hold
-
-Array = NDArray[np.float64]
 
 # --- members, one by one -------------------------------------------------------------
 

@@ -9,12 +9,9 @@ from field_oracles import (
     load,
     plain,
 )
-from numpy.typing import NDArray
 
+from hsp_control.common.arrays import Array
 from hsp_control.null_space import differences
-
-Array = NDArray[np.float64]
-
 
 # --- the members ---------------------------------------------------------------------
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from field_cases import evaluate, placed
 from field_oracles import OBSTACLE, ValueOnly, load
-from numpy.typing import NDArray
 
 from hsp_control import (
     FunctionCost,
@@ -20,6 +19,7 @@ from hsp_control import (
     RobotState,
     TargetPosture,
 )
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import (
     FieldError,
     FrameNotFoundError,
@@ -41,8 +41,6 @@ from hsp_control.null_space.fields import (
 )
 from hsp_control.null_space.metrics import IdentityMetric, Metric
 from hsp_control.trajectories import Hold
-
-Array = NDArray[np.float64]
 
 
 def arm() -> Robot:

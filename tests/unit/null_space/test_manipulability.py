@@ -12,9 +12,9 @@ from clearance_cases import load
 from field_cases import placed
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from hsp_control import Robot
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import (
     FieldError,
     FrameNotFoundError,
@@ -28,8 +28,6 @@ from hsp_control.null_space.fields.jacobian_cost import (
     JacobianTerms,
     Rows,
 )
-
-Array = NDArray[np.float64]
 
 HANDS = {
     "planar3r": "tip",

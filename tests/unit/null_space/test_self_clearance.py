@@ -8,15 +8,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from clearance_cases import agree, flowing, load, still, turned
-from numpy.typing import NDArray
 from oracles import gradient
 
 from hsp_control import Robot
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ModelError
 from hsp_control.geometry import Proximity, link_shapes, self_pairs
 from hsp_control.null_space.fields import SelfClearance
-
-Array = NDArray[np.float64]
 
 
 def names(robot: Robot) -> set[frozenset[str]]:

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from clearance_cases import AIR, load
 from field_cases import evaluate
-from numpy.typing import NDArray
 from values import assert_documented, assert_is_a_value
 
 from hsp_control import NullSpaceField, Obstacle, RobotState, geometry
 from hsp_control import trajectories as paths
+from hsp_control.common.arrays import Array
 from hsp_control.declaration import Part
 from hsp_control.geometry import Scene, shapes
 from hsp_control.geometry.start import Start
@@ -26,8 +26,6 @@ from hsp_control.null_space import fields as null_space_fields
 from hsp_control.null_space import metrics
 from hsp_control.null_space.fields import Ramp
 from hsp_control.null_space.metrics import MassMatrixMetric, Metric, MetricSample
-
-Array = NDArray[np.float64]
 
 BALL = Obstacle("ball", shapes.Sphere(0.1), AIR)
 BOX = Obstacle("box", shapes.Box((0.2, 0.3, 0.1)), paths.Hold([0.6, 0.4, 0.2]))

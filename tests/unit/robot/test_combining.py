@@ -7,7 +7,6 @@ from functools import cache
 import numpy as np
 import pinocchio as pin
 import pytest
-from numpy.typing import NDArray
 
 from hsp_control import (
     Controller,
@@ -18,6 +17,7 @@ from hsp_control import (
     Robot,
     simulate,
 )
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import (
     FrameNotFoundError,
     HspControlError,
@@ -28,8 +28,6 @@ from hsp_control.common.resources import bundled_robots
 from hsp_control.robot.description.loading import RobotPart, combine, placement
 from hsp_control.robot.description.sources import RobotSource
 from hsp_control.robot.integrators import Rk4
-
-Array = NDArray[np.float64]
 
 LEFT = placement([0.0, 0.3, 0.1], [0.0, 0.0, 0.0])
 RIGHT = placement([0.9, -0.4, 0.2], [0.7, -0.4, 2.5])  # tilted: gravity pulls otherwise

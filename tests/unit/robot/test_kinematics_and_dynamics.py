@@ -6,13 +6,12 @@ from xml.etree import ElementTree
 import numpy as np
 import pinocchio as pin
 import pytest
-from numpy.typing import NDArray
 from oracles import slope
 from robot_cases import BUNDLED, ROBOTS, draw
 
 from hsp_control import Robot
+from hsp_control.common.arrays import Array
 
-Array = NDArray[np.float64]
 LWA = pin.LOCAL_WORLD_ALIGNED
 
 

@@ -7,15 +7,13 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from numpy.typing import NDArray
 from robot_cases import ROBOTS, assert_equal_terms, draw, everything
 
+from hsp_control.common.arrays import Array
 from hsp_control.common.kernels import PLAIN
 from hsp_control.common.native import NativeCall
 from hsp_control.robot import pinocchio_calls
 from hsp_control.robot.pinocchio_calls import bind_pinocchio
-
-Array = NDArray[np.float64]
 
 compiled = pytest.mark.skipif(PLAIN, reason="plain Python has no native calls")
 

@@ -7,14 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from robot_cases import ROBOTS, assert_equal_terms, draw, everything, load
 
 from hsp_control import HspControlError, RobotState
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ConfigurationError, NonFiniteError, ShapeError
-
-Array = NDArray[np.float64]
-
 
 # --- one state, many moves -----------------------------------------------------------
 

@@ -11,7 +11,6 @@ from closed_loops import (
     planar_controller,
     planar_start,
 )
-from numpy.typing import NDArray
 
 from hsp_control import (
     Controller,
@@ -20,11 +19,10 @@ from hsp_control import (
     Robot,
     simulate,
 )
+from hsp_control.common.arrays import Array
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants import RigidBodyPlant
 from hsp_control.trajectories import Lissajous
-
-Array = NDArray[np.float64]
 
 
 @pytest.mark.parametrize("which", ["planar3r", "panda"])

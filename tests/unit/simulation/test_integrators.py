@@ -15,18 +15,16 @@ from closed_loops import (
     order,
     start,
 )
-from numpy.typing import NDArray
 
 import hsp_control as hsp
 from hsp_control import Robot
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LogError, SimulationError
 from hsp_control.common.kernels import PLAIN
 from hsp_control.robot import integrators
 from hsp_control.robot.integrators import Dop853, Rk4, SemiImplicitEuler
 from hsp_control.simulation.plants import RigidBody, RigidBodyPlant
 from hsp_control.simulation.simulate import default_integrator
-
-Array = NDArray[np.float64]
 
 
 def falling(robot: Robot) -> Callable[[float, Array, Array], Array]:

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 from closed_loops import EXACT, load, panda_controller, planar_controller, planar_start
-from numpy.typing import NDArray
 
 from hsp_control import (
     Controller,
@@ -20,12 +19,11 @@ from hsp_control import (
     simulate,
 )
 from hsp_control.cli import main
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LogError, ShapeError
 from hsp_control.null_space.metrics import MassMatrixMetric
 from hsp_control.robot.integrators import Rk4
 from hsp_control.trajectories import Lissajous
-
-Array = NDArray[np.float64]
 
 
 @pytest.fixture(scope="module")

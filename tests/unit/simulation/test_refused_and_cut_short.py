@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 from closed_loops import EXACT, load, planar_controller, planar_start
-from numpy.typing import NDArray
 
 from hsp_control import Controller, RobotState, Rollout, simulate
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import (
     ConfigurationError,
     NonFiniteError,
@@ -17,8 +17,6 @@ from hsp_control.common.exceptions import (
 )
 from hsp_control.null_space.fields import FunctionField
 from hsp_control.robot.integrators import Rk4, SemiImplicitEuler
-
-Array = NDArray[np.float64]
 
 
 @pytest.fixture(scope="module")

@@ -5,15 +5,13 @@ from typing import Any
 import numpy as np
 import pytest
 from closed_loops import load, planar_controller, planar_start
-from numpy.typing import NDArray
 
 from hsp_control import Robot, RobotState, Rollout, simulate
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.control.measurement import LogChannel
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants import IntegratedPlant, Plant, RigidBodyPlant
-
-Array = NDArray[np.float64]
 
 
 class Sampled(IntegratedPlant):

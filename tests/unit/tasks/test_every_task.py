@@ -7,7 +7,6 @@ import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from task_cases import (
     GAINS,
     SECOND,
@@ -22,10 +21,8 @@ from task_cases import (
 )
 
 from hsp_control import Gains, Pointing, Task
+from hsp_control.common.arrays import Array
 from hsp_control.tasks import AngularMomentum
-
-Array = NDArray[np.float64]
-
 
 # --- the members ---------------------------------------------------------------------
 

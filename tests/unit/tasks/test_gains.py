@@ -7,14 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from task_cases import GAINS, TIME, Case, Direction, every_task, place, placed
 
 import hsp_control as hsp
 from hsp_control import Controller, Gains, JointPosture, Robot
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import GainError
-
-Array = NDArray[np.float64]
 
 
 @pytest.mark.slow

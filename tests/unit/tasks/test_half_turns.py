@@ -8,7 +8,6 @@ import pinocchio as pin
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from task_cases import (
     GAINS,
     TIME,
@@ -22,10 +21,8 @@ from task_cases import (
 )
 
 from hsp_control import Controller, FrameOrientation, Gains, Pointing, simulate
+from hsp_control.common.arrays import Array
 from hsp_control.trajectories import HoldOrientation
-
-Array = NDArray[np.float64]
-
 
 near_pi = st.one_of(
     st.floats(0.0, 2.0 * np.pi),

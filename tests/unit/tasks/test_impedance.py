@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from numpy.typing import NDArray
 from places import THOROUGH
 from scipy.linalg import sqrtm
 from task_cases import (
@@ -29,6 +28,7 @@ from task_cases import (
 
 import hsp_control as hsp
 from hsp_control import Controller, FramePosition, Gains, JointPosture
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import (
     CompensationError,
     ControllerError,
@@ -42,8 +42,6 @@ from hsp_control.control.compensation import (
 )
 from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric, Metric
 from hsp_control.tasks import Impedance
-
-Array = NDArray[np.float64]
 
 CASES = [
     Case("planar3r", Position("tip", "xy")),

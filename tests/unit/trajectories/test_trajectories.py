@@ -10,7 +10,6 @@ import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from trajectory_cases import (
     CIRCLE,
     IDENTITY,
@@ -28,6 +27,7 @@ from trajectory_cases import (
 )
 
 import hsp_control.trajectories as family
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ImmutableError, ShapeError, TrajectoryError
 from hsp_control.common.rotations import log3
 from hsp_control.declaration.quantities import Number
@@ -51,9 +51,6 @@ from hsp_control.trajectories import (
     TrajectorySample,
     UniformLine,
 )
-
-Array = NDArray[np.float64]
-
 
 # These move already, or still accelerate, where they meet a hold: documented.
 ROUGH = {"spline 3", "polynomial", "blend in motion", "blend orientation in motion"}
