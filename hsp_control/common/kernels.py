@@ -8,16 +8,53 @@ debugging and coverage, and Numba is not even imported.
 
 import gc
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from functools import partial
-from typing import Any, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar, cast
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 KernelCall = tuple[Callable[..., Any], tuple[Any, ...]]
 """A kernel, or another function, with its first arguments: what a part's mathematics
 is. Who calls it adds the others. See `native.planned` for what may be among them."""
+
+KernelCalls = Sequence[KernelCall]
+"""What a part does in each step: its calls with all their arguments, in this order."""
+
+
+class KernelOutput(NamedTuple):
+    """An argument of a kernel: what another kernel writes into its last argument."""
+
+    call: KernelCall
+    out: Any
+
+
+def with_outputs(call: KernelCall, *others: Any) -> KernelCall:
+    """Return a call with further arguments after its own."""
+    function, arguments = call
+    return function, (*arguments, *others)
+
+
+def call_once(function: Callable[..., Any], *arguments: Any) -> Any:
+    """Call a kernel from Python; a call that comes often is bound, see `native`."""
+    from hsp_control.common.native import bind
+
+    return bind(function, *arguments)()
+
+
+def says(part: object, *ways: str) -> str:
+    """Return by which of several methods a part's class says its mathematics.
+
+    It is the one of the most derived class, so that whoever derives from a part of the
+    package may override any of them; the first, if one class has several.
+    """
+    for each in type(part).__mro__:
+        for way in ways:
+            if way in vars(each):
+                return way
+    raise AttributeError(f"{type(part).__name__} has none of {', '.join(ways)}")
+
 
 PLAIN = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 """Whether kernels run as plain Python."""

@@ -21,7 +21,12 @@ from typing import Any, NamedTuple, Self, TypeGuard
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.kernels import KernelCall, is_compiled
+from hsp_control.common.kernels import (
+    KernelCalls,
+    KernelOutput,
+    is_compiled,
+    with_outputs,
+)
 
 
 class NativeCall(partial[float]):
@@ -182,26 +187,25 @@ class StepPlan(NamedTuple):
         return value
 
 
-class KernelOutput:
-    """An argument of a kernel: what another kernel writes into its last argument."""
-
-    def __init__(self, call: KernelCall, out: Any) -> None:
-        self._call, self._out = call, out
-
-    def supplied(self) -> tuple[Any, ...]:
-        """Return the output, and the calls that write it."""
-        return self._out, *planned(self._call, self._out)
-
-
-def planned(call: KernelCall, *others: Any) -> StepPlan:
-    """Return the plan of a kernel's call, with further arguments after its own."""
-    function, arguments = call
-    given, follow, write = supplied(arguments)
-    return StepPlan(follow, (*write, bind(function, *given, *others)))
+def planned(calls: KernelCalls) -> StepPlan:
+    """Return the plan of a part's calls; one that comes twice is bound once."""
+    follow: list[Callable[[float], object]] = []
+    write: list[Callable[[], Any]] = []
+    bound: dict[int, tuple[Callable[[], Any], ...]] = {}
+    for call in calls:
+        if id(call) not in bound:
+            function, arguments = call
+            given, first, before = supplied(arguments)
+            follow += first
+            bound[id(call)] = *before, bind(function, *given)
+        write += bound[id(call)]
+    return StepPlan(tuple(follow), tuple(write))
 
 
 def supplied(argument: Any) -> tuple[Any, tuple[Any, ...], tuple[Any, ...]]:
     """Return an argument as a kernel reads it, and the calls that write it."""
+    if type(argument) is KernelOutput:
+        return argument.out, *planned([with_outputs(*argument)])
     if hasattr(argument, "supplied"):
         found: tuple[Any, tuple[Any, ...], tuple[Any, ...]] = argument.supplied()
         return found
@@ -213,29 +217,15 @@ def supplied(argument: Any) -> tuple[Any, tuple[Any, ...], tuple[Any, ...]]:
     return tuple(value for value, _, _ in parts), follow, write
 
 
-def says(part: object, *ways: str) -> str:
-    """Return by which of several methods a part's class says its mathematics.
-
-    It is the one of the most derived class, so that whoever derives from a part of the
-    package may override any of them; the first, if one class has several.
-    """
-    for each in type(part).__mro__:
-        for way in ways:
-            if way in vars(each):
-                return way
-    raise AttributeError(f"{type(part).__name__} has none of {', '.join(ways)}")
-
-
 class CallSequence:
-    """Several calls as one."""
+    """Several calls as one, with the result of the last."""
 
-    def __init__(self, *calls: Callable[..., Any], result: int = -1) -> None:
+    def __init__(self, *calls: Callable[..., Any]) -> None:
         self.calls = calls  # the calls, in order
-        self.result = result  # the index of the call whose result is returned
 
     def __call__(self, *arguments: float) -> Any:
         """Make the calls in order."""
-        return [call(*arguments) for call in self.calls][self.result]
+        return [call(*arguments) for call in self.calls][-1]
 
 
 def one_call(calls: Sequence[Callable[..., Any]], *free: float) -> Callable[..., Any]:

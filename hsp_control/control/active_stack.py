@@ -6,9 +6,10 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import NonFiniteError
-from hsp_control.common.native import StepPlan, bind, steps
+from hsp_control.common.kernels import KernelCall
+from hsp_control.common.native import planned, steps
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.contacts.contact import UnactuatedRows, unactuated_count
 from hsp_control.control.actuation.support import Support
@@ -21,7 +22,7 @@ from hsp_control.null_space.metrics import Metric
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
-from hsp_control.tasks.feedback import Feedback, InForce, beyond_largest, write_asked
+from hsp_control.tasks.feedback import InForce, beyond_largest, write_asked
 from hsp_control.tasks.slipping import slipped, write_pulls
 from hsp_control.trajectories.streams.stream import Streamed
 
@@ -85,19 +86,19 @@ class ActiveStack:
         # tasks with a largest error: the name, the first row, and `Feedback.largest`
         self.bounds: list[tuple[str, slice, Callable[[Array], float]]] = []
         self._parts: list[tuple[Task | Contact, TaskSample]] = []
-        plans: list[Callable[[], StepPlan]] = []
+        self._calls: list[KernelCall] = []
         row = 0
         for contact in self.contacts:
             sample = self.rows.rows(row, row + contact.rows)
             self._parts.append((contact, sample))
-            plans.append(partial(contact.compile, state, sample))
+            self._calls += contact.calls(state, sample)
             row += contact.rows
         row = self.first_task_row
         for each in tasks:
             sample = self.rows.rows(row, row + each.task.rows)
             self._parts.append((each.task, sample))
             in_force = feedback[each.key]
-            plans.append(partial(each.task.compile_in_force, state, in_force, sample))
+            self._calls += each.task.calls_in_force(state, in_force, sample)
             here = slice(row, row + each.task.rows)
             asked = self.resolution.problem.asked[here]
             spring = impedance_of(each.task) is not None
@@ -106,7 +107,8 @@ class ActiveStack:
                 ends = each.task.part_ends()
                 away = partial(slipped, in_force.numbers, ends)
                 pulls = self.resolution.problem.pulls[here]
-                plans.append(partial(_pulls, in_force.numbers, ends, sample, pulls))
+                given = in_force.numbers, ends, sample.error, pulls
+                self._calls.append((write_pulls, given))
                 self.bounds.append((each.task.name, here, away))
             elif len(in_force.feedback.largest):
                 away = partial(beyond_largest, largest=in_force.feedback.largest)
@@ -118,9 +120,10 @@ class ActiveStack:
             balances = robot.unactuated and each.task.keeps_balance(robot)
             follows = each.key in below or len(in_force.feedback.largest)
             if follows and not (spring or balances):
-                plans.append(partial(_asked, in_force.feedback, sample, asked))
+                still = np.zeros_like(asked)  # what damps is not lost, at any speed
+                rest = in_force.feedback, sample.error, still, asked
+                self._calls.append((write_asked, rest))
             row += each.task.rows
-        self._plans = plans
         # names of each level's tasks; ``contacts`` for those at the top
         self.level_names = [
             *(["contacts"] if first else []),
@@ -160,25 +163,23 @@ class ActiveStack:
         """
         state, metric, field = self._state, self._metric, self._field
         problem = self.resolution.problem
-        plans = [plan() for plan in self._plans]
+        calls = [*self._calls]
         if self._rest is not None:
             held = self.rows.rows(0, self._held)
             free = self.rows.rows(self._held, self.first_task_row)
-            rest = partial(self._rest.evaluate, state, held, free)
-            plans.append(StepPlan(write=(rest,)))
-        plans.append(metric.compile(state, problem.metric))
+            calls.append((self._rest.evaluate, (state, held, free)))
+        calls += metric.calls(state, problem.metric)
         sample, form = problem.field, metric.form
         if isinstance(field, FieldSum):
             self.term_samples = field.allocate_terms(state.robot.nv)
-            plan = field.compile_terms(
+            calls += field.calls_of_terms(
                 state, problem.metric, form, sample, self.term_samples
             )
         else:
             self.term_samples = (sample,)
-            plan = field.compile(state, problem.metric, form, sample)
-        plans.append(plan)
+            calls += field.calls(state, problem.metric, form, sample)
         law = self.resolution.compile(state.v, controls=field.controls)
-        return steps(plans, law)
+        return steps([planned(calls)], law)
 
     def field_value(self) -> float:
         """Return the field's value at the state that logs have: bound only for it."""
@@ -237,15 +238,3 @@ def _jacobian(contacts: Sequence[Contact], state: RobotState) -> Array:
         for contact in contacts
     ]
     return np.vstack([np.zeros((0, nv)), *rows])
-
-
-def _pulls(numbers: Array, ends: Indices, sample: TaskSample, out: Array) -> StepPlan:
-    """Return the step plan that writes how much a spring pulls."""
-    return StepPlan(write=(bind(write_pulls, numbers, ends, sample.error, out),))
-
-
-def _asked(feedback: Feedback, sample: TaskSample, asked: Array) -> StepPlan:
-    """Return the step plan that writes what a task's feedback asks for at rest."""
-    rest = np.zeros_like(asked)  # what damps is not lost, however fast the robot moves
-    call = bind(write_asked, feedback, sample.error, rest, asked)
-    return StepPlan(write=(call,))

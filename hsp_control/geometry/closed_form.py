@@ -13,7 +13,7 @@ where x' and y' include the motion of the nearest points along their cores. A co
 gradient; the product rule gives its rate.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import coal
@@ -21,8 +21,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.identity_cache import IdentityCache
-from hsp_control.common.kernels import kernel
-from hsp_control.common.native import StepPlan, bind, stay
+from hsp_control.common.kernels import KernelCalls, kernel
 from hsp_control.common.rotations import cross, rotate, rotate_back
 from hsp_control.geometry.links import LinkShape
 from hsp_control.geometry.scene import Obstacle
@@ -71,12 +70,11 @@ class ClosedFormDistances:
         self._pairs, self._places = pairs, places
         used = np.unique(pairs)
         self._motion = np.zeros((len(obstacles), MOTION_SIZE))
-        followers = [
+        self._moving = tuple(
             obstacle.follow(self._motion[k])
             for k, obstacle in enumerate(obstacles)
             if len(links) + k in used
-        ]
-        self._moving = tuple(follow for follow in followers if follow is not stay)
+        )
         solids = [_obstacle(obstacle.shape) for obstacle in obstacles]
         rows = [_link(link) for link in links] + [row for _, row in solids]
         self._sizes = np.array(rows).reshape(-1, 7)
@@ -104,32 +102,27 @@ class ClosedFormDistances:
         self._scratch = np.zeros((40, 3))
         # number of calls of `measure`, at any state, shape (1,)
         self.measurements: Indices = np.zeros(1, dtype=np.int64)
-        self._plans = IdentityCache(self._plan)
-        self._derivatives = IdentityCache(self.derivatives)
+        self._plans = IdentityCache(
+            lambda state, *arrays: state.plan(self.calls(state, *arrays))
+        )
+        self._derivatives = IdentityCache(
+            lambda state, *arrays: state.plan(self.derivatives(state, *arrays))
+        )
 
     def measure(self, state: RobotState, distances: Array) -> None:
         """Write the distances [m] at the indices ``places`` of ``distances``."""
-        self.compile(state, distances).run(state.t)
+        self._plans.get(state, distances).run(state.t)
 
-    def compile(self, state: RobotState, distances: Array) -> StepPlan:
-        """Return the step plan of `measure` for this state and this array."""
-        return self._plans.get(state, distances)
+    def calls(self, state: RobotState, distances: Array) -> KernelCalls:
+        """Return the calls of `measure` for this state and this array."""
+        placements, bodies = state.world.placements, self  # see `supplied`
+        given = self.measurements, placements, bodies, self._used, self._pairs
+        work = self._places, self._segments, self._cores, self._scratch
+        return [(_measure, (*given, *work, distances))]
 
-    def _plan(self, state: RobotState, distances: Array) -> StepPlan:
-        measure = bind(
-            _measure,
-            self.measurements,
-            state.world.placements,
-            self._bodies,
-            self._used,
-            self._pairs,
-            self._places,
-            self._segments,
-            self._cores,
-            self._scratch,
-            distances,
-        )
-        return StepPlan(self._moving, (measure,))
+    def supplied(self) -> "tuple[_Bodies, tuple[Any, ...], tuple[Any, ...]]":
+        """Return the bodies as a kernel reads them, and the calls that move them."""
+        return self._bodies, self._moving, ()
 
     def witness(self, k: int) -> tuple[Array, Array, Array]:
         """Return the witness points [m] and the unit normal from first to second."""
@@ -146,7 +139,7 @@ class ClosedFormDistances:
         rate: Array,
     ) -> None:
         """Write Σ b'(d_k) ∇d_k (nv,) and its rate, after `measure` at this state."""
-        self._derivatives.get(state, slopes, curvatures, gradient, rate)()
+        self._derivatives.get(state, slopes, curvatures, gradient, rate).run(state.t)
 
     def derivatives(
         self,
@@ -155,21 +148,11 @@ class ClosedFormDistances:
         curvatures: Array,
         gradient: Array,
         rate: Array,
-    ) -> Callable[[], Any]:
-        """Return the bound kernel of `differentiate` for these arguments."""
-        return bind(
-            _differentiate,
-            state.world,
-            self._bodies,
-            self._pairs,
-            self._places,
-            self._segments,
-            self._scratch,
-            slopes,
-            curvatures,
-            gradient,
-            rate,
-        )
+    ) -> KernelCalls:
+        """Return the calls of `differentiate` for these arguments."""
+        given = state.world, self._bodies, self._pairs, self._places
+        work = self._segments, self._scratch
+        return [(_differentiate, (*given, *work, slopes, curvatures, gradient, rate))]
 
 
 def _link(link: LinkShape) -> list[float]:

@@ -23,7 +23,8 @@ from hsp_control.common.exceptions import (
     NonFiniteError,
     ShapeError,
 )
-from hsp_control.common.native import NativeCall, once
+from hsp_control.common.kernels import KernelCalls
+from hsp_control.common.native import NativeCall, StepPlan, once, planned
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Vector
 from hsp_control.robot.description.access import ANYWHERE, Access
@@ -541,6 +542,26 @@ class RobotState:
             self._made[key] = found = part, make()  # keeps the part, and its id
         made: Made = found[1]
         return made
+
+    def run(self, calls: KernelCalls) -> Any:
+        """Make calls now, once; return what the last one returns."""
+        return planned(calls).run(self.t)
+
+    def plan(self, calls: KernelCalls) -> StepPlan:
+        """Return calls as they are made at any time: `StepPlan.run`."""
+        return planned(calls)
+
+    def prepared(
+        self, part: object, what: str, make: Callable[[], tuple[Made, KernelCalls]]
+    ) -> tuple[Made, Callable[[], Any]]:
+        """Return what `made` does, and a call that makes the calls of ``make`` now."""
+
+        def plan() -> tuple[Made, StepPlan]:
+            memory, calls = make()
+            return memory, planned(calls)
+
+        memory, calls = self.made(part, what, plan)
+        return memory, lambda: calls.run(self.t)
 
     def __getstate__(self) -> dict[str, Any]:
         return {"robot": self.robot, "t": self.t, "q": self.q, "v": self.v}

@@ -5,8 +5,7 @@ from typing import Any
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.kernels import kernel
-from hsp_control.common.native import bind
+from hsp_control.common.kernels import KernelCalls, kernel
 from hsp_control.constraints.limits import RobotLimits
 from hsp_control.control.measurement import LogChannel
 from hsp_control.robot import Robot
@@ -39,11 +38,11 @@ class LimitExcess:
         if limits is not None:
             _see(*self._arguments(limits, q, v))
 
-    def seeing(self, limits: RobotLimits | None, q: Array, v: Array) -> list[Any]:
+    def seeing(self, limits: RobotLimits | None, q: Array, v: Array) -> KernelCalls:
         """Return `see` of what these arrays then hold, as calls."""
         if limits is None:
             return []
-        return [bind(_see, *self._arguments(limits, q, v))]
+        return [(_see, self._arguments(limits, q, v))]
 
     def _arguments(self, limits: RobotLimits, q: Array, v: Array) -> tuple[Any, ...]:
         bounds = limits.lower, limits.upper, limits.velocity

@@ -83,7 +83,8 @@ class NativeLoop:
         steps = self._steps
         assert steps.native is not None
         # Rows are addresses: what they lead to is kept, here and in the steps.
-        self._seeing = self._excess.seeing(self._controller.limits, steps.q, steps.v)
+        seeing = self._excess.seeing(self._controller.limits, steps.q, steps.v)
+        self._seeing = [NativeCall.of(*call, timed=False) for call in seeing]
         moving = rows_of([steps.native, *self._seeing])
         own = steps.q, steps.v, self._plant.effort, step.effort, steps.interval
         calls = moving, *step.move.args, rows_of(step.sending)

@@ -7,7 +7,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import GainError
-from hsp_control.common.native import StepPlan, planned
+from hsp_control.common.kernels import KernelCalls
 from hsp_control.declaration import within
 from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
@@ -88,24 +88,19 @@ class CompliantTask(SecondOrderTask):
         numbers = self.impedance.numbers(self.error_parts)
         return InForce(numbers, self.feedback(), mobility)
 
-    def compile_in_force(
+    def calls_in_force(
         self, state: RobotState, in_force: InForce, out: TaskSample
-    ) -> StepPlan:
-        """Return the step plan: the task, its gains, the task with these gains."""
-        task = self.compile(state, in_force.feedback, out)
+    ) -> KernelCalls:
+        """Return the calls: the task, its gains, the task with these gains."""
+        task = self.calls(state, in_force.feedback, out)
         if self.impedance is None:
             return task
         inertia = state.inertia, state.inertia_rate
         numbers = in_force.numbers, self.part_ends()
         scratch = ImpedanceScratch.allocate(self.rows, state.robot.nv)
-        gains = planned(
-            (
-                impedance_gains,
-                (*inertia, self._rotating(state), *numbers, out, scratch),
-            ),
-            *(in_force.mobility, in_force.feedback),
-        )
-        return StepPlan(task.follow, (*task.write, *gains.write, *task.write))
+        gains = *inertia, self._rotating(state), *numbers, out, scratch
+        own = in_force.mobility, in_force.feedback
+        return [*task, (impedance_gains, (*gains, *own)), *task]
 
     def feedback_at(self, state: RobotState) -> Feedback:
         """Return new arrays of feedback at a state; see `Task.feedback_at`."""
@@ -124,15 +119,15 @@ class CompliantTask(SecondOrderTask):
     def _at(self, state: RobotState, numbers: Array) -> Feedback:
         """Return Kp and Kv of the numbers of an impedance at a state."""
 
-        def make() -> tuple[InForce, StepPlan]:
+        def make() -> tuple[InForce, KernelCalls]:
             mobility = np.zeros((self.rows, self.rows))
             in_force = InForce(np.zeros_like(numbers), self.feedback(), mobility)
             sample = TaskSample.allocate(self.rows, state.robot.nv)
-            return in_force, self.compile_in_force(state, in_force, sample)
+            return in_force, self.calls_in_force(state, in_force, sample)
 
-        in_force, plan = state.made(self, "impedance", make)
+        in_force, run = state.prepared(self, "impedance", make)
         in_force.numbers[:] = numbers
-        plan.run(state.t)
+        run()
         return Feedback(*(array.copy() for array in in_force.feedback))
 
 

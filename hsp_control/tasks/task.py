@@ -3,15 +3,18 @@
 import re
 from abc import ABC, abstractmethod
 from dataclasses import KW_ONLY, replace
-from functools import partial
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import TaskError
-from hsp_control.common.kernels import KernelCall
-from hsp_control.common.native import StepPlan, planned, says
+from hsp_control.common.kernels import (
+    KernelCall,
+    KernelCalls,
+    says,
+    with_outputs,
+)
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.quantities import PositiveCount
@@ -128,11 +131,11 @@ class Task(Part, ABC, family="tasks", error=TaskError):
         feedback = own._replace(Kp=numbers[0], Kv=numbers[1])
         return InForce(numbers, feedback, np.zeros((0, 0)))
 
-    def compile_in_force(
+    def calls_in_force(
         self, state: RobotState, in_force: InForce, out: TaskSample
-    ) -> StepPlan:
-        """Return the step plan with a feedback that may change; see `compile`."""
-        return self.compile(state, in_force.feedback, out)
+    ) -> KernelCalls:
+        """Return the calls with a feedback that may change; see `calls`."""
+        return self.calls(state, in_force.feedback, out)
 
     def feedback_at(self, state: RobotState) -> Feedback:
         """Return new arrays of the task's own feedback at a state, without offset."""
@@ -220,13 +223,13 @@ class Task(Part, ABC, family="tasks", error=TaskError):
         """
         raise TypeError(f"{type(self).__name__} implements neither kernel nor evaluate")
 
-    def compile(
+    def calls(
         self, state: RobotState, feedback: Feedback, out: TaskSample
-    ) -> StepPlan:
-        """Return the step plan that writes the sample of each step."""
+    ) -> KernelCalls:
+        """Return the calls that write the sample of each step."""
         if says(self, "kernel", "evaluate") == "kernel":
-            return planned(self.kernel(state), feedback, out)
-        return StepPlan(write=(partial(self.evaluate, state, out, feedback),))
+            return [with_outputs(self.kernel(state), feedback, out)]
+        return [(self.evaluate, (state, out, feedback))]
 
     def evaluate(
         self,
@@ -249,15 +252,15 @@ class Task(Part, ABC, family="tasks", error=TaskError):
         """
         out, feedback = self.given(state, out, feedback)
 
-        def make() -> tuple[Feedback, TaskSample, StepPlan]:
+        def make() -> tuple[tuple[Feedback, TaskSample], KernelCalls]:
             own = self.feedback()
             sample = TaskSample.allocate(self.rows, state.robot.nv)
-            return own, sample, planned(self.kernel(state), own, sample)
+            return (own, sample), [with_outputs(self.kernel(state), own, sample)]
 
-        own, sample, plan = state.made(self, "evaluate", make)
+        (own, sample), run = state.prepared(self, "evaluate", make)
         for array, value in zip(own, feedback, strict=True):
             array[:] = value
-        plan.run(state.t)
+        run()
         for array, value in zip(out, sample, strict=True):
             array[:] = value
         return out

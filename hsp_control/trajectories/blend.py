@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.kernels import KernelCall, kernel
+from hsp_control.common.kernels import KernelCall, call_once, kernel
 from hsp_control.common.linalg import multiply
-from hsp_control.common.native import bind
 from hsp_control.common.rotations import (
     compose_back,
     cross,
@@ -173,7 +172,7 @@ class BlendOrientation(OrientationTrajectory, type="blend"):
         omega_dot = np.asarray(self.start_angular_acceleration)
         w_dot = R.T @ (omega_dot - omega_d_dot - np.cross(omega, R @ w))
         y, y_dot, y_ddot = np.empty((3, 3))
-        bind(_offset, R_d, R, w, w_dot, np.empty((3, 3)), y, y_dot, y_ddot)()
+        call_once(_offset, R_d, R, w, w_dot, np.empty((3, 3)), y, y_dot, y_ddot)
         return y, y_dot, y_ddot
 
     def kernel(self) -> KernelCall:

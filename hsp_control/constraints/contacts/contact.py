@@ -11,8 +11,12 @@ from pydantic import AfterValidator
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import ContactError, TrajectoryError
-from hsp_control.common.kernels import KernelCall, kernel
-from hsp_control.common.native import StepPlan, planned
+from hsp_control.common.kernels import (
+    KernelCall,
+    KernelCalls,
+    kernel,
+    with_outputs,
+)
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.quantities import (
@@ -270,13 +274,13 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
         damps it, see `damp_velocity`; see `Task.kernel` for its arguments.
         """
 
-    def compile(self, state: RobotState, out: TaskSample) -> StepPlan:
-        """Return the step plan that writes the rows of each step."""
-        return planned(self.kernel(state), state.v, self.damping, out)
+    def calls(self, state: RobotState, out: TaskSample) -> KernelCalls:
+        """Return the calls that write the rows of each step."""
+        return [with_outputs(self.kernel(state), state.v, self.damping, out)]
 
     def evaluate(self, state: RobotState, out: TaskSample) -> TaskSample:
         """Write the rows: J, J', and the acceleration that damps the motion."""
-        self.compile(state, out).run(state.t)
+        state.run(self.calls(state, out))
         return out
 
     @property

@@ -3,7 +3,7 @@
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, replace
-from typing import Annotated, NamedTuple, Self
+from typing import Annotated, Any, NamedTuple, Self
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -11,7 +11,7 @@ from pydantic import AfterValidator
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError, SceneError
-from hsp_control.common.native import StepPlan, bind, says
+from hsp_control.common.kernels import KernelCall, KernelCalls, says
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Name, Names, OrInstance, Positive
@@ -80,25 +80,27 @@ class Clearance(Cost):
         """Return the minimum distance of all pairs [m]."""
         return self.proximity(state).nearest(state)[0]
 
-    def plan(
+    def kernels(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
-    ) -> StepPlan:
-        """Return the step plan: kernels alone if all distances have closed forms."""
+    ) -> KernelCalls:
+        """Return the calls: kernels alone if all distances have closed forms."""
         work = self._work(state)
         closed_form, coal = work.proximity.closed_form, work.proximity.coal
-        ways = "plan", "differentiate", "gradient_rate", "gradient"
-        if closed_form is None or coal is not None or says(self, *ways) != "plan":
-            return super().plan(state, metric, form, out)
-        follow, measure = closed_form.compile(state, work.proximity.distances)
-        derivatives = closed_form.derivatives(state, work.slopes, work.curvatures, *out)
-        to_field = bind(descend, metric.L, metric.W_dot, form, *out)
-        return StepPlan(follow, (*measure, work.barrier, derivatives, to_field))
+        ways = "kernels", "differentiate", "gradient_rate", "gradient"
+        if closed_form is None or coal is not None or says(self, *ways) != "kernels":
+            return super().kernels(state, metric, form, out)
+        return [
+            *closed_form.calls(state, work.proximity.distances),
+            work.barrier,
+            *closed_form.derivatives(state, work.slopes, work.curvatures, *out),
+            (descend, (metric.L, metric.W_dot, form, *out)),
+        ]
 
     def value(self, state: RobotState) -> float:
         """Return f."""
-        work = self._work(state)
+        work, add_barriers = self._prepared(state)
         work.proximity.measure(state)
-        return float(work.barrier())
+        return float(add_barriers())
 
     def gradient(self, state: RobotState) -> Array:
         """Return ∇f = Σ ∂f/∂d_k ∇d_k, shape (nv,)."""
@@ -141,14 +143,19 @@ class Clearance(Cost):
 
     def _work(self, state: RobotState) -> "_Work":
         """Return the memory that the state keeps for the field."""
+        return self._prepared(state)[0]
 
-        def make() -> _Work:
+    def _prepared(self, state: RobotState) -> "tuple[_Work, Callable[[], Any]]":
+        """Return it, and what sums the barriers."""
+
+        def make() -> tuple[_Work, KernelCalls]:
             proximity = self._pairs(state.robot)
             slopes, curvatures = np.zeros((2, len(proximity.pairs)))
             arguments = proximity.distances, self.influence, slopes, curvatures
-            return _Work(proximity, slopes, curvatures, bind(barrier, *arguments))
+            call = barrier, arguments
+            return _Work(proximity, slopes, curvatures, call), [call]
 
-        return state.made(self, "proximity", make)
+        return state.prepared(self, "proximity", make)
 
 
 class _Work(NamedTuple):
@@ -157,7 +164,7 @@ class _Work(NamedTuple):
     proximity: Proximity  # the pairs of shapes and their distances
     slopes: Array  # ∂f/∂d of each pair, written by ``barrier``
     curvatures: Array  # ∂²f/∂d² of each pair, written by ``barrier``
-    barrier: Callable[[], float]
+    barrier: KernelCall
 
 
 ObstacleOrName = Annotated[str | Obstacle, OrInstance(Name, Obstacle)]

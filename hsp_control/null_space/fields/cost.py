@@ -2,15 +2,19 @@
 
 from collections.abc import Callable
 from dataclasses import KW_ONLY
-from functools import partial
-from typing import Annotated, NoReturn
+from typing import Annotated, Any, NoReturn
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
-from hsp_control.common.kernels import KernelCall, kernel
-from hsp_control.common.native import StepPlan, bind, planned, says
+from hsp_control.common.kernels import (
+    KernelCall,
+    KernelCalls,
+    kernel,
+    says,
+    with_outputs,
+)
 from hsp_control.declaration.imported import AS_TEXT, NAMED
 from hsp_control.law import VARYING, FieldSample, MetricSample, raise_covector
 from hsp_control.null_space.differences import gradient, rate_along_flow
@@ -97,9 +101,11 @@ class Cost(NullSpaceField):
         """
         raise TypeError(f"{type(self).__name__} implements neither kernel nor value")
 
-    def derivatives(self, state: RobotState, gradient: Array, rate: Array) -> StepPlan:
-        """Return the plan that writes ∇f and (∇f)' with `kernel`, and gives f."""
-        return planned(self.kernel(state), gradient, rate)
+    def derivatives(
+        self, state: RobotState, gradient: Array, rate: Array
+    ) -> KernelCalls:
+        """Return the calls that write ∇f and (∇f)' with `kernel`, and give f."""
+        return [with_outputs(self.kernel(state), gradient, rate)]
 
     def _has_kernel(self, *ways: str) -> bool:
         """Return whether no subclass overrides any of these methods in plain Python."""
@@ -107,7 +113,7 @@ class Cost(NullSpaceField):
 
     def value(self, state: RobotState) -> float:
         """Return f(q, t), which must not depend on v."""
-        return float(self._derived(state)[0].run(state.t))
+        return float(self._derived(state)[1]())
 
     def gradient(self, state: RobotState) -> Array:
         """Return ∇f in the tangent space, shape (nv,); by default by differences."""
@@ -139,15 +145,14 @@ class Cost(NullSpaceField):
         gradient[:] = self._tangent(self.gradient(state), "gradient", nv)
         rate[:] = self._tangent(self.gradient_rate(state), "gradient rate", nv)
 
-    def plan(
+    def kernels(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
-    ) -> StepPlan:
-        """Return the step plan: g = -W⁻¹∇f and g' = -W⁻¹((∇f)' + W'g)."""
-        descent = bind(descend, metric.L, metric.W_dot, form, *out)
+    ) -> KernelCalls:
+        """Return the calls: g = -W⁻¹∇f and g' = -W⁻¹((∇f)' + W'g)."""
+        descent = metric.L, metric.W_dot, form, *out
         if self._has_kernel("gradient", "gradient_rate", "differentiate"):
-            follow, write = self.derivatives(state, *out)
-            return StepPlan(follow, (*write, descent))
-        return StepPlan(write=(partial(self._descend, state, descent, out),))
+            return [*self.derivatives(state, *out), (descend, descent)]
+        return [(self._differentiated, (state, *out)), (descend, descent)]
 
     def evaluate(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
@@ -162,13 +167,11 @@ class Cost(NullSpaceField):
             self._raise_not_finite(state)
         return out
 
-    def _descend(
-        self, state: RobotState, descent: Callable[[], bool], out: FieldSample
-    ) -> None:
+    def _differentiated(self, state: RobotState, gradient: Array, rate: Array) -> None:
         by_both = says(self, "differentiate", "gradient", "gradient_rate")
         known = self.differentiate if by_both == "differentiate" else self._by_each
-        known(state, *out)
-        if not descent():
+        known(state, gradient, rate)
+        if not np.isfinite(gradient.sum() + rate.sum()):
             self._raise_not_finite(state)
 
     def _raise_not_finite(self, state: RobotState) -> NoReturn:
@@ -181,18 +184,18 @@ class Cost(NullSpaceField):
 
     def _derivative(self, state: RobotState, which: int) -> Array:
         """Return ∇f (0) or (∇f)' (1) of the kernel, shape (nv,)."""
-        plan, both = self._derived(state)
-        plan.run(state.t)
+        both, run = self._derived(state)
+        run()
         return np.array(both[which])
 
-    def _derived(self, state: RobotState) -> tuple[StepPlan, Array]:
-        """Return a plan of `derivatives`, and ∇f and (∇f)' that it writes, (2, nv)."""
+    def _derived(self, state: RobotState) -> tuple[Array, Callable[[], Any]]:
+        """Return ∇f and (∇f)', (2, nv), and what writes them and gives f."""
 
-        def make() -> tuple[StepPlan, Array]:
+        def make() -> tuple[Array, KernelCalls]:
             both = np.zeros((2, state.robot.nv))
-            return self.derivatives(state, *both), both
+            return both, self.derivatives(state, *both)
 
-        return state.made(self, "derivatives", make)
+        return state.prepared(self, "derivatives", make)
 
     def _tangent(self, value: Array, what: str, nv: int) -> Array:
         try:
@@ -259,10 +262,9 @@ class FunctionCost(Cost, type="function_cost"):
 
 
 @kernel
-def descend(L: Array, W_dot: Array, form: int, g: Array, g_dot: Array) -> bool:
-    """Overwrite (∇f, (∇f)') by g = -W⁻¹∇f and g'; return whether all are finite."""
+def descend(L: Array, W_dot: Array, form: int, g: Array, g_dot: Array) -> None:
+    """Overwrite (∇f, (∇f)') by g = -W⁻¹∇f and g'."""
     raise_covector(g, L, form)
-    total = 0.0
     for i in range(g.shape[0]):
         g[i] = -g[i]
     for i in range(g.shape[0]):
@@ -271,6 +273,3 @@ def descend(L: Array, W_dot: Array, form: int, g: Array, g_dot: Array) -> bool:
                 g_dot[i] += W_dot[i, j] * g[j]
         g_dot[i] = -g_dot[i]
     raise_covector(g_dot, L, form)
-    for i in range(g.shape[0]):
-        total += g[i] + g_dot[i]
-    return bool(np.isfinite(total))

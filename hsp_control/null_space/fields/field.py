@@ -2,9 +2,8 @@
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import KW_ONLY, replace
-from functools import partial
 from numbers import Real
 from typing import Annotated, Any, ClassVar, Self
 
@@ -13,8 +12,7 @@ from pydantic import AfterValidator, InstanceOf
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
-from hsp_control.common.kernels import kernel
-from hsp_control.common.native import StepPlan, bind, says
+from hsp_control.common.kernels import KernelCall, KernelCalls, kernel, says
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import NonNegative, OrInstance
 from hsp_control.geometry.start import Start
@@ -90,10 +88,10 @@ class NullSpaceField(Part, ABC, family="fields", error=FieldError):
             "one, call `placed` first"
         )
 
-    def compile(
+    def calls(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
-    ) -> StepPlan:
-        """Return the step plan that writes the sample of each step.
+    ) -> KernelCalls:
+        """Return the calls that write the sample of each step.
 
         Args:
             state: The state that every step reads. Its values change between steps.
@@ -101,17 +99,17 @@ class NullSpaceField(Part, ABC, family="fields", error=FieldError):
             form: The metric's form, see `Metric`.
             out: The sample that every step writes.
         """
-        if says(self, "plan", "evaluate") == "plan":
-            return self.plan(state, metric, form, out)
+        if says(self, "kernels", "evaluate") == "kernels":
+            return self.kernels(state, metric, form, out)
         if self.zero:
             self.evaluate(state, metric, form, out)
-            return StepPlan()
-        return StepPlan(write=(partial(self.evaluate, state, metric, form, out),))
+            return []
+        return [(self.evaluate, (state, metric, form, out))]
 
-    def plan(
+    def kernels(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
-    ) -> StepPlan:
-        """Return the step plan of a kind of field that has one; else see `evaluate`."""
+    ) -> KernelCalls:
+        """Return the calls of a kind of field that has kernels; else see `evaluate`."""
         raise TypeError(f"{type(self).__name__} implements no evaluate")
 
     def evaluate(
@@ -126,15 +124,15 @@ class NullSpaceField(Part, ABC, family="fields", error=FieldError):
             out: The sample to write into, shape (nv,) each.
         """
 
-        def make() -> tuple[MetricSample, FieldSample, StepPlan]:
+        def make() -> tuple[tuple[MetricSample, FieldSample], KernelCalls]:
             known = MetricSample.allocate(state.robot.nv)
             sample = FieldSample.allocate(state.robot.nv)
-            return known, sample, self.plan(state, known, form, sample)
+            return (known, sample), self.kernels(state, known, form, sample)
 
-        known, sample, plan = state.made(self, f"evaluate {form}", make)
+        (known, sample), run = state.prepared(self, f"evaluate {form}", make)
         for array, value in zip(known, metric, strict=True):
             array[:] = value
-        plan.run(state.t)
+        run()
         for array, value in zip(out, sample, strict=True):
             array[:] = value
         return out
@@ -196,11 +194,11 @@ class FieldSum(NullSpaceField):
                 placed.append(term.placed(start))
         return replace(self, terms=tuple(placed))
 
-    def plan(
+    def kernels(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
-    ) -> StepPlan:
-        """Return the step plan of all terms."""
-        return self.compile_terms(
+    ) -> KernelCalls:
+        """Return the calls of all terms."""
+        return self.calls_of_terms(
             state, metric, form, out, self.allocate_terms(state.robot.nv)
         )
 
@@ -208,28 +206,25 @@ class FieldSum(NullSpaceField):
         """Return a sample of zeros for each term."""
         return tuple(FieldSample.allocate(nv) for _ in self.terms)
 
-    def compile_terms(
+    def calls_of_terms(
         self,
         state: RobotState,
         metric: MetricSample,
         form: int,
         out: FieldSample,
         samples: Sequence[FieldSample],
-    ) -> StepPlan:
-        """Return the step plan, which also writes the weighted sample of each term."""
-        follow: list[Callable[[float], object]] = []
-        write: list[Callable[[], object]] = []
+    ) -> KernelCalls:
+        """Return the calls, which also write the weighted sample of each term."""
+        calls: list[KernelCall] = []
         for k, (term, sample) in enumerate(zip(self.terms, samples, strict=True)):
-            plan = term.compile(state, metric, form, sample)
-            follow += plan.follow
-            write += plan.write
+            calls += term.calls(state, metric, form, sample)
             weights = np.zeros(2)
             if isinstance(term.weight, Weight) and not term.weight.constant:
-                write.append(partial(_update, term.weight, state, weights))
+                calls.append((_update, (term.weight, state, weights)))
             else:
                 weights[:] = sample_weight(term.weight, state)
-            write.append(bind(_add, k == 0, weights, *sample, *out))
-        return StepPlan(tuple(follow), tuple(write))
+            calls.append((_add, (k == 0, weights, *sample, *out)))
+        return calls
 
     def value(self, state: RobotState) -> float:
         """Return Σ w_k value_k."""

@@ -22,13 +22,13 @@ import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import FieldError
-from hsp_control.common.kernels import KernelCall, kernel
-from hsp_control.common.native import CallSequence, StepPlan, bind
+from hsp_control.common.kernels import KernelCall, KernelCalls, kernel
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Axes
 from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields.cost import Cost
 from hsp_control.robot import Robot, RobotState
+from hsp_control.robot.kinematics import FrameMotion
 
 Rows = Literal["position", "orientation", "pose"]
 
@@ -121,8 +121,18 @@ class JacobianCost(Cost):
 
         return write, ()
 
-    def derivatives(self, state: RobotState, gradient: Array, rate: Array) -> StepPlan:
-        """Return the plan that writes ∇f and (∇f)' and gives f."""
+    def value(self, state: RobotState) -> float:
+        """Return f, which the calls before the last one give."""
+
+        def make() -> tuple[None, KernelCalls]:
+            return None, self.derivatives(state, *np.zeros((2, state.robot.nv)))[:-1]
+
+        return float(state.prepared(self, "value", make)[1]())
+
+    def derivatives(
+        self, state: RobotState, gradient: Array, rate: Array
+    ) -> KernelCalls:
+        """Return the calls that write ∇f and (∇f)'; the last but one gives f."""
         frame, nv = state.frame(self._frame(state.robot)), state.robot.nv
         dofs, first = _chain(state.robot, self._frame(state.robot))
         selected = self._selected()
@@ -130,28 +140,27 @@ class JacobianCost(Cost):
         rows = selected, np.where(selected < 3, 1.0, length)
         J, J_dot, slope, slope_rate = np.zeros((4, len(selected), nv))
         motion = frame.jacobian, frame.jacobian_dot
-        select = bind(_select, *motion, *rows, J, J_dot)
         function, parameters = self.terms_kernel(nv)
         scratch = np.zeros((8, len(selected), nv))
-        terms = bind(function, *parameters, J, J_dot, slope, slope_rate, scratch)
         work = np.zeros((2, 6, nv)), dofs, first, np.zeros((4, len(dofs) + 1, 3))
-        raise_slope = bind(
-            _raise_slope, *motion, slope, slope_rate, *rows, *work, gradient, rate
-        )
-        calls = CallSequence(frame.compute, select, terms, raise_slope, result=2)
-        return StepPlan(write=(calls,))
+        slopes = slope, slope_rate
+        return [
+            (_select, (frame, *rows, J, J_dot)),
+            (function, (*parameters, J, J_dot, *slopes, scratch)),
+            (_raise_slope, (*motion, *slopes, *rows, *work, gradient, rate)),
+        ]
 
 
 @kernel
 def _select(
-    J_frame: Array,
-    J_frame_dot: Array,
+    motion: FrameMotion,
     selected: Indices,
     scale: Array,
     J: Array,
     J_dot: Array,
 ) -> None:
     """Write the selected rows of J and J', scaled."""
+    J_frame, J_frame_dot = motion.jacobian, motion.jacobian_dot
     for k in range(J.shape[0]):
         for j in range(J.shape[1]):
             J[k, j] = scale[k] * J_frame[selected[k], j]

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import KW_ONLY, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -11,9 +11,14 @@ from pydantic import Field
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import MetricError
-from hsp_control.common.kernels import KernelCall, kernel
+from hsp_control.common.kernels import (
+    KernelCall,
+    KernelCalls,
+    kernel,
+    says,
+    with_outputs,
+)
 from hsp_control.common.linalg import cholesky
-from hsp_control.common.native import StepPlan, planned, says
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import (
     ArrayField,
@@ -65,14 +70,14 @@ class Metric(Part, ABC, family="metrics", error=MetricError):
         """
         raise TypeError(f"{type(self).__name__} implements neither kernel nor evaluate")
 
-    def compile(self, state: RobotState, out: MetricSample) -> StepPlan:
-        """Return the step plan that writes the sample of each step."""
+    def calls(self, state: RobotState, out: MetricSample) -> KernelCalls:
+        """Return the calls that write the sample of each step."""
         if self.form != VARYING:
             self.evaluate(state, out)
-            return StepPlan()
+            return []
         if says(self, "kernel", "evaluate") == "kernel":
-            return planned(self.kernel(state), *out)
-        return StepPlan(write=(partial(self.evaluate, state, out),))
+            return [with_outputs(self.kernel(state), *out)]
+        return [(self.evaluate, (state, out))]
 
     def evaluate(self, state: RobotState, out: MetricSample) -> MetricSample:
         """Write W = L Lᵀ and W' at a state into ``out`` and return ``out``.
@@ -84,7 +89,7 @@ class Metric(Part, ABC, family="metrics", error=MetricError):
             state: The robot's state: t, q, v and the kinematics.
             out: The sample to write into, shapes (nv, nv).
         """
-        planned(self.kernel(state), *out).run(state.t)
+        state.run([with_outputs(self.kernel(state), *out)])
         return out
 
 

@@ -136,7 +136,7 @@ def test_steps_are_references_then_what_reads_them_then_the_law() -> None:
         _note(log, 7.0)
 
     timed = bind(_note_time, log, 20.0, timed=True)
-    pair = CallSequence(bind(_note, log, 2.0), bind(_note, log, 3.0), result=0)
+    pair = CallSequence(bind(_note, log, 2.0), bind(_note, log, 3.0))
     bounds = [
         StepPlan((CallSequence(timed, own), own), (bind(_note, log, 1.0), own_write)),
         StepPlan((), (pair,)),

@@ -135,13 +135,13 @@ def test_distances_are_measured_once_per_state(calls: list[int]) -> None:
 def test_rows_of_a_log_bind_nothing_anew(monkeypatch: pytest.MonkeyPatch) -> None:
     """The value of the field and those of its terms are taken of one state."""
     bound: list[int] = []
-    make = ClosedFormDistances._plan
+    make = ClosedFormDistances.calls
 
     def counting(self: ClosedFormDistances, *arguments: Any) -> Any:
         bound.append(1)
         return make(self, *arguments)
 
-    monkeypatch.setattr(ClosedFormDistances, "_plan", counting)
+    monkeypatch.setattr(ClosedFormDistances, "calls", counting)
     counts = []
     for duration in (0.02, 0.2):
         bound.clear()

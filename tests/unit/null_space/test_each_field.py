@@ -187,7 +187,7 @@ def test_a_step_calls_what_a_subclass_overrides(own: NullSpaceField) -> None:
     metric = MetricSample.allocate(robot.nv)
     for field in (own, of_package):
         sample = FieldSample.allocate(robot.nv)
-        field.compile(state, metric, IDENTITY, sample).run(state.t)
+        state.run(field.calls(state, metric, IDENTITY, sample))
         found.append(sample.g)
     np.testing.assert_allclose(found[0], 0.5 * found[1], rtol=1e-13)
     assert np.any(found[0])

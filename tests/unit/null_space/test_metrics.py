@@ -34,8 +34,7 @@ def test_the_mass_matrix_over_the_robots_own_inertia() -> None:
     assert metric.inertia**7 == pytest.approx(robot.largest_inertias.prod())
     scaled = metric.evaluate(state, MetricSample.allocate(7))
     compiled = MetricSample.allocate(7)
-    for call in metric.compile(state, compiled).write:
-        call()
+    state.run(metric.calls(state, compiled))
     plain = MassMatrixMetric().evaluate(state, MetricSample.allocate(7))
     for part, same, whole in zip(scaled, compiled, plain, strict=True):
         np.testing.assert_allclose(part, same, rtol=1e-14, atol=1e-16)
@@ -128,5 +127,5 @@ def test_a_metric_s_own_evaluate_is_compiled() -> None:
 
     robot = load("panda")
     state, out = robot.state(0.0, robot.home(), np.zeros(7)), MetricSample.allocate(7)
-    Halved(np.full(7, 3.0)).compile(state, out).run(0.0)
+    state.run(Halved(np.full(7, 3.0)).calls(state, out))
     np.testing.assert_array_equal(out.W, 1.5 * np.eye(7))

@@ -147,22 +147,17 @@ def defaults(name: str) -> list[Part]:
 
 
 def used(part: NullSpaceField | Metric, state: RobotState) -> list[Array]:
-    """Return what a part computes at a state: directly, and by a step plan."""
+    """Return what a part computes at a state: directly, and by its calls."""
     nv = state.robot.nv
     if isinstance(part, Metric):
         direct, planned = MetricSample.allocate(nv), MetricSample.allocate(nv)
         part.evaluate(state, direct)
-        for write in part.compile(state, planned).write:
-            write()
+        state.run(part.calls(state, planned))
         return [np.array(each) for each in (*direct, *planned)]
     found = [np.array(part.value(state)), *evaluate(part, MassMatrixMetric(), state)]
     metric = MassMatrixMetric().evaluate(state, MetricSample.allocate(nv))
     out = null_space_fields.FieldSample.allocate(nv)
-    plan = part.compile(state, metric, VARYING, out)
-    for follow in plan.follow:
-        follow(state.t)
-    for write in plan.write:
-        write()
+    state.run(part.calls(state, metric, VARYING, out))
     least = part.minimum_distance(state)
     return [*found, *out, np.array(0.0 if least is None else least)]
 

@@ -181,15 +181,11 @@ def moving_sum(robot: Robot) -> FieldSum:
 def shares(
     field: FieldSum, metric: Metric, state: RobotState
 ) -> tuple[FieldSample, tuple[FieldSample, ...]]:
-    """Return g and g' of a sum, and the weighted ones of each term, by a step plan."""
+    """Return g and g' of a sum, and the weighted ones of each term, by their calls."""
     nv = state.robot.nv
     sample = metric.evaluate(state, MetricSample.allocate(nv))
     out, terms = FieldSample.allocate(nv), field.allocate_terms(nv)
-    plan = field.compile_terms(state, sample, metric.form, out, terms)
-    for follow in plan.follow:
-        follow(state.t)
-    for write in plan.write:
-        write()
+    state.run(field.calls_of_terms(state, sample, metric.form, out, terms))
     return out, terms
 
 
