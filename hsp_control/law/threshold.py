@@ -14,7 +14,7 @@ law is exact down to ε_0. ``docs/law.md``, The edge, has the proposition.
 How hard the spring at the edge draws is 2 L |∂s/∂q|. At a stretched elbow |∂s/∂q| is up
 to a quarter of the robot's size. Where only a height counts, or x and y, it is up to
 the whole size, and the spring moves the whole arm. So an error of one component gets a
-third of L, one of two components two thirds.
+third of L, one of two components half.
 
 A level that is held at its edge leaves to those below the very directions in which it
 is drawn there: along them its spring must outweigh what they ask for. They ask for
@@ -41,9 +41,9 @@ posture by a spring of at most 2 L |∂s/∂q| ≤ 100 1/s² of its own inertia,
 beside periods of up to 10 ms and what motors can give, and damped by a null-space gain
 of 10 1/s."""
 WHOLE, TURNS = 3, 0.8
-"""Components of an error to which all of L belongs, one of m < 3 gets L m/3; and by how
-much L is less for an orientation, whose error of 1 rad asks for thrice as much as the
-largest of a position."""
+"""Components of an error to which all of L belongs, one of m < 3 gets L/(4 - m); and by
+how much L is less for an orientation, whose error of 1 rad asks for thrice as much as
+the largest of a position."""
 BELOW = 4.0
 """L times the robot's size below a held level [1/s²]. Its feedback then accelerates a
 joint by at most 2 L s, 1/50 of the spring of the level above."""
@@ -167,4 +167,4 @@ def how_held(lacking: float, wanted: float, threshold: float, least: float) -> f
     if wanted == 0.0:
         return 0.0
     got = 1.0 - min(np.sqrt(lacking / wanted), 1.0)
-    return float((1.0 - got * got * got) * (1.0 - (least / threshold) ** 2))
+    return float((1.0 - got**5) * (1.0 - (least / threshold) ** 2))

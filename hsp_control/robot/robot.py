@@ -545,7 +545,7 @@ class RobotState:
 
     def run(self, calls: KernelCalls) -> Any:
         """Make calls now, once; return what the last one returns."""
-        return planned(calls).run(self.t)
+        return self.plan(calls).run(self.t)
 
     def plan(self, calls: KernelCalls) -> StepPlan:
         """Return calls as they are made at any time: `StepPlan.run`."""
@@ -558,7 +558,7 @@ class RobotState:
 
         def plan() -> tuple[Made, StepPlan]:
             memory, calls = make()
-            return memory, planned(calls)
+            return memory, self.plan(calls)
 
         memory, calls = self.made(part, what, plan)
         return memory, lambda: calls.run(self.t)

@@ -104,7 +104,7 @@ class ErrorPart(NamedTuple):
     @property
     def yields(self) -> float:
         """By how much L is less for it; see `hsp_control.law.threshold`."""
-        return TURNS if self.unit == "rad" else max(WHOLE / self.size, 1.0)
+        return TURNS if self.unit == "rad" else max(WHOLE + 1.0 - self.size, 1.0)
 
 
 LargestError = Annotated[
