@@ -36,13 +36,6 @@ def with_outputs(call: KernelCall, *others: Any) -> KernelCall:
     return function, (*arguments, *others)
 
 
-def call_once(function: Callable[..., Any], *arguments: Any) -> Any:
-    """Call a kernel from Python; a call that comes often is bound, see `native`."""
-    from hsp_control.common.native import bind
-
-    return bind(function, *arguments)()
-
-
 def says(part: object, *ways: str) -> str:
     """Return by which of several methods a part's class says its mathematics.
 

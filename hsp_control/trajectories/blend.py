@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.kernels import KernelCall, call_once, kernel
+from hsp_control.common.kernels import KernelCall, kernel
 from hsp_control.common.linalg import multiply
 from hsp_control.common.rotations import (
     compose_back,
@@ -29,7 +29,11 @@ from hsp_control.trajectories.orientation import (
 )
 from hsp_control.trajectories.piecewise_polynomial import QUINTIC, horner
 from hsp_control.trajectories.schedule import smooth_step
-from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
+from hsp_control.trajectories.trajectory import (
+    Trajectory,
+    TrajectorySample,
+    call_once,
+)
 
 
 class Blend(Trajectory, type="blend"):

@@ -26,6 +26,11 @@ def sampled(trajectory: Any, t: float, out: Any) -> Any:
     return out
 
 
+def call_once(function: Callable[..., Any], *arguments: Any) -> Any:
+    """Call a kernel from Python, with the code that followers have."""
+    return bind(function, *arguments)()
+
+
 def follow_sampled(trajectory: Any, out: Any) -> Follower:
     """Return the follower of a trajectory that says its kernel, or its sample."""
     if trajectory.constant:
