@@ -350,11 +350,10 @@ def test_a_target_out_of_reach_is_said_and_by_how_much(still: Session) -> None:
         go(still, 0.03)
         heard.append(said())
     away = np.linalg.norm(still.rollout()["task.hand.error"][-1, :3])
-    assert list(dict.fromkeys(heard)) == [
-        "",
-        "target far away",
-        f"target out of reach, {away:.2f} m",
-    ]
+    first, then, *last = dict.fromkeys(heard)
+    assert (first, then) == ("", "target far away")
+    assert all(each.startswith("target out of reach") for each in last)
+    assert heard[-1] == f"target out of reach, {away:.2f} m"
     still.receive({"do": "resume", "target": "hand"})
     go(still, 3.0)
     assert said() == ""
