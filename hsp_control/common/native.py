@@ -196,7 +196,7 @@ def planned(calls: KernelCalls) -> StepPlan:
         if id(call) not in bound:
             function, arguments = call
             given, first, before = supplied(arguments)
-            follow += first
+            follow += [each for each in first if each is not stay]
             bound[id(call)] = *before, bind(function, *given)
         write += bound[id(call)]
     return StepPlan(tuple(follow), tuple(write))

@@ -106,7 +106,7 @@ class ClosedFormDistances:
             lambda state, *arrays: state.plan(self.calls(state, *arrays))
         )
         self._derivatives = IdentityCache(
-            lambda state, *arrays: state.plan(self.derivatives(state, *arrays))
+            lambda state, *arrays: state.plan(self.derivatives(state, *arrays)).write[0]
         )
 
     def measure(self, state: RobotState, distances: Array) -> None:
@@ -139,7 +139,7 @@ class ClosedFormDistances:
         rate: Array,
     ) -> None:
         """Write Σ b'(d_k) ∇d_k (nv,) and its rate, after `measure` at this state."""
-        self._derivatives.get(state, slopes, curvatures, gradient, rate).run(state.t)
+        self._derivatives.get(state, slopes, curvatures, gradient, rate)()
 
     def derivatives(
         self,

@@ -3,7 +3,7 @@
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, replace
-from typing import Annotated, Any, NamedTuple, Self
+from typing import Annotated, NamedTuple, Self
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -98,9 +98,9 @@ class Clearance(Cost):
 
     def value(self, state: RobotState) -> float:
         """Return f."""
-        work, add_barriers = self._prepared(state)
+        work = self._work(state)
         work.proximity.measure(state)
-        return float(add_barriers())
+        return float(work.add_barriers())
 
     def gradient(self, state: RobotState) -> Array:
         """Return ∇f = Σ ∂f/∂d_k ∇d_k, shape (nv,)."""
@@ -117,7 +117,7 @@ class Clearance(Cost):
     def differentiate(self, state: RobotState, gradient: Array, rate: Array) -> None:
         """Write ∇f and (∇f)', shape (nv,) each; see `Cost.differentiate`."""
         self.value(state)
-        proximity, slopes, curvatures, _ = self._work(state)
+        proximity, slopes, curvatures, *_ = self._work(state)
         closed_form, coal = proximity.closed_form, proximity.coal
         if closed_form is not None:
             closed_form.differentiate(state, slopes, curvatures, gradient, rate)
@@ -143,19 +143,16 @@ class Clearance(Cost):
 
     def _work(self, state: RobotState) -> "_Work":
         """Return the memory that the state keeps for the field."""
-        return self._prepared(state)[0]
 
-    def _prepared(self, state: RobotState) -> "tuple[_Work, Callable[[], Any]]":
-        """Return it, and what sums the barriers."""
-
-        def make() -> tuple[_Work, KernelCalls]:
+        def make() -> _Work:
             proximity = self._pairs(state.robot)
             slopes, curvatures = np.zeros((2, len(proximity.pairs)))
             arguments = proximity.distances, self.influence, slopes, curvatures
             call = barrier, arguments
-            return _Work(proximity, slopes, curvatures, call), [call]
+            add_barriers = state.plan([call]).write[0]
+            return _Work(proximity, slopes, curvatures, call, add_barriers)
 
-        return state.prepared(self, "proximity", make)
+        return state.made(self, "proximity", make)
 
 
 class _Work(NamedTuple):
@@ -164,7 +161,8 @@ class _Work(NamedTuple):
     proximity: Proximity  # the pairs of shapes and their distances
     slopes: Array  # ∂f/∂d of each pair, written by ``barrier``
     curvatures: Array  # ∂²f/∂d² of each pair, written by ``barrier``
-    barrier: KernelCall
+    barrier: KernelCall  # f of the distances; and the same, bound
+    add_barriers: Callable[[], float]
 
 
 ObstacleOrName = Annotated[str | Obstacle, OrInstance(Name, Obstacle)]
