@@ -3,7 +3,7 @@
 Numba keeps each variable that several blocks use in memory, clears it when it is no
 longer needed, copies an array's seven or more words there to look at one, and counts
 how often a loop will run before it begins. LLVM finds out that nothing of this is
-needed, which takes half of a cold start. Here a variable that is assigned once is a
+needed, which takes long. Here a variable that is assigned once is a
 value, an element of an array is read and written where it is, a part of an array is
 seven words, a loop counts, and what an operation means for its types is looked up once.
 """

@@ -3,7 +3,8 @@
 Numba makes each function ready to run: it optimises it, writes its machine code and a
 wrapper for Python, and then optimises it again inside each function that calls it. Of a
 kernel that is only called by kernels nothing but its code before all this is needed:
-what calls it in the end optimises the whole. A cold start takes a third of the time.
+what calls it in the end optimises the whole. With `kernel_lowering` a cold start takes
+a fifth of the time.
 """
 
 from collections.abc import Callable

@@ -121,7 +121,8 @@ def resolve_levels(
                     lack -= J[k, i] * drawn[i]
                 wanted += asked[k] * asked[k]
                 lacking += lack * lack
-            held = max(held, how_held(lacking, wanted, threshold, least))
+            here = how_held(lacking, wanted, smallest, threshold, least)
+            held = max(held, here)
             if damped == 0:
                 damped = level + 1
         _close_level(Q, QJ[:, block], G_inv, pushed)

@@ -155,16 +155,20 @@ def threshold_below(asked: Array, held: float, following: Following) -> float:
 
 
 @kernel
-def how_held(lacking: float, wanted: float, threshold: float, least: float) -> float:
+def how_held(
+    lacking: float, wanted: float, smallest: float, threshold: float, least: float
+) -> float:
     """Return how much a level is held at the edge, from 0 (exact) to nearly 1.
 
     Args:
         lacking: ‖f - J a_f‖², what the level does not get of what it asks for at rest.
-        wanted: ‖f‖²; a level of springs, which asks for nothing, is not held.
+        wanted: ‖f‖²; 0 for a level of springs, whose smallest x = s² counts instead.
+        smallest: That x, below ε².
         threshold: ε; of a level that asks for little ε_0, so that it is not held.
         least: ε_0.
     """
-    if wanted == 0.0:
-        return 0.0
-    got = 1.0 - min(np.sqrt(lacking / wanted), 1.0)
-    return float((1.0 - got**5) * (1.0 - (least / threshold) ** 2))
+    z = smallest / (threshold * threshold)
+    got = z * z * z
+    if wanted > 0.0:
+        got = (1.0 - min(np.sqrt(lacking / wanted), 1.0)) ** 5
+    return float((1.0 - got) * (1.0 - (least / threshold) ** 2))

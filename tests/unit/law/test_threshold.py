@@ -75,7 +75,8 @@ def test_a_level_below_a_held_one_asks_for_less_than_draws_that_one(
     rng, least = np.random.default_rng(seed), 0.03
     following = Following(150.0, 1.3, 3.0, 0.0)
     asked = 10.0 ** rng.uniform(-1.0, 4.0) * unit(rng, 3)
-    held = how_held(lacks**2 * (asked @ asked), asked @ asked, threshold, least)
+    square = asked @ asked
+    held = how_held(lacks**2 * square, square, 0.0, threshold, least)
     assert 0.0 <= held <= 1.0
     assert held == 0.0 or (lacks > 0.0 and threshold > least)
     below = threshold_below(asked, held, following)
