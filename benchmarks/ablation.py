@@ -32,8 +32,8 @@ from hsp_control.common.arrays import Array
 
 ROOT = Path(__file__).resolve().parents[1]
 ROBOTS, PERIODS = ("panda", "ur5", "iiwa14"), (0.001, 0.005)
-KINDS = (*OUT, "push", "steady")
-NEAREST = ("position", "levels")  # the hand's distance counts
+KINDS = (*OUT, "push", "steady", "spring above", "just out")
+NEAREST = ("position", "levels", "just out")  # the hand's distance counts
 ROLLOUTS, WAYS, POINTS = 24, 6, 1000  # of a robot; of a way
 
 _LIMITS = "constraints/limits/acceleration_bounds.py"
@@ -59,6 +59,7 @@ INGREDIENTS: dict[str, tuple[Edit, ...]] = {
     "what those above it draw": (
         ("law/hierarchy.py", "opposed[k] -= J[start", "opposed[k] -= 0.0 * J[start"),
     ),
+    "what springs lend": ((_EDGE, "SPRING = 0.4", "SPRING = 1e-9"),),
     "static effort": (
         ("constraints/limits/limits.py", "_HELD = 0.95", "_HELD = 100.0"),
     ),
@@ -76,7 +77,7 @@ INGREDIENTS: dict[str, tuple[Edit, ...]] = {
         (_SENT, "+ min(max(drift[i], present), 0.0)", ""),
     ),
     "null space dearer with the error": (
-        (_COST, "_OF_ERROR, _MOST = 0.2", "_OF_ERROR, _MOST = 0.0"),
+        (_COST, "_LEVEL, _NULL_SPACE, _MOST = 1.0, 0.2", "_LEVEL, _NULL_SPACE, _MOST = 0.0, 0.0"),
     ),
     "springs cost what is below them": (
         (_COST, "(standing or not springs)", "(standing or True)"),

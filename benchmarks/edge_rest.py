@@ -3,10 +3,11 @@
     .venv/bin/python benchmarks/edge_rest.py [--cases N] [--keep FILE] [ROBOT ...]
 
 Of each robot, kind and period: hands whose target is 5 cm to 1 m out of reach, at once,
-streamed in a line, dragged about, on springs, above an orientation, and along one axis
-or two; a centre of mass that far from where it is; steps of 0.5 m within reach, turns
-of 170°, and pushes of 50 to 200 N for 0.2 s. Efforts are held for a period and clipped.
-Writes the third table of benchmarks/results/edge.md.
+streamed in a line, dragged about, on springs, either above an orientation, also 5 mm
+within to 1 cm beyond the reach, and along one axis or two; a centre of mass that far
+from where it is; steps of 0.5 m within reach, turns of 170°, and pushes of 50 to 200 N
+for 0.2 s. Efforts are held for a period and clipped. Writes the third table of
+benchmarks/results/edge.md.
 """
 
 import argparse
@@ -32,7 +33,13 @@ ROBOTS = (
 )  # fmt: skip
 PERIODS = (0.001, 0.002, 0.005, 0.01)
 OUT = ("position", "pose", "spring", "levels")
-KINDS = (*OUT, "push", "steady", "stream", "drag", "step", "flip", "axes", "mass")
+KINDS = (
+    *(*OUT, "push", "steady", "stream", "drag", "step", "flip", "axes", "mass"),
+    *("spring above", "just out"),
+)
+ABOVE = ("levels", "spring above", "just out")  # an orientation
+SPRINGS = ("spring", "steady", "spring above")
+JUST = -0.005, 0.01  # beyond what can be reached [m]
 OF_REST = tuple(kind for kind in KINDS if kind != "steady")
 IN_THE_PLANE = ("position", "spring", "push", "stream", "drag", "step")
 STIFFNESS, HELD, PUSHED = (100.0, 2000.0), (5.0, 40.0), (50.0, 200.0)  # [N/m, N, N]
@@ -93,12 +100,14 @@ def case(arm: Arm, kind: str, period: float, rng: np.random.Generator) -> Case:
     if kind == "mass":
         state = arm.robot.state(0.0, arm.configuration(x0), np.zeros(arm.robot.nv))
         goal = state.centroidal.position + rng.uniform(*BEYOND) * d
-    if kind in (*OUT, "stream", "drag", "axes"):
-        goal += (arm.extent(d, rng) - d @ goal + rng.uniform(*BEYOND)) * d
-    if kind in ("position", "levels"):
+    if kind in (*OUT, "stream", "drag", "axes", *ABOVE):
+        reach = arm.extent(d, rng) - d @ goal
+        beyond = rng.uniform(*(JUST if kind == "just out" else BEYOND))
+        goal += (reach + beyond) * d
+    if kind in ("position", "levels", "just out"):
         target = Target(arm.frame, pin.SE3(np.eye(3), goal), 3)
         least = float(np.linalg.norm(goal - arm.nearest(target, x0, rng)))
-    if kind in ("spring", "steady"):
+    if kind in SPRINGS:
         number = float(np.exp(rng.uniform(*np.log(STIFFNESS))))
     if kind in ("push", "steady"):
         vector = float(rng.uniform(*(PUSHED if kind == "push" else HELD))) * d
@@ -141,7 +150,7 @@ def messages(case: Case, here: pin.SE3, pose: bool) -> list[dict[str, Any]]:
 def controller(case: Case, robot: hsp.Robot) -> hsp.Controller:
     """Return the controller of a case."""
     frame, goal, planar = robot.end_effector, np.array(case.goal), is_planar(case.robot)
-    spring = hsp.Impedance(case.number) if case.kind in ("spring", "steady") else None
+    spring = hsp.Impedance(case.number) if case.kind in SPRINGS else None
     streamed = case.kind in ("stream", "drag")
     at = robot.state(0.0, case.q0, np.zeros(robot.nv)).frame(frame)
     here = pin.SE3(at.rotation.copy(), at.position.copy())
@@ -170,7 +179,7 @@ def controller(case: Case, robot: hsp.Robot) -> hsp.Controller:
         hand = hsp.FramePose(frame, name="hand", **declared)
     else:
         hand = hsp.FramePosition(frame, impedance=spring, name="hand", **declared)
-    below = [hsp.FrameOrientation(frame, priority=2)] * (case.kind == "levels")
+    below = [hsp.FrameOrientation(frame, priority=2)] * (case.kind in ABOVE)
     field: Any = hsp.TargetPosture(case.q0) if planar else hsp.JointCentering()
     made = hsp.Controller(robot, [hand, *below], field, start=case.q0)
     if not streamed and case.kind not in ("push", "steady"):

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.arrays import Array, Flags, Indices
 from hsp_control.common.kernels import kernel
 from hsp_control.common.linalg import (
     multiply,
@@ -29,9 +29,15 @@ from hsp_control.common.linalg import (
     orthogonalise_rows,
     solve_lower,
     solve_lower_transposed,
+    squared_norm,
 )
 from hsp_control.law.samples import VARYING, FieldSample, MetricSample, TaskSample
-from hsp_control.law.threshold import Following, how_held, threshold_below
+from hsp_control.law.threshold import (
+    Following,
+    held_by_springs,
+    how_held,
+    threshold_below,
+)
 
 
 class LevelScratch(NamedTuple):
@@ -55,7 +61,9 @@ def resolve_levels(
     least: float,
     following: Following,
     asked: Array,
+    springs: Flags,
     thresholds: Array,
+    lends: Array,
     controls: bool,
     ends: Indices,
     scratch: LevelScratch,
@@ -76,9 +84,12 @@ def resolve_levels(
         least: ε_0.
         following: How the thresholds of levels below a held one follow.
         asked: What the feedback asks for at rest, shape (m,).
+        springs: Whether a row is that of a spring, shape (m,).
         thresholds: Singular value of each level's whitened Jacobian, in the null space
             of those above, below which it is damped, shape (levels,); raised here
-            below a held level.
+            below a held level, and to what springs lend.
+        lends: That from which a level of springs lends its directions to those below,
+            shape (levels,).
         controls: False for φ_N = 0.
         ends: Where each level's rows end in the stack.
         scratch: Memory.
@@ -92,7 +103,7 @@ def resolve_levels(
     n = v.shape[0]
     damped = 0
     _invert(metric.L, Q)
-    drawn, pushed = rows[2, :n], rows[1]
+    drawn, pushed, shares = rows[2, :n], rows[1], rows[4]
     for i in range(n):
         a[i] = drawn[i] = 0.0
     start, held = 0, 0.0
@@ -109,20 +120,27 @@ def resolve_levels(
         if held > 0.0:
             least_here = threshold_below(opposed[: end - start], held, following)
             threshold = max(threshold, least_here)
-        smallest = _open_level(J[block], Q, QJ[:, block], G_inv, square, threshold)
+        x, V = pushed, square[1, : end - start, : end - start]
+        smallest = _open_level(J[block], Q, QJ[:, block], square[0], V, x)
+        _bounded_inverse(V, x, threshold, G_inv)
+        _add_level(QJ[:, block], G_inv, rest, shares, a)
+        _add_level(QJ[:, block], G_inv, opposed, shares, drawn)
+        if lends[level] > threshold:
+            threshold = lends[level]
+            _bounded_inverse(V, x, threshold, G_inv)
         thresholds[level] = threshold
-        _add_level(QJ[:, block], G_inv, rest, pushed, a)
-        _add_level(QJ[:, block], G_inv, opposed, pushed, drawn)
         if smallest < threshold * threshold:
             wanted = lacking = 0.0
             for k in range(start, end):
+                if springs[k]:
+                    continue
                 lack = asked[k]
                 for i in range(n):
                     lack -= J[k, i] * drawn[i]
                 wanted += asked[k] * asked[k]
                 lacking += lack * lack
-            here = how_held(lacking, wanted, smallest, threshold, least)
-            held = max(held, here)
+            held = max(held, how_held(lacking, wanted, following))
+            held = max(held, held_by_springs(smallest, lends[level], following))
             if damped == 0:
                 damped = level + 1
         _close_level(Q, QJ[:, block], G_inv, pushed)
@@ -180,19 +198,11 @@ def _invert(L: Array, out: Array) -> None:
 
 
 @kernel
-def _open_level(
-    J: Array,
-    Q: Array,
-    QJ: Array,
-    G_inverse: Array,
-    square: Array,
-    threshold: float,
-) -> float:
-    """Write Q Jᵀ and q(J Q Jᵀ), see `pseudo_inverse.py`; return the smallest x."""
+def _open_level(J: Array, Q: Array, QJ: Array, G: Array, V: Array, x: Array) -> float:
+    """Write Q Jᵀ and J Q Jᵀ = Σ x_r V_r V_rᵀ; return the smallest x."""
     m, n = J.shape
     for k in range(m):
         multiply(Q, J[k], QJ[:, k])
-    G, V = square[0, :m, :m], square[1, :m, :m]
     for p in range(m):
         for k in range(p + 1):
             total = 0.0
@@ -200,23 +210,25 @@ def _open_level(
                 total += J[p, i] * QJ[i, k]
             G[p, k] = G[k, p] = total
     # G is symmetric and not negative: its rows' lengths become its eigenvalues.
-    orthogonalise_rows(G, V)
-    floor = threshold * threshold
+    orthogonalise_rows(G[:m, :m], V)
     smallest = np.inf
     for k in range(m):
-        x = 0.0
-        for p in range(m):
-            x += G[k, p] * G[k, p]
-        x = np.sqrt(x)
-        smallest = min(smallest, x)
-        G[k, 0] = 1.0 / x if x >= floor else (2.0 - x / floor) / floor
+        x[k] = np.sqrt(squared_norm(G[k, :m]))
+        smallest = min(smallest, x[k])
+    return smallest
+
+
+@kernel
+def _bounded_inverse(V: Array, x: Array, threshold: float, out: Array) -> None:
+    """Write q(G) of G = Σ x_r V_r V_rᵀ, see `pseudo_inverse.py`."""
+    m, floor = out.shape[0], threshold * threshold
     for p in range(m):
         for k in range(m):
             total = 0.0
             for r in range(m):
-                total += V[r, p] * G[r, 0] * V[r, k]
-            G_inverse[p, k] = total
-    return smallest
+                q = 1.0 / x[r] if x[r] >= floor else (2.0 - x[r] / floor) / floor
+                total += V[r, p] * q * V[r, k]
+            out[p, k] = total
 
 
 @kernel

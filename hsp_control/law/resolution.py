@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.arrays import Array, Flags, Indices
 from hsp_control.common.kernels import kernel
 from hsp_control.common.linalg import (
     norm,
@@ -162,7 +162,8 @@ class Resolution:
         step = (
             *(problem.task, problem.field, problem.metric, self.form),
             *(v, problem.gain, self.threshold, self._following, controls),
-            *(self.ends, problem.asked, problem.yields, problem.pulls, self.thresholds),
+            *(self.ends, problem.asked, problem.yields, problem.pulls, problem.springs),
+            *(self.thresholds, np.zeros_like(self.thresholds)),
             *(self._scratch, self.null_space_error, self.acceleration, self.code),
         )
         resolve = _resolve_at_once if self.alone else _resolve_levels
@@ -219,7 +220,9 @@ class LawStep(NamedTuple):
     asked: Array
     yields: Array
     pulls: Array
+    springs: Flags
     thresholds: Array
+    lends: Array
     scratch: Scratch
     e_N: Array
     a: Array
@@ -265,8 +268,8 @@ def _resolve_levels(step: LawStep) -> int:
         )
         damped = resolve_levels(
             task, step.field, step.metric, step.form, step.v, step.K_N, step.threshold,
-            step.following, step.asked, step.thresholds, step.controls, step.ends,
-            levels, step.e_N, step.a,
+            step.following, step.asked, step.springs, step.thresholds, step.lends,
+            step.controls, step.ends, levels, step.e_N, step.a,
         )  # fmt: skip
         if not _all_finite(step.a):
             damped = BEYOND_ANY_LEVEL
@@ -279,8 +282,8 @@ def _write_thresholds(step: LawStep) -> float:
     """Write ε of each level, and return the largest."""
     turning = turning_threshold(step.field.g, step.v, step.following)
     return write_thresholds(
-        step.asked, step.yields, step.pulls, step.ends, step.threshold, turning,
-        step.following, step.thresholds,
+        step.asked, step.yields, step.pulls, step.springs, step.ends, step.threshold,
+        turning, step.following, step.thresholds, step.lends,
     )  # fmt: skip
 
 

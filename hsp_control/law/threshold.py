@@ -22,6 +22,11 @@ f - J a_f, with a_f what those above draw at rest: a task that is met undoes it.
 level below follows that with an L that is a fiftieth: it is as steep as it is strong,
 and the less the level above gets of what it asks for, the less it gets there.
 
+A level of springs asks for as little at its edge as it can have: what it asks for fades
+with its mobility. But the directions in which it pulls in vain turn as 1/s, and what is
+below it with them. So it lends them to that, as far as it pulls, from an ε on that is
+four times its own.
+
 What is left to the null space turns with the robot, by at most 1.09 |∂J/∂q|/ε, and what
 a field g asks for there changes with it. So where an arm is held ε grows with g, also
 below a spring, whose own threshold is ε_0: what it asks for fades with its mobility.
@@ -31,7 +36,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.arrays import Array, Flags, Indices
 from hsp_control.common.kernels import kernel
 from hsp_control.common.linalg import squared_norm
 
@@ -56,6 +61,16 @@ TURNING, QUARTER, QUICKEST = 50.0, 0.25, 7.0
 for a period h is stable below 2/h, and periods are up to 10 ms. A velocity counts for a
 quarter, and nothing for more than 7 rad/s: no field costs the task all that it has."""
 
+SPRING = 0.4
+"""ε, over the robot's size, from which a level lends its directions whose springs pull
+with all their force: that of a feedback with its largest error."""
+KEPT = 0.25
+"""A level of springs keeps its own force down to this part of that ε."""
+WEAKEST = 0.02
+"""Springs that pull with less than this part of their force hold as those with it."""
+HALF = 5.0
+"""How many times f_0 a level asks for beyond it where it is held by half."""
+
 
 class Following(NamedTuple):
     """How the threshold follows what is asked for."""
@@ -65,6 +80,7 @@ class Following(NamedTuple):
     modest: float  # f_0 [m/s² or rad/s²]
     below: float  # L of a level below a held one
     turning: float  # ε for each rad/s of a field, where an arm is held [s]
+    spring: float  # ε from which springs lend what they pull at with all their force
 
     @classmethod
     def of(cls, size: float, *, on_legs: bool) -> Self:
@@ -72,10 +88,11 @@ class Following(NamedTuple):
         if size == 0.0:
             return cls(*NOT)
         modest = MODEST_ON_LEGS if on_legs else MODEST
-        return cls(STIFFNESS / size, size * modest, BELOW / size, size / TURNING)
+        below, turning, spring = BELOW / size, size / TURNING, SPRING * size
+        return cls(STIFFNESS / size, size * modest, below, turning, spring)
 
 
-NOT = Following(np.inf, 0.0, np.inf, 0.0)
+NOT = Following(np.inf, 0.0, np.inf, 0.0, 0.0)
 """The threshold does not follow."""
 
 
@@ -97,11 +114,13 @@ def write_thresholds(
     asked: Array,
     yields: Array,
     pulls: Array,
+    springs: Flags,
     ends: Indices,
     least: float,
     turning: float,
     following: Following,
     thresholds: Array,
+    lends: Array,
 ) -> float:
     """Write ε of each level, and return the largest.
 
@@ -109,17 +128,22 @@ def write_thresholds(
         asked: f, what the feedback asks for at rest, level after level, shape (m,).
         yields: By how much L is less for a row, shape (m,); 0: it does not count.
         pulls: With how much of its largest force a spring pulls, shape (m,).
+        springs: Whether a row is that of a spring, shape (m,).
         ends: Where each level's rows end in the stack, shape (levels,).
         least: ε_0.
         turning: See `turning_threshold`; for levels that ask for f_0, or springs that
             pull with all their force, and for others as much as they do of it.
         following: L and f_0.
         thresholds: ε of each level, shape (levels,).
+        lends: ε from which a level of springs lends its directions to those below,
+            shape (levels,); 0: it does not.
     """
-    largest, start = least, 0
+    largest, start, several = least, 0, ends.shape[0] > 1
     for level in range(ends.shape[0]):
         square = more = pull = 0.0
+        sprung = several
         for k in range(start, ends[level]):
+            sprung = sprung and springs[k]
             pull += pulls[k] * pulls[k]
             if yields[k] > 0.0:
                 square += asked[k] * asked[k]
@@ -132,8 +156,9 @@ def write_thresholds(
             beyond *= 1.0 + more / square
         follows = np.sqrt(beyond / following.steepest)
         turns = min(share, 1.0) * turning
-        thresholds[level] = max(least, follows, turns)
-        largest = max(largest, thresholds[level])
+        lends[level] = following.spring * np.sqrt(min(share, 1.0)) if sprung else 0.0
+        thresholds[level] = max(least, follows, turns, KEPT * lends[level])
+        largest = max(largest, thresholds[level], lends[level])
         start = ends[level]
     return float(largest)
 
@@ -144,7 +169,7 @@ def threshold_below(asked: Array, held: float, following: Following) -> float:
 
     Args:
         asked: f - J a_f of the level, shape (m,).
-        held: How much a level above is held, see `how_held`.
+        held: How much levels above are held, see `how_held` and `held_by_springs`.
         following: f_0 and L.
     """
     square = 0.0
@@ -155,20 +180,37 @@ def threshold_below(asked: Array, held: float, following: Following) -> float:
 
 
 @kernel
-def how_held(
-    lacking: float, wanted: float, smallest: float, threshold: float, least: float
-) -> float:
+def how_held(lacking: float, wanted: float, following: Following) -> float:
     """Return how much a level is held at the edge, from 0 (exact) to nearly 1.
+
+    It grows slowly as the level begins to ask for more than f_0: as fast as the level
+    is lost to what is below it, both would swing from one to the other.
 
     Args:
         lacking: ‖f - J a_f‖², what the level does not get of what it asks for at rest.
-        wanted: ‖f‖²; 0 for a level of springs, whose smallest x = s² counts instead.
-        smallest: That x, below ε².
-        threshold: ε; of a level that asks for little ε_0, so that it is not held.
-        least: ε_0.
+        wanted: ‖f‖².
+        following: f_0.
     """
-    z = smallest / (threshold * threshold)
-    got = z * z * z
-    if wanted > 0.0:
-        got = (1.0 - min(np.sqrt(lacking / wanted), 1.0)) ** 5
-    return float((1.0 - got) * (1.0 - (least / threshold) ** 2))
+    beyond = np.sqrt(wanted) - following.modest
+    if beyond <= 0.0:
+        return 0.0
+    got = (1.0 - min(np.sqrt(lacking / wanted), 1.0)) ** 5
+    half, square = HALF * following.modest, beyond * beyond
+    return float((1.0 - got) * square / (square + half * half))
+
+
+@kernel
+def held_by_springs(smallest: float, lends: float, following: Following) -> float:
+    """Return how much a level of springs is held, 1 or more at its very edge.
+
+    The weaker they pull, the more they count: what is below must be weaker still.
+
+    Args:
+        smallest: The smallest x = s².
+        lends: From which s the level lends its directions.
+        following: That of springs with all their force.
+    """
+    x, square = following.spring * following.spring, lends * lends
+    if smallest >= square:
+        return 0.0
+    return float((1.0 - (smallest / square) ** 3) * x / max(square, WEAKEST * x))

@@ -55,17 +55,39 @@ def test_an_orientation_that_is_met_gives_way_too() -> None:
     assert rests_at("ur5", q0, away, below) - alone <= SHORT  # it was 0.25 m
 
 
-def test_an_orientation_below_a_spring_out_of_reach_rests() -> None:
+@pytest.mark.parametrize(
+    ("name", "away"),
+    [("panda", [0.283, -0.298, 1.443]), ("ur5", [0.466, 1.109, 0.895])],
+)
+def test_an_orientation_below_a_spring_out_of_reach_rests(
+    name: str, away: list[float]
+) -> None:
     """A spring that slips holds its level, too."""
-    robot, away = load("panda"), np.array([0.283, -0.298, 1.443])
-    here = robot.state(0.0, robot.home(), np.zeros(7)).position("panda_tcp")
-    tasks = [
-        hsp.FramePosition(
-            "panda_tcp", hsp.Hold(here + away), impedance=hsp.Impedance(600.0)
-        ),
-        hsp.FrameOrientation("panda_tcp", priority=2),
-    ]
-    assert rests(robot, robot.home(), *tasks, period=PERIOD)
+    robot, frame = load(name), FRAMES[name]
+    here = robot.state(0.0, robot.home(), np.zeros(robot.nv)).position(frame)
+    spring = hsp.Impedance(600.0)
+    hand = hsp.FramePosition(frame, hsp.Hold(here + np.array(away)), impedance=spring)
+    below = hsp.FrameOrientation(frame, priority=2)
+    assert rests(robot, robot.home(), hand, below, period=PERIOD)
+
+
+@pytest.mark.parametrize(
+    ("q0", "goal"),
+    [
+        # joints 2 and 3 end at their limits, 1 cm short of the goal
+        ([0.12, -1.05, -0.26, -2.31, -0.05, 1.36, 1.06], [-0.518, -0.518, -0.263]),
+        # the hand was lost to the orientation, and regained, and lost
+        ([0.29, -0.99, 0.17, -2.62, 0.14, 1.37, 0.63], [0.301, 0.909, 0.327]),
+    ],
+    ids=["limits", "by turns"],
+)
+def test_a_hand_just_out_of_reach_rests_above_an_orientation(
+    q0: list[float], goal: list[float]
+) -> None:
+    """It asks for little, and what is below it for much."""
+    hand = hsp.FramePosition("panda_tcp", hsp.Hold(goal))
+    below = hsp.FrameOrientation("panda_tcp", priority=2)
+    assert rests(load("panda"), np.array(q0), hand, below, period=PERIOD)
 
 
 def test_a_centre_of_mass_out_of_reach_rests() -> None:
@@ -99,6 +121,7 @@ def test_a_field_does_not_shake_an_arm_that_a_spring_holds_stretched() -> None:
 def rests(robot: hsp.Robot, q0: Array, *tasks: hsp.Task, period: float = 1e-3) -> bool:
     """Return whether no effort changes by more than 1e-3 of its limit in 1 ms."""
     how: Any = {"duration": 6.0, "control_period": period, "log_period": period}
-    run = hsp.simulate(hsp.Controller(robot, tasks, hsp.JointCentering()), q0, **how)
+    made = hsp.Controller(robot, tasks, hsp.JointCentering(), start=q0)
+    run = hsp.simulate(made, q0, **how)
     changes = np.abs(np.diff(run.tau[-round(1.0 / period) :], axis=0)).max(axis=0)
     return bool((changes <= period * robot.model.effortLimit).all())

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsp_control.common.arrays import Array
-from hsp_control.control.actuation.deviation_cost import _OF_ERROR
 from hsp_control.control.actuation.support import Support
 from hsp_control.law import Resolution
 
@@ -56,7 +55,8 @@ def level_costs(resolution: Resolution, supported: bool, size: float) -> Array:
     costs, start = [1.0], 0
     for k, end in enumerate(resolution.ends):
         error = np.linalg.norm(resolution.problem.task.error[start:end])
-        below = 0.0 if supported else _OF_ERROR * error / size
+        of_error = 0.2 if k == len(resolution.ends) - 1 else 1.0
+        below = 0.0 if supported else of_error * error / size
         below = np.clip(below, least, 0.1)
         springs = resolution.problem.springs[start:end].all() and not supported
         equal = springs or (supported and k == 0)

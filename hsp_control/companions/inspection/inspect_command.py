@@ -3,10 +3,12 @@
 import argparse
 import json
 import logging
+import os
 import textwrap
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from xml.etree import ElementTree
 
 from hsp_control.cli.consoles import out, working
 from hsp_control.cli.loading import robot_access
@@ -15,7 +17,9 @@ from hsp_control.companions.inspection.findings import Inspection
 from hsp_control.companions.inspection.findings import inspect as inspect_robot
 from hsp_control.robot import RobotDescription
 from hsp_control.robot.description.access import XmlError, read_xml
-from hsp_control.robot.description.urdf import write_repaired
+from hsp_control.robot.description.inertias import project_inertias
+from hsp_control.robot.description.sources import RobotSource
+from hsp_control.robot.description.urdf import read_urdf
 
 _WIDTH = 80
 _SHOWN = 12
@@ -39,6 +43,21 @@ def inspect(options: argparse.Namespace) -> int:
         if not options.json:
             out.print(f"Written with projected inertias: {file}", markup=False)
     return 0 if inspection.loads else 2
+
+
+def write_repaired(source: RobotSource, path: Path) -> Path:
+    """Write a robot's URDF with projected inertias; all else stays, but comments."""
+    xml = read_urdf(source)
+    if path.exists() and path.samefile(source.urdf):
+        raise ModelError(f"{path}: is the robot's own file; give another one")
+    project_inertias(xml)
+    for element in xml.iter():
+        name = element.get("filename")
+        if name is not None and "://" not in name and not Path(name).is_absolute():
+            file = source.urdf.resolve().parent / name
+            element.set("filename", os.path.relpath(file, path.resolve().parent))
+    ElementTree.ElementTree(xml).write(path, encoding="utf-8", xml_declaration=True)
+    return path
 
 
 def report(inspection: Inspection) -> Iterator[str]:

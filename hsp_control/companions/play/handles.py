@@ -35,7 +35,7 @@ from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import FrameOrientation, FramePose, FramePosition, Task
 from hsp_control.trajectories import Stream
 from hsp_control.trajectories.crossfade import AnyReference
-from hsp_control.trajectories.remembering import Written
+from hsp_control.trajectories.remembering import Remembering
 from hsp_control.trajectories.streams.stream import Streamed
 
 BACK = 1.5
@@ -185,7 +185,10 @@ def targets_of(controller: Controller) -> dict[str, TargetGrip]:
         for task in controller.tasks
         if isinstance(task, kinds)
         and task.followed is not None
-        and not any(parts_within(task.followed, Written))
+        and all(
+            isinstance(each, Streamed)
+            for each in parts_within(task.followed, Remembering)
+        )
     }
 
 

@@ -24,9 +24,9 @@ _LEAST = 1e-6
 the stricter the priorities; at 1e-6 an error of 1e-3 m/s² remains in the task
 (docs/limits.md)."""
 
-_OF_ERROR, _MOST = 0.2, 0.1
-"""How much more what is below a level costs for an error of the robot's size, relative
-to the level itself, and the most that it costs [-]."""
+_LEVEL, _NULL_SPACE, _MOST = 1.0, 0.2, 0.1
+"""What is below a level costs this, another level or the null space, for an error of
+the robot's size, relative to the level itself, and the most that it costs [-]."""
 
 _LOST = 1e-3
 """Singular value, relative to the threshold, below which rounding decides where a
@@ -118,7 +118,8 @@ def _write_costs(directions: Directions) -> None:
         for r in range(start, ends[k]):
             square += e[r] * e[r]
             springs = springs and directions.springs[r]
-        below = _OF_ERROR * np.sqrt(square) / directions.size
+        of_error = _LEVEL if k < last - 1 else _NULL_SPACE
+        below = of_error * np.sqrt(square) / directions.size
         if standing:  # whoever stands keeps the balance at any cost
             below = 0.0
         if k >= directions.first and (standing or not springs):

@@ -5,17 +5,15 @@ the size. Faults that they detect and report themselves are left to them.
 """
 
 import math
-import os
 from collections import Counter
 from collections.abc import Iterator
-from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from hsp_control.common.exceptions import ModelError, RobotNotFoundError
 from hsp_control.common.suggestions import listing
 from hsp_control.robot.description.access import XmlError, parse_xml, read_xml
-from hsp_control.robot.description.inertias import ENTRIES, project_inertias
+from hsp_control.robot.description.inertias import ENTRIES
 from hsp_control.robot.description.sources import PINOCCHIO, RobotSource
 
 MAX_LINKS = 1000
@@ -185,21 +183,6 @@ def parser_text(xml: Element, *unused: str) -> str:
         for element in [each for each in link if each.tag in unused]:
             link.remove(element)
     return ElementTree.tostring(xml, encoding="unicode")
-
-
-def write_repaired(source: RobotSource, path: Path) -> Path:
-    """Write a robot's URDF with projected inertias; all else stays, but comments."""
-    xml = read_urdf(source)
-    if path.exists() and path.samefile(source.urdf):
-        raise ModelError(f"{path}: is the robot's own file; give another one")
-    project_inertias(xml)
-    for element in xml.iter():
-        name = element.get("filename")
-        if name is not None and "://" not in name and not Path(name).is_absolute():
-            file = source.urdf.resolve().parent / name
-            element.set("filename", os.path.relpath(file, path.resolve().parent))
-    ElementTree.ElementTree(xml).write(path, encoding="utf-8", xml_declaration=True)
-    return path
 
 
 def _elements(robot: Element) -> Iterator[tuple[str, Element]]:

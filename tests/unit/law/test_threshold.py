@@ -20,12 +20,15 @@ from hsp_control import (
 )
 from hsp_control.common.arrays import Array
 from hsp_control.law.threshold import (
+    KEPT,
     MODEST,
     NOT,
     QUICKEST,
     STIFFNESS,
     TURNING,
+    WEAKEST,
     Following,
+    held_by_springs,
     how_held,
     threshold_below,
     write_thresholds,
@@ -43,13 +46,14 @@ def test_it_bounds_what_the_feedback_asks_for_over_its_square(
     """‖f‖/ε² ≤ L + f_0/ε_0² for each level, and ε = ε_0 for all that is modest."""
     rng, L, least = np.random.default_rng(seed), 150.0, 0.03
     everywhere, nowhere = np.ones(9), np.zeros(9)
-    modest = 1.3
+    modest, rigid, lends = 1.3, np.zeros(9, dtype=bool), np.ones(4)
     sizes = [3, 0, 2, 4]
     ends, thresholds = np.cumsum(sizes), np.zeros(4)
     asked = 10.0**size * rng.standard_normal(9)
-    following = Following(L, modest, L / 50.0, 0.0)
-    rest = ends, least, 0.0, following
-    largest = write_thresholds(asked, everywhere, nowhere, *rest, thresholds)
+    following = Following(L, modest, L / 50.0, 0.0, 0.4)
+    none, rest = (nowhere, rigid), (ends, least, 0.0, following)
+    largest = write_thresholds(asked, everywhere, *none, *rest, thresholds, lends)
+    assert (lends[sizes != np.zeros(4)] == 0.0).all()
     assert largest == thresholds.max()
     for f, epsilon in zip(np.split(asked, ends[:-1]), thresholds, strict=True):
         norm = np.linalg.norm(f)
@@ -58,31 +62,55 @@ def test_it_bounds_what_the_feedback_asks_for_over_its_square(
         if norm <= modest + 0.99 * L * least**2:
             assert epsilon == least
     few = np.zeros(4)  # errors of one component: a third of L
-    write_thresholds(asked, 3.0 * everywhere, nowhere, *rest, few)
+    write_thresholds(asked, 3.0 * everywhere, *none, *rest, few, lends)
     exact = thresholds > least
     np.testing.assert_allclose(few[exact] ** 2, 3.0 * thresholds[exact] ** 2)
     for counts, kind in ((everywhere, NOT), (nowhere, following)):
         rest = ends, least, 0.0, kind
-        write_thresholds(asked, counts, nowhere, *rest, thresholds)
+        write_thresholds(asked, counts, *none, *rest, thresholds, lends)
         assert (thresholds == least).all()
 
 
-@given(seeds, st.floats(0.0, 1.0), st.floats(0.03, 1.0))
+@given(seeds, st.floats(0.0, 1.0))
 def test_a_level_below_a_held_one_asks_for_less_than_draws_that_one(
-    seed: int, lacks: float, threshold: float
+    seed: int, lacks: float
 ) -> None:
     """It gets 2 s ‖f‖/ε² at most along s; held for good, that is 2 L s/50."""
-    rng, least = np.random.default_rng(seed), 0.03
-    following = Following(150.0, 1.3, 3.0, 0.0)
-    asked = 10.0 ** rng.uniform(-1.0, 4.0) * unit(rng, 3)
-    square = asked @ asked
-    held = how_held(lacks**2 * square, square, 0.0, threshold, least)
+    rng, modest = np.random.default_rng(seed), 1.3
+    following = Following(150.0, modest, 3.0, 0.0, 0.4)
+    asked, above = 10.0 ** rng.uniform(-1.0, 4.0, (2, 1)) * unit(rng, 3)
+    square = above @ above
+    held = how_held(lacks**2 * square, square, following)
     assert 0.0 <= held <= 1.0
-    assert held == 0.0 or (lacks > 0.0 and threshold > least)
+    assert held == 0.0 or (lacks > 0.0 and square > modest**2)
     below = threshold_below(asked, held, following)
-    assert held * (np.linalg.norm(asked) - 1.3) <= 3.0 * below**2 * (1.0 + 1e-12)
-    if np.linalg.norm(asked) <= 1.3:
-        assert below == 0.0
+    beyond = max(np.linalg.norm(asked) - modest, 0.0)
+    assert below**2 == pytest.approx(held * beyond / 3.0)
+
+
+@given(seeds, st.floats(0.0, 2.0), st.floats(0.0, 1.0))
+def test_springs_hold_what_is_below_them_weaker_than_they_are(
+    seed: int, pull: float, s: float
+) -> None:
+    """They lend their directions as far as they pull; alone they lend nothing."""
+    rng, least, above = np.random.default_rng(seed), 0.03, 0.4
+    following, rows = Following(150.0, 1.3, 3.0, 0.02, above), np.ones(6, dtype=bool)
+    pulls, lends, thresholds = np.zeros(6), np.zeros(2), np.zeros(2)
+    pulls[:3] = pull * unit(rng, 3)
+    given = rng.standard_normal(6), np.zeros(6), pulls, rows
+    rest = least, 0.05, following, thresholds, lends
+    largest = write_thresholds(*given, np.array([3, 6]), *rest)
+    share = min(pull, 1.0)
+    np.testing.assert_allclose(lends, [above * np.sqrt(share), 0.0], atol=1e-12)
+    assert largest == max(*thresholds, *lends)
+    kept = max(least, KEPT * lends[0], 0.05 * share)
+    assert thresholds[0] == pytest.approx(kept)
+    held = held_by_springs(s * s, lends[0], following)
+    weaker = 1.0 / max(share, WEAKEST)
+    assert 0.0 <= held <= weaker * max(1.0 - (s / above) ** 6, 0.0) + 1e-12
+    write_thresholds(*given, np.array([6]), *rest)
+    assert lends[0] == 0.0
+    assert thresholds[0] == pytest.approx(max(least, 0.05 * share))
 
 
 class Slopes(NamedTuple):
