@@ -22,14 +22,9 @@ f - J a_f, with a_f what those above draw at rest: a task that is met undoes it.
 level below follows that with an L that is a fiftieth: it is as steep as it is strong,
 and the less the level above gets of what it asks for, the less it gets there.
 
-A level of springs asks for as little at its edge as it can have: what it asks for fades
-with its mobility. But the directions in which it pulls in vain turn as 1/s, and what is
-below it with them. So it lends them to that, as far as it pulls, from an ε on that is
-four times its own.
-
-What is left to the null space turns with the robot, by at most 1.09 |∂J/∂q|/ε, and what
-a field g asks for there changes with it. So where an arm is held ε grows with g, also
-below a spring, whose own threshold is ε_0: what it asks for fades with its mobility.
+A level of springs asks for as little at its edge as it can have: that fades with its
+mobility. But the directions in which it pulls in vain turn as 1/s, and all below with
+them. So it lends them to that, as far as it pulls, from four times its own ε on.
 """
 
 from typing import NamedTuple, Self
