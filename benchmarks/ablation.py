@@ -77,7 +77,7 @@ INGREDIENTS: dict[str, tuple[Edit, ...]] = {
         (_SENT, "+ min(max(drift[i], present), 0.0)", ""),
     ),
     "null space dearer with the error": (
-        (_COST, "_LEVEL, _NULL_SPACE, _MOST = 1.0, 0.2", "_LEVEL, _NULL_SPACE, _MOST = 0.0, 0.0"),
+        (_COST, "_MOST = 1.0, 0.2, 0.1", "_MOST = 0.0, 0.0, 0.1"),
     ),
     "springs cost what is below them": (
         (_COST, "(standing or not springs)", "(standing or True)"),
