@@ -122,12 +122,12 @@ def resolve_levels(
             threshold = max(threshold, least_here)
         x, V = pushed, square[1, : end - start, : end - start]
         smallest = _open_level(J[block], Q, QJ[:, block], square[0], V, x)
-        _bounded_inverse(V, x, threshold, shares, G_inv)
+        _inverted(V, x, threshold, shares, G_inv)
         _add_level(QJ[:, block], G_inv, rest, shares, a)
         _add_level(QJ[:, block], G_inv, opposed, shares, drawn)
         if lends[level] > threshold:
             threshold = lends[level]
-            _bounded_inverse(V, x, threshold, shares, G_inv)
+            _inverted(V, x, threshold, shares, G_inv)
         thresholds[level] = threshold
         if smallest < threshold * threshold:
             wanted = lacking = 0.0
@@ -219,7 +219,7 @@ def _open_level(J: Array, Q: Array, QJ: Array, G: Array, V: Array, x: Array) -> 
 
 
 @kernel
-def _bounded_inverse(V: Array, x: Array, threshold: float, q: Array, out: Array) -> None:
+def _inverted(V: Array, x: Array, threshold: float, q: Array, out: Array) -> None:
     """Write q(G) of G = Σ x_r V_r V_rᵀ, see `pseudo_inverse.py`; q is overwritten."""
     m, floor = out.shape[0], threshold * threshold
     for r in range(m):

@@ -25,6 +25,8 @@ and the less the level above gets of what it asks for, the less it gets there.
 A level of springs asks for as little at its edge as it can have: that fades with its
 mobility. But the directions in which it pulls in vain turn as 1/s, and all below with
 them. So it lends them to that, as far as it pulls, from four times its own ε on.
+
+The null space turns by at most 1.09 |∂J/∂q|/ε: where an arm is held ε grows with g.
 """
 
 from typing import NamedTuple, Self
