@@ -119,7 +119,8 @@ class ActiveStack:
             # Who is about to fall needs the balance whatever it costs.
             balances = robot.unactuated and each.task.keeps_balance(robot)
             follows = each.key in below or len(in_force.feedback.largest)
-            if spring or (follows and not balances):
+            draws = spring and below  # from those below it
+            if (follows or draws) and not balances:
                 still = np.zeros_like(asked)  # what damps is not lost, at any speed
                 rest = in_force.feedback, sample.error, still, asked
                 self._calls.append((write_asked, rest))
