@@ -106,7 +106,7 @@ def resolve_levels(
     drawn, pushed, shares = rows[2, :n], rows[1], rows[4]
     for i in range(n):
         a[i] = drawn[i] = 0.0
-    start, held, above = 0, 0.0, np.inf
+    start, held = 0, 0.0
     for level in range(ends.shape[0]):
         end = ends[level]
         block = slice(start, end)
@@ -117,8 +117,8 @@ def resolve_levels(
             for i in range(n):
                 rest[k] -= J_dot[start + k, i] * v[i] + J[start + k, i] * a[i]
                 opposed[k] -= J[start + k, i] * drawn[i]
-        if level > 0:
-            least_here = threshold_below(opposed[: end - start], held, above, following)
+        if held > 0.0:
+            least_here = threshold_below(opposed[: end - start], held, following)
             threshold = max(threshold, least_here)
         x, V = pushed, square[1, : end - start, : end - start]
         smallest = _open_level(J[block], Q, QJ[:, block], square[0], V, x)
@@ -129,7 +129,6 @@ def resolve_levels(
             threshold = lends[level]
             _inverted(V, x, threshold, shares, G_inv)
         thresholds[level] = threshold
-        above = min(above, max(np.sqrt(smallest), threshold))
         if smallest < threshold * threshold:
             wanted = lacking = 0.0
             for k in range(start, end):

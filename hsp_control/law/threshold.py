@@ -69,10 +69,6 @@ HALF = 5.0
 """How many times f_0 a level asks for beyond it where it is held by half."""
 
 
-QUICKLY = 1.0 * 0.02 * 50.0
-"""c"""
-
-
 class Following(NamedTuple):
     """How the threshold follows what is asked for."""
 
@@ -165,9 +161,7 @@ def write_thresholds(
 
 
 @kernel
-def threshold_below(
-    asked: Array, held: float, above: float, following: Following
-) -> float:
+def threshold_below(asked: Array, held: float, following: Following) -> float:
     """Return the ε that a level below a held one has at least.
 
     Args:
@@ -179,8 +173,6 @@ def threshold_below(
     for k in range(asked.shape[0]):
         square += asked[k] * asked[k]
     beyond = max(np.sqrt(square) - following.modest, 0.0)
-    if above < np.inf:
-        held += QUICKLY * following.turning / above
     return float(np.sqrt(held * beyond / following.below))
 
 
