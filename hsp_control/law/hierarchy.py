@@ -34,6 +34,7 @@ from hsp_control.common.linalg import (
 from hsp_control.law.samples import VARYING, FieldSample, MetricSample, TaskSample
 from hsp_control.law.threshold import (
     Following,
+    Thresholds,
     held_by_springs,
     how_held,
     threshold_below,
@@ -61,9 +62,9 @@ def resolve_levels(
     least: float,
     following: Following,
     asked: Array,
+    yields: Array,
     springs: Flags,
-    thresholds: Array,
-    lends: Array,
+    thresholds: Thresholds,
     controls: bool,
     ends: Indices,
     scratch: LevelScratch,
@@ -84,12 +85,11 @@ def resolve_levels(
         least: ε_0.
         following: How the thresholds of levels below a held one follow.
         asked: What the feedback asks for at rest, shape (m,).
+        yields: 0 for rows without a bounded error, shape (m,); see `write_thresholds`.
         springs: Whether a row is that of a spring, shape (m,).
-        thresholds: Singular value of each level's whitened Jacobian, in the null space
-            of those above, below which it is damped, shape (levels,); raised here
-            below a held level, and to what springs lend.
-        lends: That from which a level of springs lends its directions to those below,
-            shape (levels,).
+        thresholds: From which singular values of each level's whitened Jacobian, in
+            the null space of those above, its inverse is bounded; ``own`` is raised
+            here below levels that turn or are held, and to what springs lend.
         controls: False for φ_N = 0.
         ends: Where each level's rows end in the stack.
         scratch: Memory.
@@ -106,20 +106,24 @@ def resolve_levels(
     drawn, pushed, shares = rows[2, :n], rows[1], rows[4]
     for i in range(n):
         a[i] = drawn[i] = 0.0
-    start, held = 0, 0.0
+    start, held, above = 0, 0.0, np.inf
+    own, lends = thresholds.own, thresholds.lends
     for level in range(ends.shape[0]):
         end = ends[level]
         block = slice(start, end)
         G_inv, rest, opposed = G_inverse[block, block], rows[0], rows[3]
-        threshold = thresholds[level]
+        threshold = own[level]
+        pulls = False  # contacts stay where they are, singular or not
         for k in range(end - start):
+            pulls = pulls or springs[start + k] or yields[start + k] > 0.0
             rest[k], opposed[k] = a_x[start + k], asked[start + k]
             for i in range(n):
                 rest[k] -= J_dot[start + k, i] * v[i] + J[start + k, i] * a[i]
                 opposed[k] -= J[start + k, i] * drawn[i]
-        if held > 0.0:
-            least_here = threshold_below(opposed[: end - start], held, following)
-            threshold = max(threshold, least_here)
+        least_here = threshold_below(
+            opposed[: end - start], held, above, level, following, thresholds
+        )
+        threshold = max(threshold, least_here)
         x, V = pushed, square[1, : end - start, : end - start]
         smallest = _open_level(J[block], Q, QJ[:, block], square[0], V, x)
         _inverted(V, x, threshold, shares, G_inv)
@@ -128,7 +132,10 @@ def resolve_levels(
         if lends[level] > threshold:
             threshold = lends[level]
             _inverted(V, x, threshold, shares, G_inv)
-        thresholds[level] = threshold
+        own[level] = threshold
+        if pulls:
+            s = max(np.sqrt(smallest), threshold) / thresholds.scales[level]
+            above = min(above, s)
         if smallest < threshold * threshold:
             wanted = lacking = 0.0
             for k in range(start, end):
@@ -140,7 +147,7 @@ def resolve_levels(
                 wanted += asked[k] * asked[k]
                 lacking += lack * lack
             held = max(held, how_held(lacking, wanted, following))
-            held = max(held, held_by_springs(smallest, lends[level], following))
+            held = max(held, held_by_springs(smallest, lends[level]))
             if damped == 0:
                 damped = level + 1
         _close_level(Q, QJ[:, block], G_inv, pushed)

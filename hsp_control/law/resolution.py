@@ -10,6 +10,7 @@ import numpy as np
 from hsp_control.common.arrays import Array, Flags, Indices
 from hsp_control.common.kernels import kernel
 from hsp_control.common.linalg import (
+    bounded_inverse,
     norm,
     orthogonalise_rows,
     squared_norm,
@@ -19,11 +20,12 @@ from hsp_control.common.native import bind
 from hsp_control.law.hierarchy import LevelScratch, resolve_levels
 from hsp_control.law.law import acceleration, null_space_command
 from hsp_control.law.problem import Problem
-from hsp_control.law.pseudo_inverse import weighted_pseudo_inverse, whiten
+from hsp_control.law.pseudo_inverse import whiten
 from hsp_control.law.samples import FieldSample, MetricSample, TaskSample
 from hsp_control.law.threshold import (
     NOT,
     Following,
+    Thresholds,
     turning_threshold,
     write_thresholds,
 )
@@ -131,7 +133,9 @@ class Resolution:
         self.ends: Indices = np.cumsum([*levels] or [0], dtype=np.int64)
         self.form = form
         self.threshold, self._following = threshold, following
-        self.thresholds = np.full(len(self.ends), threshold)
+        self._thresholds = Thresholds.allocate(len(self.ends))
+        self.thresholds = self._thresholds.own
+        self.thresholds[:] = threshold
         self.factors = Factors(np.zeros((m, nv)), np.zeros((m, m)))
         self._scratch = Scratch(
             self.factors,
@@ -163,8 +167,7 @@ class Resolution:
             *(problem.task, problem.field, problem.metric, self.form),
             *(v, problem.gain, self.threshold, self._following, controls),
             *(self.ends, problem.asked, problem.yields, problem.pulls, problem.springs),
-            *(self.thresholds, np.zeros_like(self.thresholds)),
-            *(self._scratch, self.null_space_error, self.acceleration, self.code),
+            *(self._thresholds, self._scratch, self.null_space_error, self.acceleration, self.code),
         )
         resolve = _resolve_at_once if self.alone else _resolve_levels
         return bind(resolve, LawStep._make(step))
@@ -221,8 +224,7 @@ class LawStep(NamedTuple):
     yields: Array
     pulls: Array
     springs: Flags
-    thresholds: Array
-    lends: Array
+    thresholds: Thresholds
     scratch: Scratch
     e_N: Array
     a: Array
@@ -237,11 +239,11 @@ def _resolve_at_once(step: LawStep) -> int:
     other: this is the same then.
     """
     task, field, metric, form, v = step.task, step.field, step.metric, step.form, step.v
-    (Q, X), rows = step.scratch.factors, step.scratch.rows
+    (Q, X), rows, B = step.scratch.factors, step.scratch.rows, step.scratch.wide
     J, L, e_N, a = task.jacobian, metric.L, step.e_N, step.a
     u = rows[6, : J.shape[1]]
-    largest = _write_thresholds(step)
-    damped = int(weighted_pseudo_inverse(J, L, form, largest, step.scratch.wide, Q, X))
+    whiten(J, L, form, B)
+    damped = int(bounded_inverse(B, _write_thresholds(step), Q, X))
     null_space_command(task, field, metric, form, Q, X, v, step.K_N, rows, e_N, u)
     if not step.controls:
         for i in range(u.shape[0]):
@@ -261,6 +263,7 @@ def _resolve_levels(step: LawStep) -> int:
     if task.jacobian.shape[0] <= task.jacobian.shape[1]:
         damped = _resolve_at_once(step)
     else:
+        whiten(task.jacobian, step.metric.L, step.form, scratch.wide)
         _write_thresholds(step)
     if damped > 0:
         levels = LevelScratch(
@@ -268,7 +271,7 @@ def _resolve_levels(step: LawStep) -> int:
         )
         damped = resolve_levels(
             task, step.field, step.metric, step.form, step.v, step.K_N, step.threshold,
-            step.following, step.asked, step.springs, step.thresholds, step.lends,
+            step.following, step.asked, step.yields, step.springs, step.thresholds,
             step.controls, step.ends, levels, step.e_N, step.a,
         )  # fmt: skip
         if not _all_finite(step.a):
@@ -279,11 +282,12 @@ def _resolve_levels(step: LawStep) -> int:
 
 @kernel
 def _write_thresholds(step: LawStep) -> float:
-    """Write ε of each level, and return the largest."""
+    """See `write_thresholds`: J is whitened before."""
     turning = turning_threshold(step.field.g, step.v, step.following)
     return write_thresholds(
-        step.asked, step.yields, step.pulls, step.springs, step.ends, step.threshold,
-        turning, step.following, step.thresholds, step.lends,
+        step.task.jacobian, step.scratch.wide, step.asked, step.yields, step.pulls,
+        step.springs, step.ends, step.threshold, turning, step.following,
+        step.thresholds,
     )  # fmt: skip
 
 

@@ -46,9 +46,9 @@ WHOLE, TURNS = 3, 0.8
 """Components of an error to which all of L belongs, one of m < 3 gets L/(4 - m); and by
 how much L is less for an orientation, whose error of 1 rad asks for thrice as much as
 the largest of a position."""
-BELOW = 4.0
-"""L times the robot's size below a held level [1/s²]. Its feedback then accelerates a
-joint by at most 2 L s, 1/50 of the spring of the level above."""
+BELOW = 50.0
+"""By how much L is less below a held level: its feedback then accelerates a joint by at
+most 1/50 of the spring of the level above."""
 MODEST, MODEST_ON_LEGS = 1.0, 10.0
 """f_0 over the robot's size [1/s²]: what a position 1 % of the size away asks for at
 10 rad/s; and with a floating base, whose feet ask for more where they land."""
@@ -61,23 +61,15 @@ quarter, and nothing for more than 7 rad/s: no field costs the task all that it 
 SPRING = 0.4
 """ε, over the robot's size, from which a level lends its directions whose springs pull
 with all their force: that of a feedback with its largest error."""
-KEPT = 0.25
-"""A level of springs keeps its own force down to this part of that ε."""
-WEAKEST = 0.02
-"""Springs that pull with less than this part of their force hold as those with it."""
-HALF = 5.0
-"""How many times f_0 a level asks for beyond it where it is held by half."""
 
 
 class Following(NamedTuple):
-    """How the threshold follows what is asked for."""
+    """How the thresholds follow what is asked for."""
 
+    size: float  # the robot's [m]; 0: they do not
     # L [rad/s² for each unit of a singular value]; inf: it does not follow
     steepest: float
     modest: float  # f_0 [m/s² or rad/s²]
-    below: float  # L of a level below a held one
-    turning: float  # ε for each rad/s of a field, where an arm is held [s]
-    spring: float  # ε from which springs lend what they pull at with all their force
 
     @classmethod
     def of(cls, size: float, *, on_legs: bool) -> Self:
@@ -85,12 +77,25 @@ class Following(NamedTuple):
         if size == 0.0:
             return cls(*NOT)
         modest = MODEST_ON_LEGS if on_legs else MODEST
-        below, turning, spring = BELOW / size, size / TURNING, SPRING * size
-        return cls(STIFFNESS / size, size * modest, below, turning, spring)
+        return cls(size, STIFFNESS / size, size * modest)
 
 
-NOT = Following(np.inf, 0.0, np.inf, 0.0, 0.0)
-"""The threshold does not follow."""
+NOT = Following(0.0, np.inf, 0.0)
+"""The thresholds do not follow."""
+
+
+class Thresholds(NamedTuple):
+    """Where the inverses of the levels begin to be bounded, each of shape (levels,)."""
+
+    own: Array  # ε of each level
+    follows: Array  # the part of it that follows f
+    lends: Array  # ε from which springs lend their directions to those below; 0: never
+    scales: Array  # ‖J L⁻ᵀ‖/‖J‖, what ε is measured in: 1 where W = I
+
+    @classmethod
+    def allocate(cls, levels: int) -> Self:
+        """Return those of a number of levels."""
+        return cls(*np.zeros((4, levels)))
 
 
 @kernel
@@ -103,11 +108,13 @@ def turning_threshold(g: Array, v: Array, following: Following) -> float:
         following: What they count.
     """
     quickest = max(np.sqrt(squared_norm(g)), QUARTER * np.sqrt(squared_norm(v)))
-    return float(following.turning * min(quickest, QUICKEST))
+    return float(following.size / TURNING * min(quickest, QUICKEST))
 
 
 @kernel
 def write_thresholds(
+    J: Array,
+    B: Array,
     asked: Array,
     yields: Array,
     pulls: Array,
@@ -116,12 +123,13 @@ def write_thresholds(
     least: float,
     turning: float,
     following: Following,
-    thresholds: Array,
-    lends: Array,
+    thresholds: Thresholds,
 ) -> float:
-    """Write ε of each level, and return the largest.
+    """Write the threshold of each level.
 
     Args:
+        J: The levels' Jacobians, one below the other, shape (m, nv).
+        B: J L⁻ᵀ, shape (m, nv).
         asked: f, what the feedback asks for at rest, level after level, shape (m,).
         yields: By how much L is less for a row, shape (m,); 0: it does not count.
         pulls: With how much of its largest force a spring pulls, shape (m,).
@@ -131,49 +139,69 @@ def write_thresholds(
         turning: See `turning_threshold`; for levels that ask for f_0, or springs that
             pull with all their force, and for others as much as they do of it.
         following: L and f_0.
-        thresholds: ε of each level, shape (levels,).
-        lends: ε from which a level of springs lends its directions to those below,
-            shape (levels,); 0: it does not.
+        thresholds: Where they are written.
+
+    Returns:
+        A singular value of the stack from which on no level is bounded.
     """
     largest, start, several = least, 0, ends.shape[0] > 1
+    above = 0.0  # the largest scale of those above
     for level in range(ends.shape[0]):
-        square = more = pull = 0.0
-        sprung = several
+        square = more = pull = whitened = plain = 0.0
+        sprung, tracks = several, False
         for k in range(start, ends[level]):
             sprung = sprung and springs[k]
             pull += pulls[k] * pulls[k]
+            whitened += squared_norm(B[k])
+            plain += squared_norm(J[k])
             if yields[k] > 0.0:
+                tracks = True
                 square += asked[k] * asked[k]
                 more += (yields[k] - 1.0) * asked[k] * asked[k]
+        scale = np.sqrt(whitened / plain) if plain > 0.0 else 1.0
         norm, share = np.sqrt(square), np.sqrt(pull)
         if following.modest > 0.0:
             share = max(share, norm / following.modest)
         beyond = max(norm - following.modest, 0.0)
         if beyond > 0.0:
             beyond *= 1.0 + more / square
-        follows = np.sqrt(beyond / following.steepest)
-        turns = min(share, 1.0) * turning
-        lends[level] = following.spring * np.sqrt(min(share, 1.0)) if sprung else 0.0
-        thresholds[level] = max(least, follows, turns, KEPT * lends[level])
-        largest = max(largest, thresholds[level], lends[level])
+        part = min(share, 1.0)
+        follows = scale * np.sqrt(beyond / following.steepest)
+        lends = scale * SPRING * following.size * np.sqrt(part) if sprung else 0.0
+        own = max(least, follows, scale * part * turning)
+        # s and s_1 are not below that of the stack: so ε² ≤ s² in `threshold_below`.
+        turns = (follows * follows * following.size * above) ** (1.0 / 3.0)
+        largest = max(largest, own, lends, turns)
+        thresholds.own[level], thresholds.follows[level] = own, follows
+        thresholds.lends[level], thresholds.scales[level] = lends, scale
+        above = max(above, scale) if sprung or tracks else above
         start = ends[level]
     return float(largest)
 
 
 @kernel
-def threshold_below(asked: Array, held: float, following: Following) -> float:
-    """Return the ε that a level below a held one has at least.
+def threshold_below(
+    asked: Array,
+    held: float,
+    above: float,
+    level: int,
+    following: Following,
+    thresholds: Thresholds,
+) -> float:
+    """Return the ε that a level below others has at least.
 
     Args:
         asked: f - J a_f of the level, shape (m,).
         held: How much levels above are held, see `how_held` and `held_by_springs`.
+        above: Their least singular value s_1, in their scale; inf: nobody turns.
+        level: Which one.
         following: f_0 and L.
+        thresholds: Those of `write_thresholds`.
     """
-    square = 0.0
-    for k in range(asked.shape[0]):
-        square += asked[k] * asked[k]
-    beyond = max(np.sqrt(square) - following.modest, 0.0)
-    return float(np.sqrt(held * beyond / following.below))
+    beyond = max(np.sqrt(squared_norm(asked)) - following.modest, 0.0)
+    scale, follows = thresholds.scales[level], thresholds.follows[level]
+    square = scale * scale * held * BELOW * beyond / following.steepest
+    return float(np.sqrt(square + follows * follows * following.size / above))
 
 
 @kernel
@@ -192,22 +220,16 @@ def how_held(lacking: float, wanted: float, following: Following) -> float:
     if beyond <= 0.0:
         return 0.0
     got = (1.0 - min(np.sqrt(lacking / wanted), 1.0)) ** 5
-    half, square = HALF * following.modest, beyond * beyond
-    return float((1.0 - got) * square / (square + half * half))
+    return float((1.0 - got) * beyond / (beyond + following.modest))
 
 
 @kernel
-def held_by_springs(smallest: float, lends: float, following: Following) -> float:
-    """Return how much a level of springs is held, 1 or more at its very edge.
-
-    The weaker they pull, the more they count: what is below must be weaker still.
+def held_by_springs(smallest: float, lends: float) -> float:
+    """Return how much a level of springs is held, 1 at its very edge.
 
     Args:
         smallest: The smallest x = s².
         lends: From which s the level lends its directions.
-        following: That of springs with all their force.
     """
-    x, square = following.spring * following.spring, lends * lends
-    if smallest >= square:
-        return 0.0
-    return float((1.0 - (smallest / square) ** 3) * x / max(square, WEAKEST * x))
+    square = lends * lends
+    return float(1.0 - (smallest / square) ** 3) if smallest < square else 0.0
