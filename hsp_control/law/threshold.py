@@ -219,8 +219,8 @@ def how_held(lacking: float, wanted: float, following: Following) -> float:
     beyond = np.sqrt(wanted) - following.modest
     if beyond <= 0.0:
         return 0.0
-    got = (1.0 - min(np.sqrt(lacking / wanted), 1.0)) ** 5
-    return float((1.0 - got) * beyond / (beyond + following.modest))
+    lacks = min(np.sqrt(lacking / wanted), 1.0)
+    return float(lacks * beyond / (beyond + following.modest))
 
 
 @kernel
