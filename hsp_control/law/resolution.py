@@ -167,7 +167,8 @@ class Resolution:
             *(problem.task, problem.field, problem.metric, self.form),
             *(v, problem.gain, self.threshold, self._following, controls),
             *(self.ends, problem.asked, problem.yields, problem.pulls, problem.springs),
-            *(self._thresholds, self._scratch, self.null_space_error, self.acceleration, self.code),
+            *(self._thresholds, self._scratch),
+            *(self.null_space_error, self.acceleration, self.code),
         )
         resolve = _resolve_at_once if self.alone else _resolve_levels
         return bind(resolve, LawStep._make(step))

@@ -169,9 +169,11 @@ def write_thresholds(
         follows = scale * np.sqrt(beyond / following.steepest)
         lends = scale * SPRING * following.size * np.sqrt(part) if sprung else 0.0
         own = max(least, follows, scale * part * turning)
-        # s and s_1 are not below that of the stack: so ε² ≤ s² in `threshold_below`.
-        turns = (follows * follows * following.size * above) ** (1.0 / 3.0)
-        largest = max(largest, own, lends, turns)
+        largest = max(largest, own, lends)
+        if above > 0.0:
+            # No s is below that of the stack: `threshold_below` is not above it then.
+            turns = np.cbrt(follows * follows * following.size * above)
+            largest = max(largest, turns)
         thresholds.own[level], thresholds.follows[level] = own, follows
         thresholds.lends[level], thresholds.scales[level] = lends, scale
         above = max(above, scale) if sprung or tracks else above
@@ -232,4 +234,4 @@ def held_by_springs(smallest: float, lends: float) -> float:
         lends: From which s the level lends its directions.
     """
     square = lends * lends
-    return float(1.0 - (smallest / square) ** 3) if smallest < square else 0.0
+    return float(1.0 - smallest / square) if smallest < square else 0.0

@@ -1,6 +1,6 @@
 """The threshold follows the feedback: the law is not steep where tasks are lost."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -20,14 +20,15 @@ from hsp_control import (
 )
 from hsp_control.common.arrays import Array
 from hsp_control.law.threshold import (
-    KEPT,
+    BELOW,
     MODEST,
     NOT,
     QUICKEST,
+    SPRING,
     STIFFNESS,
     TURNING,
-    WEAKEST,
     Following,
+    Thresholds,
     held_by_springs,
     how_held,
     threshold_below,
@@ -36,39 +37,62 @@ from hsp_control.law.threshold import (
 from hsp_control.null_space.fields import Rest
 
 seeds = st.integers(0, 2**32 - 1)
+LEAST = 0.03
 STEP = 1e-6  # of differences; the law bends within ε of 0.03 or more
 
 
-@given(seeds, st.floats(-3.0, 6.0))
+def written(
+    asked: Array,
+    ends: list[int],
+    following: Following,
+    *,
+    yields: float = 1.0,
+    pulls: float | Array = 0.0,
+    whitened: float | Array = 1.0,
+    turning: float = 0.0,
+) -> tuple[float, Thresholds]:
+    """Return the thresholds of springs, where they pull, or of other levels."""
+    m, thresholds = len(asked), Thresholds.allocate(len(ends))
+    J, pulling = np.ones((m, 7)), np.broadcast_to(pulls, m)
+    springs = np.full(m, bool(pulling.any()))
+    counts = np.full(m, yields)
+    largest = write_thresholds(
+        J, J * whitened, asked, counts, np.array(pulling), springs, np.array(ends),
+        LEAST, turning, following, thresholds,
+    )  # fmt: skip
+    return largest, thresholds
+
+
+@given(seeds, st.floats(-3.0, 6.0), st.floats(0.1, 10.0))
 def test_it_bounds_what_the_feedback_asks_for_over_its_square(
-    seed: int, size: float
+    seed: int, size: float, scale: float
 ) -> None:
-    """‖f‖/ε² ≤ L + f_0/ε_0² for each level, and ε = ε_0 for all that is modest."""
-    rng, L, least = np.random.default_rng(seed), 150.0, 0.03
-    everywhere, nowhere = np.ones(9), np.zeros(9)
-    modest, rigid, lends = 1.3, np.zeros(9, dtype=bool), np.ones(4)
-    sizes = [3, 0, 2, 4]
-    ends, thresholds = np.cumsum(sizes), np.zeros(4)
-    asked = 10.0**size * rng.standard_normal(9)
-    following = Following(L, modest, L / 50.0, 0.0, 0.4)
-    none, rest = (nowhere, rigid), (ends, least, 0.0, following)
-    largest = write_thresholds(asked, everywhere, *none, *rest, thresholds, lends)
-    assert (lends[sizes != np.zeros(4)] == 0.0).all()
-    assert largest == thresholds.max()
-    for f, epsilon in zip(np.split(asked, ends[:-1]), thresholds, strict=True):
+    """‖f‖/ε² ≤ L + f_0/ε_0² for each level, and ε = ε_0 for all that is modest.
+
+    In a metric that makes J L⁻ᵀ longer than J the same holds for ε in its scale.
+    """
+    asked = 10.0**size * np.random.default_rng(seed).standard_normal(9)
+    following = Following(0.8, 150.0, 1.3)
+    ends = [3, 3, 5, 9]
+    largest, (own, _, lends, scales) = written(asked, ends, following)
+    _, scaled = written(asked, ends, following, whitened=scale)
+    assert (lends == 0.0).all()
+    assert largest >= own.max()
+    assert (scales == 1.0).all()
+    assert written(asked[:3], [3], following)[0] == own[0]
+    for f, epsilon in zip(np.split(asked, ends[:-1]), own, strict=True):
         norm = np.linalg.norm(f)
-        assert norm <= (L + modest / least**2) * epsilon**2 * (1.0 + 1e-12)
-        assert epsilon >= least
-        if norm <= modest + 0.99 * L * least**2:
-            assert epsilon == least
-    few = np.zeros(4)  # errors of one component: a third of L
-    write_thresholds(asked, 3.0 * everywhere, *none, *rest, few, lends)
-    exact = thresholds > least
-    np.testing.assert_allclose(few[exact] ** 2, 3.0 * thresholds[exact] ** 2)
-    for counts, kind in ((everywhere, NOT), (nowhere, following)):
-        rest = ends, least, 0.0, kind
-        write_thresholds(asked, counts, *none, *rest, thresholds, lends)
-        assert (thresholds == least).all()
+        assert norm <= (150.0 + 1.3 / LEAST**2) * epsilon**2 * (1.0 + 1e-12)
+        assert epsilon >= LEAST
+        if norm <= 1.3 + 0.99 * 150.0 * LEAST**2:
+            assert epsilon == LEAST
+    few = written(asked, ends, following, yields=3.0)[1].own  # a third of L
+    exact = own > LEAST
+    np.testing.assert_allclose(few[exact] ** 2, 3.0 * own[exact] ** 2)
+    exact &= scaled.own > LEAST
+    np.testing.assert_allclose(scaled.own[exact], scale * own[exact])
+    for counts, kind in ((1.0, NOT), (0.0, following)):
+        assert (written(asked, ends, kind, yields=counts)[1].own == LEAST).all()
 
 
 @given(seeds, st.floats(0.0, 1.0))
@@ -76,41 +100,51 @@ def test_a_level_below_a_held_one_asks_for_less_than_draws_that_one(
     seed: int, lacks: float
 ) -> None:
     """It gets 2 s ‖f‖/ε² at most along s; held for good, that is 2 L s/50."""
-    rng, modest = np.random.default_rng(seed), 1.3
-    following = Following(150.0, modest, 3.0, 0.0, 0.4)
+    rng, following = np.random.default_rng(seed), Following(0.8, 150.0, 1.3)
     asked, above = 10.0 ** rng.uniform(-1.0, 4.0, (2, 1)) * unit(rng, 3)
     square = above @ above
     held = how_held(lacks**2 * square, square, following)
     assert 0.0 <= held <= 1.0
-    assert held == 0.0 or (lacks > 0.0 and square > modest**2)
-    below = threshold_below(asked, held, following)
-    beyond = max(np.linalg.norm(asked) - modest, 0.0)
-    assert below**2 == pytest.approx(held * beyond / 3.0)
+    assert held == 0.0 or (lacks > 0.0 and square > 1.3**2)
+    _, thresholds = written(np.zeros(6), [3, 6], following)
+    below = threshold_below(asked, held, np.inf, 1, following, thresholds)
+    beyond = max(np.linalg.norm(asked) - 1.3, 0.0)
+    assert below**2 == pytest.approx(held * beyond * BELOW / 150.0)
 
 
-@given(seeds, st.floats(0.0, 2.0), st.floats(0.0, 1.0))
-def test_springs_hold_what_is_below_them_weaker_than_they_are(
-    seed: int, pull: float, s: float
+@given(seeds, st.floats(-1.0, 3.0), st.floats(0.0, 1.0))
+def test_a_level_below_follows_as_slowly_as_those_above_turn(
+    seed: int, size: float, log_s: float
 ) -> None:
-    """They lend their directions as far as they pull; alone they lend nothing."""
-    rng, least, above = np.random.default_rng(seed), 0.03, 0.4
-    following, rows = Following(150.0, 1.3, 3.0, 0.02, above), np.ones(6, dtype=bool)
-    pulls, lends, thresholds = np.zeros(6), np.zeros(2), np.zeros(2)
+    """ε² = f size/(L s_1); and it is below s where all are resolved at once."""
+    rng, following = np.random.default_rng(seed), Following(0.8, 150.0, 1.3)
+    asked = 10.0**size * rng.standard_normal(6)
+    scales = 10.0 ** rng.uniform(-1.0, 1.0, (6, 1))
+    largest, thresholds = written(asked, [3, 6], following, whitened=scales)
+    s = largest * 10.0 ** (log_s * rng.random(2))  # of both levels
+    above = s[0] / thresholds.scales[0]
+    below = threshold_below(np.zeros(3), 0.0, above, 1, following, thresholds)
+    assert below**2 == pytest.approx(thresholds.follows[1] ** 2 * 0.8 / above)
+    assert below <= s[1] * (1.0 + 1e-12)
+
+
+@given(seeds, st.floats(0.01, 2.0), st.floats(0.0, 1.0))
+def test_springs_lend_as_far_as_they_pull(seed: int, pull: float, s: float) -> None:
+    """Alone they lend nothing; where s is less than what they lend they are held."""
+    rng, following = np.random.default_rng(seed), Following(0.8, 150.0, 1.3)
+    pulls = np.zeros(6)
     pulls[:3] = pull * unit(rng, 3)
-    given = rng.standard_normal(6), np.zeros(6), pulls, rows
-    rest = least, 0.05, following, thresholds, lends
-    largest = write_thresholds(*given, np.array([3, 6]), *rest)
+    springs: dict[str, Any] = {"yields": 0.0, "pulls": pulls, "turning": 0.05}
+    f = rng.standard_normal(6)
+    largest, (own, _, lends, _) = written(f, [3, 6], following, **springs)
     share = min(pull, 1.0)
-    np.testing.assert_allclose(lends, [above * np.sqrt(share), 0.0], atol=1e-12)
-    assert largest == max(*thresholds, *lends)
-    kept = max(least, KEPT * lends[0], 0.05 * share)
-    assert thresholds[0] == pytest.approx(kept)
-    held = held_by_springs(s * s, lends[0], following)
-    weaker = 1.0 / max(share, WEAKEST)
-    assert 0.0 <= held <= weaker * max(1.0 - (s / above) ** 6, 0.0) + 1e-12
-    write_thresholds(*given, np.array([6]), *rest)
-    assert lends[0] == 0.0
-    assert thresholds[0] == pytest.approx(max(least, 0.05 * share))
+    most = SPRING * 0.8 * np.sqrt(share)
+    np.testing.assert_allclose(lends, [most, 0.0], atol=1e-12)
+    assert largest == max(*own, *lends)
+    assert own[0] == pytest.approx(max(LEAST, 0.05 * share))
+    held = held_by_springs(s * s, lends[0])
+    assert held == pytest.approx(max(1.0 - (s / most) ** 2, 0.0))
+    assert written(f, [6], following, **springs)[1].lends[0] == 0.0
 
 
 class Slopes(NamedTuple):
