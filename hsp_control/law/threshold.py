@@ -16,15 +16,21 @@ to a quarter of the robot's size. Where only a height counts, or x and y, it is 
 the whole size, and the spring moves the whole arm. So an error of one component gets a
 third of L, one of two components half.
 
+Below a level of the singular value s_1 the null space turns by up to |∂J/∂q|/s_1, and
+what a level there asks for with it: it follows with L s_1/size where that is less.
+
 A level that is held at its edge leaves to those below the very directions in which it
 is drawn there: along them its spring must outweigh what they ask for. They ask for
 f - J a_f, with a_f what those above draw at rest: a task that is met undoes it. So a
-level below follows that with an L that is a fiftieth: it is as steep as it is strong,
-and the less the level above gets of what it asks for, the less it gets there.
+level below follows that with an L that is a fiftieth, as far as the one above lacks
+what it asks for.
 
 A level of springs asks for as little at its edge as it can have: that fades with its
-mobility. But the directions in which it pulls in vain turn as 1/s, and all below with
-them. So it lends them to that, as far as it pulls, from four times its own ε on.
+mobility, and the directions in which it pulls in vain turn as 1/s. So it lends them to
+what is below, as far as it pulls.
+
+All but ε_0 is meant for the identity as metric. Another one makes J L⁻ᵀ longer than J,
+or shorter, and ε with it.
 
 The null space turns by at most 1.09 |∂J/∂q|/ε: where an arm is held ε grows with g.
 """
