@@ -1,7 +1,7 @@
 """Compile what the bundled configurations use, for a wheel: ``make wheel``.
 
 Writes ``machine_code/`` beside the package, for a processor that all of the last ten
-years contain. ``hsp_control/common/kernel_cache.py`` says where it is used.
+years contain. ``hsp_control/compiled/kernel_cache.py`` says where it is used.
 """
 
 import os
@@ -11,8 +11,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from hsp_control.common.kernel_cache import shipped_processor
 from hsp_control.common.resources import bundled_configs
+from hsp_control.compiled.kernel_cache import shipped_processor
 
 FOLDER = Path(__file__).resolve().parents[1] / "machine_code"
 

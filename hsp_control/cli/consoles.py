@@ -14,7 +14,7 @@ from rich.errors import LiveError
 from rich.markup import escape
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-from hsp_control.common import kernels
+from hsp_control.compiled import kernels
 from hsp_control.control.first_state import StartWarning
 
 _LONGEST = 1500

@@ -13,9 +13,9 @@ from typing import Literal, NamedTuple
 from packaging.requirements import Requirement
 
 from hsp_control.cli.consoles import out
-from hsp_control.common import kernel_cache
 from hsp_control.common.entry_points import entry_points
 from hsp_control.common.version import __version__
+from hsp_control.compiled import kernel_cache
 
 _PACKAGE = "hsp_control"
 _SHOWN = ("pin", "numpy", "scipy", "numba", "pydantic", "meshcat")
@@ -99,7 +99,7 @@ def _cache() -> Check:
 
 def _dynamics() -> Check:
     """Look whether Pinocchio is called without its Python bindings."""
-    from hsp_control.robot.pinocchio_calls import unknown
+    from hsp_control.compiled.pinocchio_calls import unknown
 
     if reason := unknown():
         found = "called through its Python bindings: a step takes a fifth longer"

@@ -1,1 +1,1 @@
-"""What all rooms use: array types, errors, linear algebra and compiled kernels."""
+"""What all rooms use: array types, errors, entry points and resources."""

@@ -8,8 +8,8 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import NonFiniteError
-from hsp_control.common.kernels import KernelCall
-from hsp_control.common.native import planned, steps
+from hsp_control.compiled.kernels import KernelCall
+from hsp_control.compiled.native import planned, steps
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.contacts.contact import UnactuatedRows, unactuated_count
 from hsp_control.control.actuation.support import Support

@@ -21,8 +21,8 @@ import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.identity_cache import IdentityCache
-from hsp_control.common.kernels import KernelCalls, kernel
-from hsp_control.common.rotations import cross, rotate, rotate_back
+from hsp_control.compiled.kernels import KernelCalls, kernel
+from hsp_control.compiled.rotations import cross, rotate, rotate_back
 from hsp_control.geometry.links import LinkShape
 from hsp_control.geometry.scene import Obstacle
 from hsp_control.geometry.shapes import Box, Capsule, Cylinder, HalfSpace, Shape, Sphere

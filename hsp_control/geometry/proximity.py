@@ -8,7 +8,7 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import FieldError
-from hsp_control.common.kernels import kernel
+from hsp_control.compiled.kernels import kernel
 from hsp_control.geometry.closed_form import ClosedFormDistances, has_closed_form
 from hsp_control.geometry.links import LinkShape
 from hsp_control.geometry.scene import Obstacle

@@ -7,7 +7,7 @@ own origin (box, cylinder, half-space), with gradient n and Hessian H.
 from math import sqrt
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.kernels import kernel
+from hsp_control.compiled.kernels import kernel
 
 SEGMENT, BOX, CYLINDER, HALF_SPACE = 0, 1, 2, 3
 """Kinds of shapes; a sphere is a segment of length zero."""

@@ -22,8 +22,8 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array, Flags, Indices
-from hsp_control.common.kernels import kernel
-from hsp_control.common.linalg import (
+from hsp_control.compiled.kernels import kernel
+from hsp_control.compiled.linalg import (
     multiply,
     multiply_transposed,
     orthogonalise_rows,

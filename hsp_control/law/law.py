@@ -11,8 +11,8 @@ has the proof for every metric.
 """
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.kernels import kernel
-from hsp_control.common.linalg import multiply, multiply_transposed
+from hsp_control.compiled.kernels import kernel
+from hsp_control.compiled.linalg import multiply, multiply_transposed
 from hsp_control.law.pseudo_inverse import (
     apply_pseudo_inverse,
     apply_pseudo_inverse_transpose,

@@ -6,8 +6,8 @@ multiplies by one after the other: J# = L⁻ᵀ Qᵀ X.
 """
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.kernels import kernel
-from hsp_control.common.linalg import (
+from hsp_control.compiled.kernels import kernel
+from hsp_control.compiled.linalg import (
     bounded_inverse,
     multiply,
     multiply_transposed,

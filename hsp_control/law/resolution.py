@@ -8,15 +8,15 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array, Flags, Indices
-from hsp_control.common.kernels import kernel
-from hsp_control.common.linalg import (
+from hsp_control.compiled.kernels import kernel
+from hsp_control.compiled.linalg import (
     bounded_inverse,
     norm,
     orthogonalise_rows,
     squared_norm,
     triangularise_rows,
 )
-from hsp_control.common.native import bind
+from hsp_control.compiled.native import bind
 from hsp_control.law.hierarchy import LevelScratch, resolve_levels
 from hsp_control.law.law import acceleration, null_space_command
 from hsp_control.law.problem import Problem

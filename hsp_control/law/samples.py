@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.kernels import kernel
-from hsp_control.common.linalg import solve_lower, solve_lower_transposed
+from hsp_control.compiled.kernels import kernel
+from hsp_control.compiled.linalg import solve_lower, solve_lower_transposed
 
 IDENTITY, CONSTANT, VARYING = 0, 1, 2
 """Form of a metric: W = I (no solves); W' = 0 (solves); any W (solves, terms in W')."""

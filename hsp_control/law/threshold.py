@@ -40,8 +40,8 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from hsp_control.common.arrays import Array, Flags, Indices
-from hsp_control.common.kernels import kernel
-from hsp_control.common.linalg import squared_norm
+from hsp_control.compiled.kernels import kernel
+from hsp_control.compiled.linalg import squared_norm
 
 STIFFNESS = 200.0
 """L times the robot's size [1/s²]. A stretched elbow is then drawn to its singular

@@ -14,8 +14,8 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array
 from hsp_control.common.entry_points import own_names
 from hsp_control.common.exceptions import HspControlError, SimulationError
-from hsp_control.common.kernels import kernel
-from hsp_control.common.native import NativeCall, are_native, bind, in_order
+from hsp_control.compiled.kernels import kernel
+from hsp_control.compiled.native import NativeCall, are_native, bind, in_order
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Positive
 from hsp_control.robot.motion import Acceleration, number_of_steps

@@ -9,9 +9,9 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array, Indices, kept_view, matrix_view
 from hsp_control.common.exceptions import ModelError
-from hsp_control.common.kernels import kernel
-from hsp_control.common.native import bind, once
-from hsp_control.robot.pinocchio_calls import bind_pinocchio
+from hsp_control.compiled.kernels import kernel
+from hsp_control.compiled.native import bind, once
+from hsp_control.compiled.pinocchio_calls import bind_pinocchio
 
 
 class FrameMotion(NamedTuple):

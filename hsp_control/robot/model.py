@@ -19,9 +19,9 @@ from hsp_control.common.exceptions import (
     SimulationError,
 )
 from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.compiled.pinocchio_calls import bind_pinocchio
 from hsp_control.robot.description.loading import moving_joints
 from hsp_control.robot.motion import Acceleration
-from hsp_control.robot.pinocchio_calls import bind_pinocchio
 
 _ARM_RATE, _LEG_RATE = 11.0, 500.0
 """Maximum rate of an effort in maximum efforts [1/s]: with a fixed base, and of a robot

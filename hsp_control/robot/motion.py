@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.kernels import kernel
+from hsp_control.compiled.kernels import kernel
 
 REFUSED = -1.0
 """What a move returns if it was refused; kernels' results are not negative."""

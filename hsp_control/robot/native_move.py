@@ -6,10 +6,10 @@ from typing import Self
 
 from numba import types
 
-from hsp_control.common.adapters import entry_point, run
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.kernels import kernel
-from hsp_control.common.native import NativeCall, rows_of
+from hsp_control.compiled.adapters import entry_point, run
+from hsp_control.compiled.kernels import kernel
+from hsp_control.compiled.native import NativeCall, rows_of
 from hsp_control.robot.motion import REFUSED, copy_valid, number_of_steps
 
 

@@ -23,8 +23,9 @@ from hsp_control.common.exceptions import (
     NonFiniteError,
     ShapeError,
 )
-from hsp_control.common.kernels import KernelCalls
-from hsp_control.common.native import NativeCall, StepPlan, once, planned
+from hsp_control.compiled.kernels import KernelCalls
+from hsp_control.compiled.native import NativeCall, StepPlan, once, planned
+from hsp_control.compiled.pinocchio_calls import bind_pinocchio
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Vector
 from hsp_control.robot.description.access import ANYWHERE, Access
@@ -48,7 +49,6 @@ from hsp_control.robot.kinematics import (
 )
 from hsp_control.robot.model import RobotModel
 from hsp_control.robot.motion import REFUSED, copy_valid
-from hsp_control.robot.pinocchio_calls import bind_pinocchio
 
 Made = TypeVar("Made")
 

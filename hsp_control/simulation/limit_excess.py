@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.kernels import KernelCalls, kernel
+from hsp_control.compiled.kernels import KernelCalls, kernel
 from hsp_control.constraints.limits import RobotLimits
 from hsp_control.control.measurement import LogChannel
 from hsp_control.robot import Robot

@@ -7,7 +7,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
-from hsp_control.common.kernels import kernel
+from hsp_control.compiled.kernels import kernel
 from hsp_control.control.compensation import Command
 from hsp_control.control.controller import Controller
 from hsp_control.control.measurement import LogChannel, Measurement

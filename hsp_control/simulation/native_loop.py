@@ -10,10 +10,10 @@ from functools import partial
 
 import numpy as np
 
-from hsp_control.common.adapters import run
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.kernels import kernel
-from hsp_control.common.native import NativeCall, rows_of
+from hsp_control.compiled.adapters import run
+from hsp_control.compiled.kernels import kernel
+from hsp_control.compiled.native import NativeCall, rows_of
 from hsp_control.control.controller import Controller
 from hsp_control.control.mixture import FreeStep, is_free
 from hsp_control.robot.integrators import Steps

@@ -6,7 +6,7 @@ from typing import ClassVar, Literal, Self
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.kernels import KernelCall
+from hsp_control.compiled.kernels import KernelCall
 from hsp_control.declaration.quantities import Axes, Positive
 from hsp_control.geometry.start import Start
 from hsp_control.law import TaskSample

@@ -7,7 +7,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import GainError
-from hsp_control.common.kernels import KernelCalls
+from hsp_control.compiled.kernels import KernelCalls
 from hsp_control.declaration import within
 from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState

@@ -8,7 +8,7 @@ from pydantic import AfterValidator, BeforeValidator
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HspControlError, TaskError
-from hsp_control.common.kernels import kernel
+from hsp_control.compiled.kernels import kernel
 from hsp_control.declaration.quantities import Positive, plain
 from hsp_control.law.threshold import TURNS, WHOLE
 from hsp_control.robot import Robot

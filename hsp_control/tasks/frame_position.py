@@ -4,7 +4,7 @@ from dataclasses import KW_ONLY
 from typing import Any, ClassVar
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.kernels import KernelCall
+from hsp_control.compiled.kernels import KernelCall
 from hsp_control.declaration.quantities import Axes
 from hsp_control.robot import RobotState
 from hsp_control.robot.kinematics import FrameKinematics

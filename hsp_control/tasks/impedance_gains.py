@@ -24,8 +24,8 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.kernels import kernel
-from hsp_control.common.linalg import (
+from hsp_control.compiled.kernels import kernel
+from hsp_control.compiled.linalg import (
     bounded_inverse,
     cholesky,
     gram,
@@ -34,7 +34,7 @@ from hsp_control.common.linalg import (
     solve_rows_transposed,
     squared_norm,
 )
-from hsp_control.common.rotations import compose, jexp3_dot, jlog3
+from hsp_control.compiled.rotations import compose, jexp3_dot, jlog3
 from hsp_control.law import TaskSample
 from hsp_control.tasks.feedback import Feedback
 from hsp_control.tasks.slipping import bounded_stiffness

@@ -8,7 +8,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import TaskError
-from hsp_control.common.kernels import KernelCall, kernel
+from hsp_control.compiled.kernels import KernelCall, kernel
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Names
 from hsp_control.geometry.start import Start

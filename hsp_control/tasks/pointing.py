@@ -10,8 +10,8 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TaskError
-from hsp_control.common.kernels import KernelCall, kernel
-from hsp_control.common.rotations import cross, rotate, rotate_back
+from hsp_control.compiled.kernels import KernelCall, kernel
+from hsp_control.compiled.rotations import cross, rotate, rotate_back
 from hsp_control.declaration.quantities import Vector3
 from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState

@@ -8,7 +8,7 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TaskError
-from hsp_control.common.kernels import KernelCall, KernelOutput, kernel
+from hsp_control.compiled.kernels import KernelCall, KernelOutput, kernel
 from hsp_control.declaration import within
 from hsp_control.geometry.start import Start
 from hsp_control.robot import Robot, RobotState

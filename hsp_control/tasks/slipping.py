@@ -16,8 +16,8 @@ number.
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.kernels import kernel
-from hsp_control.common.linalg import cholesky, solve_columns
+from hsp_control.compiled.kernels import kernel
+from hsp_control.compiled.linalg import cholesky, solve_columns
 
 _TOLERANCE = 1e-11  # of |s_g|, relative to F_g
 _STEPS = 40  # of Newton, and sweeps over the groups where K couples them

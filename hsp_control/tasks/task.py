@@ -9,7 +9,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import TaskError
-from hsp_control.common.kernels import (
+from hsp_control.compiled.kernels import (
     KernelCall,
     KernelCalls,
     says,

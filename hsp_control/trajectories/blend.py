@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.kernels import KernelCall, kernel
-from hsp_control.common.linalg import multiply
-from hsp_control.common.rotations import (
+from hsp_control.compiled.kernels import KernelCall, kernel
+from hsp_control.compiled.linalg import multiply
+from hsp_control.compiled.rotations import (
     compose_back,
     cross,
     jexp3,

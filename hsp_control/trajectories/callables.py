@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.rotations import compose_back, log3
+from hsp_control.compiled.rotations import compose_back, log3
 from hsp_control.declaration.quantities import Positive, PositiveCount
 from hsp_control.trajectories import checks
 from hsp_control.trajectories.orientation import (

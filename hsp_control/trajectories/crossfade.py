@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TrajectoryError
-from hsp_control.common.kernels import kernel
+from hsp_control.compiled.kernels import kernel
 from hsp_control.declaration.quantities import NonNegative, Number
 from hsp_control.trajectories.blend import BlendOrientation
 from hsp_control.trajectories.orientation import (

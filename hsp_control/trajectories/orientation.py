@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TrajectoryError
-from hsp_control.common.kernels import KernelCall, kernel
-from hsp_control.common.rotations import compose_back, log3, rotate, turn
+from hsp_control.compiled.kernels import KernelCall, kernel
+from hsp_control.compiled.rotations import compose_back, log3, rotate, turn
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Number, Vector, Vector3
 from hsp_control.declaration.rotation import Rotation, Rotations, matrix_of

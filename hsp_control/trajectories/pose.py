@@ -10,8 +10,8 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TrajectoryError
-from hsp_control.common.kernels import kernel
-from hsp_control.common.rotations import compose_back, jlog3, log3, stumpff, turn
+from hsp_control.compiled.kernels import kernel
+from hsp_control.compiled.rotations import compose_back, jlog3, log3, stumpff, turn
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Number, Positive, Vector3, numbers
 from hsp_control.declaration.rotation import Rotation, matrix_of

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field
 
 from hsp_control.common.exceptions import ScheduleError
-from hsp_control.common.kernels import kernel
+from hsp_control.compiled.kernels import kernel
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import NonNegative, Number, plain
 

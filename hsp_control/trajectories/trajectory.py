@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ShapeError, TrajectoryError
-from hsp_control.common.kernels import KernelCall, says
-from hsp_control.common.native import bind, one_call, stay, supplied
+from hsp_control.compiled.kernels import KernelCall, says
+from hsp_control.compiled.native import bind, one_call, stay, supplied
 from hsp_control.declaration import Part
 
 Follower = Callable[[float], object]

@@ -159,7 +159,7 @@ sys.argv[0] = "hsp"
 import hsp_control.cli
 
 def check(options):
-    from hsp_control.common import kernels
+    from hsp_control.compiled import kernels
     if kernels.PLAIN:
         raise ZeroDivisionError
     print("compiled")

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from hsp_control.common.exceptions import HardwareError
-from hsp_control.common.rotations import quaternion_from_rotation
 from hsp_control.common.suggestions import did_you_mean
 from hsp_control.companions.datagrams.targets import address_of
 from hsp_control.companions.shared import name_and_options, rate_of
+from hsp_control.compiled.rotations import quaternion_from_rotation
 from hsp_control.declaration.nested import parts_within
 from hsp_control.robot import RobotState
 from hsp_control.simulation.control_chain import EffortSource

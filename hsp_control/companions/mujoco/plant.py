@@ -10,7 +10,6 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import ModelError, SimulationError
-from hsp_control.common.kernels import kernel
 from hsp_control.companions.mujoco import scene
 from hsp_control.companions.mujoco.coordinates import MujocoCoordinates, joints_of
 from hsp_control.companions.mujoco.mjcf import (
@@ -20,6 +19,7 @@ from hsp_control.companions.mujoco.mjcf import (
     geoms_of,
     write_mjcf,
 )
+from hsp_control.compiled.kernels import kernel
 from hsp_control.control.measurement import LogChannel
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Flag, Positive

@@ -3,9 +3,9 @@
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.rotations import log3, turn
 from hsp_control.companions.walking.footsteps import Footstep
 from hsp_control.companions.walking.quintic import FootMotion, Quintic, at_rest, to_rest
+from hsp_control.compiled.rotations import log3, turn
 from hsp_control.trajectories.schedule import smooth_step
 
 APPROACH = 0.92

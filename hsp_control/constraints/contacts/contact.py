@@ -11,7 +11,7 @@ from pydantic import AfterValidator
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import ContactError, TrajectoryError
-from hsp_control.common.kernels import (
+from hsp_control.compiled.kernels import (
     KernelCall,
     KernelCalls,
     kernel,

@@ -9,8 +9,8 @@ from pydantic import AfterValidator
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ContactError
-from hsp_control.common.kernels import KernelCall, kernel
-from hsp_control.common.linalg import multiply_transposed
+from hsp_control.compiled.kernels import KernelCall, kernel
+from hsp_control.compiled.linalg import multiply_transposed
 from hsp_control.constraints.contacts.contact import (
     NORMAL,
     WRENCH,

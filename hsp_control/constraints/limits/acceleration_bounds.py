@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.kernels import kernel
+from hsp_control.compiled.kernels import kernel
 
 _STEEPER = 4.0
 """How much steeper the velocity barrier is beyond the guarded speed."""

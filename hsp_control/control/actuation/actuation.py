@@ -19,9 +19,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.kernels import kernel
-from hsp_control.common.linalg import copy
-from hsp_control.common.native import bind, in_order
+from hsp_control.compiled.kernels import kernel
+from hsp_control.compiled.linalg import copy
+from hsp_control.compiled.native import bind, in_order
 from hsp_control.constraints.limits.acceleration_bounds import (
     EFFORT,
     MOTION,

@@ -5,8 +5,8 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from hsp_control.common.arrays import Array, Flags, Indices
-from hsp_control.common.kernels import kernel
-from hsp_control.common.linalg import (
+from hsp_control.compiled.kernels import kernel
+from hsp_control.compiled.linalg import (
     add_rows,
     copy,
     multiply,

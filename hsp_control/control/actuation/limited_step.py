@@ -21,8 +21,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.kernels import kernel
-from hsp_control.common.native import bind, one_call, only_if
+from hsp_control.compiled.kernels import kernel
+from hsp_control.compiled.native import bind, one_call, only_if
 from hsp_control.constraints.limits.acceleration_bounds import Bounds
 from hsp_control.control.actuation.deviation_cost import (
     Directions,

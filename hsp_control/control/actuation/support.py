@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.kernels import kernel
-from hsp_control.common.linalg import (
+from hsp_control.compiled.kernels import kernel
+from hsp_control.compiled.linalg import (
     cholesky,
     multiply,
     multiply_transposed,
@@ -17,7 +17,7 @@ from hsp_control.common.linalg import (
     solve_lower,
     solve_lower_transposed,
 )
-from hsp_control.common.native import bind, in_order
+from hsp_control.compiled.native import bind, in_order
 from hsp_control.constraints.contacts import Contact, SlidingContact
 from hsp_control.constraints.contacts.contact import NORMAL, WRENCH, shares
 from hsp_control.control.evolution import PlannedContact

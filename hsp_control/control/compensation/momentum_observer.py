@@ -16,7 +16,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError
-from hsp_control.common.linalg import cholesky
+from hsp_control.compiled.linalg import cholesky
 from hsp_control.constraints.limits.joint_numbers import Positives, by_dof
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.compensation.stage import Run, Stage

@@ -8,7 +8,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
-from hsp_control.common.kernels import (
+from hsp_control.compiled.kernels import (
     KernelCall,
     KernelCalls,
     kernel,

@@ -12,7 +12,7 @@ from pydantic import AfterValidator, InstanceOf
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
-from hsp_control.common.kernels import KernelCall, KernelCalls, kernel, says
+from hsp_control.compiled.kernels import KernelCall, KernelCalls, kernel, says
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import NonNegative, OrInstance
 from hsp_control.geometry.start import Start

@@ -22,7 +22,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import FieldError
-from hsp_control.common.kernels import KernelCall, KernelCalls, kernel
+from hsp_control.compiled.kernels import KernelCall, KernelCalls, kernel
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Axes
 from hsp_control.geometry.start import Start

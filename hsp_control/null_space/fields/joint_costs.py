@@ -10,7 +10,7 @@ from pydantic import Field
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import FieldError
-from hsp_control.common.kernels import KernelCall, kernel
+from hsp_control.compiled.kernels import KernelCall, kernel
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Fraction, Names, Weights
 from hsp_control.geometry.start import Start

@@ -8,8 +8,8 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
-from hsp_control.common.kernels import KernelCall, kernel
-from hsp_control.common.linalg import (
+from hsp_control.compiled.kernels import KernelCall, kernel
+from hsp_control.compiled.linalg import (
     cholesky,
     gram,
     multiply,

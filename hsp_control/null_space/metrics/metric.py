@@ -11,14 +11,14 @@ from pydantic import Field
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import MetricError
-from hsp_control.common.kernels import (
+from hsp_control.compiled.kernels import (
     KernelCall,
     KernelCalls,
     kernel,
     says,
     with_outputs,
 )
-from hsp_control.common.linalg import cholesky
+from hsp_control.compiled.linalg import cholesky
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import (
     ArrayField,

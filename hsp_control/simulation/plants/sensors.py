@@ -12,7 +12,7 @@ from pydantic import AfterValidator
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
-from hsp_control.common.rotations import log3
+from hsp_control.compiled.rotations import log3
 from hsp_control.control.measurement import Inertial
 from hsp_control.declaration import within
 from hsp_control.declaration.by_type import ByType

@@ -14,9 +14,9 @@ from math import pi
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.kernels import kernel
-from hsp_control.common.linalg import multiply
-from hsp_control.common.rotations import (
+from hsp_control.compiled.kernels import kernel
+from hsp_control.compiled.linalg import multiply
+from hsp_control.compiled.rotations import (
     compose,
     compose_back,
     exp3,

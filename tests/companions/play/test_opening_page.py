@@ -11,7 +11,6 @@ import pytest
 
 import hsp_control as hsp
 from hsp_control.cli import main
-from hsp_control.common import adapters, kernels
 from hsp_control.common.exceptions import SimulationError, ViewerError
 from hsp_control.companions.play import steering
 from hsp_control.companions.play.live_loop import channel_pair
@@ -20,6 +19,7 @@ from hsp_control.companions.play.steering import PageProcess, SteeringPage
 from hsp_control.companions.viewer import SceneRecorder, Viewer, transport
 from hsp_control.companions.viewer.commands import unpack
 from hsp_control.companions.viewer.pages import OpeningPage, draw_before
+from hsp_control.compiled import adapters, kernels
 from hsp_control.config.document import read_document
 from hsp_control.config.loaded_scenario import load_scenario
 from hsp_control.live import OperatorRequests

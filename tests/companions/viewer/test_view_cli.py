@@ -12,8 +12,8 @@ from played import wait_until
 
 from hsp_control import Experiment, Rollout
 from hsp_control.cli import main
-from hsp_control.common import kernels
 from hsp_control.companions.viewer import transport
+from hsp_control.compiled import kernels
 from hsp_control.config.loaded_scenario import LoadedScenario
 
 pytestmark = pytest.mark.process

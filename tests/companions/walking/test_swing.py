@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from hsp_control.common.rotations import log3, turn
 from hsp_control.companions.walking import Walk
 from hsp_control.companions.walking.footsteps import (
     Footstep,
@@ -21,6 +20,7 @@ from hsp_control.companions.walking.step_adjustment import (
 )
 from hsp_control.companions.walking.step_planner import StepPlanner
 from hsp_control.companions.walking.swing import APPROACH, DESCENT, Swing
+from hsp_control.compiled.rotations import log3, turn
 
 H = 1e-5
 STANCE = Stance(width=0.17, narrowest=0.12, widest=0.4, longest=0.6)

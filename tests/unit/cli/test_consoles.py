@@ -7,7 +7,7 @@ from rich.console import Console
 
 from hsp_control.cli import consoles
 from hsp_control.cli.consoles import compiling_shown, compiling_told
-from hsp_control.common import kernels
+from hsp_control.compiled import kernels
 
 
 @pytest.mark.parametrize("terminal", [True, False])

@@ -13,7 +13,7 @@ from runs import held
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.common.kernels import PLAIN
+from hsp_control.compiled.kernels import PLAIN
 from hsp_control.constraints.limits import StaticEffort
 from hsp_control.control.actuation import Status
 from hsp_control.control.actuation.deviation_cost import (

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hsp_control import load_experiment
-from hsp_control.common.kernels import PLAIN
+from hsp_control.compiled.kernels import PLAIN
 from hsp_control.control.actuation import Status
 from hsp_control.control.actuation.actuation import LOOK
 from hsp_control.robot.motion import REFUSED

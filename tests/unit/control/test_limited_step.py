@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.common.kernels import PLAIN
+from hsp_control.compiled.kernels import PLAIN
 from hsp_control.constraints.limits import Scaled
 from hsp_control.control.actuation import Actuation, Delivered, Status
 from hsp_control.control.actuation.limited_step import Barriers
@@ -224,7 +224,7 @@ def test_one_native_call_is_the_same_as_its_parts(strength: float) -> None:
 
 def test_nothing_is_compiled_where_a_limit_binds() -> None:
     """Neither in the first limited step, nor in a relaxed one, nor after a change."""
-    from hsp_control.common import adapters
+    from hsp_control.compiled import adapters
 
     home, rest, near = panda().home(), np.zeros(7), panda().home()
     near[3] = panda().position_limits()[1][3] - 0.02

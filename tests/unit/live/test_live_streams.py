@@ -6,7 +6,7 @@ import sys
 import pytest
 from places import ROOT
 
-from hsp_control.common.kernels import PLAIN
+from hsp_control.compiled.kernels import PLAIN
 
 pytestmark = [
     pytest.mark.process,
@@ -22,7 +22,7 @@ import pinocchio as pin
 from numba.core.dispatcher import Dispatcher
 
 import hsp_control as hsp
-from hsp_control.common import adapters
+from hsp_control.compiled import adapters
 from hsp_control.live import run_loop
 
 sys.path.append(sys.argv[1])

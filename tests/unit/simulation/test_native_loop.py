@@ -17,7 +17,7 @@ from hsp_control import (
     simulate,
 )
 from hsp_control.common.exceptions import SimulationError
-from hsp_control.common.kernels import PLAIN
+from hsp_control.compiled.kernels import PLAIN
 from hsp_control.config import Experiment
 from hsp_control.constraints.limits import RobotLimits
 from hsp_control.control.changes import Changes

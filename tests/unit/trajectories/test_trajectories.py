@@ -29,7 +29,7 @@ from trajectory_cases import (
 import hsp_control.trajectories as family
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ImmutableError, ShapeError, TrajectoryError
-from hsp_control.common.rotations import log3
+from hsp_control.compiled.rotations import log3
 from hsp_control.declaration.quantities import Number
 from hsp_control.trajectories import (
     Blend,

@@ -7,11 +7,6 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import EstimationError
-from hsp_control.common.rotations import (
-    log3,
-    quaternion_from_rotation,
-    rotation_from_quaternion,
-)
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.companions.walking.estimation.invariant_filter import (
     ACCELEROMETER,
@@ -28,6 +23,11 @@ from hsp_control.companions.walking.estimation.leg_kinematics import (
     LegKinematics,
     Seen,
     rolled,
+)
+from hsp_control.compiled.rotations import (
+    log3,
+    quaternion_from_rotation,
+    rotation_from_quaternion,
 )
 from hsp_control.constraints.contacts import Contact
 from hsp_control.control.controller import Controller

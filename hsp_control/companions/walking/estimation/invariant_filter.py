@@ -38,7 +38,7 @@ from typing import TypeAlias
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.rotations import exp3, jexp3
+from hsp_control.compiled.rotations import exp3, jexp3
 
 PointName: TypeAlias = tuple[str, int]
 """A contact, and which of its points."""

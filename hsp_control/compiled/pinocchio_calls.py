@@ -20,8 +20,8 @@ import pinocchio as pin
 from pinocchio import pinocchio_pywrap_default
 
 from hsp_control.common.arrays import Array, Indices, matrix_view
-from hsp_control.common.kernels import PLAIN, kernel
-from hsp_control.common.native import NativeCall, sequence
+from hsp_control.compiled.kernels import PLAIN, kernel
+from hsp_control.compiled.native import NativeCall, sequence
 
 _MODEL = b"N9pinocchio8ModelTplIdLi0ENS_25JointCollectionDefaultTplEEE"
 _DATA = b"N9pinocchio7DataTplIdLi0ENS_25JointCollectionDefaultTplEEE"
@@ -128,7 +128,7 @@ def unknown() -> str:
     """Return what keeps Pinocchio from being called natively, or nothing."""
     if PLAIN:
         return "kernels run as plain Python"
-    from hsp_control.common import adapters
+    from hsp_control.compiled import adapters
 
     if not adapters.AVAILABLE:
         return "kernels are called one by one"

@@ -33,7 +33,7 @@ from hsp_control import (
     Robot,
     RobotState,
 )
-from hsp_control.common import kernels
+from hsp_control.compiled import kernels
 from hsp_control.control.actuation import Status
 from hsp_control.geometry import Proximity, Scene, link_shapes
 from hsp_control.geometry.proximity import CoalDistances

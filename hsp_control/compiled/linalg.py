@@ -9,7 +9,7 @@ the spectrum.
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.kernels import kernel
+from hsp_control.compiled.kernels import kernel
 
 
 @kernel

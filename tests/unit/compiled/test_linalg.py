@@ -9,9 +9,9 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from hsp_control.common import linalg
 from hsp_control.common.arrays import Array
-from hsp_control.common.linalg import (
+from hsp_control.compiled import linalg
+from hsp_control.compiled.linalg import (
     cholesky,
     multiply,
     multiply_transposed,

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hsp_control.common import rotations as so3
 from hsp_control.common.arrays import Array
+from hsp_control.compiled import rotations as so3
 
 ANGLES = (0.0, 1e-300, 1e-160, 1e-12, 1e-8, 1e-4, 0.1, 1.0, 2.0, 3.0, pi - 1e-4)
 NEAR_PI = (pi - 1e-7, pi - 1e-8, pi - 1e-12, pi - 1e-15, pi)

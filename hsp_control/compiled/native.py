@@ -21,7 +21,7 @@ from typing import Any, NamedTuple, Self, TypeGuard
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.kernels import (
+from hsp_control.compiled.kernels import (
     KernelCalls,
     KernelOutput,
     is_compiled,
@@ -50,7 +50,7 @@ class NativeCall(partial[float]):
         cls, kernel: Callable[..., Any], arguments: tuple[Any, ...], timed: bool
     ) -> Self:
         """Pack the arguments, and compile or load the adapter."""
-        from hsp_control.common import adapters
+        from hsp_control.compiled import adapters
 
         kinds, words = adapters.packed(arguments)
         address = adapters.adapter(kernel, kinds, timed)
@@ -66,7 +66,7 @@ class NativeCall(partial[float]):
         cls, address: int, words: Sequence[int], recipe: tuple[Any, tuple[Any, ...]]
     ) -> Self:
         """Return a call of a C function whose arguments are integers and pointers."""
-        from hsp_control.common import adapters
+        from hsp_control.compiled import adapters
 
         packed = np.array([address, *words], dtype=np.int64)
         row = adapters.foreign_adapter(len(words)), packed.ctypes.data
@@ -111,7 +111,7 @@ def bind(
         timed: Whether the kernel has one more argument, the time, given to the call.
     """
     if is_compiled(function):
-        from hsp_control.common import adapters  # here: plain runs need no Numba
+        from hsp_control.compiled import adapters  # here: plain runs need no Numba
 
         if adapters.AVAILABLE:
             return NativeCall.of(function, arguments, timed)
@@ -123,7 +123,7 @@ def once(calls: Sequence[Callable[[], object]], stamp: Indices) -> Callable[[], 
     made = np.full(1, -1)
     if not are_native(calls):
         return partial(_make_once, calls, stamp, made)
-    from hsp_control.common.adapters import run_once
+    from hsp_control.compiled.adapters import run_once
 
     return NativeCall.over(run_once, calls, stamp, made)
 
@@ -142,7 +142,7 @@ def only_if(calls: Sequence[Callable[[], float]], found: Array) -> Callable[[], 
     """Return one call that makes several if ``found[1]`` is not zero, found (2,)."""
     if not are_native(calls):
         return partial(_make_if, calls, found)
-    from hsp_control.common.adapters import run_if
+    from hsp_control.compiled.adapters import run_if
 
     return NativeCall.over(run_if, calls, found)
 
@@ -158,7 +158,7 @@ def _make_if(calls: Sequence[Callable[[], float]], found: Array) -> float:
 
 def sequence(calls: Sequence[NativeCall], *free: float) -> NativeCall:
     """Return one call of the time that makes several; it returns the last result."""
-    from hsp_control.common import adapters
+    from hsp_control.compiled import adapters
 
     call = NativeCall(adapters.entry(), rows_of(calls), *free)
     call.recipe = sequence, (calls, *free)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.kernels import PLAIN, kernel
+from hsp_control.compiled.kernels import PLAIN, kernel
 
 pytestmark = pytest.mark.skipif(PLAIN, reason="compiled code is tested")
 

@@ -20,7 +20,7 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.kernels import callback, kernel
+from hsp_control.compiled.kernels import callback, kernel
 
 _ARRAY = ("meminfo", "parent", "nitems", "itemsize", "data", "shape", "strides")
 """The words of an array in Numba's compiled code, in order."""

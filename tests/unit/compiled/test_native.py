@@ -12,10 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hsp_control as hsp
-from hsp_control.common import adapters
 from hsp_control.common.arrays import Array
-from hsp_control.common.kernels import PLAIN, kernel
-from hsp_control.common.native import (
+from hsp_control.compiled import adapters
+from hsp_control.compiled.kernels import PLAIN, kernel
+from hsp_control.compiled.native import (
     CallSequence,
     NativeCall,
     StepPlan,

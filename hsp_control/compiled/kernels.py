@@ -76,8 +76,8 @@ def kernel(function: Function) -> Function:
         return function
     import numba
 
-    from hsp_control.common.kernel_cache import Kept
-    from hsp_control.common.linked_kernels import KernelCompiler, linked
+    from hsp_control.compiled.kernel_cache import Kept
+    from hsp_control.compiled.linked_kernels import KernelCompiler, linked
 
     jit = numba.jit(**_OPTIONS, pipeline_class=KernelCompiler)
     compiled = cast("Any", jit(function))
@@ -100,8 +100,8 @@ def callback(signature: Any, function: Callable[..., Any]) -> Any:
     """Return a function of these types, compiled now, for calls by its ``address``."""
     from numba.core.ccallback import CFunc
 
-    from hsp_control.common.kernel_cache import Kept
-    from hsp_control.common.linked_kernels import compile_callable
+    from hsp_control.compiled.kernel_cache import Kept
+    from hsp_control.compiled.linked_kernels import compile_callable
 
     arguments = signature.args, signature.return_type
     compiled = cast("Any", CFunc)(function, arguments, locals={}, options=_OPTIONS)

@@ -16,12 +16,12 @@ import numba
 from llvmlite.binding import Linkage, newpassmanagers
 from numba.core import codegen, compiler, compiler_machinery, registry, types
 
-from hsp_control.common.kernel_lowering import KernelLowering
+from hsp_control.compiled.kernel_lowering import KernelLowering
 
 _target = cast("Any", registry).cpu_target
 _Library = cast("Any", codegen).JITCodeLibrary
 _LINEAR_ALGEBRA = "6common6linalg"
-"""What names of functions of this package's `common.linalg` contain."""
+"""What names of functions of this package's `compiled.linalg` contain."""
 
 
 class _LinkedLibrary(_Library):  # type: ignore[misc,valid-type]

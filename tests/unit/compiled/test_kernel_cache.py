@@ -11,14 +11,14 @@ import pytest
 from llvmlite.binding import get_host_cpu_features
 
 import hsp_control as hsp
-from hsp_control.common.kernel_cache import shipped_processor
+from hsp_control.compiled.kernel_cache import shipped_processor
 
 pytestmark = pytest.mark.process
 
 KERNELS = """
 import numpy as np
-from hsp_control.common import adapters, native
-from hsp_control.common.linalg import multiply
+from hsp_control.compiled import adapters, native
+from hsp_control.compiled.linalg import multiply
 from hsp_control.law.pseudo_inverse import apply_pseudo_inverse
 
 out, part = np.zeros(2), np.zeros(2)
@@ -35,7 +35,7 @@ COMPILED, LOADED = "0 0 0", "1 1 1"
 
 ONE_KERNEL = """
 import numpy as np
-from hsp_control.common.linalg import multiply
+from hsp_control.compiled.linalg import multiply
 
 multiply(np.eye(2), np.ones(2), np.zeros(2))
 print(sum(multiply.stats.cache_hits.values()))

@@ -16,7 +16,7 @@ docstring allows it.
 from math import atan2, factorial, sin, sqrt
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.kernels import kernel
+from hsp_control.compiled.kernels import kernel
 
 # Threshold of s. It is above π², so that the range of log uses the series only.
 _SERIES_BELOW = 10.0

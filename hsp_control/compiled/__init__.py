@@ -1,0 +1,1 @@
+"""Kernels, what calls them, and Pinocchio's functions as calls."""
