@@ -103,10 +103,10 @@ def test_only_an_edit_of_what_it_is_made_of_compiles_again(installed: Path) -> N
     # Whatever is neither a kernel nor read by one.
     control = package / "control" / "controller.py"
     control.write_text(control.read_text() + "\n# A comment.\n")
-    version = package / "common" / "version.py"
+    version = package / "compiled" / "version.py"
     version.write_text(version.read_text() + '"""Another."""\n')
     # Comments, docstrings and lines that move, in the kernels' own files as well.
-    linalg = package / "common" / "linalg.py"
+    linalg = package / "compiled" / "linalg.py"
     linalg.write_text("# A comment.\n\n" + linalg.read_text())
     inverse = package / "law" / "pseudo_inverse.py"
     edit(inverse, '"""Write J# x =', '"""Write the product J# x =')
@@ -164,7 +164,7 @@ def test_the_machine_code_of_a_wheel(installed: Path, tmp_path: Path) -> None:
         return run(installed, KERNELS, NUMBA_CACHE_DIR=str(tmp_path / folder)).stdout
 
     assert without_other_code("empty").strip() == LOADED
-    linalg = installed / "hsp_control" / "common" / "linalg.py"
+    linalg = installed / "hsp_control" / "compiled" / "linalg.py"
     edit(linalg, "out[i] = total", "out[i] = total + 0.0")
     assert without_other_code("still empty").strip() == COMPILED
     assert sorted(shipped.iterdir()) == before

@@ -10,10 +10,10 @@ import pytest
 from robot_cases import ROBOTS, assert_equal_terms, draw, everything
 
 from hsp_control.common.arrays import Array
+from hsp_control.compiled import pinocchio_calls
 from hsp_control.compiled.kernels import PLAIN
 from hsp_control.compiled.native import NativeCall
 from hsp_control.compiled.pinocchio_calls import bind_pinocchio
-from hsp_control.robot import pinocchio_calls
 
 compiled = pytest.mark.skipif(PLAIN, reason="plain Python has no native calls")
 
