@@ -3,20 +3,18 @@
 "use strict";
 
 {
-  const PHONE = "(max-width: 560px)";
   let side = null;  // none before there are plots: a page without a run keeps its look
   const names = make("ul", {className: "run-names"});  // several runs, with the lines of their curves
 
   commandHandlers.plots = ({arrays, plots}) => {
     if (!side) {
       side = new Side(player);
-      if (matchMedia(PHONE).matches) side.toggle();  // away at first: the scene needs the space
       side.box.append(names);
+      if (matchMedia("(max-width: 560px)").matches) side.toggle();  // the scene needs the space
     }
     side.show(withArrays(plots, arrays.map(unpackArray)));
-    const told = plots.runs.length > 1 ? plots.runs : [];
-    names.hidden = !told.length;
-    names.replaceChildren(...told.map((name, run) => make("li", {}, Side.sample(run), name)));
+    names.hidden = plots.runs.length < 2;
+    names.replaceChildren(...plots.runs.map((name, k) => make("li", {}, Side.sample(k), name)));
   };
 
   commandHandlers.no_plots = () => side?.clear();
@@ -31,14 +29,13 @@ class LivePlots {
   static PERIOD = 50;  // ms
 
   constructor(parent, definitions, isOpen) {
-    Object.assign(this, {isOpen});
-    let first = 0;
+    Object.assign(this, {isOpen, width: 0});
     this.plots = definitions.map((definition) => {
-      first += definition.series.length;
-      return new LivePlot(this, definition, first - definition.series.length);
+      const first = this.width;
+      this.width += definition.series.length;
+      return new LivePlot(this, definition, first);
     });
     this.clear();
-    this.width = first;
     parent.replaceChildren(...this.plots.map(({box}) => box));
     this.timer = setInterval(() => this.draw(), LivePlots.PERIOD);
   }
@@ -46,14 +43,12 @@ class LivePlots {
   dispose() { clearInterval(this.timer); }
 
   clear() {
-    this.times = [];
-    this.rows = [];  // as `add` gets them; null: a gap
+    Object.assign(this, {times: [], rows: []});  // rows as `add` gets them; null: a gap
     for (const plot of this.plots) plot.stale = true;
   }
 
   add(times, values) {
-    const {width, rows} = this;
-    if (values.length !== times.length * width) return;
+    const {width} = this;
     times.forEach((time, k) => {
       const step = time - (this.times.at(-1) ?? -Infinity);
       if (Math.abs(step) < 1e-9) return;  // the same row again
@@ -85,9 +80,9 @@ class LivePlots {
 class LivePlot extends Plot {
   constructor(plots, definition, first) {
     super("h3", definition, definition.series);
-    Object.assign(this, {plots, log: definition.log, first, known: null});
-    Object.assign(this.figure, {role: "img",
-                                ariaLabel: `${definition.title}, the last ${LivePlots.SPAN} s`});
+    Object.assign(this, {plots, log: definition.log, first, known: [NaN, NaN]});
+    const ariaLabel = `${definition.title}, the last ${LivePlots.SPAN} s`;
+    Object.assign(this.figure, {role: "img", ariaLabel});
   }
 
   value(row, k) {
@@ -103,20 +98,19 @@ class LivePlot extends Plot {
 
   build() {
     if (!this.figure.clientWidth) return;
-    const {plots} = this;
-    this.known = null;
+    const {plots} = this, shades = this.entries.map(({color}) => Plot.shade(color));
+    const newest = {show: true, size: 5, filter: () => [plots.times.length - 1]};
+    this.known = [NaN, NaN];
     this.draw(this.data(), {
       logarithmic: this.log,
-      series: this.entries.map(({color}, k) => ({
-        stroke: Plot.shade(color), width: 1.6, show: this.shows(k),
-        points: {show: true, size: 5, fill: Plot.shade(color), filter: () => [plots.times.length - 1]},
-      })),
+      series: shades.map((stroke, k) => (
+        {stroke, width: 1.6, show: this.shows(k), points: {...newest, fill: stroke}})),
       scales: {
         x: {time: false, range: () => [0, LivePlots.SPAN].map(
           (t) => t + Math.max(plots.end - LivePlots.SPAN, 0))},
         y: {range: (_, least, most) => this.range(least, most)},
       },
-      cursor: {points: {size: 7, width: 0, fill: (_, k) => Plot.shade(this.entries[k - 1].color)}},
+      cursor: {points: {size: 7, width: 0, fill: (_, k) => shades[k - 1]}},
       hooks: {setCursor: [() => this.showValues()]},
     });
   }
@@ -137,10 +131,9 @@ class LivePlot extends Plot {
       const least = Math.max(Math.floor(low - 0.05), -9);  // below is nothing to see
       return [least, Math.max(Math.ceil(high + 0.05), least + 1)];
     }
-    const least = Math.max(1e-9, 0.02 * Math.max(Math.abs(low), Math.abs(high)));
-    const room = Math.max(high - low, least), [from, to] = this.known ?? [];
+    const size = Math.max(Math.abs(low), Math.abs(high), 5e-8), [from, to] = this.known;
+    const room = Math.max(high - low, 0.02 * size), middle = (low + high) / 2;
     if (!(low >= from && high <= to && room > 0.55 * (to - from))) {
-      const middle = (low + high) / 2;
       this.known = [middle - 0.62 * room, middle + 0.62 * room];
     }
     return this.known;

@@ -4,33 +4,19 @@
 
 const side = new Side(player);
 
-commandHandlers.show = ({arrays, commands, plots, about, runs}) => {
-  const unpacked = arrays.map(unpackArray);
+commandHandlers.show = (content) => {
+  const {commands, plots, about, runs} = withArrays(content, content.arrays.map(unpackArray));
   viewer.set_3d_pane_size();
-  viewer.handle_command(withArrays(commands, unpacked));
+  viewer.handle_command(commands);
   if (!plots) return;
-  side.show(withArrays(plots, unpacked));
+  side.show(plots);
   if (runs) new RunSwitch(viewer, side, runs);
-  side.box.append(footer(about));
-};
-
-// The descriptions and the facts of the runs, below the plots.
-function footer(runs) {
   const help = matchMedia("(pointer: coarse)").matches
     ? "In the plots: tap or drag to a time, pinch to zoom; tap a name to see it alone."
     : "In the plots: click to go to a time, drag to zoom, Esc for the whole run; click a name "
       + "to see it alone.";
-  const foot = make("footer", {}, make("p", {className: "help"}, help));
-  let last = "";
-  for (const {name, text, facts} of runs) {
-    if (text && text !== last) foot.append(make("p", {}, text));
-    last = text;
-    const list = facts.map(([what, value]) => `${what} ${value}`);
-    const told = (runs.length > 1 ? [name, ...list] : list).join("  ·  ");
-    foot.append(make("p", {className: "facts"}, told));
-  }
-  return foot;
-}
+  side.box.append(make("footer", {}, ...[help, ...about].map((text) => make("p", {}, text))));
+};
 
 // The switch over the scene: one of the runs, or all; `w` shows the next choice. Of one run the
 // robot and all layers are shown, of all runs the first, and of the others a ghost and its paths.
@@ -41,13 +27,12 @@ class RunSwitch {
   static UNSEEN = 1;  // the layer of three.js; cameras see layer 0
 
   constructor(viewer, side, {names, parts, colors, opacity}) {
-    Object.assign(this, {viewer, side, parts, colors, opacity, solid: new Map()});
+    Object.assign(this, {viewer, side, names, parts, colors, opacity});
     this.choices = [...names.keys(), null];
-    this.names = names;
     this.buttons = this.choices.map((run) => {
-      const text = run !== null ? names[run] : names.length === 2 ? "both" : "all";
+      const text = names[run] ?? (names.length === 2 ? "both" : "all");
       return makeButton({title: `${text} (w: the next)`}, () => this.select(run),
-                        ...(run !== null ? [Side.sample(run)] : []), make("span", {}, text));
+                        ...(run === null ? [] : [Side.sample(run)]), make("span", {}, text));
     });
     side.stage.append(make("div", {className: "run-switch", role: "group",
                                    ariaLabel: "Runs (w: the next)"}, ...this.buttons));
@@ -64,7 +49,7 @@ class RunSwitch {
     this.buttons.forEach((button, k) => { button.ariaPressed = this.choices[k] === run; });
     this.parts.forEach((paths, k) => this.place(paths, k, run));
     this.side.select(run);
-    this.side.player.select(this.names[run] ?? null);
+    this.side.player.set({run: this.names[run] ?? null});
     this.viewer.set_dirty();
   }
 
@@ -72,34 +57,17 @@ class RunSwitch {
     const ghost = selected === null && run > 0;
     for (const path of paths) this.show(path, !ghost && (selected ?? run) === run);
     if (!run) return;
-    const robot = `${paths[0]}/robot`;
-    for (const path of [robot, `${paths[0]}/paths`]) if (ghost) this.show(path, true);
-    this.tint(robot, ghost, run);
+    const [root] = paths, robot = findNode(this.viewer, `${root}/robot`).object;
+    makeSolid(robot);
+    if (!ghost) return;
+    makeGhost(robot, this.colors[run], this.opacity);
+    for (const part of ["robot", "paths"]) this.show(`${root}/${part}`, true);
   }
 
   show(path, seen) {
-    const hidden = (thing) => thing.layers.set(seen ? 0 : RunSwitch.UNSEEN);
-    findNode(this.viewer, path)?.object.traverse(hidden);
-  }
-
-  // Make the robot of a run a ghost, or solid again.
-  tint(path, ghost, run) {
-    const robot = findNode(this.viewer, path)?.object;
-    if (!robot) return;
-    eachMaterial(robot, (material) => {
-      if (!this.solid.has(material)) {
-        const {opacity, transparent, polygonOffset} = material;
-        this.solid.set(material, {color: material.color?.clone(), opacity, transparent, polygonOffset});
-      }
-      const {color, ...solid} = this.solid.get(material);
-      if (color) material.color.copy(color);
-      Object.assign(material, solid, {needsUpdate: true});
+    findNode(this.viewer, path)?.object.traverse(({layers}) => {
+      layers.set(seen ? 0 : RunSwitch.UNSEEN);
     });
-    robot.traverse((thing) => {
-      thing.userData.cast ??= thing.castShadow;
-      thing.castShadow = thing.userData.cast;
-    });
-    if (ghost) makeGhost(robot, this.colors[run], this.opacity);
   }
 }
 
@@ -110,7 +78,7 @@ function openAtHash() {
   player.pause();
   player.seek(Number(time));
 }
-addEventListener("hashchange", openAtHash);
+on(window, "hashchange", openAtHash);
 
 function begin(content) {
   viewer.handle_command_bytearray(content);

@@ -8,11 +8,9 @@ async function unzipped(id) {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-function showError(message) {
+function showError(textContent) {
   const paragraph = document.createElement("p");
-  paragraph.className = "error";
-  paragraph.textContent = message;
-  document.body.append(paragraph);
+  document.body.append(Object.assign(paragraph, {className: "error", textContent}));
 }
 
 (async () => {
@@ -20,9 +18,7 @@ function showError(message) {
     return showError("This page needs a browser of 2023 or newer.");
   }
   for (const code of JSON.parse(new TextDecoder().decode(await unzipped("scripts")))) {
-    const script = document.createElement("script");
-    script.textContent = code;
-    document.head.append(script);
+    document.head.append(Object.assign(document.createElement("script"), {textContent: code}));
   }
   begin(await unzipped("content"));
 })().catch((error) => {

@@ -24,10 +24,9 @@ class Sight {
 
   // A point's pixel, and whether it lies in front of the camera.
   project(point) {
-    const {camera, scene} = this.viewer, {left, top, width, height} = this.box;
-    const seen = point.clone().applyMatrix4(scene.matrixWorld).project(camera);
-    const ahead = this.depth(point) > camera.near;
-    return {x: left + (1 + seen.x) / 2 * width, y: top + (1 - seen.y) / 2 * height, ahead};
+    const {camera, scene} = this.viewer, {left, top} = this.box;
+    const {x, y} = pixelOf(this.viewer, point.clone().applyMatrix4(scene.matrixWorld));
+    return {x: left + x, y: top + y, ahead: this.depth(point) > camera.near};
   }
 
   depth(point) { return this.eye.clone().sub(point).dot(this.back); }
@@ -43,26 +42,23 @@ class Sight {
 
   // A raycaster of three.js through a pixel, in three.js's own axes; and its ray in ours.
   caster(x, y) {
-    const {left, top, width, height} = this.box;
-    const caster = new MeshCat.THREE.Raycaster();
-    caster.setFromCamera({x: 2 * (x - left) / width - 1, y: 1 - 2 * (y - top) / height},
-                         this.viewer.camera);
+    const {left, top, width, height} = this.box, caster = new MeshCat.THREE.Raycaster();
+    const place = {x: 2 * (x - left) / width - 1, y: 1 - 2 * (y - top) / height};
+    caster.setFromCamera(place, this.viewer.camera);
     return caster;
   }
 
-  ray(x, y) { return this.caster(x, y).ray.clone().applyMatrix4(this.toScene); }
+  ray(x, y) { return this.caster(x, y).ray.applyMatrix4(this.toScene); }
 
   // The point of a plane under a pixel; null at its horizon.
   hit(through, normal, x, y) {
-    const {origin, direction} = this.ray(x, y);
-    const along = direction.dot(normal);
-    if (Math.abs(along) < 0.02) return null;
+    const {origin, direction} = this.ray(x, y), along = direction.dot(normal);
     const reach = through.clone().sub(origin).dot(normal) / along;
-    if (!(reach > 0 && reach < Sight.REACH + this.depth(through))) return null;
-    return origin.addScaledVector(direction, reach);
+    const near = reach > 0 && reach < Sight.REACH + this.depth(through);
+    return Math.abs(along) > 0.02 && near ? origin.addScaledVector(direction, reach) : null;
   }
 
-  // The next three take the pixel at which a thing is grabbed, and return a function from later
+  // The next four take the pixel at which a thing is grabbed, and return a function from later
   // pixels to its new place or angle; null where the pointer tells none. The thing keeps its
   // offset from the pointer: it never jumps.
 
@@ -114,22 +110,21 @@ class Sight {
     const nearest = (x, y) => {
       const {origin, direction} = this.ray(x, y), between = from.clone().sub(origin);
       const cosine = axis.dot(direction), sine2 = 1 - cosine * cosine;
-      return sine2 < 0.01 ? null : (cosine * direction.dot(between) - axis.dot(between)) / sine2;
+      return sine2 < 0.01 ? NaN : (cosine * direction.dot(between) - axis.dot(between)) / sine2;
     };
-    const start = nearest(x, y) ?? 0;
+    const start = nearest(x, y) || 0;
     return (x, y) => {
-      const way = nearest(x, y);
-      if (way === null || Math.abs(way - start) > Sight.REACH) return null;
-      return from.clone().addScaledVector(axis, way - start);
+      const way = nearest(x, y) - start;
+      return Math.abs(way) < Sight.REACH ? from.clone().addScaledVector(axis, way) : null;
     };
   }
 
   // Angles about an axis [rad]; more than a turn is counted on. The radius is in pixels.
   about(center, axis, radius, x, y) {
-    if (Math.abs(this.towards(center).dot(axis)) < 0.2) {  // from its edge: its near side is moved
-      const along = this.towards(center).cross(axis).negate().normalize();
-      const here = this.project(center);
-      const there = this.project(center.clone().addScaledVector(along, this.pixel(center)));
+    const eye = this.towards(center);
+    if (Math.abs(eye.dot(axis)) < 0.2) {  // from its edge: its near side is moved
+      const along = eye.cross(axis).negate().setLength(this.pixel(center));
+      const here = this.project(center), there = this.project(center.clone().add(along));
       const [dx, dy] = [there.x - here.x, there.y - here.y], length = Math.hypot(dx, dy) || 1;
       return (to_x, to_y) => ((to_x - x) * dx + (to_y - y) * dy) / length / radius;
     }

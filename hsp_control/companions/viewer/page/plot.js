@@ -47,11 +47,13 @@ class Plot {
     const axis = {stroke: muted, font, ticks: {stroke: muted, width: 1, size: 3}};
     const label = this.unit === "–" ? null : `[${this.unit}]`;
     const labelled = {label, labelFont: font, labelSize: 14, labelGap: 0};
+    const {clientWidth, clientHeight} = this.figure;
     this.chart?.destroy();
     this.chart = null;  // what is told while the next one is made is not for the last one
     this.chart = new uPlot({
-      width: this.figure.clientWidth || 300, height: this.figure.clientHeight || Plot.HEIGHT, padding: [6, 12, 0, label ? 0 : 14],
-      legend: {show: false}, scales, hooks, series: [{}, ...series.map((each) => ({points: {show: false}, pxAlign: 0, ...each}))],
+      width: clientWidth || 300, height: clientHeight || Plot.HEIGHT,
+      padding: [6, 12, 0, label ? 0 : 14], legend: {show: false}, scales, hooks,
+      series: [{}, ...series.map((each) => ({points: {show: false}, pxAlign: 0, ...each}))],
       axes: [
         {...axis, size: 20, gap: 2, space: 45, grid: {show: false}, values: Plot.numbers(" s"),
          border: {show: true, stroke: muted, width: 1}},
@@ -74,21 +76,16 @@ class Plot {
   // The labels of ticks; the last one has the unit.
   static numbers(unit) {
     return (_, ticks, axis, space, step) => {
-      const digits = (String(step).split(".")[1] ?? "").length;
-      return ticks.map((tick, k) => {
-        const text = step < 1e-4 && tick ? tick.toExponential(1) : tick.toFixed(Math.min(digits, 6));
-        return Plot.minus(text) + (k === ticks.length - 1 ? unit : "");
-      });
+      const digits = Math.min((String(step).split(".")[1] ?? "").length, 6);
+      const text = (tick) => step < 1e-4 && tick ? tick.toExponential(1) : tick.toFixed(digits);
+      const last = ticks.length - 1;
+      return ticks.map((tick, k) => Plot.minus(text(tick)) + (k === last ? unit : ""));
     };
   }
 
-  // Ticks where values are exponents of ten: at most five.
+  // Ticks where values are exponents of ten.
   static DECADES = {
-    splits: (_, axis, low, high) => {
-      const every = Math.max(1, Math.ceil((high - low) / 4.5)), ticks = [];
-      for (let k = every * Math.ceil(low / every); k <= high; k += every) ticks.push(k);
-      return ticks;
-    },
+    incrs: [1, 2, 3, 4, 5, 6, 8, 10], space: 16,
     values: (_, ticks) => ticks.map((tick) => tick === 0 ? "1"
       : `10${[...String(tick)].map((c) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[c] ?? "⁻").join("")}`),
   };

@@ -12,45 +12,41 @@ class Presentation {
 
   // `changed` is called when there is more or less space.
   constructor(changed) {
-    Object.assign(this, {changed, on: false, full: false, at: [NaN, NaN], buttons: []});
+    Object.assign(this, {changed, on: false, full: false, at: "", buttons: []});
     onKey(({key, repeat}) => repeat ? null
       : key === "p" ? () => this.toggle()
         : key === "Escape" && this.on ? () => this.set(false) : null);
-    addEventListener("pointermove", ({clientX, clientY}) => {
+    on(window, "pointermove", ({clientX, clientY}) => {
       // A browser also tells of a pointer that rests while the page moves below it.
-      if (clientX === this.at[0] && clientY === this.at[1]) return;
-      this.at = [clientX, clientY];
-      this.wake();
+      const at = `${clientX} ${clientY}`;
+      if (at !== this.at) this.wake();
+      this.at = at;
     });
     on(window, "pointerdown focusin", () => this.wake());
-    document.addEventListener("fullscreenchange", () => {
+    on(document, "fullscreenchange", () => {
       if (document.fullscreenElement && !this.on) this.leaveFullScreen();  // it came too late
       else if (document.fullscreenElement) this.full = true;
       else if (this.full) this.set(false);  // its Escape goes to the browser, not to the page
     });
   }
 
-  // Add a button to a bar, which goes with the pointer while presenting.
-  addButton(bar) {
-    const button = makeButton(
-      {className: "present", title: "Present (p)", ariaLabel: "Present", ariaPressed: this.on},
-      () => this.toggle(),
-      makeIcon("M4 4h6v2.2H6.2V10H4zM14 4h6v6h-2.2V6.2H14zM4 14h2.2v3.8H10V20H4zM17.8 14H20v6h-6v-2.2h3.8z"));
-    bar.append(button);
-    this.buttons.push(button);
+  // Take over a button of a bar, which goes with the pointer while presenting.
+  addButton(button) {
+    button.ariaPressed = this.on;
+    this.buttons.push(onPress(button, () => this.toggle()));
   }
 
   toggle() { this.set(!this.on); }
 
-  set(on) {
-    if (on === this.on) return;
-    this.on = on;
-    document.body.classList.toggle("presenting", on);
-    for (const button of this.buttons) button.ariaPressed = on;
+  set(presenting) {
+    if (presenting === this.on) return;
+    this.on = presenting;
+    document.body.classList.toggle("presenting", presenting);
+    for (const button of this.buttons) button.ariaPressed = presenting;
     // It may not be allowed, such as in a frame: then the window is all there is.
-    if (on) document.documentElement.requestFullscreen?.().catch(() => {});
+    if (presenting) document.documentElement.requestFullscreen?.().catch(() => {});
     else if (document.fullscreenElement) this.leaveFullScreen();
-    this.full = Boolean(on && document.fullscreenElement);
+    this.full = Boolean(presenting && document.fullscreenElement);
     this.wake();
     this.changed();
   }

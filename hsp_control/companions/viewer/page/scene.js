@@ -2,7 +2,7 @@
 // viewer/commands.py.
 "use strict";
 
-const viewer = newViewer(document.getElementById("meshcat-pane"));
+const viewer = newViewer(part("#meshcat-pane"));
 const meshcat = viewer.handle_command.bind(viewer);
 
 // The scene brings its own lights, floor and grid, which fit the robot.
@@ -14,8 +14,8 @@ viewer.gui.domElement.remove();
 viewer.renderer.shadowMap.type = MeshCat.THREE.VSMShadowMap;  // soft edges
 
 const player = new Player(viewer);
-const playerBar = new PlayerBar(player, document.body);
-const legend = new Legend(viewer, document.getElementById("caption"));
+new PlayerBar(player, part(".player"));
+const legend = new Legend(viewer);
 const lengthLabels = new LengthLabels(viewer);
 let placed = null;  // the last camera of the program, and where it was placed then
 const drawScene = viewer.render.bind(viewer);
@@ -35,9 +35,9 @@ viewer.set_3d_pane_size = () => {
 };
 new ResizeObserver(refit).observe(viewer.dom_element);
 const presentation = new Presentation(refit);
-presentation.addButton(playerBar.bar);
+presentation.addButton(part(".player .present"));
 
-const say = (name, text) => { document.querySelector(`#caption .${name}`).textContent = text; };
+const say = (name, text) => { part(`#caption .${name}`).textContent = text; };
 const commandHandlers = {
   camera, caption, set_object, ask,
   nothing() {},
@@ -105,7 +105,7 @@ function caption({title, legend: entries, dark}) {
   document.title = title;
   document.body.classList.toggle("dark", dark);
   viewer.scene.environment = dark ? viewer.scene.environment ?? studio() : null;
-  document.querySelector("#caption h1").textContent = title;
+  part("#caption h1").textContent = title;
   legend.show(entries);
   refit();  // now it is known what title and legend cover
 }
@@ -140,7 +140,7 @@ async function lookForNext() {
   const text = "The program has ended. " + (status === 403
     ? "Another one runs here now: open the address that it has printed."
     : "Its next start at this address will appear here.");
-  Object.assign(document.getElementById("lost"), {hidden: false, textContent: text});
+  Object.assign(part("#lost"), {hidden: false, textContent: text});
   setTimeout(lookForNext, 1000);
 }
 
@@ -234,11 +234,10 @@ function refit() {
 function set_object(command) {
   const {BufferGeometry, BufferAttribute} = MeshCat.THREE;
   const apply = BufferGeometry.prototype.applyMatrix4;
-  const parts = [];
   BufferGeometry.prototype.applyMatrix4 = function (matrix) {  // called for each part
-    parts.push(this);
-    const {position, uv} = this.attributes;
-    if (!uv) this.setAttribute("uv", new BufferAttribute(new Float32Array(2 * position.count), 2));
+    const {groups, attributes: {position: {count}, uv}} = this;
+    if (!uv) this.setAttribute("uv", new BufferAttribute(new Float32Array(2 * count), 2));
+    this.userData = {groups};  // which the merged geometry keeps
     return apply.call(this, matrix);
   };
   try {
@@ -248,7 +247,7 @@ function set_object(command) {
   }
   node(command.path).traverse((object) => {
     const {geometry, material} = object;
-    if (Array.isArray(material) && material.some(Array.isArray)) assignMaterials(object, parts);
+    if (geometry?.userData.mergedUserData && Array.isArray(material)) assignMaterials(object);
     // Without normals, a mesh would be black.
     if (geometry?.isBufferGeometry && !geometry.attributes.normal) geometry.computeVertexNormals();
     if (material) object.material = Array.isArray(object.material)
@@ -266,26 +265,16 @@ function lit(material) {
   return standard;
 }
 
-// Assign its material to each group of triangles of a merged mesh.
-function assignMaterials(mesh, parts) {
-  const size = ({attributes}) => attributes.position.count;
-  const number = mesh.material.length;
-  const first = parts.findIndex((_, k) => {
-    const own = parts.slice(k, k + number);
-    return own.length === number
-      && own.reduce((total, part) => total + size(part), 0) === size(mesh.geometry);
-  });
-  if (first < 0) return;
+// Assign its material to each group of triangles of a merged mesh, which has a group for each part.
+function assignMaterials(mesh) {
+  const {groups: parts, userData: {mergedUserData: own}} = mesh.geometry, materials = [];
   mesh.geometry.clearGroups();
-  const materials = [];
-  let offset = 0;
-  parts.slice(first, first + number).forEach((part, k) => {
-    const whole = {start: 0, count: size(part), materialIndex: 0};
-    for (const {start, count, materialIndex} of part.groups.length ? part.groups : [whole]) {
-      mesh.geometry.addGroup(offset + start, count, materials.length);
-      materials.push([mesh.material[k]].flat()[materialIndex]);
+  parts.forEach(({start: first, count: size}, part) => {
+    const whole = {start: 0, count: size, materialIndex: 0}, {groups} = own[part];
+    for (const {start, count, materialIndex} of groups.length ? groups : [whole]) {
+      mesh.geometry.addGroup(first + start, count, materials.length);
+      materials.push([mesh.material[part]].flat()[materialIndex]);
     }
-    offset += size(part);
   });
   mesh.material = materials;
 }
