@@ -126,9 +126,15 @@ def _runs(
     return rollout
 
 
+_HELP = (
+    "In the plots: click to go to a time, drag to zoom (or pinch), Esc for the whole run; "
+    "click a name to see it alone."
+)
+
+
 def _about(runs: Sequence[ComparedRun]) -> list[str]:
     """Return the paragraphs at the foot of the page: descriptions and facts."""
-    told: list[str] = []
+    told = [_HELP]
     for run in runs:
         meta, config = run.rollout.meta, run.rollout.config or {}
         text = " ".join(str(config.get("description") or "").split())

@@ -1,8 +1,7 @@
 // Elements, buttons and keys: what all parts of the page are made of.
 "use strict";
 
-// An element with properties, attributes and children:
-//   make("button", {className: "x", "aria-label": "..."}, "its text")
+// An element with properties, attributes and children.
 function make(tag, properties = {}, ...children) {
   const element = document.createElement(tag);
   for (const [name, value] of Object.entries(properties)) {
@@ -42,7 +41,7 @@ function onKey(actionOf) {
   });
 }
 
-// The first element of the page, or of another one, that a selector of CSS names.
+// The first element that a selector of CSS names.
 const part = (selector, parent = document) => parent.querySelector(selector);
 
 // Call a function for each of some kinds of events.

@@ -1,9 +1,6 @@
-// The legend, whose rows are switches: each shows and hides the nodes of what it names.
-//
-// A row says what is in the scene: it is pressed while its nodes are visible. What the user
-// chooses is kept as long as the page is open, also when the nodes are drawn again. In small
-// windows the rows are behind a button, so that they do not cover the robot.
-"use strict";
+// The legend, whose rows are switches: each shows and hides the nodes of what it names. What the user
+// chooses is kept as long as the page is open, also when the nodes are drawn again. In small windows
+// the rows are behind a button.
 
 class Legend {
   static SMALL = "(max-width: 760px), (max-height: 480px), "
@@ -22,7 +19,6 @@ class Legend {
     this.fit();
   }
 
-  // Collapse the rows in a small window, show them in a large one.
   fit() {
     this.caption.classList.toggle("small", this.small.matches);
     this.setOpen(!this.small.matches);
@@ -36,24 +32,20 @@ class Legend {
   // Show the rows of a caption (viewer/commands.py); repeated ones are kept, and with them the focus.
   show(entries) {
     const told = JSON.stringify(entries);
-    if (told !== this.told) {
-      this.told = told;
-      this.rows = entries.map((entry) => [entry, this.row(entry)]);
-      this.toggle.hidden = !entries.length;
-      this.list.replaceChildren(...this.rows.map(([{plain}, row]) =>
-        make("li", {className: plain ? "plain" : ""}, row)));
-    }
-    this.apply();
+    if (told === this.told) return;
+    this.told = told;
+    this.rows = entries.map((entry) => [entry, this.row(entry)]);
+    this.toggle.hidden = !entries.length;
+    this.list.replaceChildren(...this.rows.map(([{plain}, row]) =>
+      make("li", {className: plain ? "plain" : ""}, row)));
   }
 
   row({name, color, paths}) {
-    const row = makeButton({style: `--color: ${color}`}, () => {
-      const shown = row.ariaPressed !== "true";
-      for (const path of paths) this.choices.set(path, shown);
+    return makeButton({style: `--color: ${color}`}, ({currentTarget: {ariaPressed}}) => {
+      for (const path of paths) this.choices.set(path, ariaPressed !== "true");
       this.apply();
       this.viewer.set_dirty();
     }, name);
-    return row;
   }
 
   // Bring the user's choices into the scene, and the scene's state into the rows.

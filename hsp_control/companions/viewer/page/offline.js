@@ -1,5 +1,4 @@
-// An exported page, which contains its scene: shows the scene, the plots beside it, and a switch
-// between several runs.
+// An exported page: shows the scene, the plots beside it, and a switch between several runs.
 "use strict";
 
 const side = new Side(player);
@@ -11,21 +10,14 @@ commandHandlers.show = (content) => {
   if (!plots) return;
   side.show(plots);
   if (runs) new RunSwitch(viewer, side, runs);
-  const help = matchMedia("(pointer: coarse)").matches
-    ? "In the plots: tap or drag to a time, pinch to zoom; tap a name to see it alone."
-    : "In the plots: click to go to a time, drag to zoom, Esc for the whole run; click a name "
-      + "to see it alone.";
-  side.box.append(make("footer", {}, ...[help, ...about].map((text) => make("p", {}, text))));
+  side.box.append(make("footer", {}, ...about.map((text) => make("p", {}, text))));
 };
 
-// The switch over the scene: one of the runs, or all; `w` shows the next choice. Of one run the
-// robot and all layers are shown, of all runs the first, and of the others a ghost and its paths.
-// A run that is not shown is in a layer of three.js that no camera sees: so the switches of the
-// legend keep their meaning. Runs without `parts` stand side by side, and stay in sight. The data
-// are those of viewer/export_page.py.
+// The switch over the scene: one of the runs, or all; `w` shows the next choice. Of one run the robot
+// and all layers are shown, of all runs the first, and of the others a ghost and its paths. A run that
+// is not shown is in a layer of three.js that no camera sees: so the switches of the legend keep their
+// meaning. Runs without `parts` stand side by side, and stay in sight.
 class RunSwitch {
-  static UNSEEN = 1;  // the layer of three.js; cameras see layer 0
-
   constructor(viewer, side, {names, parts, colors, opacity}) {
     Object.assign(this, {viewer, side, names, parts, colors, opacity});
     this.choices = [...names.keys(), null];
@@ -34,7 +26,7 @@ class RunSwitch {
       return makeButton({title: `${text} (w: the next)`}, () => this.select(run),
                         ...(run === null ? [] : [Side.sample(run)]), make("span", {}, text));
     });
-    side.stage.append(make("div", {className: "run-switch", role: "group",
+    part("#stage").append(make("div", {className: "run-switch", role: "group",
                                    ariaLabel: "Runs (w: the next)"}, ...this.buttons));
     onKey(({key}) => key === "w" && (() => {
       const next = this.choices.indexOf(this.selected) + 1;
@@ -43,18 +35,17 @@ class RunSwitch {
     this.select(null);
   }
 
-  // Show one run; null: all.
   select(run) {
     this.selected = run;
     this.buttons.forEach((button, k) => { button.ariaPressed = this.choices[k] === run; });
-    this.parts.forEach((paths, k) => this.place(paths, k, run));
+    this.parts.forEach((paths, k) => this.place(paths, k));
     this.side.select(run);
     this.side.player.set({run: this.names[run] ?? null});
     this.viewer.set_dirty();
   }
 
-  place(paths, run, selected) {
-    const ghost = selected === null && run > 0;
+  place(paths, run) {
+    const {selected} = this, ghost = selected === null && run > 0;
     for (const path of paths) this.show(path, !ghost && (selected ?? run) === run);
     if (!run) return;
     const [root] = paths, robot = findNode(this.viewer, `${root}/robot`).object;
@@ -66,17 +57,15 @@ class RunSwitch {
 
   show(path, seen) {
     findNode(this.viewer, path)?.object.traverse(({layers}) => {
-      layers.set(seen ? 0 : RunSwitch.UNSEEN);
+      layers.set(seen ? 0 : 1);  // cameras see layer 0
     });
   }
 }
 
 // `page.html#t=2.5` opens the page paused at that time.
 function openAtHash() {
-  const time = new URLSearchParams(location.hash.slice(1)).get("t");
-  if (time === null || !Number.isFinite(Number(time))) return;
-  player.pause();
-  player.seek(Number(time));
+  const time = Number(new URLSearchParams(location.hash.slice(1)).get("t") ?? NaN);
+  if (Number.isFinite(time)) player.halt(time);
 }
 on(window, "hashchange", openAtHash);
 

@@ -1,9 +1,7 @@
-// `hsp play` in the page: a running controller whose targets, obstacles, links and settings
-// are moved by hand.
-//
-// The program describes itself by "play_setup" and then reports by the other "play_..."
-// commands; see the end. The page answers over the scene's websocket with JSON:
-// {"do": "move", ...}. Only the page that steers sends anything.
+// `hsp play` in the page: a running controller whose targets, obstacles, links and settings are moved
+// by hand. The program describes itself by "play_setup" and then reports by the other "play_..."
+// commands; see the end. The page that steers answers over the scene's websocket with JSON:
+// {"do": "move", ...}.
 "use strict";
 
 class Play {
@@ -11,26 +9,23 @@ class Play {
 
   constructor(viewer) {
     Object.assign(this, {viewer, sight: new Sight(viewer), mine: true, holdKey: null, taken: false});
-    this.pending = new Map();    // messages of the next frame, the newest of each kind
-    this.gizmos = new Map();     // key -> Gizmo, of a target or an obstacle
-    this.touched = new Map();    // key of a thing or a setting -> when the hand has changed it [ms]
+    this.pending = new Map();  // messages of the next frame, the newest of each kind
+    this.gizmos = new Map();  // key -> Gizmo, of a target or an obstacle
+    this.touched = new Map();  // key of a thing or a setting -> when the hand has changed it [ms]
     this.state = {t: 0, running: true, rate: 1, message: "", level: "info"};
-    this.away = {};              // task -> what to say of a target that is not reached
+    this.away = {};  // task -> what to say of a target that is not reached
     this.setup = this.selected = this.force = this.pull = null;
   }
 
   get ready() { return this.setup !== null; }
-
   // Whether it is a simulation, which can be paused; else it is a live loop.
   get simulated() { return this.setup.loop === "simulated"; }
 
-  // --- what the program says ---
-
   setUp(setup) {
-    const first = !this.ready, {targets, obstacles, plots, loop} = setup;
-    if (first) this.build();
-    else this.hand.end(true);
+    const {targets, obstacles, plots, loop} = setup;
+    if (!this.ready) this.build();
     this.setup = setup;
+    this.hand.end(true);
     document.body.classList.toggle("live-loop", !this.simulated);
     if (loop === "held") this.holdKey ??= new PlayHold(this);
     this.touched.clear();
@@ -43,7 +38,6 @@ class Play {
     this.overlay.setThings(gizmos, (key) => this.select(key));
     this.panel.build(setup, gizmos);
     this.setUpPlots(plots);
-    if (first) this.panel.setOpen(!this.panel.narrow.matches);
     this.select(this.gizmos.has(this.selected) ? this.selected : null);
     this.showDrive();
     this.bar.showState(this.state);
@@ -59,6 +53,7 @@ class Play {
     this.keys = new PlayKeys(this);
     this.viewer.scene.onBeforeRender = () => this.layOut();
     legend.setOpen(false);  // what is in the picture is to be touched
+    this.panel.setOpen(!this.panel.narrow.matches);
   }
 
   // After a reset the plots are the same: they keep what is shown alone.
@@ -84,7 +79,6 @@ class Play {
 
   // Whether the program's word on a thing or a setting is newer than what the hand has done.
   isFresh(key) { return !(performance.now() < this.touched.get(key) + Play.ECHO); }
-
   touch(key) { this.touched.set(key, performance.now()); }
 
   showState(state) {
@@ -111,14 +105,17 @@ class Play {
     this.showMarks();
   }
 
-  // --- what the hand does ---
-
   // Say something to the program, after what is pending.
-  send(message) { if (this.mine) this.say(message); }
+  send(message) {
+    this.flush();
+    const heard = this.viewer.connection?.readyState === WebSocket.OPEN;
+    if (heard && (this.mine || message.do === "take_over")) {
+      this.viewer.connection.send(JSON.stringify(message));
+    }
+  }
 
   // Say it with the next frame; a newer message of its key replaces it.
   sendLater(key, message) {
-    if (!this.mine) return;
     if (!this.pending.size) requestAnimationFrame(() => this.flush());
     this.pending.set(key, message);
   }
@@ -126,16 +123,9 @@ class Play {
   flush() {
     const messages = [...this.pending.values()];
     this.pending.clear();
-    messages.forEach((message) => this.say(message));
+    for (const message of messages) this.send(message);
   }
 
-  say(message) {
-    this.flush();
-    const {connection} = this.viewer;
-    if (connection?.readyState === WebSocket.OPEN) connection.send(JSON.stringify(message));
-  }
-
-  // Say where a target or an obstacle is wanted.
   move(gizmo) {
     this.hold(gizmo.key);
     this.sendLater(gizmo.key, gizmo.wish());
@@ -146,7 +136,6 @@ class Play {
     this.send({do: "release", ...gizmo.address()});
   }
 
-  // Let a target or an obstacle return to its own path.
   resume(gizmo) {
     this.touched.delete(gizmo.key);
     this.panel.showMoved(gizmo.key, false);
@@ -171,10 +160,7 @@ class Play {
   }
 
   act(what) { this.send({do: what}); }
-
   toggle() { this.act(this.state.running ? "pause" : "go"); }
-
-  // --- what is shown ---
 
   select(key) {
     this.selected = key;

@@ -1,10 +1,7 @@
 // The handles of what is moved: of a target a ball, arrows along the world's axes and rings about
-// its own; of an obstacle itself, and arrows. A line to the floor tells where they are.
-//
-// Sizes are in pixels, whatever the distance. Where the robot hides a handle it is drawn
-// through it, translucent. A pointer finds handles by its distance from them on the screen,
-// as thin things are hard to hit; a finger's reach is larger.
-"use strict";
+// its own; of an obstacle itself, and arrows. A line to the floor tells where they are. Sizes are in
+// pixels, whatever the distance. Where the robot hides a handle it is drawn through it, translucent. A
+// pointer finds handles by its distance from them on the screen; a finger's reach is larger.
 
 class Gizmo {
   static BALL = 8;           // px, radius
@@ -13,7 +10,6 @@ class Gizmo {
   static RING = 54;          // px, radius
   static REACH = {mouse: {ball: 13, arrow: 8, ring: 7}, touch: {ball: 24, arrow: 22, ring: 22}};
   static COLORS = ["#D55E00", "#009E73", "#0072B2"];  // those of the axes of targets.py
-  static BALL_COLOR = "#E69F00";                      // palette.DESIRED
 
   constructor(target, viewer) {
     const {Group, Vector3, Quaternion} = MeshCat.THREE;
@@ -35,7 +31,6 @@ class Gizmo {
 
   // What the program is told: which thing, and where it is wanted.
   address() { return {target: this.target.name}; }
-
   wish() { return {do: "move", ...this.address(), pose: this.pose()}; }
 
   // Whether the program follows this coordinate of the target.
@@ -48,7 +43,6 @@ class Gizmo {
 
   pose() { return [...this.position.toArray(), ...this.turn.toArray()]; }
 
-  // An axis of the target itself, in the world.
   own(axis) { return this.axes[axis].clone().applyQuaternion(this.turn); }
 
   rotate(axis, angle) {
@@ -56,23 +50,21 @@ class Gizmo {
     this.turn.premultiply(turn).normalize();
   }
 
-  // Fit its size to the camera.
+  // Fit its size to the camera: in a small picture, usual handles would hide the robot.
   layOut(sight) {
-    // In a small picture, as above a phone's open sheet, the handles would hide the robot.
     const room = Math.min(sight.box.height / 450, sight.box.width / 480);
     this.enlarged = this.usual * clamp(room, 0.65, 1);
     this.size = sight.pixel(this.position) * this.enlarged;
     this.group.position.copy(this.position);
     this.group.scale.setScalar(this.size);
     this.rings.quaternion.copy(this.turn);
-    const beyond = this.ball - Gizmo.BALL;  // arrows begin at the surface
     for (const {handle, meshes} of this.parts) {
       if (handle.kind === "line") this._layOutLine(meshes);
       if (handle.kind !== "arrow") continue;
       const visible = this._outline(handle, sight).length > 0;
       for (const mesh of meshes) {
-        mesh.visible = visible;
-        mesh.position.copy(this.axes[handle.axis]).multiplyScalar(beyond);
+        mesh.visible = visible;  // it begins at the ball's surface
+        mesh.position.copy(this.axes[handle.axis]).multiplyScalar(this.ball - Gizmo.BALL);
       }
     }
     this.group.updateMatrixWorld();
@@ -134,8 +126,7 @@ class Gizmo {
     return Math.min(...nearest.map((point) => point?.distanceTo(pixel) ?? Infinity));
   }
 
-  // Start to drag a handle: returns a function from pixels to what it says, after which
-  // position and turn are the new ones.
+  // Drag a handle: returns a function that takes pixels, moves the gizmo, and says how far.
   grab(handle, sight, x, y) {
     const from = this.position.clone(), turn = this.turn.clone(), degrees = 180 / Math.PI;
     const radius = Gizmo.RING * this.enlarged;
@@ -167,8 +158,7 @@ class Gizmo {
     };
   }
 
-  // The ball moves in the picture's plane, or in that of the two coordinates, or along
-  // the one coordinate, that the program follows.
+  // The ball moves in the picture's plane, or along the coordinates that the program follows.
   _ballDrag(sight, from, x, y) {
     const left = [0, 1, 2].filter((axis) => !this.follows(axis));
     if (left.length === 2) return sight.onLine(from, this.axes[3 - left[0] - left[1]], x, y);
@@ -183,7 +173,6 @@ class Gizmo {
     };
   }
 
-  // Show which handle is under the pointer or dragged, and whether any may be.
   mark(handle, dragged, disabled, selected) {
     this.lined = Boolean(handle) || selected;
     const white = new MeshCat.THREE.Color("#FFFFFF");
@@ -208,7 +197,6 @@ class Gizmo {
     }
   }
 
-  // A thing's displacement in words: along an axis with its name.
   static way(from, to) {
     const step = to.clone().sub(from);
     const moved = ["x", "y", "z"].filter((name) => Math.abs(step[name]) > 5e-5);
@@ -225,9 +213,8 @@ class Gizmo {
     const {SphereGeometry, CylinderGeometry, RingGeometry, TorusGeometry, DoubleSide, Mesh,
            MeshBasicMaterial} = MeshCat.THREE;
     const {ARROW: [start, tip], HEAD, RING} = Gizmo, quarter = Math.PI / 2;
-    const color = this.target.color ?? Gizmo.BALL_COLOR;
+    const color = this.target.color ?? "#E69F00";  // palette.DESIRED
     this._buildBall(color);
-    // From the surface down to the floor, and around the place there.
     const down = new CylinderGeometry(0.8, 0.8, 1, 8).translate(0, 0.5, 0);
     const foot = new RingGeometry(0.86, 1, 48).rotateX(quarter);
     this._part({kind: "line"}, [down, foot], color, 1000, 0.3, {x: -quarter, side: DoubleSide});

@@ -1,12 +1,9 @@
 // Pointers and keys in the scene of `hsp play`: what is under them, and what they move.
 "use strict";
 
-// The hand finds, in this order: a handle, an obstacle, a link of the robot; all else
-// is left to the camera, as are drags with Shift, Ctrl or Meta. A drag ends when the pointer is
-// released, but also when it is lost or the page is hidden: nothing stays grabbed.
+// The hand finds, in this order: a handle, an obstacle, a link of the robot; all else is left to the
+// camera, as are drags with Shift, Ctrl or Meta.
 class PlayHand {
-  static STILL = {mouse: 2, pen: 3, touch: 5};  // px: a shorter way is no drag
-
   constructor(play, viewer) {
     Object.assign(this, {play, viewer, grip: null, hover: null, pane: viewer.dom_element});
     const first = {capture: true}, {pane} = this;
@@ -31,8 +28,8 @@ class PlayHand {
     PlayHand.keep(event);
     this.viewer.controls.enabled = false;
     this.pane.setPointerCapture(pointerId);
-    this.grip = {...found, pointer: pointerId, x, y, moved: false,
-                 still: PlayHand.STILL[pointerType] ?? 3};
+    const still = pointerType === "touch" ? 5 : 2;  // px: a shorter way is no drag
+    this.grip = {...found, pointer: pointerId, x, y, moved: false, still};
     if (found.key) play.select(found.key);
     this.setHover(found);
   }
@@ -78,7 +75,6 @@ class PlayHand {
     this.setHover(null);
   }
 
-  // What a grip does with the pointer, from its first move on.
   begin({gizmo, handle, point, x, y, ...link}) {
     const {play} = this, {sight} = play;
     const drag = gizmo ? gizmo.grab(handle, sight, x, y)
@@ -99,14 +95,13 @@ class PlayHand {
     return best ?? this.findLink(x, y);
   }
 
-  // The link of the robot under a pixel. Joint 0 is the world: what is fixed to it cannot
-  // be pulled.
+  // The link of the robot under a pixel. What is fixed to joint 0, the world, cannot be pulled.
   findLink(x, y) {
     const {setup, sight} = this.play, robot = this.viewer.scene_tree.children.robot;
     if (!setup?.pull || !robot) return null;
     const first = sight.caster(x, y).intersectObject(robot.object, true)
       .find(({object}) => isShown(object));
-    const path = first && PlayHand.pathOf(robot, "/robot", first.object);
+    const path = first && PlayHand.pathOf(first.object);
     if (!path || path.startsWith("/robot/universe")) return null;
     return {path, point: first.point.clone().applyMatrix4(sight.toScene),
             local: node(path).worldToLocal(first.point.clone())};
@@ -128,20 +123,14 @@ class PlayHand {
     this.play.showMarks();
   }
 
-  // The event is ours: neither the camera nor the browser's gestures get it.
   static keep(event) {
     event.stopImmediatePropagation();
     event.preventDefault();
   }
 
-  // The path of the node that holds an object: the deepest one with a name of its own.
-  static pathOf({children, object: own}, path, object) {
-    for (const [name, child] of Object.entries(children)) {
-      const found = name !== "<object>" && PlayHand.pathOf(child, `${path}/${name}`, object);
-      if (found) return found;
-    }
-    for (let at = object; at; at = at.parent) if (at === own) return path;
-    return null;
+  // The path of the node that holds an object: what is drawn there has no name.
+  static pathOf({name, parent}) {
+    return parent ? `${PlayHand.pathOf(parent)}${name && `/${name}`}` : "";
   }
 }
 
@@ -151,11 +140,10 @@ function whenAway(act) {
   on(document, "visibilitychange", () => { if (document.hidden) act(); });
 }
 
-// The keys that the panel's foot names; with a clip, those of player_bar.js hold instead.
-// In a live loop the space bar is the dead-man's key, if it has one, and there is no pause, step,
-// reset or save. The arrows follow those of the world's horizontal axes that lie nearest to the
-// picture's; a coordinate that the program does not follow is left out. An orientation is turned,
-// by 1° (shift: 0.1°).
+// The keys that the panel's foot names; with a clip, those of player_bar.js hold instead. In a live
+// loop the space bar is the dead-man's key, if it has one. The arrows follow those of the world's
+// horizontal axes that lie nearest to the picture's; a coordinate that the program does not follow is
+// left out. An orientation is turned, by 1° (shift: 0.1°).
 class PlayKeys {
   static WAYS = {ArrowRight: [1, 0, 0], ArrowLeft: [-1, 0, 0], ArrowUp: [0, 1, 0],
                  ArrowDown: [0, -1, 0], PageUp: [0, 0, 1], PageDown: [0, 0, -1]};
@@ -171,7 +159,6 @@ class PlayKeys {
   actionOf({target, key, shiftKey, repeat}) {
     const {play} = this, way = PlayKeys.WAYS[key];
     if (!play.ready || player.loaded) return null;
-    // In the panel, its own controls take the arrows and the space key first.
     const inControl = target.matches?.("input, button, [tabindex]")
       && target.closest(".play-panel, .play-bar, #caption");
     if (inControl && (key === " " || way)) return null;

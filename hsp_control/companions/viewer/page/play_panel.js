@@ -1,22 +1,19 @@
 // What is around the scene of `hsp play`: the bar below it, the panel beside it, and what is drawn
 // over it in pixels.
-"use strict";
 
-// The bar: pause, step, reset, save, the time and the rate; above it the status line, and who
-// steers the robot.
 class PlayBar {
   constructor(play) {
     this.play = play;
     this.row = part(".play-bar");
     const names = ["toggle", "panel", "clock", "rate"];
-    [this.toggle, this.panel, this.clock, this.rate] = names.map((name) => part(`.${name}`, this.row));
+    [this.toggle, this.panel, this.clock, this.rate] =
+      names.map((name) => part(`.${name}`, this.row));
     const actions = ["step", "reset", "save", "stop"];
     this.acting = [onPress(this.toggle, () => play.toggle()), ...actions.map((name) =>
       onPress(part(`.${name}`, this.row), () => play.act(name)))];
-    this.status = part(".play-status");
-    this.watching = part(".play-watching");
+    [this.status, this.watching] = [".play-status", ".play-watching"].map((name) => part(name));
     onPress(this.panel, () => play.panel.setOpen(!play.panel.open));
-    onPress(part("button", this.watching), () => play.say({do: "take_over"}));
+    onPress(part("button", this.watching), () => play.act("take_over"));
     presentation.addButton(part(".present", this.row));
   }
 
@@ -27,24 +24,20 @@ class PlayBar {
       : [this.play.simulated ? "paused" : "stopped"]);
     const ariaLabel = running ? "Pause" : "Go";
     Object.assign(this.toggle, {ariaLabel, title: `${ariaLabel} (space)`});
-    this.status.hidden = !message;
     if (this.status.textContent !== message) this.status.textContent = message;
     this.status.classList.toggle("warning", level === "warning");
   }
 
   showDrive(mine, taken) {
     this.watching.hidden = mine;
-    part("span", this.watching).textContent = `You are watching: ${taken ? "another page" : "nobody"} steers.`;
+    part("span", this.watching).textContent = taken ? "another page" : "nobody";
     for (const button of this.acting) button.disabled = !mine;
   }
 }
 
 // The dead-man's key of a live loop: the robot moves only while somebody holds the space bar, or
-// this button. The page repeats that it is held; the loop stops the robot when it hears nothing,
-// whatever the reason.
+// this button. The page repeats that it is held; the loop stops the robot when it hears nothing.
 class PlayHold {
-  static EVERY = 50;  // ms; the loop waits for 500
-
   constructor(play) {
     Object.assign(this, {play, held: false, button: part(".play-bar .hold")});
     this.button.hidden = false;
@@ -63,14 +56,13 @@ class PlayHold {
     clearInterval(this.timer);
     const say = () => this.play.send({do: "hold", held});
     say();
-    if (held) this.timer = setInterval(say, PlayHold.EVERY);
+    if (held) this.timer = setInterval(say, 50);  // ms; the loop waits for 500
   }
 }
 
-// The panel: switches, live plots, the other controls in their groups. A value is the program's:
-// a change is sent, and the value that the program then reports, with each picture, is shown, so a
-// refused one goes back. While a slider is held, and a moment after each change, what the program
-// said before does not count.
+// The panel: switches, live plots, the other controls in their groups. A change is sent, and the value
+// that the program then reports, with each picture, is shown: a refused one goes back. While a slider
+// is held, and a moment after each change, what the program said before does not count.
 class PlayPanel {
   static NARROW = "(max-width: 620px), (max-width: 860px) and (max-aspect-ratio: 6/5)";
 
@@ -81,9 +73,7 @@ class PlayPanel {
     this.fields = [...this.box.querySelectorAll("fieldset")];  // switches and settings
     onPress(part(".close", this.box), () => this.setOpen(false));
     // On a phone there is room for the sheet or the legend.
-    on(legend.toggle, "click", () => {
-      if (legend.open && this.narrow.matches) this.setOpen(false);
-    });
+    on(legend.toggle, "click", () => { if (legend.open && this.narrow.matches) this.setOpen(false); });
   }
 
   setOpen(open) {
@@ -99,16 +89,13 @@ class PlayPanel {
     part("h2", this.box).textContent = title || "Play";
     this.setters = new Map();
     this.things = new Map(gizmos.map((gizmo) => [gizmo.key, this.thing(gizmo)]));
-    const groups = new Map(), switches = [];
-    const put = (group, row) => groups.set(group, [...groups.get(group) ?? [], row]);
-    for (const gizmo of gizmos) put(`${gizmo.noun}s`, this.things.get(gizmo.key));
-    for (const control of controls) {
-      if (control.kind === "switch") switches.push(this.switch(control));
-      else put(control.group || "Settings", this.slider(control));
-    }
-    this.fields[0].replaceChildren(...switches);
-    this.fields[1].replaceChildren(...[...groups].map(([name, rows]) =>
-      make("section", {}, make("h3", {}, name), ...rows)));
+    const {switch: switches = [], slider: sliders = []} = Object.groupBy(controls, ({kind}) => kind);
+    const rows = [...gizmos.map(({key, noun}) => [`${noun}s`, this.things.get(key)]),
+                  ...sliders.map((each) => [each.group || "Settings", this.slider(each)])];
+    const groups = [...Map.groupBy(rows, ([group]) => group)];
+    this.fields[0].replaceChildren(...switches.map((each) => this.switch(each)));
+    this.fields[1].replaceChildren(...groups.map(([name, own]) =>
+      make("section", {}, make("h3", {}, name), ...own.map(([, row]) => row))));
   }
 
   // The name of a target or an obstacle, which selects it, and the way back to its own path.
@@ -124,7 +111,6 @@ class PlayPanel {
     return make("div", {className: "play-row target"}, select, resume);
   }
 
-  // Show that a thing was moved away from its path, or is on it again.
   showMoved(key, moved) { this.things.get(key).classList.toggle("moved", moved); }
 
   showSelected(selected) {
@@ -137,40 +123,40 @@ class PlayPanel {
     const shown = make("output");
     const place = (x) => log ? Math.log(x / low) / Math.log(high / low) : (x - low) / (high - low);
     const valueAt = (share) => log ? low * (high / low) ** share : low + share * (high - low);
-    const tell = (x) => {
-      const words = `${PlayPanel.number(x)}${unit && unit !== "–" ? ` ${unit}` : ""}`;
-      shown.textContent = input.ariaValueText = words;
+    const short = (x) => Number(x.toPrecision(3));  // enough to set a gain
+    const show = (x) => {
+      const words = [Plot.minus(String(short(x))), unit === "–" ? "" : unit].join(" ");
+      shown.textContent = input.ariaValueText = words.trim();
       input.style.setProperty("--share", `${100 * clamp(place(x), 0, 1)}%`);
     };
-    const show = (x) => {
-      if (input.matches(":active")) return;
-      input.value = place(x);
-      tell(x);
-    };
     on(input, "input", () => {
-      // Three significant digits are enough to set a gain, and its ends are exact.
-      const next = clamp(Number(valueAt(Number(input.value)).toPrecision(3)), low, high);
-      tell(next);
+      const next = clamp(short(valueAt(Number(input.value))), low, high);
+      show(next);
       this.set(id, next);
     });
-    this.setters.set(id, show);
-    show(value);
-    const name = make("label", {htmlFor: input.id}, PlayPanel.named(control), shown);
-    return make("div", {className: "play-row slider"}, name, input);
+    this.setters.set(id, (x) => {
+      if (input.matches(":active")) return;
+      input.value = place(x);
+      show(x);
+    });
+    this.setters.get(id)(value);
+    return PlayPanel.row(control, input, shown);
   }
 
   switch(control) {
     const {id, value} = control;
-    const input = make("input", {type: "checkbox", role: "switch", checked: value});
+    const input = make("input", {type: "checkbox", role: "switch", checked: value, id: `play-${id}`});
     on(input, "change", () => this.set(id, input.checked));
     this.setters.set(id, (checked) => { input.checked = checked; });
-    return make("div", {className: "play-row switch"},
-                make("label", {}, PlayPanel.named(control), input));
+    return PlayPanel.row(control, input);
   }
 
-  static named({label, note}) { return make("span", {}, label, make("small", {}, note ?? "")); }
+  static row({kind, label, note}, input, ...shown) {
+    const name = make("span", {}, label, make("small", {}, note ?? ""));
+    return make("div", {className: `play-row ${kind}`},
+                make("label", {htmlFor: input.id}, name, ...shown), input);
+  }
 
-  // Ask for a value; what the program said before it heard of it is not shown.
   set(id, value) {
     const key = `set ${id}`;
     this.play.touch(key);
@@ -182,40 +168,24 @@ class PlayPanel {
       if (this.play.isFresh(`set ${id}`)) this.setters.get(id)?.(value);
     }
   }
-
-  static number(value) {
-    const text = value !== 0 && (Math.abs(value) < 1e-3 || Math.abs(value) >= 1e5)
-      ? value.toExponential(1) : String(Number(value.toPrecision(3)));
-    return Plot.minus(text);
-  }
 }
 
-// Over the scene: the name of what is selected or dragged, and the spring by which a link is
-// pulled. It also holds one invisible button per target and obstacle, at its place, so that the
-// Tab key and screen readers find them.
+// Over the scene: the name of what is selected or dragged, and the spring by which a link is pulled;
+// and an invisible button at each target and obstacle, for the Tab key and screen readers.
 class PlayOverlay {
-  // From 0 to 1, with nine turns.
-  static COIL = `M0 0H.1q.0222 -2 .0444 0${"t.0444 0".repeat(17)}H1`;
-
   constructor() {
-    this.box = part(".play-overlay");
-    [this.handles, this.spring, this.force] =
-      [".play-handles", ".spring", ".force"].map((name) => part(name, this.box));
-    for (const line of this.spring.querySelectorAll("path")) line.setAttribute("d", PlayOverlay.COIL);
-    this.buttons = this.labels = new Map();
+    this.spring = part(".spring");
+    this.force = part(".play-label.force");
   }
 
-  // One button per gizmo; select(key) is called when one gets the focus.
   setThings(gizmos, select) {
     this.buttons = new Map(gizmos.map(({key, noun, target}, k) => {
       const number = k < 9 ? `, key ${k + 1}` : "";
       const ariaLabel = `${noun} ${target.name}${number}: arrow keys and page up, page down move it`;
       return [key, make("button", {type: "button", ariaLabel, onfocus: () => select(key)})];
     }));
-    for (const label of this.labels.values()) label.remove();
     this.labels = new Map(gizmos.map(({key}) => [key, make("div", {className: "play-label name"})]));
-    this.box.append(...this.labels.values());
-    this.handles.replaceChildren(...this.buttons.values());
+    part(".play-handles").replaceChildren(...this.buttons.values(), ...this.labels.values());
   }
 
   // Put a gizmo's button at its place, and what there is to say above its radius [px].
@@ -239,7 +209,6 @@ class PlayOverlay {
     if (!visible) return;
     const [coil, ...ends] = this.spring.children, [dx, dy] = [to.x - from.x, to.y - from.y];
     const length = Math.hypot(dx, dy), angle = Math.atan2(dy, dx) * 180 / Math.PI;
-    // It becomes thinner as it is stretched.
     const height = Math.max(2, Math.min(7, 900 / (length + 60), 0.2 * length));
     const at = ({x, y}) => `translate(${x} ${y})`;
     coil.setAttribute("transform", `${at(from)} rotate(${angle}) scale(${length} ${height})`);

@@ -1,8 +1,5 @@
-// What the camera sees, and how a pointer moves things in it.
-//
-// All points and directions are in Pinocchio's axes (z up), which are the axes inside Meshcat's
-// scene; pixels are those of pointer events (clientX, clientY).
-"use strict";
+// What the camera sees, and how a pointer moves things in it. Points and directions are in Pinocchio's
+// axes (z up), which are those inside Meshcat's scene; pixels are those of pointer events.
 
 class Sight {
   static REACH = 20;  // m: no drag leads farther from the eye
@@ -16,9 +13,9 @@ class Sight {
     camera.updateWorldMatrix(true, false);
     this.box = renderer.domElement.getBoundingClientRect();
     this.toScene = scene.matrixWorld.clone().invert();
-    [this.right, this.up, this.back] = [0, 1, 2].map((column) => new Vector3()
-      .setFromMatrixColumn(camera.matrixWorld, column).transformDirection(this.toScene));
-    this.eye = new Vector3().setFromMatrixPosition(camera.matrixWorld).applyMatrix4(this.toScene);
+    const pose = this.toScene.clone().multiply(camera.matrixWorld);
+    [this.right, this.up, this.back, this.eye] = [0, 1, 2, 3].map((column) =>
+      new Vector3().setFromMatrixColumn(pose, column));
     return this;
   }
 
@@ -37,10 +34,9 @@ class Sight {
     return Math.max(this.depth(point), 1e-6) * 2 * Math.tan(fov * Math.PI / 360) / this.box.height;
   }
 
-  // The direction from a point to the eye.
   towards(point) { return this.eye.clone().sub(point).normalize(); }
 
-  // A raycaster of three.js through a pixel, in three.js's own axes; and its ray in ours.
+  // A raycaster through a pixel, in three.js's own axes; and its ray in ours.
   caster(x, y) {
     const {left, top, width, height} = this.box, caster = new MeshCat.THREE.Raycaster();
     const place = {x: 2 * (x - left) / width - 1, y: 1 - 2 * (y - top) / height};
@@ -92,7 +88,6 @@ class Sight {
     };
   }
 
-  // Some points of the robot's surface.
   surface(robot) {
     const points = [];
     robot?.traverse(({geometry, matrixWorld}) => {

@@ -1,10 +1,4 @@
-// The player: moves the scene along a clip, and sends events with the time. It depends on
-// neither a server nor a file: it needs a scene tree and a clip.
-//
-//   const player = new Player(viewer);        // a MeshCat.Viewer
-//   player.load(clip);                        // shows the clip's start; plays if clip.play is set
-//   player.seek(2.5);                         // shows t = 2.5 s, exactly and immediately
-//   player.addEventListener("time", ({detail}) => cursor.moveTo(detail.time));
+// The player: moves the scene along a clip, without a server or a file.
 //
 // A clip is what viewer/clip.py writes: clocks (times), tracks that refer to them, and bands for the
 // time line. Before its first time and after its last one a track keeps its first and last value; all
@@ -19,7 +13,7 @@ class Player extends EventTarget {
 
   constructor(viewer) {
     super();
-    Object.assign(this, {viewer, speed: 1, loop: false, run: null});  // the run that is seen alone
+    Object.assign(this, {viewer, speed: 1, loop: false, run: null});  // run: that is seen alone
     this.unload();
   }
 
@@ -29,49 +23,35 @@ class Player extends EventTarget {
     this._emit("state");
   }
 
-  // The bands of what is seen: of several runs each with its run's name.
+  // The bands of what is seen.
   get marks() {
-    return [...this.bands.values()].filter(({run}) => this.run === null || run === this.run)
-      .map(({name, caption, run, ...rest}) => {
-        const whose = run && this.run === null ? `${run}: ` : "";
-        return {...rest, name: whose + name, caption: whose + caption};
-      });
+    return [...this.bands.values()].filter(({run}) => this.run === null || run === this.run);
   }
 
-  // Remove the clip; the scene does not change.
   unload() {
-    Object.assign(this, {tracks: new Map(), bands: new Map(), open: false});
-    Object.assign(this, {time: 0, start: 0, end: 0, horizon: 0});
-    this.set({playing: false, loaded: false});
+    this.set({tracks: new Map(), bands: new Map(), time: 0, start: 0, end: 0, horizon: 0,
+              open: false, playing: false, loaded: false});
   }
 
   // Replace the clip. With `keep`, time, speed and state of the last clip are kept.
   load(clip, keep = false) {
-    const {time, playing, speed, loop} = this, kept = keep && this.loaded;
-    const {start} = clip;
+    const {time, playing} = this, {start, speed, loop} = clip, kept = keep && this.loaded;
     Object.assign(this, {tracks: new Map(), bands: new Map(), start, end: start, loaded: true});
-    if (!kept) {
-      const own = {speed: clip.speed ?? speed, loop: clip.loop ?? loop};
-      Object.assign(this, {...own, time: start, playing: false});
-    }
+    if (!kept) Object.assign(this, {speed, loop, time: start, playing: false});
     this.extend(clip);
     if (kept) this.seek(time);
     if (kept ? playing : clip.play) this.play();
   }
 
-  // Append an extension to the clip.
   extend(clip) {
     for (const {path, property, clock, values} of clip.tracks) {
       const key = `${path}\n${property}`;
       if (!this.tracks.has(key)) this.tracks.set(key, new Track(path, property));
       this.tracks.get(key).append(clip.clocks[clock], values);
     }
-    for (const band of clip.bands ?? []) this._mark(band);
-    this.end = Math.max(this.end, clip.end);
-    this.horizon = Math.max(this.end, clip.horizon ?? clip.end);
-    this.open = Boolean(clip.open);
+    for (const band of clip.bands) this._mark(band);
     this.refresh();
-    this._emit("state");
+    this.set({end: clip.end, horizon: clip.horizon, open: clip.open});
   }
 
   play() {
@@ -91,7 +71,6 @@ class Player extends EventTarget {
   }
 
   pause() { if (this.playing) this.set({playing: false}); }
-
   toggle() { if (this.playing) this.pause(); else this.play(); }
 
   // Show a time [s], limited to the clip.
@@ -101,17 +80,16 @@ class Player extends EventTarget {
     this._emit("time", {time: this.time});
   }
 
-  // Pause, and move by some seconds.
-  step(seconds) {
+  halt(time) {
     this.pause();
-    this.seek(this.time + seconds);
+    this.seek(time);
   }
 
-  faster() { this.set({speed: Player.SPEEDS.find((x) => x > this.speed) ?? this.speed}); }
+  step(seconds) { this.halt(this.time + seconds); }
 
+  faster() { this.set({speed: Player.SPEEDS.find((x) => x > this.speed) ?? this.speed}); }
   slower() { this.set({speed: Player.SPEEDS.findLast((x) => x < this.speed) ?? this.speed}); }
 
-  // Show one instant of some tracks, which replaces what they show now.
   pose(tracks) {
     for (const {path, property, values} of tracks) {
       new Track(path, property).append([0], values).show(this.viewer, 0);
@@ -119,7 +97,6 @@ class Player extends EventTarget {
     this.viewer.set_dirty();
   }
 
-  // Show the current time again, after the scene has changed.
   refresh() {
     for (const track of this.tracks.values()) track.show(this.viewer, this.time);
     this.viewer.set_dirty();
@@ -153,14 +130,13 @@ class Player extends EventTarget {
   _emit(kind, detail = {}) { this.dispatchEvent(new CustomEvent(kind, {detail})); }
 }
 
-// A node of the scene tree; none is created.
-function findNode(viewer, path) {
-  return path.split("/").filter(Boolean)
-    .reduce((node, name) => node?.children[name], viewer.scene_tree);
+function findNode(viewer, path) {  // none is created
+  return elements(path).reduce((node, name) => node?.children[name], viewer.scene_tree);
 }
 
-// The animation of one property of one node, in pieces: each begins at the last row of the one
-// before.
+function elements(path) { return path.split("/").filter(Boolean); }
+
+// The animation of a property of a node, in pieces: each begins at the last row of the one before.
 class Track {
   constructor(path, property) {
     const interpolant = Track.INTERPOLANTS[property] ?? "LinearInterpolant";

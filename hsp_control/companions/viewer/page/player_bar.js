@@ -1,13 +1,9 @@
 // The player's bar: buttons, the time line with its bands, and the keys of docs/companions/view.md.
-// Bands on the time line tell when a limit, a singularity or an obstacle acted on the law: one row
-// per kind. A band under the pointer, or with the focus, is named with its times; a click goes to
-// its start. While the player's time is inside a band, its caption stands above the bar.
-"use strict";
+// A row of bands for each kind of thing that acted on the law. A band under the pointer, or with the
+// focus, is named with its times; a click goes to its start. While the player's time is inside a
+// band, its caption stands above the bar.
 
 class PlayerBar {
-  static FRAME = 1 / 30;  // s
-
-  // The bar is hidden while there is no clip.
   constructor(player, bar) {
     Object.assign(this, {player, bar, moments: part(".moments")});
     const names = ["toggle", "loop", "timeline", "clock", "speed", "bands", "band-name"];
@@ -37,7 +33,7 @@ class PlayerBar {
 
   actionOf({key, shiftKey}) {
     const {player} = this;
-    const step = shiftKey ? 1 : PlayerBar.FRAME;
+    const step = shiftKey ? 1 : 1 / 30;  // s
     return player.loaded && {
       " ": () => player.toggle(),
       ArrowLeft: () => player.step(-step),
@@ -45,10 +41,9 @@ class PlayerBar {
       Home: () => player.seek(player.start),
       End: () => player.seek(player.end),
       "+": () => player.faster(),
-      "=": () => player.faster(),
       "-": () => player.slower(),
       l: () => player.set({loop: !player.loop}),
-    }[key];
+    }[key === "=" ? "+" : key];
   }
 
   showState() {
@@ -56,11 +51,11 @@ class PlayerBar {
     this.bar.hidden = !(player.loaded && player.horizon > player.start);
     this.toggle.ariaPressed = player.playing;
     this.loop.ariaPressed = player.loop;
-    const known = [...this.speed.options].some(({value}) => Number(value) === player.speed);
-    if (!known) this.speed.add(new Option(`${player.speed} ×`, player.speed));
     this.speed.value = player.speed;
-    timeline.min = player.start;
-    timeline.max = player.horizon;
+    if (!this.speed.value) {
+      this.speed.add(new Option(`${player.speed} ×`, player.speed, false, true));
+    }
+    Object.assign(timeline, {min: player.start, max: player.horizon});
     this.drawBands();
     this.showTime();
   }
@@ -87,7 +82,7 @@ class PlayerBar {
     const drawn = JSON.stringify([start, horizon, marks]);
     if (drawn === this.drawn) return;
     this.drawn = drawn;
-    // The rows of a comparison are many: they share the space below the rail.
+    // Those of a comparison are many: they share the space below the rail.
     this.bands.style.setProperty("--pitch", `${Math.min(4, 16 / marks.length)}px`);
     this.bands.replaceChildren(...marks.map(({name, color, spans}) => make(
       "div", {style: `--color: ${color}`}, ...spans.map((span) => this.band(name, ...span)))));
@@ -107,7 +102,6 @@ class PlayerBar {
     return band;
   }
 
-  // Name a band above it; anything else hides the name.
   nameBand(band) {
     const named = Boolean(band?.matches?.(".bands button"));
     this.bandName.hidden = !named;

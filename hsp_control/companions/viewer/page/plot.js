@@ -1,6 +1,5 @@
 // A plot over time, drawn by uPlot (github.com/leeoniya/uPlot): what the plots of a run and those
 // of `hsp play` share. The legend is below it, with values; a name shows its curve alone.
-"use strict";
 
 class Plot {
   static HEIGHT = 118;  // px
@@ -29,7 +28,7 @@ class Plot {
       make("ul", {}, ...this.buttons.map((button) => make("li", {}, button))));
   }
 
-  // Show one curve alone, by its place in the legend; null: all.
+  // Show one curve alone, by its place; null: all.
   isolate(place) {
     this.alone = place;
     this.buttons.forEach((button, k) => {
@@ -65,7 +64,6 @@ class Plot {
     }, data, this.figure);
   }
 
-  // Take the width that there is.
   fit() {
     const {clientWidth} = this.figure;
     if (clientWidth && this.chart && this.chart.width !== clientWidth) {
@@ -83,17 +81,17 @@ class Plot {
     };
   }
 
-  // Ticks where values are exponents of ten.
+  // Ticks where values are exponents of ten: at most five.
   static DECADES = {
-    incrs: [1, 2, 3, 4, 5, 6, 8, 10], space: 16,
+    incrs: (_, axis, low, high) => [Math.max(1, Math.ceil((high - low) / 4.5))], space: 1,
     values: (_, ticks) => ticks.map((tick) => tick === 0 ? "1"
       : `10${[...String(tick)].map((c) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[c] ?? "⁻").join("")}`),
   };
 
-  // A number with few characters, always of about the same width.
-  static number(value) {
-    if (value === null || !Number.isFinite(value)) return "–";
-    const size = Math.abs(value);
+  // A number, or one by its logarithm, with few characters, always of about the same width.
+  static number(shown, logarithmic) {
+    if (shown === null) return "–";
+    const value = logarithmic ? 10 ** shown : shown, size = Math.abs(value);
     return Plot.minus(size !== 0 && (size < 1e-3 || size >= 1e5)
       ? value.toExponential(1) : value.toFixed(size < 10 ? 3 : size < 1000 ? 1 : 0));
   }

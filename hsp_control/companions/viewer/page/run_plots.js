@@ -1,26 +1,14 @@
-// The plots beside the scene: curves of a run, or of several, and a cursor at the player's time.
-//
-//   const side = new Side(player);
-//   side.show({runs, start, end, damped, panels, colors});   // as viewer/page_plots.py writes them
-//   side.select(1);          // emphasise the curves of one run; null: of all
-//
-// In a plot with the focus + and - zoom, Home shows the whole run; all other keys are the
-// player's. All plots have the same span of time.
+// The plots beside the scene: curves of a run, or of several, and a cursor at the player's time; the
+// data are those of viewer/page_plots.py. In a plot with the focus + and - zoom, Home shows the whole
+// run; all other keys are the player's. All plots have the same span of time.
 "use strict";
 
 class Side {
-  static FINEST = 1 / 500;  // the shortest span, over the whole one
-
   constructor(player) {
     Object.assign(this, {player, plots: [], selected: null, start: 0, end: 1, from: 0, to: 1});
-    this.stage = make("main", {id: "stage"});  // the scene, its caption and the bar
-    this.whole = makeButton({className: "whole-run", title: "Show the whole run (Esc)", hidden: true},
-                            () => this.reset());
-    this.box = make("aside", {id: "side"}, this.whole);
+    this.box = part("#side");
+    this.whole = onPress(part(".whole-run"), () => this.reset());
     document.body.classList.add("sided", "without-plots");
-    document.body.append(this.stage, this.box);
-    const parts = "#meshcat-pane, #caption, #lost, .player, .moments";
-    this.stage.append(...document.querySelectorAll(parts));
     barHeight = 0;  // the bar is below the picture
     onPress(part(".player .side"), () => this.toggle());
     onKey(({key}) => key === "g" && !document.body.classList.contains("without-plots")
@@ -32,22 +20,18 @@ class Side {
 
   // Show or hide the plots; the scene takes their space.
   toggle() { document.body.classList.toggle("alone"); }
-
-  // Remove the plots; whether the user wants to see any is kept.
+  // Remove them; whether the user wants to see any is kept.
   clear() { document.body.classList.add("without-plots"); }
 
-  // Show other data. Plots with the same curves are kept, and with them the focus and what the
-  // user drags; so are a span that is zoomed, and a curve that is shown alone.
-  show({runs, start, end, damped, panels, colors}) {
+  // Show other data; what the user has made of the plots stays, if they have the same curves.
+  show({runs, start, end, damped, panels}) {
     document.body.classList.remove("without-plots");
     const {zoomed, plots} = this;
-    Object.assign(this, {runs, start, damped, colors, end: end > start ? end : start + 1});
-    if (!zoomed) [this.from, this.to] = [this.start, this.end];
-    const same = panels.length === plots.length
-      && panels.every((panel, k) => plots[k].look === RunPlot.lookOf(panel));
-    if (same) panels.forEach((panel, k) => { plots[k].panel = panel; });
-    else this.replace(panels);
-    this.zoom(this.from, this.to);
+    Object.assign(this, {runs, start, damped, end: end > start ? end : start + 1});
+    const looks = (each) => String(each.map(RunPlot.lookOf));
+    if (looks(panels) !== looks(plots.map(({panel}) => panel))) this.replace(panels);
+    panels.forEach((panel, k) => { this.plots[k].panel = panel; });
+    this.zoom(...(zoomed ? [this.from, this.to] : [this.start, this.end]));
   }
 
   replace(panels) {
@@ -66,10 +50,10 @@ class Side {
 
   get zoomed() { return this.from > this.start || this.to < this.end; }
 
-  // Show a span of time [s] in all plots, as far as it is in the run.
+  // Show a span of time [s], as far as it is in the run.
   zoom(from, to) {
     const longest = this.end - this.start;
-    const length = clamp(to - from, Side.FINEST * longest, longest);
+    const length = clamp(to - from, longest / 500, longest);
     this.from = clamp((from + to - length) / 2, this.start, this.end - length);
     this.to = this.from + length;
     if (length > 0.999 * longest) [this.from, this.to] = [this.start, this.end];
@@ -78,13 +62,14 @@ class Side {
     for (const plot of this.plots) plot.refresh();
   }
 
-  // Magnify by a factor; the given time keeps its place.
+  // Magnify; the given time keeps its place.
   magnify(factor, time) {
     this.zoom(time - (time - this.from) / factor, time + (this.to - time) / factor);
   }
 
   reset() { if (this.zoomed) this.zoom(this.start, this.end); }
 
+  // Emphasise the curves of one run; null: of all.
   select(run) {
     this.selected = run;
     for (const plot of this.plots) plot.build();
@@ -96,16 +81,13 @@ class Side {
   }
 
   showTime() {
-    const {time} = this.player;
+    const {time} = this.player, {from, to} = this, half = (to - from) / 2;
     const focused = this.plots.some(({figure}) => figure === document.activeElement);
-    if (focused && this.zoomed && (time < this.from || time > this.to)) {
-      const half = (this.to - this.from) / 2;
-      this.zoom(time - half, time + half);  // the cursor stays in sight
-    }
+    const hidden = this.zoomed && (time < from || time > to);
+    if (focused && hidden) this.zoom(time - half, time + half);
     for (const plot of this.plots) plot.showTime();
   }
 
-  // The line by which the plots tell the runs apart.
   static sample(run) {
     const innerHTML = `<svg viewBox="0 0 22 8" aria-hidden="true"><line x1="2" x2="20" y1="4" y2="4"
       stroke="currentColor" stroke-width="2.2" stroke-linecap="${run ? "round" : "butt"}"
@@ -118,8 +100,7 @@ class RunPlot extends Plot {
   static MOVED = 4;  // a pointer that moves less is a click [px]
   static NEAR = 7;  // where the cursor can be taken [px]
 
-  // The dashes of a curve, which tell the runs apart: solid, dotted, dashes and dots.
-  static dashes(run, dashed) {
+  static dashes(run, dashed) {  // solid, dotted, dashes and dots
     const dots = !run ? [] : run % 2 ? [0.1, 3.6] : [0.1, 3.6, 0.1, 3.6, 8, 3.6];
     return dashed ? [5, run ? 3.6 : 3, ...dots] : dots;
   }
@@ -133,7 +114,7 @@ class RunPlot extends Plot {
   constructor(side, panel) {
     // Curves of one name have one entry of the legend.
     super("h2", panel, [...new Map(panel.series.map((each) => [each.name, each])).values()]);
-    Object.assign(this, {side, panel, look: RunPlot.lookOf(panel), fingers: new Map(), drag: null});
+    Object.assign(this, {side, panel, fingers: new Map(), drag: null, marks: make("div")});
     Object.assign(this.figure, {tabIndex: 0, role: "slider", ariaLabel: `${panel.title}, time`});
     this.listen();
   }
@@ -166,10 +147,9 @@ class RunPlot extends Plot {
     this.chart.over.append(this.cursor);
   }
 
-  // Whether a run is pale because another one is emphasised.
   faint(run) { return this.side.selected !== null && this.side.selected !== run; }
 
-  // The curves at their corners and about one time a pixel in the span that is shown.
+  // The curves at their corners, and about one time a pixel.
   data() {
     const {from, to} = this.side, count = this.figure.clientWidth || 300;
     const corners = this.curves.flatMap(({times}) => [...times.filter((t) => t > from && t < to)]);
@@ -178,7 +158,6 @@ class RunPlot extends Plot {
     return [times, ...this.curves.map((curve) => Array.from(times, (t) => valueAt(curve, t)))];
   }
 
-  // Show the span, and the data, of now.
   refresh() {
     this.curves = this.curves.map(({name, run}) => this.find(name, run));
     this.chart.setData(this.data());
@@ -193,41 +172,31 @@ class RunPlot extends Plot {
     const {low, high, logarithmic, edges} = this.panel;
     if ((!this.side.zoomed && this.alone === null) || least === null) return [low, high];
     // Values beyond the whole axis are clipped: they say nothing about the range.
-    const needed = [least, most].map((value) => clamp(value, low, high));
-    needed.push(...edges.map(({value}) => value));
-    const [from, to] = [Math.min(...needed), Math.max(...needed)];
+    const ends = [least, most].map((value) => clamp(value, low, high));
+    const needed = [...ends, ...edges.map(({value}) => value)];
+    const from = Math.min(...needed), to = Math.max(...needed);
     const smallest = logarithmic ? 1 : (high - low) / 1000;
     const room = 0.08 * (to - from) + Math.max(0, smallest - (to - from)) / 2;
     return [from - room, to + room];
   }
 
-  // Below the curves: when the law is damped near a singularity, and where there is contact.
-  drawMarks({ctx, bbox: {left, top, width, height}, valToPos}) {
-    const {damped, colors, from, to} = this.side;
-    ctx.save();
-    ctx.beginPath();
-    ctx.rect(left, top, width, height);
-    ctx.clip();
-    ctx.fillStyle = `${Plot.shade(colors.warning)}30`;
-    for (const ends of damped.flatMap((spans, run) => this.faint(run) ? [] : spans)) {
-      const [x, until] = ends.map((time) => valToPos(time, "x", true));
-      ctx.fillRect(x, top, Math.max(until - x, 1), height);
-    }
-    const ratio = devicePixelRatio, paper = Plot.shade("#FFFFFF");
-    ctx.font = Plot.FONT.replace(/[\d.]+/, (size) => size * ratio);
-    for (const {value, name} of this.panel.edges) {
+  // Marks of when the law is damped near a singularity, and of where there is contact.
+  drawMarks({over, valToPos}) {
+    const {damped, from, to} = this.side;
+    const spans = damped.flatMap((each, run) => this.faint(run) ? [] : each);
+    const singular = spans.map((ends) => {
+      const [left, right] = ends.map((time) => valToPos(time, "x"));
+      return make("i", {className: "damped", style: `left: ${left}px; width: ${right - left}px`});
+    });
+    const contacts = this.panel.edges.map(({value, name}) => {
       // The label stands at the end of the line that is farther from the curves.
       const [before, after] = [0.15, 0.85].map((share) => Math.min(...this.curves.map((curve) =>
         Math.abs((valueAt(curve, from + share * (to - from)) ?? Infinity) - value))));
-      const x = before > after ? left + 2 : left + width - 2;
-      ctx.textAlign = before > after ? "left" : "right";
-      const y = Math.round(valToPos(value, "y", true)) + 0.5;
-      Object.assign(ctx, {strokeStyle: colors.contact, lineWidth: ratio});
-      ctx.stroke(new Path2D(`M${left} ${y}h${width}`));
-      Object.assign(ctx, {strokeStyle: paper, lineWidth: 3 * ratio, fillStyle: colors.contact});
-      for (const put of ["strokeText", "fillText"]) ctx[put](name, x, y - 4 * ratio);
-    }
-    ctx.restore();
+      const side = before > after ? "left" : "right", top = Math.round(valToPos(value, "y"));
+      return make("i", {className: "edge", style: `top: ${top}px; text-align: ${side}`}, name);
+    });
+    this.marks.replaceChildren(...singular, ...contacts);
+    over.prepend(this.marks);
   }
 
   // The cursor at the player's time: a line, and a dot on each curve.
@@ -257,7 +226,7 @@ class RunPlot extends Plot {
     this.entries.forEach(({name}, k) => {
       this.outputs[k].textContent = runs.map((run) => {
         const curve = this.find(name, run), value = curve ? valueAt(curve, time) : null;
-        return Plot.number(panel.logarithmic && value !== null ? 10 ** value : value);
+        return Plot.number(value, panel.logarithmic);
       }).join(" | ");
     });
     if (figure !== document.activeElement) return;
@@ -266,12 +235,9 @@ class RunPlot extends Plot {
                            ariaValueText: `${moment}: ${told.join(", ")}`});
   }
 
-  // -- what the user does --
-
   listen() {
     const {figure} = this;
-    // A click of the mouse must not take the keyboard from the player.
-    // Nor must a finger leave a pointer behind, where the browser plays a mouse after a tap.
+    // A mouse must not take the keyboard from the player, nor a tap leave a pointer behind.
     on(figure, "mousedown touchend", (event) => event.preventDefault());
     on(figure, "pointerdown", (event) => this.press(event));
     on(figure, "pointermove", (event) => this.move(event));
@@ -340,11 +306,11 @@ class RunPlot extends Plot {
 
   release({pointerId, type}) {
     if (!this.fingers.delete(pointerId) || this.fingers.size) return;
-    const {side, drag} = this;
+    const {side} = this, {kind, x, span} = this.drag ?? {};
     this.stop();
-    if (type === "pointercancel" || !drag) return;
-    if (drag.kind === "click") side.player.seek(this.timeAt(drag.x));
-    if (drag.kind === "span" && drag.span[1] > drag.span[0]) side.zoom(...drag.span);
+    if (type === "pointercancel") return;
+    if (kind === "click") side.player.seek(this.timeAt(x));
+    if (kind === "span" && span[1] > span[0]) side.zoom(...span);
   }
 
   stop() {
@@ -377,8 +343,7 @@ class RunPlot extends Plot {
   }
 }
 
-// A curve's value at a time, interpolated linearly between two of its points; null after its
-// end or before its start.
+// A curve's value at a time; null after its end or before its start.
 function valueAt(curve, time) {
   const {times, values} = curve;
   if (time < times[0] - 1e-6 || time > times.at(-1) + 1e-6) return null;

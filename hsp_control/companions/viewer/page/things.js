@@ -64,25 +64,24 @@ function drawRings(object, rings) {
   });
 }
 
-// Labels beside bars, with their lengths: they follow the bars as the scene moves. A bar has the
-// length 1 along z; its node's scale in z is what it shows [m].
+// Labels beside bars, with their lengths: of each the scale of its node in z [m].
 class LengthLabels {
   static MOST = 8;  // more would hide the scene: then the shortest bars have labels
-  static GAP = 7;  // between a bar and its label [px]
 
-  constructor(viewer) { Object.assign(this, {viewer, paths: new Set(), labels: []}); }
+  constructor(viewer) {
+    const className = "length-label", length = LengthLabels.MOST;
+    const labels = Array.from({length}, () => make("div", {className}));
+    Object.assign(this, {viewer, labels, paths: new Set()});
+    viewer.dom_element.append(...labels);
+  }
 
-  // Call it after each drawing.
   update() {
     const bars = this.bars();
-    while (this.labels.length < bars.length) {
-      this.labels.push(make("div", {className: "length-label"}));
-      this.viewer.dom_element.append(this.labels.at(-1));
-    }
     this.labels.forEach((label, k) => {
       label.hidden = k >= bars.length;
       if (label.hidden) return;
-      const {z} = bars[k].scale, deep = this.collides(bars[k]);
+      const {z} = bars[k].scale, {color} = bars[k].getObjectByProperty("isMesh", true).material;
+      const deep = color.getHex() === 0xD00020;  // palette.COLLISION
       const text = deep ? `${(100 * z).toFixed(1)} cm deep` : `${z.toFixed(2)} m`;
       label.classList.toggle("deep", deep);
       if (label.textContent !== text) label.textContent = text;
@@ -90,14 +89,6 @@ class LengthLabels {
     });
   }
 
-  // Whether a bar is in the colour of a collision: palette.COLLISION.
-  collides(bar) {
-    let deep = false;
-    eachMaterial(bar, ({color}) => { deep ||= color?.getHex() === 0xD00020; });
-    return deep;
-  }
-
-  // The visible bars, the shortest first.
   bars() {
     const bars = [];
     for (const path of this.paths) {
@@ -114,15 +105,12 @@ class LengthLabels {
     const [start, middle, end] = [0, 0.5, 1].map((z) => pixelOf(
       this.viewer, new MeshCat.THREE.Vector3(0, 0, z).applyMatrix4(bar.matrixWorld)));
     if (Math.abs(middle.z) > 1) label.hidden = true;  // behind the camera
-    const length = Math.hypot(end.x - start.x, end.y - start.y) || 1;
     // Normal to the bar, and to the right, or up if the bar is level.
-    let across = [(start.y - end.y) / length, (end.x - start.x) / length];
-    if (across[0] < -1e-3 || (across[0] < 1e-3 && across[1] > 0)) across = across.map((c) => -c);
-    const {offsetWidth, offsetHeight} = label;
-    const away = LengthLabels.GAP + Math.abs(across[0]) * offsetWidth / 2
-      + Math.abs(across[1]) * offsetHeight / 2;
-    const left = middle.x + away * across[0] - offsetWidth / 2;
-    const top = middle.y + away * across[1] - offsetHeight / 2;
+    const across = new MeshCat.THREE.Vector2(start.y - end.y, end.x - start.x).normalize();
+    if (across.x < -1e-3 || (across.x < 1e-3 && across.y > 0)) across.negate();
+    const width = label.offsetWidth / 2, height = label.offsetHeight / 2;
+    const away = 7 + Math.abs(across.x) * width + Math.abs(across.y) * height;
+    const left = middle.x + away * across.x - width, top = middle.y + away * across.y - height;
     // Whole pixels: else the same time may give another image.
     label.style.transform = `translate(${Math.round(left)}px, ${Math.round(top)}px)`;
   }
