@@ -127,8 +127,8 @@ def _runs(
 
 
 _HELP = (
-    "In the plots: click to go to a time, drag to zoom (or pinch), Esc for the whole run; "
-    "click a name to see it alone."
+    "In the plots: click to go to a time, drag to zoom (or pinch), Esc for the whole "
+    "run; click a name to see it alone."
 )
 
 

@@ -17,8 +17,7 @@ from hsp_control.companions.viewer.commands import (
     key_of,
     unpack,
 )
-from hsp_control.companions.viewer.packed_scene import reduce_scene
-from hsp_control.companions.viewer.packing import ArrayTable
+from hsp_control.companions.viewer.packing import ArrayTable, reduce_scene
 from hsp_control.companions.viewer.transport import meshcat_page
 
 _FILES = Path(__file__).parent / "page"
