@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hsp_control.companions.viewer.export_format import ExportFormat
+from hsp_control.companions.viewer.command import ExportFormat
 
 if TYPE_CHECKING:
     from hsp_control.companions.viewer.comparison import ComparedRun

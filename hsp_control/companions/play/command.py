@@ -35,9 +35,9 @@ def _add_play_options(play: argparse.ArgumentParser) -> None:
 
 
 def _play(options: argparse.Namespace) -> int:
-    from hsp_control.companions.play.play_command import play
+    from hsp_control.companions.play.real_time import play_command
 
-    return play(options)
+    return play_command(options)
 
 
 PLAY = AddedCommand(

@@ -1,11 +1,31 @@
-"""The loop of a session in real time, and what a page says about time."""
+"""``hsp play``: a session in real time that a page steers, and the command itself."""
 
-from collections.abc import Callable, Iterable, Mapping
+import argparse
+import gc
+import signal
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
 from time import monotonic, sleep
+from types import FrameType
 from typing import Any
 
+from hsp_control.cli.consoles import out
+from hsp_control.cli.loading import run_imports
+from hsp_control.common.exceptions import HspControlError
 from hsp_control.companions.play.picture import FRAME, Picture
+from hsp_control.companions.play.playable import playable_document
 from hsp_control.companions.play.session import Session
+from hsp_control.companions.viewer import Viewer
+from hsp_control.companions.viewer.pages import (
+    OpeningPage,
+    draw_before,
+    draw_empty,
+    status_line,
+)
+from hsp_control.companions.viewer.transport import PageServer
+from hsp_control.config import Experiment
+from hsp_control.config.loaded_scenario import load_scenario
 
 BEHIND = 0.1
 """A session that is later than this goes on from now: it is slower than real time [s].
@@ -62,3 +82,68 @@ def play(
             drawn = now
         wait = due if running and not session.over else drawn + FRAME
         sleep(max(min(wait - monotonic(), FRAME), 0.0))
+
+
+def play_command(options: argparse.Namespace) -> int:
+    """Serve the page until Ctrl-C, and save the log at the end; 2 if a run failed."""
+    options.out.mkdir(parents=True, exist_ok=True)  # fails before the play, not after
+    with ExitStack() as stack:
+        server = PageServer(options.port, host=options.host, steerable=True)
+        stack.callback(server.close)
+        draw_empty(server, str(options.config))
+        page = OpeningPage(
+            server.url,
+            options,
+            lambda url: out.print(f"Play: {url}", soft_wrap=True),
+            status_line(server),
+        )
+        with page.compiling():
+            run_imports(options)
+            document = playable_document(
+                options.config,
+                *options.overrides,
+                strict=options.strict or bool(options.allow),
+                allow=options.allow,
+            )
+            loaded = load_scenario(document)
+            view = loaded.scenario.view.all_fields()
+            viewer = Viewer(loaded.robot, transport=server, **view)
+            draw_before(viewer, loaded)
+            experiment = Experiment.of(loaded)
+            page.open()
+            session = Session(experiment)
+            session.rehearse()
+            picture = Picture(session, viewer)
+        page.ready()
+        gc.collect()
+        gc.freeze()  # what is there now stays: no collection looks at it in a row
+        stack.enter_context(_stop_at_termination())
+        log = options.out / f"{experiment.name}-play.npz"
+
+        def save() -> str:
+            try:
+                return f"saved: {session.rollout().save(log)}"
+            except HspControlError as error:
+                return str(error)
+
+        with suppress(KeyboardInterrupt):
+            out.print("Ctrl-C ends it and saves the log.")
+            play(session, picture, server.messages, save)
+        out.print(f"Log: {session.rollout().save(log)}")
+        if session.over:  # and was not reset
+            print(f"hsp: {session.over.partition('; reset')[0]}", file=sys.stderr)
+    return 2 if session.over else 0
+
+
+@contextmanager
+def _stop_at_termination() -> Iterator[None]:
+    """End as at Ctrl-C when the process is asked to terminate: the log is saved."""
+
+    def stop(_number: int, _frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, stop)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)

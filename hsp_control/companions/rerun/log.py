@@ -16,7 +16,7 @@ from hsp_control.companions.plots import palette
 from hsp_control.companions.viewer.commands import path_element
 from hsp_control.companions.viewer.motion import RunMotion
 from hsp_control.companions.viewer.obstacles import logged_shapes, triangles_of
-from hsp_control.companions.viewer.packed_scene import read_mesh
+from hsp_control.companions.viewer.packing import read_mesh
 from hsp_control.companions.viewer.replay import robot_of
 from hsp_control.companions.viewer.robot_drawing import Visual, read_visuals
 from hsp_control.companions.viewer.targets import read_targets

@@ -40,6 +40,11 @@ class Band(NamedTuple):
     spans: list[tuple[float, float]]  # its intervals [s], ascending and apart
     run: str = ""  # in a comparison, the name of its run
 
+    def of_run(self, run: str) -> "Band":
+        """Return it as a band of one run of several, which it names."""
+        name, caption = f"{run}: {self.name}", f"{run}: {self.caption}"
+        return self._replace(run=run, name=name, caption=caption)
+
 
 def bands_of(
     rollout: Rollout, controller: Controller | None, *, duration: float | None = None

@@ -4,12 +4,15 @@ What is slow is imported when they run.
 """
 
 import argparse
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from hsp_control.cli.options import AddedCommand, CommandPage, add_strict
-from hsp_control.companions.viewer.export_format import export_formats
+from hsp_control.cli.options import AddedCommand, CommandPage, add_strict, loaded
+
+if TYPE_CHECKING:
+    from hsp_control.companions.viewer.comparison import ComparedRun
 
 
 def _add_view_options(view: argparse.ArgumentParser) -> None:
@@ -61,6 +64,30 @@ VIEW = AddedCommand(
 )
 
 
+class ExportFormat(NamedTuple):
+    """Formats of ``hsp export`` for one run: an entry point of ``hsp_control.exports``.
+
+    Attributes:
+        what: What such a file is called in a message, as in "a film".
+        files: The endings, which are the names of options, and what each is.
+        add_options: Adds the other options to the parser of `hsp export`.
+        write: Writes a file and returns its path, given the run, the path, the options
+            and what takes the share that is done.
+    """
+
+    what: str
+    files: Mapping[str, str]
+    add_options: Callable[[argparse.ArgumentParser], object]
+    write: Callable[
+        ["ComparedRun", Path, argparse.Namespace, Callable[[float], None]], Path
+    ]
+
+
+def export_formats() -> list[ExportFormat]:
+    """Return the formats that companions and other packages add to `hsp export`."""
+    return [each for _, each in loaded("exports")]
+
+
 def _add_export_options(export: argparse.ArgumentParser) -> None:
     export.add_argument(
         "logs",
@@ -83,9 +110,10 @@ def _add_export_options(export: argparse.ArgumentParser) -> None:
 
 
 def _export(options: argparse.Namespace) -> int:
-    from hsp_control.companions.viewer.export_command import export
+    from hsp_control.companions.viewer.pages import export
 
-    return export(options)
+    added = [(end, each) for each in export_formats() for end in each.files]
+    return export(options, {end: (each.what, each.write) for end, each in added})
 
 
 EXPORT = AddedCommand(

@@ -83,7 +83,7 @@ class Comparison:
             )
             drawing = self._drawings[-1]
             known = bands_of(run.rollout, run.controller)
-            bands = [band._replace(run=run.name) for band in known]
+            bands = [band.of_run(run.name) for band in known]
             self._runs.append(
                 RunDrawing(drawing, motion, layers, root=root, shown=shown, bands=bands)
             )

@@ -92,7 +92,7 @@ def page_of(runs: Sequence[ComparedRun], view: dict[str, Any]) -> str:
             viewer.compare(runs, beside=beside, ghosts=False)
     content: Json = {
         "plots": pack_panels(runs, arrays),
-        "about": [_about(run) for run in runs],
+        "about": _about(runs),
     }
     if len(runs) > 1:
         content["runs"] = {
@@ -126,20 +126,28 @@ def _runs(
     return rollout
 
 
-def _about(run: ComparedRun) -> Json:
-    """Return the description and the facts of a run, at the foot of the page."""
-    rollout = run.rollout
-    meta, config = rollout.meta, rollout.config or {}
-    facts = [
-        ("robot", meta["robot"]["name"]),
-        ("field", meta.get("field", "")),
-        ("metric", meta.get("metric", "")),
-        ("hsp_control", meta.get("versions", {}).get("hsp_control", "")),
-    ]
-    if rollout.status != "completed":
-        facts.insert(0, (rollout.status, meta.get("message", "")))
-    return {
-        "name": run.name,
-        "text": " ".join(str(config.get("description") or "").split()),
-        "facts": [[name, str(value)] for name, value in facts if value],
-    }
+_HELP = (
+    "In the plots: click to go to a time, drag to zoom (or pinch), Esc for the whole "
+    "run; click a name to see it alone."
+)
+
+
+def _about(runs: Sequence[ComparedRun]) -> list[str]:
+    """Return the paragraphs at the foot of the page: descriptions and facts."""
+    told = [_HELP]
+    for run in runs:
+        meta, config = run.rollout.meta, run.rollout.config or {}
+        text = " ".join(str(config.get("description") or "").split())
+        facts = [
+            (run.rollout.status, meta.get("message", "")),
+            ("robot", meta["robot"]["name"]),
+            ("field", meta.get("field", "")),
+            ("metric", meta.get("metric", "")),
+            ("hsp_control", meta.get("versions", {}).get("hsp_control", "")),
+        ]
+        if run.rollout.status == "completed":
+            del facts[0]
+        words = [f"{name} {value}" for name, value in facts if value]
+        told += [text] if text and text not in told else []
+        told.append("  ·  ".join([run.name, *words] if len(runs) > 1 else words))
+    return told

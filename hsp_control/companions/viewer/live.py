@@ -87,17 +87,16 @@ class LiveView:
         self._viewer.replace_run(rollout, self._experiment.controller, status)
 
     def _send(self, recorder: LogWriter, now: float) -> None:
-        rows = Rollout(recorder.rows(self._sent), self._meta)
-        # From the last row sent on, whose bands may go on.
-        joined = Rollout(recorder.rows(max(self._sent - 1, 0)), self._meta)
+        # From the last row sent on: what moves, and bands, go on from there.
+        rows = Rollout(recorder.rows(max(self._sent - 1, 0)), self._meta)
         rate = float(rows.t[-1]) / max(now - (self._begin or 0.0), 1e-9)
         # Drawn rows per second of computing, times their cost, is drawing's share.
         finest = max(COARSEST, rate * self._cost / DRAWING_SHARE)
         before = time.thread_time()
         motion = motion_of(self._experiment.robot, rows, finest, coarsest=np.inf)
-        self._viewer.transport.send(self._commands(motion, joined, rate))
+        self._viewer.transport.send(self._commands(motion, rows, rate))
         self._cost = (time.thread_time() - before) / len(motion.times)
-        self._sent += len(rows)
+        self._sent = recorder.count
         self._pieces += 1
 
     def _send_plots(self, recorder: LogWriter, now: float) -> None:

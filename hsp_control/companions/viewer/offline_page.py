@@ -17,8 +17,7 @@ from hsp_control.companions.viewer.commands import (
     key_of,
     unpack,
 )
-from hsp_control.companions.viewer.packed_scene import reduce_scene
-from hsp_control.companions.viewer.packing import ArrayTable
+from hsp_control.companions.viewer.packing import ArrayTable, reduce_scene
 from hsp_control.companions.viewer.transport import meshcat_page
 
 _FILES = Path(__file__).parent / "page"
@@ -43,7 +42,7 @@ def scene_page(
     live = (_FILES / "index.html").read_text(encoding="utf-8")
     body = live[live.index("<body>") + len("<body>") : live.index("</body>")]
     names = re.findall(r'<script src="([^"]+)"></script>', body)
-    body = re.sub(r"<script.*?</script>\s*", "", body, flags=re.DOTALL)
+    body = re.sub(r"<(script|template).*?</\1>\s*", "", body, flags=re.DOTALL)
     styles = [
         *map(_text, re.findall(r'<link rel="stylesheet" href="([^"]+)">', live)),
         *re.findall(r"<style>(.*?)</style>", live, flags=re.DOTALL),

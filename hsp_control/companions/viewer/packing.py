@@ -1,13 +1,20 @@
-"""Packs arrays of numbers, clips and curves into few bytes."""
+"""Packs a recorded scene, its meshes, its clip and curves into few bytes."""
 
+import base64
 import hashlib
-from typing import Any
+import io
+import warnings
+from collections.abc import Iterable
+from pathlib import PurePath
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.exceptions import ExportError
 from hsp_control.companions.viewer.commands import Json, typed_array
+from hsp_control.companions.viewer.threejs import material, matrix, unique_name
 
 CLOCK_STEP = 1e-6  # resolution of times [s]
 _KINDS = {
@@ -133,3 +140,219 @@ def reduce_clip(command: Json, arrays: ArrayTable) -> Json:
         packed = arrays.numbers(values, step)
         tracks.append({**track, "clock": clocks.index(clock), "values": packed})
     return {**command, "clocks": clocks, "tracks": tracks}
+
+
+CREASE = np.radians(38.0)
+"""Angle between neighbouring triangles from which their edge is a crease [rad]."""
+
+
+def sort_along_curve(vertices: Array, triangles: Indices) -> tuple[Array, Indices]:
+    """Sort triangles along a space-filling curve: neighbours pack well."""
+    triangles = triangles[np.argsort(_morton_codes(vertices[triangles].mean(axis=1)))]
+    used, first = np.unique(triangles, return_index=True)
+    order = np.argsort(first)
+    number = np.empty(len(vertices), np.int64)
+    number[used[order]] = np.arange(len(used))
+    return vertices[used[order]], number[triangles]
+
+
+def _morton_codes(points: Array) -> Indices:
+    """Return each point's Morton (1966) code: its coordinates' bits, interleaved."""
+    extent = float(np.ptp(points, axis=0).max()) or 1.0
+    cells = ((points - points.min(axis=0)) / extent * 1023.0).astype(np.int64)
+    number = np.zeros(len(points), np.int64)
+    for bit in range(10):
+        for axis in range(3):
+            number |= (cells[:, axis] >> bit & 1) << (3 * bit + axis)
+    return number
+
+
+INSTALL = "pip install 'hsp_control[export]'"
+
+
+class Piece(NamedTuple):
+    """A part of a mesh with one colour."""
+
+    vertices: Array  # (n, 3), in the file's unit of length
+    triangles: Indices  # indices of vertices, (k, 3)
+    # Red, green, blue and opacity, from 0 to 1; None: the URDF's colour.
+    color: tuple[float, ...] | None
+
+
+def read_mesh(thing: Json, owner: str) -> list[Piece]:
+    """Return a mesh file's pieces, one per colour; a texture becomes its mean colour.
+
+    A Collada file's unit and up axis are ignored, as in Meshcat's page and Pinocchio.
+    """
+    try:
+        import collada  # noqa: F401
+        import trimesh
+    except ImportError as error:
+        raise ExportError(
+            f"{owner} is drawn from a mesh file, and reading it needs {error.name}: "
+            f"{INSTALL}"
+        ) from None
+    data = thing["data"]
+    content = data.encode() if isinstance(data, str) else bytes(data)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # about defects of the file
+            scene = trimesh.load_scene(
+                io.BytesIO(content),
+                file_type=thing["format"],
+                resolver=_textures(thing.get("resources", {})),
+                process=False,
+            )
+            colored = thing["type"] == "_meshfile_object"
+            pieces = [
+                _piece(trimesh, scene, node, colored)
+                for node in scene.graph.nodes_geometry
+                if hasattr(scene.geometry[scene.graph[node][1]], "faces")
+            ]
+    except Exception as error:  # any error is possible with untrusted files
+        raise ExportError(f"{owner}: its mesh cannot be read: {error}") from error
+    return merged([piece for piece in pieces if len(piece.triangles)])
+
+
+def merged(pieces: list[Piece]) -> list[Piece]:
+    """Merge the pieces of each colour into one."""
+    by_color: dict[tuple[float, ...] | None, list[Piece]] = {}
+    for piece in pieces:
+        by_color.setdefault(piece.color, []).append(piece)
+    result = []
+    for color, group in by_color.items():
+        before = np.cumsum([0, *(len(piece.vertices) for piece in group)])
+        triangles = [p.triangles + n for p, n in zip(group, before[:-1], strict=True)]
+        vertices = np.concatenate([piece.vertices for piece in group])
+        result.append(Piece(vertices, np.concatenate(triangles), color))
+    return result
+
+
+def _piece(trimesh: Any, scene: Any, node: str, colored: bool) -> Piece:
+    pose, name = scene.graph[node]
+    mesh = scene.geometry[name]
+    vertices = trimesh.transform_points(np.asarray(mesh.vertices, float), pose)
+    triangles = np.asarray(mesh.faces, np.int64)
+    if np.linalg.det(pose[:3, :3]) < 0.0:  # mirrored: keep the outside outside
+        triangles = triangles[:, ::-1]
+    return Piece(vertices, triangles, _color(mesh.visual) if colored else None)
+
+
+def _color(visual: Any) -> tuple[float, ...]:
+    """Return a material's colour; of a texture, the mean over the vertices."""
+    material = getattr(visual, "material", None)
+    if getattr(material, "image", None) or getattr(material, "baseColorTexture", None):
+        sampled = visual.to_color().vertex_colors.mean(axis=0)
+    elif material is not None:
+        sampled = material.main_color
+    else:
+        sampled = visual.main_color
+    return tuple(float(channel) / 255.0 for channel in sampled)
+
+
+def _textures(addresses: dict[str, str]) -> dict[str, bytes]:
+    """Decode a mesh's textures from data URLs; return them by name."""
+    textures = {}
+    for name, address in addresses.items():
+        content = base64.b64decode(address.partition(",")[2])
+        textures[name] = textures[PurePath(name).name] = content
+    return textures
+
+
+VERTEX_STEP = 2e-5
+"""Resolution of vertices [m], or 2⁻¹⁶ of a mesh's size if that is larger."""
+_TRAIL_STEP = 5e-5  # resolution of a trail's points [m]
+
+
+def reduce_scene(commands: Iterable[Json], arrays: ArrayTable) -> list[Json]:
+    """Return commands that show the same scene in fewer bytes."""
+    return [_reduced(command, arrays) for command in commands]
+
+
+def _reduced(command: Json, arrays: ArrayTable) -> Json:
+    match command["type"]:
+        case "clip":
+            return reduce_clip(command, arrays)
+        case "trail":
+            points = np.reshape(command["points"], (-1, 3))
+            return {**command, "points": arrays.numbers(points, _TRAIL_STEP)}
+        case "set_object":
+            thing = _without_files(command["object"], command["path"], arrays)
+            return {**command, "object": _packed(thing, arrays)}
+    packed: Json = _packed(command, arrays)
+    return packed
+
+
+def _packed(value: Any, arrays: ArrayTable) -> Any:
+    """Return data with its arrays moved to the table."""
+    if isinstance(value, dict):
+        return {key: _packed(item, arrays) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_packed(item, arrays) for item in value]
+    if isinstance(value, np.ndarray):
+        if value.dtype.kind == "f":
+            return arrays.numbers(value, step_of(value[:, None], 16), value.dtype)
+        return arrays.whole(value)
+    return value
+
+
+def _without_files(thing: Json, owner: str, arrays: ArrayTable) -> Json:
+    """Return an object with triangles in place of its mesh files."""
+    known = thing.get("geometries", [])
+    files = {g["uuid"]: g for g in known if g["type"] == "_meshfile_geometry"}
+    geometries = [each for each in known if each["uuid"] not in files]
+    materials = list(thing.get("materials", []))
+
+    def mesh(piece: Piece, scale: float, surface: str, shadows: Json) -> Json:
+        geometry = _geometry(piece, scale, arrays)
+        geometries.append(geometry)
+        about = {"geometry": geometry["uuid"], "material": surface}
+        return {"uuid": unique_name(), "type": "Mesh", **about, **shadows}
+
+    def replaced(node: Json, scale: float) -> Json:
+        if "matrix" in node:
+            axes = np.reshape(node["matrix"], (4, 4))[:3, :3]
+            scale *= float(np.linalg.norm(axes, axis=1).max())
+        shadows = {k: v for k, v in node.items() if k.endswith("Shadow")}
+        if node["type"] == "_meshfile_object":
+            children = []
+            for piece in read_mesh(node, owner):
+                color = piece.color or (0.72, 0.74, 0.76, 1.0)
+                surface = material(color, opacity=color[3])
+                materials.append(surface)
+                children.append(mesh(piece, scale, surface["uuid"], shadows))
+        elif file := files.get(node.get("geometry")):
+            pieces = read_mesh(file, owner)
+            children = [mesh(p, scale, node["material"], shadows) for p in pieces]
+        elif "children" in node:
+            children = [replaced(child, scale) for child in node["children"]]
+            return {**node, "children": children}
+        else:
+            return node
+        place = node.get("matrix", matrix(np.eye(4)))
+        group = {"uuid": node["uuid"], "type": "Group", "matrix": place}
+        return {**group, "children": children}
+
+    drawn = replaced(thing["object"], 1.0)
+    about = {"geometries": geometries, "materials": materials}
+    return {**thing, **about, "object": drawn}
+
+
+def _geometry(piece: Piece, scale: float, arrays: ArrayTable) -> Json:
+    """Return a piece as a packed geometry; the page computes its normals."""
+    import trimesh
+    from trimesh.graph import smooth_shade
+
+    solid = trimesh.Trimesh(piece.vertices, piece.triangles)  # with vertices merged
+    solid.update_faces(solid.nondegenerate_faces())
+    # The vertices of creases are doubled: normals are smooth across other edges.
+    solid = smooth_shade(solid, angle=CREASE, facet_minarea=None)
+    vertices, triangles = sort_along_curve(solid.vertices, solid.faces)
+    size = float(np.ptp(vertices, axis=0).max(initial=0.0)) or 1.0
+    step = max(VERTEX_STEP / scale, size * 2.0**-16)
+    places = arrays.numbers(vertices, step)
+    corners = arrays.whole(triangles.astype(np.uint32).ravel())
+    position = {"itemSize": 3, "type": "Float32Array", "array": places}
+    index = {"itemSize": 1, "type": "Uint32Array", "array": corners}
+    data = {"attributes": {"position": position}, "index": index}
+    return {"uuid": unique_name(), "type": "BufferGeometry", "data": data}

@@ -175,10 +175,6 @@ def pack_panels(runs: Sequence[ComparedRun], arrays: ArrayTable) -> Json:
             for run in runs
         ],
         "panels": [_packed(panels[key], curves[key], arrays) for key in panels],
-        "colors": {
-            "contact": palette.OBSTACLE,
-            "warning": palette.WARNING,
-        },
     }
 
 

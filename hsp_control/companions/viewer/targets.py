@@ -154,7 +154,7 @@ def growing_paths(
 ) -> tuple[Layer, Callable[[RunMotion], Iterator[PageCommand]]]:
     """Draw paths of a run that is being computed; return also what extends them.
 
-    The desired paths are those of a preview.
+    The desired paths are those of a preview. Each extension begins at the last point.
     """
     rings = np.arange(len(preview.times))
     sleeves = _moving(preview, "desired", rings)
@@ -175,13 +175,14 @@ def growing_paths(
 
     def tracks(motion: RunMotion) -> Iterator[Track]:
         for name, before in points.items():
-            numbers = len(before) + np.arange(len(motion.times), dtype=float)[:, None]
+            first = max(len(before) - 1, 0)
+            numbers = first + np.arange(len(motion.times), dtype=float)[:, None]
             yield Track(_node(root, name, "actual"), "length", motion.times, numbers)
 
     def extend(motion: RunMotion) -> Iterator[PageCommand]:
         for target in read_targets(motion.rows):
             if target.name in points:
-                known = points[target.name]
+                known = points[target.name][:-1]
                 points[target.name] = np.vstack([known, target.actual])
         yield from trails()
 

@@ -24,7 +24,7 @@ from hsp_control.config.document import read_document
 from hsp_control.config.loaded_scenario import load_scenario
 from hsp_control.live import OperatorRequests
 
-PLAYED = "hsp_control.companions.play.play_command.play_in_real_time"
+PLAYED = "hsp_control.companions.play.real_time.play"
 
 
 class Said:

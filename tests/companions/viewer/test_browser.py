@@ -349,7 +349,7 @@ def test_the_live_view_has_the_run_s_plots(
         watched = watch(viewer.url)
         page = watched.page
         live = LiveView(viewer, experiment)
-        assert not page.locator("#side").count()  # there is no run yet
+        assert not page.locator("#side").is_visible()  # there is no run yet
         log = experiment.run(on_row=on_row)
         assert partial == [4]  # the axis is that of the whole run
         live.finish(log)

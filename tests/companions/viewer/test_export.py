@@ -22,10 +22,7 @@ from hsp_control.cli import main
 from hsp_control.common.exceptions import ExportError, ViewerError
 from hsp_control.companions.viewer import ComparedRun, export_html, robot_of
 from hsp_control.companions.viewer.export_page import write_page
-from hsp_control.companions.viewer.packed_scene import VERTEX_STEP, read_mesh
-from hsp_control.companions.viewer.packing import (
-    ArrayTable,
-)
+from hsp_control.companions.viewer.packing import VERTEX_STEP, ArrayTable, read_mesh
 from hsp_control.companions.viewer.page_plots import (
     CURVE_BOUND,
     pack_panels,

@@ -501,7 +501,7 @@ def test_a_run_is_shown_while_it_is_computed(monkeypatch: pytest.MonkeyPatch) ->
     said = [c["text"] for c in transport.sent if c["type"] == "status"]
     assert any("× real time" in text for text in said)
     times = np.concatenate([clip["clocks"][0] for clip in clips])
-    assert (np.diff(times) > 0.0).all()
+    assert (np.diff(times) >= 0.0).all()  # each begins where the one before ends
     assert (times[0], times[-1]) == (0.0, 0.5)
     joint = np.concatenate(
         [
@@ -517,7 +517,7 @@ def test_a_run_is_shown_while_it_is_computed(monkeypatch: pytest.MonkeyPatch) ->
         expected = pin.SE3ToXYZQUAT(state.data.oMi[1])[3:]
         assert abs(quaternion @ expected) == pytest.approx(1.0, abs=1e-6)
     trail = told(transport, "/paths/tip/actual", "object")["points"]
-    assert len(trail) == 3 * len(times)
+    assert len(trail) == 3 * len(np.unique(times))
 
     view.finish(rollout)
     begin = transport.command(CLIP, "begin")

@@ -3,72 +3,61 @@
 "use strict";
 
 {
-  const PHONE = "(max-width: 560px)";
   let side = null;  // none before there are plots: a page without a run keeps its look
-  const names = make("ul", {className: "run-names"});  // several runs, with the lines of their curves
 
   commandHandlers.plots = ({arrays, plots}) => {
     if (!side) {
       side = new Side(player);
-      if (matchMedia(PHONE).matches) side.toggle();  // away at first: the scene needs the space
-      side.box.append(names);
+      if (matchMedia("(max-width: 560px)").matches) side.toggle();  // the scene needs the space
     }
     side.show(withArrays(plots, arrays.map(unpackArray)));
-    const told = plots.runs.length > 1 ? plots.runs : [];
-    names.hidden = !told.length;
-    names.replaceChildren(...told.map((name, run) => make("li", {}, Side.sample(run), name)));
+    const names = part(".run-names");  // with the lines of their curves
+    names.hidden = plots.runs.length < 2;
+    names.replaceChildren(...plots.runs.map((name, k) => make("li", {}, Side.sample(k), name)));
   };
 
   commandHandlers.no_plots = () => side?.clear();
 }
 
-// Rows of all series of all plots, in order. A time that jumps back clears them; a gap in time, as
+// The last seconds of all series of all plots. A time that jumps back clears them; a gap in time, as
 // after a page has stalled, is drawn as one. Drawn at most 20 times a second, and not while the
 // panel is closed, the page is hidden, or a plot is scrolled out of sight.
 class LivePlots {
   static SPAN = 10;  // s
   static GAP = 0.3;  // s without a row
-  static PERIOD = 50;  // ms
 
   constructor(parent, definitions, isOpen) {
-    Object.assign(this, {isOpen});
-    let first = 0;
-    this.plots = definitions.map((definition) => {
-      first += definition.series.length;
-      return new LivePlot(this, definition, first - definition.series.length);
-    });
+    Object.assign(this, {isOpen, plots: definitions.map((each) => new LivePlot(this, each))});
     this.clear();
-    this.width = first;
     parent.replaceChildren(...this.plots.map(({box}) => box));
-    this.timer = setInterval(() => this.draw(), LivePlots.PERIOD);
+    this.timer = setInterval(() => this.draw(), 50);  // ms
   }
 
   dispose() { clearInterval(this.timer); }
 
   clear() {
     this.times = [];
-    this.rows = [];  // as `add` gets them; null: a gap
-    for (const plot of this.plots) plot.stale = true;
+    for (const plot of this.plots) plot.clear();
   }
 
   add(times, values) {
-    const {width, rows} = this;
-    if (values.length !== times.length * width) return;
+    const width = values.length / times.length;
     times.forEach((time, k) => {
       const step = time - (this.times.at(-1) ?? -Infinity);
       if (Math.abs(step) < 1e-9) return;  // the same row again
       if (step < 0) this.clear();
-      else if (step > LivePlots.GAP && this.times.length) this.put(time - 1e-6, null);
-      this.put(time, values.subarray(k * width, (k + 1) * width));
+      else if (step > LivePlots.GAP && this.times.length) this.put(time - 1e-6, []);
+      this.put(time, [...values.subarray(k * width, (k + 1) * width)]);
     });
     const old = this.times.findIndex((time) => time > this.end - LivePlots.SPAN - 1);
-    if (old > 100) for (const kept of [this.times, this.rows]) kept.splice(0, old);
-    for (const plot of this.plots) plot.stale = true;
+    if (old < 100) return;
+    this.times.splice(0, old);
+    for (const column of this.plots.flatMap(({columns}) => columns)) column.splice(0, old);
   }
 
   put(time, row) {
     this.times.push(time);
-    this.rows.push(row);
+    for (const plot of this.plots) plot.put(row.splice(0, plot.columns.length));
   }
 
   get end() { return this.times.at(-1) ?? 0; }
@@ -83,40 +72,38 @@ class LivePlots {
 }
 
 class LivePlot extends Plot {
-  constructor(plots, definition, first) {
+  constructor(plots, definition) {
     super("h3", definition, definition.series);
-    Object.assign(this, {plots, log: definition.log, first, known: null});
-    Object.assign(this.figure, {role: "img",
-                                ariaLabel: `${definition.title}, the last ${LivePlots.SPAN} s`});
+    Object.assign(this, {plots, log: definition.log});
+    const ariaLabel = `${definition.title}, the last ${LivePlots.SPAN} s`;
+    Object.assign(this.figure, {role: "img", ariaLabel});
   }
 
-  value(row, k) {
-    const value = this.plots.rows[row]?.[this.first + k] ?? NaN;
-    const shown = this.log ? Math.log10(value) : value;
-    return Number.isFinite(shown) ? shown : null;
-  }
+  clear() { Object.assign(this, {columns: this.entries.map(() => []), stale: true}); }
 
-  data() {
-    const {times, rows} = this.plots;
-    return [times, ...this.entries.map((_, k) => rows.map((_, row) => this.value(row, k)))];
+  // Append a row; an empty one is a gap.
+  put(row) {
+    this.columns.forEach((column, k) => {
+      const value = this.log ? Math.log10(row[k]) : row[k];
+      column.push(Number.isFinite(value) ? value : null);
+    });
+    this.stale = true;
   }
 
   build() {
     if (!this.figure.clientWidth) return;
-    const {plots} = this;
-    this.known = null;
-    this.draw(this.data(), {
+    const {plots} = this, shades = this.entries.map(({color}) => Plot.shade(color));
+    const newest = {show: true, size: 5, filter: () => [plots.times.length - 1]};
+    this.draw([plots.times, ...this.columns], {
       logarithmic: this.log,
-      series: this.entries.map(({color}, k) => ({
-        stroke: Plot.shade(color), width: 1.6, show: this.shows(k),
-        points: {show: true, size: 5, fill: Plot.shade(color), filter: () => [plots.times.length - 1]},
-      })),
+      series: shades.map((stroke, k) => (
+        {stroke, width: 1.6, show: this.shows(k), points: {...newest, fill: stroke}})),
       scales: {
         x: {time: false, range: () => [0, LivePlots.SPAN].map(
           (t) => t + Math.max(plots.end - LivePlots.SPAN, 0))},
         y: {range: (_, least, most) => this.range(least, most)},
       },
-      cursor: {points: {size: 7, width: 0, fill: (_, k) => Plot.shade(this.entries[k - 1].color)}},
+      cursor: {points: {size: 7, width: 0, fill: (_, k) => shades[k - 1]}},
       hooks: {setCursor: [() => this.showValues()]},
     });
   }
@@ -126,35 +113,29 @@ class LivePlot extends Plot {
     this.fit();
     if (!this.stale || !this.chart) return;
     this.stale = false;
-    this.chart.setData(this.data());
+    this.chart.setData([this.plots.times, ...this.columns]);
     this.showValues();
   }
 
-  // The range of the axis: it grows at once, and shrinks when much of it is unused.
+  // The range of the axis: not much finer than the values, or it would show their noise.
   range(low, high) {
     if (low === null) return this.log ? [-3, 0] : [0, 1];
     if (this.log) {
       const least = Math.max(Math.floor(low - 0.05), -9);  // below is nothing to see
       return [least, Math.max(Math.ceil(high + 0.05), least + 1)];
     }
-    const least = Math.max(1e-9, 0.02 * Math.max(Math.abs(low), Math.abs(high)));
-    const room = Math.max(high - low, least), [from, to] = this.known ?? [];
-    if (!(low >= from && high <= to && room > 0.55 * (to - from))) {
-      const middle = (low + high) / 2;
-      this.known = [middle - 0.62 * room, middle + 0.62 * room];
-    }
-    return this.known;
+    const size = Math.max(Math.abs(low), Math.abs(high), 5e-8), middle = (low + high) / 2;
+    const half = Math.max(high - low, 0.02 * size) / 2;
+    return uPlot.rangeNum(middle - half, middle + half, 0.1, false);
   }
 
-  // The values under the pointer, or else the present ones.
   showValues() {
     if (!this.chart) return;
     const {left, idx} = this.chart.cursor, {times} = this.plots;
     const hovered = left >= 0 && idx !== null, row = hovered ? idx : times.length - 1;
     this.moment.textContent = hovered ? `t = ${times[row].toFixed(2)} s` : "";
     this.outputs.forEach((output, k) => {
-      const value = this.value(row, k);
-      output.textContent = Plot.number(value === null || !this.log ? value : 10 ** value);
+      output.textContent = Plot.number(this.columns[k][row] ?? null, this.log);
     });
   }
 }

@@ -8,24 +8,17 @@ async function unzipped(id) {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-function showError(message) {
-  const paragraph = document.createElement("p");
-  paragraph.className = "error";
-  paragraph.textContent = message;
-  document.body.append(paragraph);
-}
-
 (async () => {
   if (typeof DecompressionStream === "undefined") {
-    return showError("This page needs a browser of 2023 or newer.");
+    throw new Error("it needs a browser of 2023 or newer");
   }
   for (const code of JSON.parse(new TextDecoder().decode(await unzipped("scripts")))) {
-    const script = document.createElement("script");
-    script.textContent = code;
-    document.head.append(script);
+    document.head.append(Object.assign(document.createElement("script"), {textContent: code}));
   }
   begin(await unzipped("content"));
 })().catch((error) => {
-  showError(`This page cannot be shown: ${error.message}. Does the browser support WebGL?`);
+  const textContent = `This page cannot be shown: ${error.message}.`;
+  const paragraph = Object.assign(document.createElement("p"), {className: "error", textContent});
+  document.body.append(paragraph);
   throw error;
 });

@@ -1,109 +1,85 @@
-// `hsp play` in the page: a running controller whose targets, obstacles, links and settings
-// are moved by hand.
-//
-// The program describes itself by "play_setup" and then reports by the other "play_..."
-// commands; see the end. The page answers over the scene's websocket with JSON:
-// {"do": "move", ...}. Only the page that steers sends anything.
+// `hsp play` in the page: a running controller whose targets, obstacles, links and settings are moved
+// by hand. The program describes itself by "play_setup" and then reports by the other "play_..."
+// commands; see the end. The page that steers answers over the scene's websocket with JSON:
+// {"do": "move", ...}.
 "use strict";
 
 class Play {
   static ECHO = 400;  // ms: after a release or a change, the program's older word is not shown
 
-  static targetKey(name) { return `target ${name}`; }
-
-  static obstacleKey(name) { return `obstacle ${name}`; }
-
   constructor(viewer) {
     Object.assign(this, {viewer, sight: new Sight(viewer), mine: true, holdKey: null, taken: false});
-    this.pending = new Map();    // messages of the next frame, the newest of each kind
-    this.gizmos = new Map();     // key -> Gizmo, of a target or an obstacle
-    this.held = new Map();       // key -> until when its own place is shown [ms]
+    this.pending = new Map();  // messages of the next frame, the newest of each kind
+    this.gizmos = new Map();  // key -> Gizmo, of a target or an obstacle
+    this.touched = new Map();  // key of a thing or a setting -> when the hand has changed it [ms]
     this.state = {t: 0, running: true, rate: 1, message: "", level: "info"};
-    this.away = {};              // task -> what to say of a target that is not reached
+    this.away = {};  // task -> what to say of a target that is not reached
     this.setup = this.selected = this.force = this.pull = null;
   }
 
   get ready() { return this.setup !== null; }
-
   // Whether it is a simulation, which can be paused; else it is a live loop.
   get simulated() { return this.setup.loop === "simulated"; }
 
-  // --- what the program says ---
-
   setUp(setup) {
-    const first = !this.ready;
-    if (first) this.build();
-    else this.hand.end(true);
-    this.setup = {targets: [], obstacles: [], controls: [], plots: [], ...setup};
+    const {targets, obstacles, plots, loop} = setup;
+    if (!this.ready) this.build();
+    this.setup = setup;
+    this.hand.end(true);
     document.body.classList.toggle("live-loop", !this.simulated);
-    if (setup.loop === "held") this.holdKey ??= new PlayHold(this, this.bar.row);
-    this.held.clear();
+    if (loop === "held") this.holdKey ??= new PlayHold(this);
+    this.touched.clear();
     this.force = null;
     for (const gizmo of this.gizmos.values()) gizmo.dispose();
-    const {targets, obstacles} = this.setup;
-    const gizmos = [
-      ...targets.map((target) => new Gizmo(Play.targetKey(target.name), target, this.viewer)),
-      ...obstacles.map((obstacle) => new Obstacle(Play.obstacleKey(obstacle.name), obstacle,
-                                                  this.viewer, obstacles.length === 1)),
-    ];
+    const alone = obstacles.length === 1;
+    const gizmos = [...targets.map((each) => new Gizmo(each, this.viewer)),
+                    ...obstacles.map((each) => new Obstacle(each, this.viewer, alone))];
     this.gizmos = new Map(gizmos.map((gizmo) => [gizmo.key, gizmo]));
     this.overlay.setThings(gizmos, (key) => this.select(key));
-    this.panel.build(this.setup);
-    this.setUpPlots(this.setup.plots);
-    if (!this.gizmos.has(this.selected)) this.selected = null;
-    if (first) this.panel.setOpen(!this.panel.narrow.matches);
-    this.select(this.selected);
+    this.panel.build(setup, gizmos);
+    this.setUpPlots(plots);
+    this.select(this.gizmos.has(this.selected) ? this.selected : null);
     this.showDrive();
     this.bar.showState(this.state);
-    this.fit();
   }
 
   build() {
     document.body.classList.add("play");
-    this.overlay = new PlayOverlay(document.body);
-    this.bar = new PlayBar(this, document.body);
-    this.panel = new PlayPanel(this, document.body);
+    document.body.append(part("#play-parts").content);
+    this.overlay = new PlayOverlay();
+    this.bar = new PlayBar(this);
+    this.panel = new PlayPanel(this);
     this.hand = new PlayHand(this, this.viewer);
     this.keys = new PlayKeys(this);
     this.viewer.scene.onBeforeRender = () => this.layOut();
     legend.setOpen(false);  // what is in the picture is to be touched
-    addEventListener("resize", () => this.fit());
-  }
-
-  // On a phone the picture ends where the bar, or the open sheet, begins; the camera follows
-  // the picture's size.
-  fit() {
-    const {panel, bar} = this;
-    const sheet = panel.open ? panel.box.offsetHeight - 18 : 0;  // behind its round corners
-    const height = Math.max(120, innerHeight - bar.row.offsetHeight - sheet);
-    this.viewer.dom_element.style.height = panel.narrow.matches ? `${height}px` : "";
-    legend.measure();
+    this.panel.setOpen(!this.panel.narrow.matches);
   }
 
   // After a reset the plots are the same: they keep what is shown alone.
   setUpPlots(definitions) {
     const text = JSON.stringify(definitions);
-    if (this.plots && text === this.plotsText) return this.plots.clear();
+    if (text === this.plotsText) return this.plots.clear();
     this.plots?.dispose();
     this.plotsText = text;
     this.plots = new LivePlots(this.panel.plots, definitions, () => this.panel.open);
   }
 
-  showTargets({poses, obstacles, away = {}}) {
+  showTargets({poses = {}, obstacles = {}, away = {}}) {
     this.away = away;
-    for (const [keyOf, places] of [[Play.targetKey, poses], [Play.obstacleKey, obstacles]]) {
-      for (const [name, place] of Object.entries(places ?? {})) {
-        const key = keyOf(name);
-        if (this.follows(key)) this.gizmos.get(key)?.setPose(place);
-      }
-    }
+    for (const [name, pose] of Object.entries(poses)) this.showAt(`target ${name}`, pose);
+    for (const [name, place] of Object.entries(obstacles)) this.showAt(`obstacle ${name}`, place);
   }
 
-  // Whether the program's word on where a thing is holds, not the hand's.
-  follows(key) {
-    const {grip} = this.hand;
-    return !(grip?.moved && grip.key === key) && !(performance.now() < this.held.get(key));
+  // Show a thing where the program has it, unless the hand has it.
+  showAt(key, pose) {
+    const {grip} = this.hand, held = grip?.moved && grip.key === key;
+    if (!held && this.isFresh(key)) this.gizmos.get(key)?.setPose(pose);
   }
+
+  // Whether the program's word on a thing or a setting is newer than what the hand has done.
+  isFresh(key) { return !(performance.now() < this.touched.get(key) + Play.ECHO); }
+  touch(key) { this.touched.set(key, performance.now()); }
 
   showState(state) {
     Object.assign(this.state, state);
@@ -129,14 +105,17 @@ class Play {
     this.showMarks();
   }
 
-  // --- what the hand does ---
-
   // Say something to the program, after what is pending.
-  send(message) { if (this.mine) this.say(message); }
+  send(message) {
+    this.flush();
+    const heard = this.viewer.connection?.readyState === WebSocket.OPEN;
+    if (heard && (this.mine || message.do === "take_over")) {
+      this.viewer.connection.send(JSON.stringify(message));
+    }
+  }
 
   // Say it with the next frame; a newer message of its key replaces it.
   sendLater(key, message) {
-    if (!this.mine) return;
     if (!this.pending.size) requestAnimationFrame(() => this.flush());
     this.pending.set(key, message);
   }
@@ -144,16 +123,9 @@ class Play {
   flush() {
     const messages = [...this.pending.values()];
     this.pending.clear();
-    messages.forEach((message) => this.say(message));
+    for (const message of messages) this.send(message);
   }
 
-  say(message) {
-    this.flush();
-    const {connection} = this.viewer;
-    if (connection?.readyState === WebSocket.OPEN) connection.send(JSON.stringify(message));
-  }
-
-  // Say where a target or an obstacle is wanted.
   move(gizmo) {
     this.hold(gizmo.key);
     this.sendLater(gizmo.key, gizmo.wish());
@@ -164,11 +136,10 @@ class Play {
     this.send({do: "release", ...gizmo.address()});
   }
 
-  // Let a target or an obstacle return to its own path.
-  resume(key) {
-    this.held.delete(key);
-    this.panel.showMoved(key, false);
-    this.send({do: "resume", ...this.gizmos.get(key).address()});
+  resume(gizmo) {
+    this.touched.delete(gizmo.key);
+    this.panel.showMoved(gizmo.key, false);
+    this.send({do: "resume", ...gizmo.address()});
   }
 
   pullLink({path, point, local}, to) {
@@ -183,18 +154,13 @@ class Play {
 
   // For a moment, show a thing where the hand has put it.
   hold(key) {
-    this.held.set(key, performance.now() + Play.ECHO);
+    this.touch(key);
     this.panel.showMoved(key, true);
     this.viewer.set_dirty();
   }
 
   act(what) { this.send({do: what}); }
-
   toggle() { this.act(this.state.running ? "pause" : "go"); }
-
-  takeOver() { this.say({do: "take_over"}); }
-
-  // --- what is shown ---
 
   select(key) {
     this.selected = key;
@@ -217,7 +183,7 @@ class Play {
     const {grip, hover} = this.hand, active = grip ? grip.key : hover?.key ?? this.selected;
     for (const [key, gizmo] of this.gizmos) {
       gizmo.layOut(sight);
-      const {name} = gizmo.target, away = key === Play.targetKey(name) ? this.away[name] : "";
+      const {name} = gizmo.target, away = gizmo.noun === "Target" ? this.away[name] : "";
       const lines = [away, key === active && (grip?.text ? `${name}   ${grip.text}` : name)];
       const at = sight.project(gizmo.position), radius = gizmo.ball * gizmo.enlarged + 9;
       this.overlay.place(key, at, radius, lines.filter(Boolean).join("\n"), Boolean(away));
@@ -242,9 +208,7 @@ const play = new Play(viewer);
 Object.assign(commandHandlers, {
   play_setup(command) { play.setUp(command); },
   play_targets(command) { if (play.ready) play.showTargets(command); },
-  play_state({t, running, rate, message, level}) {
-    play.showState({t, running, rate, message, level});
-  },
+  play_state(command) { play.showState(command); },
   play_values({values}) { if (play.ready) play.panel.setValues(values); },
   play_force(command) { play.force = command.visible ? command : null; },
   play_samples({times, values}) { if (play.ready) play.plots.add(times, values); },

@@ -1,10 +1,7 @@
 // The handles of what is moved: of a target a ball, arrows along the world's axes and rings about
-// its own; of an obstacle itself, and arrows. A line to the floor tells where they are.
-//
-// Sizes are in pixels, whatever the distance. Where the robot hides a handle it is drawn
-// through it, translucent. A pointer finds handles by its distance from them on the screen,
-// as thin things are hard to hit; a finger's reach is larger.
-"use strict";
+// its own; of an obstacle itself, and arrows. A line to the floor tells where they are. Sizes are in
+// pixels, whatever the distance. Where the robot hides a handle it is drawn through it, translucent. A
+// pointer finds handles by its distance from them on the screen; a finger's reach is larger.
 
 class Gizmo {
   static BALL = 8;           // px, radius
@@ -13,12 +10,12 @@ class Gizmo {
   static RING = 54;          // px, radius
   static REACH = {mouse: {ball: 13, arrow: 8, ring: 7}, touch: {ball: 24, arrow: 22, ring: 22}};
   static COLORS = ["#D55E00", "#009E73", "#0072B2"];  // those of the axes of targets.py
-  static BALL_COLOR = "#E69F00";                      // palette.DESIRED
 
-  constructor(key, target, viewer) {
+  constructor(target, viewer) {
     const {Group, Vector3, Quaternion} = MeshCat.THREE;
-    Object.assign(this, {key, target, viewer, position: new Vector3(), turn: new Quaternion(), parts: [],
+    Object.assign(this, {target, viewer, position: new Vector3(), turn: new Quaternion(), parts: [],
                          group: new Group(), rings: new Group(), shown: true, lined: false});
+    this.key = `${this.noun.toLowerCase()} ${target.name}`;
     this.axes = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map((axis) => new Vector3(...axis));
     this.enlarged = this.usual = matchMedia("(pointer: coarse)").matches ? 1.2 : 1;
     this.size = 1e-3;  // m: of a pixel here, enlarged
@@ -28,15 +25,12 @@ class Gizmo {
     viewer.scene.add(this.group);
   }
 
-  get label() { return `Target ${this.target.name}`; }
-
-  get movable() { return this.target.kind !== "orientation"; }
-
+  get noun() { return "Target"; }
   get ball() { return Gizmo.BALL; }
+  get movable() { return this.target.kind !== "orientation"; }
 
   // What the program is told: which thing, and where it is wanted.
   address() { return {target: this.target.name}; }
-
   wish() { return {do: "move", ...this.address(), pose: this.pose()}; }
 
   // Whether the program follows this coordinate of the target.
@@ -49,26 +43,28 @@ class Gizmo {
 
   pose() { return [...this.position.toArray(), ...this.turn.toArray()]; }
 
-  // An axis of the target itself, in the world.
   own(axis) { return this.axes[axis].clone().applyQuaternion(this.turn); }
 
-  // Fit its size to the camera.
+  rotate(axis, angle) {
+    const turn = new MeshCat.THREE.Quaternion().setFromAxisAngle(axis, angle);
+    this.turn.premultiply(turn).normalize();
+  }
+
+  // Fit its size to the camera: in a small picture, usual handles would hide the robot.
   layOut(sight) {
-    // In a small picture, as above a phone's open sheet, the handles would hide the robot.
     const room = Math.min(sight.box.height / 450, sight.box.width / 480);
     this.enlarged = this.usual * clamp(room, 0.65, 1);
     this.size = sight.pixel(this.position) * this.enlarged;
     this.group.position.copy(this.position);
     this.group.scale.setScalar(this.size);
     this.rings.quaternion.copy(this.turn);
-    const beyond = this.ball - Gizmo.BALL;  // arrows begin at the surface
     for (const {handle, meshes} of this.parts) {
       if (handle.kind === "line") this._layOutLine(meshes);
       if (handle.kind !== "arrow") continue;
-      const shown = this._arrowEnds(handle, sight).long;
+      const visible = this._outline(handle, sight).length > 0;
       for (const mesh of meshes) {
-        mesh.visible = shown;
-        mesh.position.copy(this.axes[handle.axis]).multiplyScalar(beyond);
+        mesh.visible = visible;  // it begins at the ball's surface
+        mesh.position.copy(this.axes[handle.axis]).multiplyScalar(this.ball - Gizmo.BALL);
       }
     }
     this.group.updateMatrixWorld();
@@ -87,52 +83,69 @@ class Gizmo {
 
   // The handle under a pixel, and its distance on the screen; null if none is in reach.
   find(sight, x, y, pointer) {
+    if (!sight.project(this.position).ahead) return null;
     const reach = Gizmo.REACH[pointer === "touch" ? "touch" : "mouse"];
-    const center = sight.project(this.position);
-    if (!center.ahead) return null;
-    const measures = {  // distance, and thickness
-      ball: () => [Math.hypot(x - center.x, y - center.y), this.ball * this.enlarged + 4],
-      arrow: (handle) => {
-        const {start, tip, long} = this._arrowEnds(handle, sight);
-        return [long ? Gizmo.toSegment(x, y, start, tip) : Infinity, 3];
-      },
-      ring: (handle) => [this._toRing(handle, sight, x, y), 2],
-      line: () => [Infinity, 0],
-    };
+    const thickness = {ball: this.ball * this.enlarged + 4, arrow: 3, ring: 2};
     let best = null;
     for (const {handle} of this.parts) {
-      const [distance, thickness] = measures[handle.kind](handle);
-      const gap = Math.max(0, distance - thickness);
-      if (distance <= Math.max(reach[handle.kind], thickness) && !(best && best.gap <= gap)) {
-        best = {gizmo: this, handle, gap};
-      }
+      const distance = Gizmo.distance(this._outline(handle, sight), x, y), {kind} = handle;
+      const gap = Math.max(0, distance - thickness[kind]);
+      const reached = distance <= Math.max(reach[kind], thickness[kind]);
+      if (reached && !(best?.gap <= gap)) best = {gizmo: this, handle, gap};
     }
     return best;
   }
 
-  // Start to drag a handle: returns a function from pixels to what it says, after which
-  // position and turn are the new ones.
+  // The pixels of a handle's middle line: of a ring its visible half, and of an arrow that points
+  // at the eye none, because it is too short to be used.
+  _outline({kind, axis}, sight) {
+    const {Vector3} = MeshCat.THREE, eye = sight.towards(this.position);
+    const at = (offset) => {
+      const {x, y} = sight.project(offset.multiplyScalar(this.size).add(this.position));
+      return new Vector3(x, y, 0);
+    };
+    if (kind === "line") return [];
+    if (kind === "ball") return [at(new Vector3())];
+    if (kind === "arrow") {
+      const beyond = this.ball - Gizmo.BALL, along = this.axes[axis];
+      const [start, tip] = Gizmo.ARROW.map((way) => at(along.clone().setLength(way + beyond)));
+      return this.shown && start.distanceTo(tip) > 16 ? [start, tip] : [];
+    }
+    const normal = this.own(axis), faces = Math.abs(normal.dot(eye)) > 0.95;  // a whole circle
+    return Array.from({length: 49}, (_, k) => {
+      const spoke = this.own((axis + 1) % 3).applyAxisAngle(normal, 2 * Math.PI * k / 48);
+      return faces || spoke.dot(eye) > -0.08 ? at(spoke.multiplyScalar(Gizmo.RING)) : null;
+    });
+  }
+
+  // The distance of a pixel from a line through pixels; null: a gap.
+  static distance(line, x, y) {
+    const {Line3, Vector3} = MeshCat.THREE, pixel = new Vector3(x, y, 0);
+    const nearest = line.map((here, k) => here && line[k - 1]
+      ? new Line3(line[k - 1], here).closestPointToPoint(pixel, true, new Vector3()) : here);
+    return Math.min(...nearest.map((point) => point?.distanceTo(pixel) ?? Infinity));
+  }
+
+  // Drag a handle: returns a function that takes pixels, moves the gizmo, and says how far.
   grab(handle, sight, x, y) {
-    const from = this.position.clone(), turn = this.turn.clone();
+    const from = this.position.clone(), turn = this.turn.clone(), degrees = 180 / Math.PI;
     const radius = Gizmo.RING * this.enlarged;
-    const rotate = (axis, angle) => this.turn.premultiply(
-      new MeshCat.THREE.Quaternion().setFromAxisAngle(axis, angle)).normalize();
     if (handle.kind === "ring") {
       const axis = this.own(handle.axis), angle = sight.about(from, axis, radius, x, y);
       return (x, y) => {
         const value = angle(x, y);
         if (value === null) return null;
         this.turn.copy(turn);
-        rotate(axis, value);
-        return `${Gizmo.signed(value * 180 / Math.PI)}°`;
+        this.rotate(axis, value);
+        return `${Gizmo.signed(value * degrees)}°`;
       };
     }
     if (!this.movable) {  // the ball of an orientation rolls under the pointer
       return (to_x, to_y) => {
         this.turn.copy(turn);
-        rotate(sight.up, (to_x - x) / radius);
-        rotate(sight.right, (to_y - y) / radius);
-        return `${(this.turn.angleTo(turn) * 180 / Math.PI).toFixed(1)}°`;
+        this.rotate(sight.up, (to_x - x) / radius);
+        this.rotate(sight.right, (to_y - y) / radius);
+        return `${(this.turn.angleTo(turn) * degrees).toFixed(1)}°`;
       };
     }
     const place = handle.kind === "arrow"
@@ -145,12 +158,10 @@ class Gizmo {
     };
   }
 
-  // The ball moves in the picture's plane, or in that of the two coordinates, or along
-  // the one coordinate, that the program follows.
+  // The ball moves in the picture's plane, or along the coordinates that the program follows.
   _ballDrag(sight, from, x, y) {
-    const followed = [0, 1, 2].filter((axis) => this.follows(axis));
-    if (followed.length === 1) return sight.onLine(from, this.axes[followed[0]], x, y);
     const left = [0, 1, 2].filter((axis) => !this.follows(axis));
+    if (left.length === 2) return sight.onLine(from, this.axes[3 - left[0] - left[1]], x, y);
     if (left.length === 1 && Math.abs(this.axes[left[0]].dot(sight.towards(from))) > 0.1) {
       return sight.inPlane(from, this.axes[left[0]], x, y);
     }
@@ -162,7 +173,6 @@ class Gizmo {
     };
   }
 
-  // Show which handle is under the pointer or dragged, and whether any may be.
   mark(handle, dragged, disabled, selected) {
     this.lined = Boolean(handle) || selected;
     const white = new MeshCat.THREE.Color("#FFFFFF");
@@ -180,14 +190,13 @@ class Gizmo {
   }
 
   dispose() {
-    this.group.parent.remove(this.group);
+    this.group.removeFromParent();
     for (const {geometry, material} of this.parts.flatMap(({meshes}) => meshes)) {
       geometry.dispose();
       material.dispose();
     }
   }
 
-  // A thing's displacement in words: along an axis with its name.
   static way(from, to) {
     const step = to.clone().sub(from);
     const moved = ["x", "y", "z"].filter((name) => Math.abs(step[name]) > 5e-5);
@@ -200,86 +209,50 @@ class Gizmo {
     return Number(text) === 0 ? text : (value < 0 ? "−" : "+") + text;
   }
 
-  static toSegment(x, y, a, b) {
-    const [dx, dy] = [b.x - a.x, b.y - a.y];
-    const share = clamp(((x - a.x) * dx + (y - a.y) * dy) / (dx * dx + dy * dy || 1), 0, 1);
-    return Math.hypot(x - a.x - share * dx, y - a.y - share * dy);
-  }
-
-  // The pixels of an arrow's ends; one that points at the eye is too short to be used.
-  _arrowEnds({axis}, sight) {
-    const size = sight.pixel(this.position) * this.enlarged, beyond = this.ball - Gizmo.BALL;
-    const [start, tip] = Gizmo.ARROW.map((length) => sight.project(
-      this.position.clone().addScaledVector(this.axes[axis], (length + beyond) * size)));
-    return {start, tip, long: this.shown && Math.hypot(tip.x - start.x, tip.y - start.y) > 16};
-  }
-
-  // The distance from the visible half of a ring.
-  _toRing({axis}, sight, x, y) {
-    const size = sight.pixel(this.position) * this.enlarged * Gizmo.RING;
-    const eye = sight.towards(this.position);
-    const [u, v] = [this.own((axis + 1) % 3), this.own((axis + 2) % 3)];
-    const faces = Math.abs(this.own(axis).dot(eye)) > 0.95;  // seen as a whole circle
-    let closest = Infinity, last = null;
-    for (let k = 0; k <= 48; k++) {
-      const angle = 2 * Math.PI * k / 48;
-      const spoke = u.clone().multiplyScalar(Math.cos(angle)).addScaledVector(v, Math.sin(angle));
-      const here = faces || spoke.dot(eye) > -0.08
-        ? sight.project(spoke.multiplyScalar(size).add(this.position)) : null;
-      if (here && last) closest = Math.min(closest, Gizmo.toSegment(x, y, last, here));
-      last = here;
-    }
-    return closest;
-  }
-
   _build() {
     const {SphereGeometry, CylinderGeometry, RingGeometry, TorusGeometry, DoubleSide, Mesh,
            MeshBasicMaterial} = MeshCat.THREE;
-    const {ARROW: [start, tip], HEAD, RING} = Gizmo;
-    const color = this.target.color ?? Gizmo.BALL_COLOR;
+    const {ARROW: [start, tip], HEAD, RING} = Gizmo, quarter = Math.PI / 2;
+    const color = this.target.color ?? "#E69F00";  // palette.DESIRED
     this._buildBall(color);
-    // From the surface down to the floor, and around the place there.
     const down = new CylinderGeometry(0.8, 0.8, 1, 8).translate(0, 0.5, 0);
-    const foot = new RingGeometry(0.86, 1, 48).rotateX(Math.PI / 2);
-    this._part({kind: "line"}, [down, foot], color, 1000, 0.3, {x: -Math.PI / 2});
-    for (const {material} of this.parts.at(-1).meshes) material.side = DoubleSide;
-    const along = [{z: -Math.PI / 2}, {}, {x: Math.PI / 2}];  // from y to the three axes
+    const foot = new RingGeometry(0.86, 1, 48).rotateX(quarter);
+    this._part({kind: "line"}, [down, foot], color, 1000, 0.3, {x: -quarter, side: DoubleSide});
+    const along = [{z: -quarter}, {}, {x: quarter}];  // from y to the three axes
     for (const axis of [0, 1, 2].filter((axis) => this.follows(axis))) {
       const shaft = new CylinderGeometry(1.6, 1.6, tip - HEAD - start, 16)
         .translate(0, (tip - HEAD + start) / 2, 0);
       const cone = new CylinderGeometry(0, 5.6, HEAD, 24).translate(0, tip - HEAD / 2, 0);
       this._part({kind: "arrow", axis}, [shaft, cone], Gizmo.COLORS[axis], 1001, 0.35, along[axis]);
     }
-    if (this.target.kind === "position") return;
+    if (!["orientation", "pose"].includes(this.target.kind)) return;
     // An invisible ball inside the rings, which makes their far halves faint.
     const veil = new Mesh(new SphereGeometry(RING - 2, 40, 24),
                           new MeshBasicMaterial({colorWrite: false, transparent: true}));
     veil.renderOrder = 1002;
     this.group.add(veil);
-    const across = [{y: Math.PI / 2}, {x: Math.PI / 2}, {}];
+    const across = [{y: quarter}, {x: quarter}, {}];
     for (const axis of [0, 1, 2]) {
       this._part({kind: "ring", axis}, [new TorusGeometry(RING, 1.5, 10, 96)], Gizmo.COLORS[axis],
-                 1003, 0.22, across[axis], this.rings);
+                 1003, 0.22, {...across[axis], parent: this.rings});
     }
   }
 
+  // Its rim is the far half of a larger ball, which never hides the ball itself.
   _buildBall(color) {
     const {SphereGeometry, BackSide} = MeshCat.THREE, {BALL} = Gizmo, ball = {kind: "ball"};
-    this._part(ball, [new SphereGeometry(BALL + 2.2, 32, 20)], "#FFFFFF", 1004, 0.8);
-    // Its rim is the far half of a larger ball, which never hides the ball itself.
-    for (const {material} of this.parts[0].meshes) material.side = BackSide;
+    this._part(ball, [new SphereGeometry(BALL + 2.2, 32, 20)], "#FFFFFF", 1004, 0.8, {side: BackSide});
     this._part(ball, [new SphereGeometry(BALL, 32, 20)], color, 1005, 0.9);
   }
 
   // A handle's shapes, each drawn twice: faint through everything, and solid where it is seen.
-  _part(handle, geometries, color, order, faint, turned = {}, parent = this.group) {
+  _part(handle, geometries, color, order, faint, {side = 0, parent = this.group, ...turned} = {}) {
     const {Mesh, MeshBasicMaterial} = MeshCat.THREE;
     const meshes = geometries.flatMap((geometry) => [false, true].map((depthTest) => {
-      const mesh = new Mesh(geometry, new MeshBasicMaterial({
-        color, transparent: true, depthTest, depthWrite: false, toneMapped: false,
-        opacity: depthTest ? 1 : faint,
-      }));
-      Object.assign(mesh, {renderOrder: depthTest ? order : order - 20, frustumCulled: false});
+      const opacity = depthTest ? 1 : faint, renderOrder = depthTest ? order : order - 20;
+      const mesh = new Mesh(geometry, new MeshBasicMaterial(
+        {color, side, opacity, transparent: true, depthTest, depthWrite: false, toneMapped: false}));
+      Object.assign(mesh, {renderOrder, frustumCulled: false});
       Object.assign(mesh.rotation, turned);
       parent.add(mesh);
       return mesh;
@@ -291,16 +264,13 @@ class Gizmo {
 // Of an obstacle: it takes the place of the ball, and is dragged to where the robot is in the
 // picture. Of several, only what is pointed at or selected has arrows.
 class Obstacle extends Gizmo {
-  static COLOR = "#D55E00";  // palette.OBSTACLE
-
-  constructor(key, {position, ...about}, viewer, alone) {
-    super(key, {kind: "position", pose: position, color: Obstacle.COLOR, ...about}, viewer);
+  constructor(obstacle, viewer, alone) {
+    super({pose: obstacle.position, color: "#D55E00", ...obstacle}, viewer);  // palette.OBSTACLE
     this.alone = alone;
     this.mark(null);
   }
 
-  get label() { return `Obstacle ${this.target.name}`; }
-
+  get noun() { return "Obstacle"; }
   get ball() { return Math.max(this.target.radius / this.size, Gizmo.BALL); }
 
   address() { return {name: this.target.name}; }

@@ -1,12 +1,9 @@
 // Pointers and keys in the scene of `hsp play`: what is under them, and what they move.
 "use strict";
 
-// The hand finds, in this order: a handle, an obstacle, a link of the robot; all else
-// is left to the camera, as are drags with Shift, Ctrl or Meta. A drag ends when the pointer is
-// released, but also when it is lost or the page is hidden: nothing stays grabbed.
+// The hand finds, in this order: a handle, an obstacle, a link of the robot; all else is left to the
+// camera, as are drags with Shift, Ctrl or Meta.
 class PlayHand {
-  static STILL = {mouse: 2, pen: 3, touch: 5};  // px: a shorter way is no drag
-
   constructor(play, viewer) {
     Object.assign(this, {play, viewer, grip: null, hover: null, pane: viewer.dom_element});
     const first = {capture: true}, {pane} = this;
@@ -31,16 +28,16 @@ class PlayHand {
     PlayHand.keep(event);
     this.viewer.controls.enabled = false;
     this.pane.setPointerCapture(pointerId);
-    this.grip = {...found, pointer: pointerId, x, y, moved: false,
-                 still: PlayHand.STILL[pointerType] ?? 3};
+    const still = pointerType === "touch" ? 5 : 2;  // px: a shorter way is no drag
+    this.grip = {...found, pointer: pointerId, x, y, moved: false, still};
     if (found.key) play.select(found.key);
     this.setHover(found);
   }
 
   move(event) {
-    const {grip} = this, {clientX: x, clientY: y} = event;
+    const {grip} = this, {clientX: x, clientY: y, pointerType} = event;
     if (!grip) {
-      if (event.pointerType !== "touch" && !event.buttons) this.look(x, y, event.pointerType);
+      if (pointerType !== "touch" && !event.buttons) this.look(x, y, pointerType);
       return;
     }
     PlayHand.keep(event);
@@ -48,9 +45,8 @@ class PlayHand {
     this.viewer.controls.enabled = false;  // a new camera has new controls
     if (!grip.moved) {
       if (Math.hypot(x - grip.x, y - grip.y) < grip.still) return;
-      grip.moved = true;
       this.play.sight.update();
-      grip.drag = this.begin(grip);
+      Object.assign(grip, {moved: true, drag: this.begin(grip)});
     }
     grip.text = grip.drag(x, y) ?? grip.text;
     this.viewer.set_dirty();
@@ -79,22 +75,16 @@ class PlayHand {
     this.setHover(null);
   }
 
-  // What a grip does with the pointer, from its first move on.
-  begin(grip) {
+  begin({gizmo, handle, point, x, y, ...link}) {
     const {play} = this, {sight} = play;
-    if (grip.gizmo) {
-      const drag = grip.gizmo.grab(grip.handle, sight, grip.x, grip.y);
-      return (x, y) => {
-        const text = drag(x, y);
-        if (text !== null) play.move(grip.gizmo);
-        return text;
-      };
-    }
-    const place = sight.inPlane(grip.point.clone(), sight.back.clone(), grip.x, grip.y);
+    const drag = gizmo ? gizmo.grab(handle, sight, x, y)
+      : sight.inPlane(point.clone(), sight.back.clone(), x, y);
     return (x, y) => {
-      const to = place(x, y);
-      if (to) play.pullLink(grip, to);
-      return to && "";
+      const found = drag(x, y);
+      if (found === null) return null;
+      if (gizmo) play.move(gizmo);
+      else play.pullLink({...link, point}, found);
+      return gizmo ? found : "";
     };
   }
 
@@ -105,31 +95,26 @@ class PlayHand {
     return best ?? this.findLink(x, y);
   }
 
-  // The link of the robot under a pixel. Joint 0 is the world: what is fixed to it cannot
-  // be pulled.
+  // The link of the robot under a pixel. What is fixed to joint 0, the world, cannot be pulled.
   findLink(x, y) {
-    const {play, viewer} = this, robot = viewer.scene_tree.children.robot;
-    if (!play.setup?.pull || !robot) return null;
-    const visible = (object) => !object || (object.visible && visible(object.parent));
-    const first = play.sight.caster(x, y).intersectObject(robot.object, true)
-      .find(({object}) => visible(object));
-    const path = first && PlayHand.pathOf(robot, "/robot", first.object);
+    const {setup, sight} = this.play, robot = this.viewer.scene_tree.children.robot;
+    if (!setup?.pull || !robot) return null;
+    const first = sight.caster(x, y).intersectObject(robot.object, true)
+      .find(({object}) => isShown(object));
+    const path = first && PlayHand.pathOf(first.object);
     if (!path || path.startsWith("/robot/universe")) return null;
-    return {path, point: first.point.clone().applyMatrix4(play.sight.toScene),
+    return {path, point: first.point.clone().applyMatrix4(sight.toScene),
             local: node(path).worldToLocal(first.point.clone())};
   }
 
   // Look what is under a resting pointer, at most once a frame.
-  look(x, y, pointer) {
-    const waiting = this.looking;
-    this.looking = [x, y, pointer];
-    if (waiting) return;
-    requestAnimationFrame(() => {
-      const at = this.looking;
+  look(...pointer) {
+    if (!this.looking) requestAnimationFrame(() => {
+      const at = this.looking, {play} = this;
       this.looking = null;
-      if (this.grip || !this.play.ready) return;
-      this.setHover(this.play.mine ? this.find(...at) : null);
+      if (!this.grip && play.ready) this.setHover(play.mine ? this.find(...at) : null);
     });
+    this.looking = pointer;
   }
 
   setHover(found) {
@@ -138,34 +123,27 @@ class PlayHand {
     this.play.showMarks();
   }
 
-  // The event is ours: neither the camera nor the browser's gestures get it.
   static keep(event) {
     event.stopImmediatePropagation();
     event.preventDefault();
   }
 
-  // The path of the node that holds an object: the deepest one with a name of its own.
-  static pathOf({children, object: own}, path, object) {
-    for (const [name, child] of Object.entries(children)) {
-      const found = name !== "<object>" && PlayHand.pathOf(child, `${path}/${name}`, object);
-      if (found) return found;
-    }
-    for (let at = object; at; at = at.parent) if (at === own) return path;
-    return null;
+  // The path of the node that holds an object: what is drawn there has no name.
+  static pathOf({name, parent}) {
+    return parent ? `${PlayHand.pathOf(parent)}${name && `/${name}`}` : "";
   }
 }
 
 // Call a function when the user looks away: nothing stays held.
 function whenAway(act) {
   on(window, "blur pagehide", act);
-  document.addEventListener("visibilitychange", () => { if (document.hidden) act(); });
+  on(document, "visibilitychange", () => { if (document.hidden) act(); });
 }
 
-// The keys that the panel's foot names; with a clip, those of player_bar.js hold instead.
-// In a live loop the space bar is the dead-man's key, if it has one, and there is no pause, step,
-// reset or save. The arrows follow those of the world's horizontal axes that lie nearest to the
-// picture's; a coordinate that the program does not follow is left out. An orientation is turned,
-// by 1° (shift: 0.1°).
+// The keys that the panel's foot names; with a clip, those of player_bar.js hold instead. In a live
+// loop the space bar is the dead-man's key, if it has one. The arrows follow those of the world's
+// horizontal axes that lie nearest to the picture's; a coordinate that the program does not follow is
+// left out. An orientation is turned, by 1° (shift: 0.1°).
 class PlayKeys {
   static WAYS = {ArrowRight: [1, 0, 0], ArrowLeft: [-1, 0, 0], ArrowUp: [0, 1, 0],
                  ArrowDown: [0, -1, 0], PageUp: [0, 0, 1], PageDown: [0, 0, -1]};
@@ -174,14 +152,13 @@ class PlayKeys {
     this.play = play;
     this.moving = new Map();  // keys that are down -> what they move
     onKey((event) => this.actionOf(event));
-    addEventListener("keyup", ({key}) => this.up(key));
+    on(window, "keyup", ({key}) => this.up(key));
     whenAway(() => this.releaseAll());
   }
 
   actionOf({target, key, shiftKey, repeat}) {
     const {play} = this, way = PlayKeys.WAYS[key];
     if (!play.ready || player.loaded) return null;
-    // In the panel, its own controls take the arrows and the space key first.
     const inControl = target.matches?.("input, button, [tabindex]")
       && target.closest(".play-panel, .play-bar, #caption");
     if (inControl && (key === " " || way)) return null;
@@ -208,40 +185,34 @@ class PlayKeys {
   }
 
   move(key, way, fine) {
-    const {play} = this, {selected} = play;
-    if (!play.mine || !selected || play.hand.grip) return;
+    const {play} = this, gizmo = play.gizmos.get(play.selected);
+    if (!play.mine || !gizmo || play.hand.grip) return;
     play.sight.update();
-    const gizmo = play.gizmos.get(selected);
     if (!gizmo.movable) {
       this.turn(gizmo, way, (fine ? 0.1 : 1) * Math.PI / 180);
     } else {
-      const at = gizmo.position, {axis, sign} = this.axis(way, gizmo);
-      if (axis === null) return;
-      at.setComponent(axis, at.getComponent(axis) + sign * (fine ? 0.001 : 0.01));
+      const step = this.axis(way, gizmo)?.multiplyScalar(fine ? 0.001 : 0.01);
+      if (!step) return;
+      gizmo.position.add(step);
     }
     play.move(gizmo);
     this.moving.set(key, gizmo);
   }
 
-  // The world's axis for a key: x or y by the picture, z for page up and down.
+  // The world's axis for a key, with its sign: x or y by the picture, z for page up and down.
   axis([across, along, up], gizmo) {
     const {right, up: above} = this.play.sight;
-    const followed = (axis) => gizmo.follows(axis) ? axis : null;
-    if (up) return {axis: followed(2), sign: up};
-    const first = Math.abs(right.x) >= Math.abs(right.y) ? 0 : 1, other = 1 - first;
-    const sideways = Math.sign(right.getComponent(first)) || 1;
-    if (across) return {axis: followed(first), sign: across * sideways};
-    if (followed(other) === null) return {axis: followed(2), sign: along};
-    // To the right of "away from the viewer" is the picture's right.
-    const away = (other === 1 ? 1 : -1) * sideways * (above.z < -0.5 ? -1 : 1);
-    return {axis: other, sign: along * away};
+    const ahead = new MeshCat.THREE.Vector3(0, 0, above.z < -0.5 ? -1 : 1).cross(right);
+    const sideways = Math.abs(right.x) >= Math.abs(right.y) ? 0 : 1, other = 1 - sideways;
+    const [axis, sign] = across ? [sideways, across * Math.sign(right.getComponent(sideways))]
+      : along && gizmo.follows(other) ? [other, along * Math.sign(ahead.getComponent(other))]
+        : [2, up || along];
+    return gizmo.follows(axis) ? gizmo.axes[axis].clone().multiplyScalar(sign) : null;
   }
 
   turn(gizmo, [across, along, up], angle) {
     const {right, up: above, back} = this.play.sight;
-    const turned = new MeshCat.THREE.Quaternion().setFromAxisAngle(
-      across ? above : along ? right : back, (across || -along || up) * angle);
-    gizmo.turn.premultiply(turned).normalize();
+    gizmo.rotate(across ? above : along ? right : back, (across || -along || up) * angle);
   }
 
   up(key) {
@@ -251,9 +222,5 @@ class PlayKeys {
     if (gizmo && ![...this.moving.values()].includes(gizmo)) this.play.release(gizmo);
   }
 
-  releaseAll() {
-    const gizmos = new Set(this.moving.values());
-    this.moving.clear();
-    for (const gizmo of gizmos) this.play.release(gizmo);
-  }
+  releaseAll() { for (const key of [...this.moving.keys()]) this.up(key); }
 }

@@ -1,8 +1,5 @@
-// What the camera sees, and how a pointer moves things in it.
-//
-// All points and directions are in Pinocchio's axes (z up), which are the axes inside Meshcat's
-// scene; pixels are those of pointer events (clientX, clientY).
-"use strict";
+// What the camera sees, and how a pointer moves things in it. Points and directions are in Pinocchio's
+// axes (z up), which are those inside Meshcat's scene; pixels are those of pointer events.
 
 class Sight {
   static REACH = 20;  // m: no drag leads farther from the eye
@@ -16,18 +13,17 @@ class Sight {
     camera.updateWorldMatrix(true, false);
     this.box = renderer.domElement.getBoundingClientRect();
     this.toScene = scene.matrixWorld.clone().invert();
-    [this.right, this.up, this.back] = [0, 1, 2].map((column) => new Vector3()
-      .setFromMatrixColumn(camera.matrixWorld, column).transformDirection(this.toScene));
-    this.eye = new Vector3().setFromMatrixPosition(camera.matrixWorld).applyMatrix4(this.toScene);
+    const pose = this.toScene.clone().multiply(camera.matrixWorld);
+    [this.right, this.up, this.back, this.eye] = [0, 1, 2, 3].map((column) =>
+      new Vector3().setFromMatrixColumn(pose, column));
     return this;
   }
 
   // A point's pixel, and whether it lies in front of the camera.
   project(point) {
-    const {camera, scene} = this.viewer, {left, top, width, height} = this.box;
-    const seen = point.clone().applyMatrix4(scene.matrixWorld).project(camera);
-    const ahead = this.depth(point) > camera.near;
-    return {x: left + (1 + seen.x) / 2 * width, y: top + (1 - seen.y) / 2 * height, ahead};
+    const {camera, scene} = this.viewer, {left, top} = this.box;
+    const {x, y} = pixelOf(this.viewer, point.clone().applyMatrix4(scene.matrixWorld));
+    return {x: left + x, y: top + y, ahead: this.depth(point) > camera.near};
   }
 
   depth(point) { return this.eye.clone().sub(point).dot(this.back); }
@@ -38,31 +34,27 @@ class Sight {
     return Math.max(this.depth(point), 1e-6) * 2 * Math.tan(fov * Math.PI / 360) / this.box.height;
   }
 
-  // The direction from a point to the eye.
   towards(point) { return this.eye.clone().sub(point).normalize(); }
 
-  // A raycaster of three.js through a pixel, in three.js's own axes; and its ray in ours.
+  // A raycaster through a pixel, in three.js's own axes; and its ray in ours.
   caster(x, y) {
-    const {left, top, width, height} = this.box;
-    const caster = new MeshCat.THREE.Raycaster();
-    caster.setFromCamera({x: 2 * (x - left) / width - 1, y: 1 - 2 * (y - top) / height},
-                         this.viewer.camera);
+    const {left, top, width, height} = this.box, caster = new MeshCat.THREE.Raycaster();
+    const place = {x: 2 * (x - left) / width - 1, y: 1 - 2 * (y - top) / height};
+    caster.setFromCamera(place, this.viewer.camera);
     return caster;
   }
 
-  ray(x, y) { return this.caster(x, y).ray.clone().applyMatrix4(this.toScene); }
+  ray(x, y) { return this.caster(x, y).ray.applyMatrix4(this.toScene); }
 
   // The point of a plane under a pixel; null at its horizon.
   hit(through, normal, x, y) {
-    const {origin, direction} = this.ray(x, y);
-    const along = direction.dot(normal);
-    if (Math.abs(along) < 0.02) return null;
+    const {origin, direction} = this.ray(x, y), along = direction.dot(normal);
     const reach = through.clone().sub(origin).dot(normal) / along;
-    if (!(reach > 0 && reach < Sight.REACH + this.depth(through))) return null;
-    return origin.addScaledVector(direction, reach);
+    const near = reach > 0 && reach < Sight.REACH + this.depth(through);
+    return Math.abs(along) > 0.02 && near ? origin.addScaledVector(direction, reach) : null;
   }
 
-  // The next three take the pixel at which a thing is grabbed, and return a function from later
+  // The next four take the pixel at which a thing is grabbed, and return a function from later
   // pixels to its new place or angle; null where the pointer tells none. The thing keeps its
   // offset from the pointer: it never jumps.
 
@@ -96,7 +88,6 @@ class Sight {
     };
   }
 
-  // Some points of the robot's surface.
   surface(robot) {
     const points = [];
     robot?.traverse(({geometry, matrixWorld}) => {
@@ -114,22 +105,21 @@ class Sight {
     const nearest = (x, y) => {
       const {origin, direction} = this.ray(x, y), between = from.clone().sub(origin);
       const cosine = axis.dot(direction), sine2 = 1 - cosine * cosine;
-      return sine2 < 0.01 ? null : (cosine * direction.dot(between) - axis.dot(between)) / sine2;
+      return sine2 < 0.01 ? NaN : (cosine * direction.dot(between) - axis.dot(between)) / sine2;
     };
-    const start = nearest(x, y) ?? 0;
+    const start = nearest(x, y) || 0;
     return (x, y) => {
-      const way = nearest(x, y);
-      if (way === null || Math.abs(way - start) > Sight.REACH) return null;
-      return from.clone().addScaledVector(axis, way - start);
+      const way = nearest(x, y) - start;
+      return Math.abs(way) < Sight.REACH ? from.clone().addScaledVector(axis, way) : null;
     };
   }
 
   // Angles about an axis [rad]; more than a turn is counted on. The radius is in pixels.
   about(center, axis, radius, x, y) {
-    if (Math.abs(this.towards(center).dot(axis)) < 0.2) {  // from its edge: its near side is moved
-      const along = this.towards(center).cross(axis).negate().normalize();
-      const here = this.project(center);
-      const there = this.project(center.clone().addScaledVector(along, this.pixel(center)));
+    const eye = this.towards(center);
+    if (Math.abs(eye.dot(axis)) < 0.2) {  // from its edge: its near side is moved
+      const along = eye.cross(axis).negate().setLength(this.pixel(center));
+      const here = this.project(center), there = this.project(center.clone().add(along));
       const [dx, dy] = [there.x - here.x, there.y - here.y], length = Math.hypot(dx, dy) || 1;
       return (to_x, to_y) => ((to_x - x) * dx + (to_y - y) * dy) / length / radius;
     }

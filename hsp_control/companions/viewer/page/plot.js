@@ -1,6 +1,5 @@
 // A plot over time, drawn by uPlot (github.com/leeoniya/uPlot): what the plots of a run and those
 // of `hsp play` share. The legend is below it, with values; a name shows its curve alone.
-"use strict";
 
 class Plot {
   static HEIGHT = 118;  // px
@@ -29,7 +28,7 @@ class Plot {
       make("ul", {}, ...this.buttons.map((button) => make("li", {}, button))));
   }
 
-  // Show one curve alone, by its place in the legend; null: all.
+  // Show one curve alone, by its place; null: all.
   isolate(place) {
     this.alone = place;
     this.buttons.forEach((button, k) => {
@@ -47,11 +46,13 @@ class Plot {
     const axis = {stroke: muted, font, ticks: {stroke: muted, width: 1, size: 3}};
     const label = this.unit === "–" ? null : `[${this.unit}]`;
     const labelled = {label, labelFont: font, labelSize: 14, labelGap: 0};
+    const {clientWidth, clientHeight} = this.figure;
     this.chart?.destroy();
     this.chart = null;  // what is told while the next one is made is not for the last one
     this.chart = new uPlot({
-      width: this.figure.clientWidth || 300, height: this.figure.clientHeight || Plot.HEIGHT, padding: [6, 12, 0, label ? 0 : 14],
-      legend: {show: false}, scales, hooks, series: [{}, ...series.map((each) => ({points: {show: false}, pxAlign: 0, ...each}))],
+      width: clientWidth || 300, height: clientHeight || Plot.HEIGHT,
+      padding: [6, 12, 0, label ? 0 : 14], legend: {show: false}, scales, hooks,
+      series: [{}, ...series.map((each) => ({points: {show: false}, pxAlign: 0, ...each}))],
       axes: [
         {...axis, size: 20, gap: 2, space: 45, grid: {show: false}, values: Plot.numbers(" s"),
          border: {show: true, stroke: muted, width: 1}},
@@ -63,7 +64,6 @@ class Plot {
     }, data, this.figure);
   }
 
-  // Take the width that there is.
   fit() {
     const {clientWidth} = this.figure;
     if (clientWidth && this.chart && this.chart.width !== clientWidth) {
@@ -74,29 +74,24 @@ class Plot {
   // The labels of ticks; the last one has the unit.
   static numbers(unit) {
     return (_, ticks, axis, space, step) => {
-      const digits = (String(step).split(".")[1] ?? "").length;
-      return ticks.map((tick, k) => {
-        const text = step < 1e-4 && tick ? tick.toExponential(1) : tick.toFixed(Math.min(digits, 6));
-        return Plot.minus(text) + (k === ticks.length - 1 ? unit : "");
-      });
+      const digits = Math.min((String(step).split(".")[1] ?? "").length, 6);
+      const text = (tick) => step < 1e-4 && tick ? tick.toExponential(1) : tick.toFixed(digits);
+      const last = ticks.length - 1;
+      return ticks.map((tick, k) => Plot.minus(text(tick)) + (k === last ? unit : ""));
     };
   }
 
   // Ticks where values are exponents of ten: at most five.
   static DECADES = {
-    splits: (_, axis, low, high) => {
-      const every = Math.max(1, Math.ceil((high - low) / 4.5)), ticks = [];
-      for (let k = every * Math.ceil(low / every); k <= high; k += every) ticks.push(k);
-      return ticks;
-    },
+    incrs: (_, axis, low, high) => [Math.max(1, Math.ceil((high - low) / 4.5))], space: 1,
     values: (_, ticks) => ticks.map((tick) => tick === 0 ? "1"
       : `10${[...String(tick)].map((c) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[c] ?? "⁻").join("")}`),
   };
 
-  // A number with few characters, always of about the same width.
-  static number(value) {
-    if (value === null || !Number.isFinite(value)) return "–";
-    const size = Math.abs(value);
+  // A number, or one by its logarithm, with few characters, always of about the same width.
+  static number(shown, logarithmic) {
+    if (shown === null) return "–";
+    const value = logarithmic ? 10 ** shown : shown, size = Math.abs(value);
     return Plot.minus(size !== 0 && (size < 1e-3 || size >= 1e5)
       ? value.toExponential(1) : value.toFixed(size < 10 ? 3 : size < 1000 ? 1 : 0));
   }

@@ -1,63 +1,43 @@
-// Presenting: the scene, its title and what happens now, as large as the screen.
-//
-//   p        begins and ends it             escape   ends it
-//
-// Legend, panels and details are put away. The bar and the pointer go, too, when the pointer
-// has rested for two seconds; they come back when it moves, or for the Tab key. Then the camera
-// begins to sway about its target, until somebody takes it.
-"use strict";
+// Presenting: the scene, its title and what happens now, as large as the screen. Legend, panels and
+// details are put away. When the pointer has rested for two seconds, it and the bar go, too, until
+// it moves, or for the Tab key; and the camera sways about its target, until somebody takes it.
 
 class Presentation {
   static REST = 2000;  // ms
 
-  // `changed` is called when there is more or less space.
-  constructor(changed) {
-    Object.assign(this, {changed, on: false, full: false, at: [NaN, NaN], buttons: []});
+  constructor(changed) {  // called when there is more or less space
+    Object.assign(this, {changed, on: false, full: false, buttons: []});
     onKey(({key, repeat}) => repeat ? null
       : key === "p" ? () => this.toggle()
         : key === "Escape" && this.on ? () => this.set(false) : null);
-    addEventListener("pointermove", ({clientX, clientY}) => {
+    on(window, "pointermove pointerdown focusin", ({type, movementX, movementY}) => {
       // A browser also tells of a pointer that rests while the page moves below it.
-      if (clientX === this.at[0] && clientY === this.at[1]) return;
-      this.at = [clientX, clientY];
-      this.wake();
+      if (type !== "pointermove" || movementX || movementY) this.wake();
     });
-    on(window, "pointerdown focusin", () => this.wake());
-    document.addEventListener("fullscreenchange", () => {
-      if (document.fullscreenElement && !this.on) this.leaveFullScreen();  // it came too late
-      else if (document.fullscreenElement) this.full = true;
-      else if (this.full) this.set(false);  // its Escape goes to the browser, not to the page
+    on(document, "fullscreenchange", () => {
+      const full = Boolean(document.fullscreenElement);
+      if (full && !this.on) document.exitFullscreen().catch(() => {});  // it came too late
+      else if (this.full && !full) this.set(false);  // its Escape goes to the browser
+      else this.full = full;
     });
   }
 
-  // Add a button to a bar, which goes with the pointer while presenting.
-  addButton(bar) {
-    const button = makeButton(
-      {className: "present", title: "Present (p)", ariaLabel: "Present", ariaPressed: this.on},
-      () => this.toggle(),
-      makeIcon("M4 4h6v2.2H6.2V10H4zM14 4h6v6h-2.2V6.2H14zM4 14h2.2v3.8H10V20H4zM17.8 14H20v6h-6v-2.2h3.8z"));
-    bar.append(button);
-    this.buttons.push(button);
-  }
-
+  addButton(button) { this.buttons.push(onPress(button, () => this.toggle())); }
   toggle() { this.set(!this.on); }
 
-  set(on) {
-    if (on === this.on) return;
-    this.on = on;
-    document.body.classList.toggle("presenting", on);
-    for (const button of this.buttons) button.ariaPressed = on;
+  set(presenting) {
+    if (presenting === this.on) return;
+    this.on = presenting;
+    document.body.classList.toggle("presenting", presenting);
+    for (const button of this.buttons) button.ariaPressed = presenting;
     // It may not be allowed, such as in a frame: then the window is all there is.
-    if (on) document.documentElement.requestFullscreen?.().catch(() => {});
-    else if (document.fullscreenElement) this.leaveFullScreen();
-    this.full = Boolean(on && document.fullscreenElement);
+    if (presenting) document.documentElement.requestFullscreen?.().catch(() => {});
+    else if (document.fullscreenElement) document.exitFullscreen().catch(() => {});
+    this.full = false;
     this.wake();
     this.changed();
   }
 
-  leaveFullScreen() { document.exitFullscreen().catch(() => {}); }
-
-  // Show the bar and the pointer, for a while.
   wake() {
     clearTimeout(this.timer);
     document.body.classList.remove("resting");

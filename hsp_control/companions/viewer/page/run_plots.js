@@ -1,77 +1,59 @@
-// The plots beside the scene: curves of a run, or of several, and a cursor at the player's time.
-//
-//   const side = new Side(player);
-//   side.show({runs, start, end, damped, panels, colors});   // as viewer/page_plots.py writes them
-//   side.select(1);          // emphasise the curves of one run; null: of all
-//
-// In a plot with the focus + and - zoom, Home shows the whole run; all other keys are the
-// player's. All plots have the same span of time.
+// The plots beside the scene: curves of a run, or of several, and a cursor at the player's time; the
+// data are those of viewer/page_plots.py. In a plot with the focus + and - zoom, Home shows the whole
+// run; all other keys are the player's. All plots have the same span of time.
 "use strict";
 
 class Side {
-  static FINEST = 1 / 500;  // the shortest span, over the whole one
-
   constructor(player) {
     Object.assign(this, {player, plots: [], selected: null, start: 0, end: 1, from: 0, to: 1});
-    this.stage = make("main", {id: "stage"});  // the scene, its caption and the bar
-    this.whole = makeButton({className: "whole-run", title: "Show the whole run (Esc)", hidden: true},
-                            () => this.reset());
-    this.box = make("aside", {id: "side"}, this.whole);
+    this.box = part("#side");
+    this.whole = onPress(part(".whole-run"), () => this.reset());
     document.body.classList.add("sided", "without-plots");
-    document.body.append(this.stage, this.box);
-    const parts = "#meshcat-pane, #caption, #lost, .player, .moments";
-    this.stage.append(...document.querySelectorAll(parts));
     barHeight = 0;  // the bar is below the picture
-    const toggle = makeButton(
-      {className: "side", title: "Plots (g)", ariaLabel: "Show or hide the plots"},
-      () => this.toggle(),
-      makeIcon("M4 4h1.8v14.2H20V20H4zM7.5 15l3.6-5 3.2 3 4.4-7 1.6 1-5.6 9-3.3-3.1-2.5 3.4z"));
-    document.querySelector(".player .present").before(toggle);
+    onPress(part(".player .side"), () => this.toggle());
     onKey(({key}) => key === "g" && !document.body.classList.contains("without-plots")
       && (() => this.toggle()));
-    addEventListener("keydown", ({key}) => { if (key === "Escape") this.reset(); });
-    player.addEventListener("time", () => this.showTime());
+    on(window, "keydown", ({key}) => { if (key === "Escape") this.reset(); });
+    on(player, "time", () => this.showTime());
     new ResizeObserver(() => this.fit()).observe(this.box);
   }
 
   // Show or hide the plots; the scene takes their space.
   toggle() { document.body.classList.toggle("alone"); }
-
-  // Remove the plots; whether the user wants to see any is kept.
+  // Remove them; whether the user wants to see any is kept.
   clear() { document.body.classList.add("without-plots"); }
 
-  // Show other data. Plots with the same curves are kept, and with them the focus and what the
-  // user drags; so are a span that is zoomed, and a curve that is shown alone.
-  show({runs, start, end, damped, panels, colors}) {
-    const {zoomed, box} = this;
+  // Show other data; what the user has made of the plots stays, if they have the same curves.
+  show({runs, start, end, damped, panels}) {
     document.body.classList.remove("without-plots");
-    Object.assign(this, {runs, start, damped, colors, end: end > start ? end : start + 1});
-    if (!zoomed) [this.from, this.to] = [this.start, this.end];
-    const same = panels.length === this.plots.length
-      && panels.every((panel, k) => this.plots[k].look === RunPlot.lookOf(panel));
-    if (same) panels.forEach((panel, k) => this.plots[k].load(panel));
-    else {
-      const {scrollTop} = box, before = this.plots;
-      for (const plot of before) plot.box.remove();
-      this.plots = panels.map((panel) => new RunPlot(this, panel));
-      for (const plot of this.plots) {
-        box.append(plot.box);
-        const known = before.find(({title}) => title === plot.title);
-        const alone = known?.entries[known.alone]?.name;
-        const place = plot.entries.findIndex(({name}) => name === alone);
-        plot.isolate(place < 0 ? null : place);
-      }
-      box.scrollTop = scrollTop;
+    const {zoomed, plots} = this;
+    Object.assign(this, {runs, start, damped, end: end > start ? end : start + 1});
+    const looks = (each) => String(each.map(RunPlot.lookOf));
+    if (looks(panels) !== looks(plots.map(({panel}) => panel))) this.replace(panels);
+    panels.forEach((panel, k) => { this.plots[k].panel = panel; });
+    this.zoom(...(zoomed ? [this.from, this.to] : [this.start, this.end]));
+  }
+
+  replace(panels) {
+    const {scrollTop} = this.box, before = this.plots;
+    for (const plot of before) plot.box.remove();
+    this.plots = panels.map((panel) => new RunPlot(this, panel));
+    this.box.append(...this.plots.map(({box}) => box));
+    for (const plot of this.plots) {
+      const known = before.find(({title}) => title === plot.title);
+      const alone = known?.entries[known.alone]?.name;
+      const place = plot.entries.findIndex(({name}) => name === alone);
+      plot.isolate(place < 0 ? null : place);
     }
-    this.zoom(this.from, this.to);
+    this.box.scrollTop = scrollTop;
   }
 
   get zoomed() { return this.from > this.start || this.to < this.end; }
 
-  // Show a span of time [s] in all plots, as far as it is in the run.
+  // Show a span of time [s], as far as it is in the run.
   zoom(from, to) {
     const longest = this.end - this.start;
-    const length = clamp(to - from, Side.FINEST * longest, longest);
+    const length = clamp(to - from, longest / 500, longest);
     this.from = clamp((from + to - length) / 2, this.start, this.end - length);
     this.to = this.from + length;
     if (length > 0.999 * longest) [this.from, this.to] = [this.start, this.end];
@@ -80,13 +62,14 @@ class Side {
     for (const plot of this.plots) plot.refresh();
   }
 
-  // Magnify by a factor; the given time keeps its place.
+  // Magnify; the given time keeps its place.
   magnify(factor, time) {
     this.zoom(time - (time - this.from) / factor, time + (this.to - time) / factor);
   }
 
   reset() { if (this.zoomed) this.zoom(this.start, this.end); }
 
+  // Emphasise the curves of one run; null: of all.
   select(run) {
     this.selected = run;
     for (const plot of this.plots) plot.build();
@@ -98,22 +81,18 @@ class Side {
   }
 
   showTime() {
-    const {time} = this.player;
+    const {time} = this.player, {from, to} = this, half = (to - from) / 2;
     const focused = this.plots.some(({figure}) => figure === document.activeElement);
-    if (focused && this.zoomed && (time < this.from || time > this.to)) {
-      const half = (this.to - this.from) / 2;
-      this.zoom(time - half, time + half);  // the cursor stays in sight
-    }
+    const hidden = this.zoomed && (time < from || time > to);
+    if (focused && hidden) this.zoom(time - half, time + half);
     for (const plot of this.plots) plot.showTime();
   }
 
-  // The line by which the plots tell the runs apart.
   static sample(run) {
-    const parent = make("i");
-    parent.innerHTML = `<svg viewBox="0 0 22 8" aria-hidden="true"><line x1="2" x2="20" y1="4" y2="4"
+    const innerHTML = `<svg viewBox="0 0 22 8" aria-hidden="true"><line x1="2" x2="20" y1="4" y2="4"
       stroke="currentColor" stroke-width="2.2" stroke-linecap="${run ? "round" : "butt"}"
       stroke-dasharray="${RunPlot.dashes(run).join(" ")}"/></svg>`;
-    return parent.firstChild;
+    return make("i", {innerHTML}).firstChild;
   }
 }
 
@@ -121,8 +100,7 @@ class RunPlot extends Plot {
   static MOVED = 4;  // a pointer that moves less is a click [px]
   static NEAR = 7;  // where the cursor can be taken [px]
 
-  // The dashes of a curve, which tell the runs apart: solid, dotted, dashes and dots.
-  static dashes(run, dashed) {
+  static dashes(run, dashed) {  // solid, dotted, dashes and dots
     const dots = !run ? [] : run % 2 ? [0.1, 3.6] : [0.1, 3.6, 0.1, 3.6, 8, 3.6];
     return dashed ? [5, run ? 3.6 : 3, ...dots] : dots;
   }
@@ -136,57 +114,50 @@ class RunPlot extends Plot {
   constructor(side, panel) {
     // Curves of one name have one entry of the legend.
     super("h2", panel, [...new Map(panel.series.map((each) => [each.name, each])).values()]);
-    Object.assign(this, {side, panel, look: RunPlot.lookOf(panel), fingers: new Map(), drag: null});
+    Object.assign(this, {side, panel, fingers: new Map(), drag: null, marks: make("div")});
     Object.assign(this.figure, {tabIndex: 0, role: "slider", ariaLabel: `${panel.title}, time`});
     this.listen();
   }
 
-  // Take other data of the same look.
-  load(panel) { this.panel = panel; }
-
   build() {
-    const {side, panel} = this, {selected} = side;
-    const rank = ({run, band}) => (band ? 0 : 2) + (run === selected ? 1 : 0);
+    const {side, panel} = this;
+    const rank = ({run, band}) => (band ? 0 : 2) + (run === side.selected ? 1 : 0);
     this.curves = panel.series.filter(({name}) => this.alone === null
       || this.entries[this.alone].name === name).sort((one, other) => rank(one) - rank(other));
-    const paper = Plot.shade("#FFFFFF");
+    const shades = this.curves.map(({color}) => Plot.shade(color)), paper = Plot.shade("#FFFFFF");
+    const pointed = ({band, run}) => !band && !this.faint(run);
     this.draw(this.data(), {
       logarithmic: panel.logarithmic,
-      series: this.curves.map(({color, dashed, band, run, predicted}) => ({
-        stroke: Plot.shade(color), width: band ? 1 : run ? 1.9 : 1.6, cap: run ? "round" : "butt",
+      series: this.curves.map(({dashed, band, run, predicted}, k) => ({
+        stroke: shades[k], width: band ? 1 : run ? 1.9 : 1.6, cap: run ? "round" : "butt",
         dash: RunPlot.dashes(run, dashed), alpha: this.faint(run) ? 0.3 : 1,
         auto: this.alone !== null || !predicted,
-        ...(band && {fill: `${Plot.shade(color)}33`, fillTo: (u) => u.scales.y.min}),
+        ...(band && {fill: `${shades[k]}33`, fillTo: (u) => u.scales.y.min}),
       })),
       scales: {x: {time: false, range: () => [side.from, side.to]},
                y: {range: (_, least, most) => this.range(least, most)}},
       cursor: {sync: {key: "run"},
-               points: {size: (_, k) => this.curves[k - 1].band || this.faint(this.curves[k - 1].run) ? 0 : 7,
-                        fill: (_, k) => Plot.shade(this.curves[k - 1].color), stroke: paper, width: 1}},
+               points: {size: (_, k) => pointed(this.curves[k - 1]) ? 7 : 0,
+                        fill: (_, k) => shades[k - 1], stroke: paper, width: 1}},
       hooks: {drawAxes: [(u) => this.drawMarks(u)], draw: [() => this.showTime()],
               setCursor: [() => this.showValues()]},
     });
-    this.dots = this.curves.map(({color}) => make("i", {style: `background: ${Plot.shade(color)}`}));
+    this.dots = shades.map((shade) => make("i", {style: `background: ${shade}`}));
     this.cursor = make("div", {className: "cursor"}, ...this.dots);
     this.chart.over.append(this.cursor);
   }
 
-  // Whether a run is pale because another one is emphasised.
   faint(run) { return this.side.selected !== null && this.side.selected !== run; }
 
-  // The curves at their corners and about one time a pixel in the span that is shown.
+  // The curves at their corners, and about one time a pixel.
   data() {
     const {from, to} = this.side, count = this.figure.clientWidth || 300;
-    const times = new Set();
-    for (let k = 0; k <= count; k++) times.add(from + k / count * (to - from));
-    for (const curve of this.curves) {
-      for (const time of curve.times) if (time > from && time < to) times.add(time);
-    }
-    const sorted = Float64Array.from(times).sort();
-    return [sorted, ...this.curves.map((curve) => Array.from(sorted, (t) => valueAt(curve, t)))];
+    const corners = this.curves.flatMap(({times}) => [...times.filter((t) => t > from && t < to)]);
+    const even = Array.from({length: count + 1}, (_, k) => from + k / count * (to - from));
+    const times = Float64Array.from(new Set([...even, ...corners])).sort();
+    return [times, ...this.curves.map((curve) => Array.from(times, (t) => valueAt(curve, t)))];
   }
 
-  // Show the span, and the data, of now.
   refresh() {
     this.curves = this.curves.map(({name, run}) => this.find(name, run));
     this.chart.setData(this.data());
@@ -201,43 +172,31 @@ class RunPlot extends Plot {
     const {low, high, logarithmic, edges} = this.panel;
     if ((!this.side.zoomed && this.alone === null) || least === null) return [low, high];
     // Values beyond the whole axis are clipped: they say nothing about the range.
-    const needed = [least, most].map((value) => clamp(value, low, high));
-    for (const {value} of edges) needed.push(value);
-    [least, most] = [Math.min(...needed), Math.max(...needed)];
+    const ends = [least, most].map((value) => clamp(value, low, high));
+    const needed = [...ends, ...edges.map(({value}) => value)];
+    const from = Math.min(...needed), to = Math.max(...needed);
     const smallest = logarithmic ? 1 : (high - low) / 1000;
-    const room = 0.08 * (most - least) + Math.max(0, smallest - (most - least)) / 2;
-    return [least - room, most + room];
+    const room = 0.08 * (to - from) + Math.max(0, smallest - (to - from)) / 2;
+    return [from - room, to + room];
   }
 
-  // Below the curves: when the law is damped near a singularity, and where there is contact.
-  drawMarks({ctx, bbox: {left, top, width, height}, valToPos}) {
-    const {damped, colors, from, to} = this.side;
-    ctx.save();
-    ctx.beginPath();
-    ctx.rect(left, top, width, height);
-    ctx.clip();
-    ctx.fillStyle = `${Plot.shade(colors.warning)}30`;
-    damped.forEach((spans, run) => {
-      for (const ends of this.faint(run) ? [] : spans) {
-        const [x, until] = ends.map((time) => valToPos(time, "x", true));
-        ctx.fillRect(x, top, Math.max(until - x, 1), height);
-      }
+  // Marks of when the law is damped near a singularity, and of where there is contact.
+  drawMarks({over, valToPos}) {
+    const {damped, from, to} = this.side;
+    const spans = damped.flatMap((each, run) => this.faint(run) ? [] : each);
+    const singular = spans.map((ends) => {
+      const [left, right] = ends.map((time) => valToPos(time, "x"));
+      return make("i", {className: "damped", style: `left: ${left}px; width: ${right - left}px`});
     });
-    const ratio = devicePixelRatio, paper = Plot.shade("#FFFFFF");
-    ctx.font = Plot.FONT.replace(/[\d.]+/, (size) => size * ratio);
-    for (const {value, name} of this.panel.edges) {
+    const contacts = this.panel.edges.map(({value, name}) => {
       // The label stands at the end of the line that is farther from the curves.
       const [before, after] = [0.15, 0.85].map((share) => Math.min(...this.curves.map((curve) =>
         Math.abs((valueAt(curve, from + share * (to - from)) ?? Infinity) - value))));
-      const x = before > after ? left + 2 : left + width - 2;
-      ctx.textAlign = before > after ? "left" : "right";
-      const y = Math.round(valToPos(value, "y", true)) + 0.5;
-      Object.assign(ctx, {strokeStyle: colors.contact, lineWidth: ratio});
-      ctx.stroke(new Path2D(`M${left} ${y}h${width}`));
-      Object.assign(ctx, {strokeStyle: paper, lineWidth: 3 * ratio, fillStyle: colors.contact});
-      for (const put of ["strokeText", "fillText"]) ctx[put](name, x, y - 4 * ratio);
-    }
-    ctx.restore();
+      const side = before > after ? "left" : "right", top = Math.round(valToPos(value, "y"));
+      return make("i", {className: "edge", style: `top: ${top}px; text-align: ${side}`}, name);
+    });
+    this.marks.replaceChildren(...singular, ...contacts);
+    over.prepend(this.marks);
   }
 
   // The cursor at the player's time: a line, and a dot on each curve.
@@ -248,10 +207,9 @@ class RunPlot extends Plot {
     cursor.dataset.time = time;
     cursor.style.transform = `translateX(${chart.valToPos(time, "x").toFixed(2)}px)`;
     this.curves.forEach((curve, k) => {
-      const value = valueAt(curve, time);
-      this.dots[k].hidden = value === null || value < min || value > max || curve.band
-        || this.faint(curve.run);
-      if (!this.dots[k].hidden) this.dots[k].style.top = `${chart.valToPos(value, "y").toFixed(2)}px`;
+      const value = valueAt(curve, time), inside = value !== null && value >= min && value <= max;
+      this.dots[k].hidden = !inside || curve.band || this.faint(curve.run);
+      if (inside) this.dots[k].style.top = `${chart.valToPos(value, "y").toFixed(2)}px`;
     });
     this.showValues();
   }
@@ -264,30 +222,27 @@ class RunPlot extends Plot {
     const moment = `t = ${time.toFixed(2)} s`;
     this.moment.textContent = hovered && figure.matches(":hover") ? moment : "";
     this.box.classList.toggle("hovered", hovered);
-    const told = this.entries.map(({name}, k) => {
-      const text = side.runs.map((_, run) => run).filter((run) => !this.faint(run)).map((run) => {
+    const runs = [...side.runs.keys()].filter((run) => !this.faint(run));
+    this.entries.forEach(({name}, k) => {
+      this.outputs[k].textContent = runs.map((run) => {
         const curve = this.find(name, run), value = curve ? valueAt(curve, time) : null;
-        return Plot.number(panel.logarithmic && value !== null ? 10 ** value : value);
+        return Plot.number(value, panel.logarithmic);
       }).join(" | ");
-      this.outputs[k].textContent = text;
-      return `${name} ${text}`;
     });
     if (figure !== document.activeElement) return;
+    const told = this.entries.map(({name}, k) => `${name} ${this.outputs[k].textContent}`);
     Object.assign(figure, {ariaValueMin: side.start, ariaValueMax: side.end, ariaValueNow: time,
                            ariaValueText: `${moment}: ${told.join(", ")}`});
   }
 
-  // -- what the user does --
-
   listen() {
-    const {figure, side} = this;
-    // A click of the mouse must not take the keyboard from the player.
-    // Nor must a finger leave a pointer behind, where the browser plays a mouse after a tap.
+    const {figure} = this;
+    // A mouse must not take the keyboard from the player, nor a tap leave a pointer behind.
     on(figure, "mousedown touchend", (event) => event.preventDefault());
     on(figure, "pointerdown", (event) => this.press(event));
     on(figure, "pointermove", (event) => this.move(event));
     on(figure, "pointerup pointercancel", (event) => this.release(event));
-    on(figure, "dblclick", () => side.reset());
+    on(figure, "dblclick", () => this.side.reset());
     on(figure, "wheel", (event) => this.wheel(event), {passive: false});
     on(figure, "keydown", (event) => this.key(event));
     on(figure, "focus", () => this.showValues());
@@ -309,58 +264,53 @@ class RunPlot extends Plot {
 
   press(event) {
     if (event.button) return;
-    const {clientX, pointerId} = event;
-    this.fingers.set(pointerId, clientX);
+    const {clientX: x, pointerId} = event, {fingers} = this;
+    fingers.set(pointerId, {x});
+    for (const finger of fingers.values()) finger.time = this.timeAt(finger.x);
     this.figure.setPointerCapture(pointerId);
     this.stop();
-    if (this.fingers.size === 1) {
-      this.drag = {kind: "click", x: clientX, next: this.takes(event) ? "time" : "span"};
-    } else if (this.fingers.size === 2) {
-      const times = [...this.fingers].map(([id, x]) => [id, this.timeAt(x)]);
-      this.drag = {kind: "pinch", times: new Map(times)};
-    }
+    if (fingers.size > 2) return;
+    this.drag = {kind: fingers.size === 2 ? "pinch" : "click", x,
+                 next: this.takes(event) ? "time" : "span"};
   }
 
   move(event) {
-    const {drag, side, chart} = this, {clientX, pointerId} = event, {player} = side;
+    const {drag, side, chart} = this, {clientX: x, pointerId} = event, {player} = side;
     if (!drag || !this.fingers.has(pointerId)) {
       this.figure.classList.toggle("at-cursor", this.takes(event));
       return;
     }
-    this.fingers.set(pointerId, clientX);
-    if (drag.kind === "click" && Math.abs(clientX - drag.x) > RunPlot.MOVED) {
+    this.fingers.get(pointerId).x = x;
+    if (drag.kind === "click" && Math.abs(x - drag.x) > RunPlot.MOVED) {
       drag.kind = drag.next;
-      if (drag.kind === "time") {  // the player pauses as long as the cursor is held
-        drag.resume = player.playing;
-        player.pause();
-      }
+      drag.resume = drag.kind === "time" && player.playing;
+      if (drag.resume) player.pause();  // as long as the cursor is held
     }
-    if (drag.kind === "time") player.seek(this.timeAt(clientX));
+    if (drag.kind === "time") player.seek(this.timeAt(x));
     if (drag.kind === "pinch") this.pinch();
     if (drag.kind === "span") {
-      [drag.from, drag.to] = [drag.x, clientX].map((x) => this.timeAt(x)).sort((a, b) => a - b);
-      const [left, right] = [drag.from, drag.to].map((time) => chart.valToPos(time, "x"));
+      drag.span = [drag.x, x].map((end) => this.timeAt(end)).sort((a, b) => a - b);
+      const [left, right] = drag.span.map((time) => chart.valToPos(time, "x"));
       chart.setSelect({left, width: right - left, top: 0, height: this.area.height}, false);
     }
   }
 
   // Two fingers keep the times that they have touched.
   pinch() {
-    const [[one, x1], [other, x2]] = [...this.fingers];
-    const t1 = this.drag.times.get(one), t2 = this.drag.times.get(other);
-    if (Math.abs(x2 - x1) < 12 || (x2 - x1) * (t2 - t1) <= 0) return;
-    const rate = (t2 - t1) / (x2 - x1);  // s per pixel
-    const {left, width} = this.area, from = t1 - rate * (x1 - left);
+    const [one, other] = this.fingers.values(), apart = other.x - one.x;
+    if (Math.abs(apart) < 12 || apart * (other.time - one.time) <= 0) return;
+    const rate = (other.time - one.time) / apart;  // s per pixel
+    const {left, width} = this.area, from = one.time - rate * (one.x - left);
     this.side.zoom(from, from + rate * width);
   }
 
   release({pointerId, type}) {
     if (!this.fingers.delete(pointerId) || this.fingers.size) return;
-    const {side, drag} = this;
+    const {side} = this, {kind, x, span} = this.drag ?? {};
     this.stop();
-    if (type === "pointercancel" || !drag) return;
-    if (drag.kind === "click") side.player.seek(this.timeAt(drag.x));
-    if (drag.kind === "span" && drag.to > drag.from) side.zoom(drag.from, drag.to);
+    if (type === "pointercancel") return;
+    if (kind === "click") side.player.seek(this.timeAt(x));
+    if (kind === "span" && span[1] > span[0]) side.zoom(...span);
   }
 
   stop() {
@@ -375,35 +325,28 @@ class RunPlot extends Plot {
     const zooms = event.ctrlKey || event.metaKey;
     if (!zooms && !(side.zoomed && Math.abs(deltaX) > Math.abs(deltaY))) return;
     event.preventDefault();
-    if (zooms) side.magnify(Math.exp(-deltaY / 200), this.timeAt(event.clientX));
-    else {
-      const by = deltaX / this.area.width * (side.to - side.from);
-      const shift = clamp(by, side.start - side.from, side.end - side.to);
-      side.zoom(side.from + shift, side.to + shift);
-    }
+    if (zooms) return side.magnify(Math.exp(-deltaY / 200), this.timeAt(event.clientX));
+    const by = deltaX / this.area.width * (side.to - side.from);
+    const shift = clamp(by, side.start - side.from, side.end - side.to);
+    side.zoom(side.from + shift, side.to + shift);
   }
 
   key(event) {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     const {side} = this, about = clamp(side.player.time, side.from, side.to);
-    const action = {
-      "+": () => side.magnify(2, about),
-      "=": () => side.magnify(2, about),
-      "-": () => side.magnify(0.5, about),
-      ...(side.zoomed && {Home: () => side.reset()}),  // else to the start: the player's
-    }[event.key];
-    if (!action) return;
+    const factor = {"+": 2, "=": 2, "-": 0.5}[event.key];
+    if (factor) side.magnify(factor, about);
+    else if (event.key === "Home" && side.zoomed) side.reset();  // else to the start: the player's
+    else return;
     event.preventDefault();
     event.stopPropagation();  // else the player would take it
-    action();
   }
 }
 
-// A curve's value at a time, interpolated linearly between two of its points; null after its
-// end or before its start.
-function valueAt({times, values}, time) {
+// A curve's value at a time; null after its end or before its start.
+function valueAt(curve, time) {
+  const {times, values} = curve;
   if (time < times[0] - 1e-6 || time > times.at(-1) + 1e-6) return null;
-  const [low, high] = bracketed(times, time);
-  const fraction = high > low ? (time - times[low]) / (times[high] - times[low]) : 0;
-  return values[low] + clamp(fraction, 0, 1) * (values[high] - values[low]);
+  curve.line ??= new MeshCat.THREE.LinearInterpolant(times, values, 1);
+  return curve.line.evaluate(time)[0];
 }

@@ -1,21 +1,16 @@
-// The scene: Meshcat's viewer, and what the program says to it beside Meshcat's own commands; see
-// viewer/commands.py.
+// The scene: Meshcat's viewer, and what the program says beside Meshcat's own commands.
 "use strict";
 
-const viewer = newViewer(document.getElementById("meshcat-pane"));
+const viewer = newViewer(part("#meshcat-pane"));
 const meshcat = viewer.handle_command.bind(viewer);
 
-// The scene brings its own lights, floor and grid, which fit the robot.
+// The scene brings its own lights, floor and grid, which fit the robot, and its own controls.
 for (const name of ["Lights", "Grid", "Axes"]) viewer.delete_path([name]);
-// Its own controls go, too: the legend has the switches, the player the time. The scene tree
-// needs them, but nobody has to see them.
 viewer.gui.domElement.remove();
-
 viewer.renderer.shadowMap.type = MeshCat.THREE.VSMShadowMap;  // soft edges
 
-const player = new Player(viewer);
-const playerBar = new PlayerBar(player, document.body);
-const legend = new Legend(viewer, document.getElementById("caption"));
+const player = new Player(viewer), legend = new Legend(viewer);
+new PlayerBar(player, part(".player"));
 const lengthLabels = new LengthLabels(viewer);
 let placed = null;  // the last camera of the program, and where it was placed then
 const drawScene = viewer.render.bind(viewer);
@@ -35,30 +30,20 @@ viewer.set_3d_pane_size = () => {
 };
 new ResizeObserver(refit).observe(viewer.dom_element);
 const presentation = new Presentation(refit);
-presentation.addButton(playerBar.bar);
+presentation.addButton(part(".player .present"));
 
-const say = (name, text) => { document.querySelector(`#caption .${name}`).textContent = text; };
 const commandHandlers = {
   camera, caption, set_object, ask,
   nothing() {},
-  // The time that the program sets, without a clip; and its status.
-  time({text}) { say("time", text); },
-  status({text}) { say("status", text); },
+  time({text}) { part("#caption .time").textContent = text; },
+  status({text}) { part("#caption .status").textContent = text; },
   ghost({path, color, opacity}) { makeGhost(node(path), color, opacity); },
-  trail(command) {
-    viewer.set_object(command.path.split("/").filter(Boolean), trailMesh(command));
-  },
+  trail(command) { viewer.set_object(elements(command.path), trailMesh(command)); },
   length_label({path}) { lengthLabels.paths.add(path); },
-  // Load a clip, or append an extension to the current one.
   clip(command) { if (command.begins) player.load(command, command.keep); else player.extend(command); },
-  // Remove the clip; from now on the program moves the scene.
   still() { player.unload(); },
-  // Show one instant of tracks, without a clip.
   pose({tracks}) { player.pose(tracks); },
-  seek({time}) {
-    player.pause();
-    player.seek(time);
-  },
+  seek({time}) { player.halt(time); },
 };
 viewer.handle_command = (command) => {
   for (const each of [command].flat(Infinity)) (commandHandlers[each.type] ?? meshcat)(each);
@@ -71,9 +56,7 @@ function newViewer(pane) {
   try {
     return new MeshCat.Viewer(pane);
   } catch (error) {
-    pane.className = "without-webgl";
-    pane.textContent = "This browser cannot draw in three dimensions: WebGL is off or not "
-      + "supported. Turn on hardware acceleration, or open the page in another browser.";
+    part(".without-webgl").hidden = false;
     throw error;
   }
 }
@@ -82,35 +65,32 @@ function newViewer(pane) {
 function studio() {
   const {Scene, Mesh, BoxGeometry, MeshBasicMaterial, BackSide, PMREMGenerator} = MeshCat.THREE;
   const room = new Scene();
-  const box = (size, place, brightness, side = 0) => {
-    const material = new MeshBasicMaterial({side});
-    material.color.setScalar(brightness);  // beyond 1: a lamp
-    const mesh = new Mesh(new BoxGeometry(...size), material);
+  const walls = [[20, 20, 20], [0, 0, 0], 0.12, BackSide];
+  const lamps = [[[6, 0.2, 3], [2, 7, 3], 5], [[0.2, 5, 8], [-8, 2, 0], 1.6],
+                 [[0.2, 5, 3], [8, 3, -5], 2.8]];
+  for (const [size, place, brightness, side = 0] of [walls, ...lamps]) {
+    const mesh = new Mesh(new BoxGeometry(...size), new MeshBasicMaterial({side}));
+    mesh.material.color.setScalar(brightness);  // beyond 1: a lamp
     mesh.position.set(...place);
     room.add(mesh);
-  };
-  box([20, 20, 20], [0, 0, 0], 0.12, BackSide);
-  box([6, 0.2, 3], [2, 7, 3], 5);
-  box([0.2, 5, 8], [-8, 2, 0], 1.6);
-  box([0.2, 5, 3], [8, 3, -5], 2.8);
+  }
   const maker = new PMREMGenerator(viewer.renderer), {texture} = maker.fromScene(room, 0.04);
   maker.dispose();
   return texture;
 }
 
 // The object of a node, which is created if there is none.
-function node(path) { return viewer.scene_tree.find(path.split("/").filter(Boolean)).object; }
+function node(path) { return viewer.scene_tree.find(elements(path)).object; }
 
 function caption({title, legend: entries, dark}) {
   document.title = title;
   document.body.classList.toggle("dark", dark);
   viewer.scene.environment = dark ? viewer.scene.environment ?? studio() : null;
-  document.querySelector("#caption h1").textContent = title;
+  part("#caption h1").textContent = title;
   legend.show(entries);
   refit();  // now it is known what title and legend cover
 }
 
-// Answer once all previous commands are drawn.
 function ask({number}) {
   viewer.render();
   viewer.connection.send(String(number));
@@ -137,56 +117,46 @@ function connect() {
 async function lookForNext() {
   const {ok, status} = await fetch(location).catch(() => ({}));
   if (ok) return location.reload();
-  const text = "The program has ended. " + (status === 403
-    ? "Another one runs here now: open the address that it has printed."
-    : "Its next start at this address will appear here.");
-  Object.assign(document.getElementById("lost"), {hidden: false, textContent: text});
+  part("#lost").hidden = false;
+  part("#lost").classList.toggle("another", status === 403);
   setTimeout(lookForNext, 1000);
 }
-
-// -- the camera --
 
 // From Pinocchio's axes (z up) to those of three.js (y up).
 function vector([x, y, z]) { return new MeshCat.THREE.Vector3(x, z, -y); }
 
 // Shares of the picture's height that are reserved for the player's bar and the title.
-const BAR = 0.1, TITLE = 0.06;
-const WIDE = 16 / 9;  // width over height
+const BAR = 0.1, TITLE = 0.06, WIDE = 16 / 9;  // WIDE: width over height
 let barHeight = 64;  // what the player's bar covers at the bottom of the picture [px]
 
 // Half the width of the robot's widest link [m]: the points are those of its skeleton.
 function girth() {
-  const size = new MeshCat.THREE.Vector3(), scale = new MeshCat.THREE.Vector3();
-  let widest = 0;
+  const size = new MeshCat.THREE.Vector3(), scale = new MeshCat.THREE.Vector3(), widths = [0];
   findNode(viewer, "/robot")?.object.traverse((mesh) => {
-    if (!mesh.geometry?.isBufferGeometry) return;
-    mesh.geometry.boundingBox ?? mesh.geometry.computeBoundingBox();
-    mesh.geometry.boundingBox.getSize(size).multiply(mesh.getWorldScale(scale));
-    const [, width] = size.toArray().sort((one, other) => one - other);  // the middle one of its edges
-    widest = Math.max(widest, width / 2);
+    const {geometry} = mesh;
+    if (!geometry?.isBufferGeometry) return;
+    if (!geometry.boundingBox) geometry.computeBoundingBox();
+    geometry.boundingBox.getSize(size).multiply(mesh.getWorldScale(scale));
+    widths.push(size.toArray().sort((one, other) => one - other)[1] / 2);  // the middle of its edges
   });
-  return widest;
+  return Math.max(...widths);
 }
 
 // Look at a target from an eye, or along a direction from a distance at which all balls
 // around the points are visible. An eye is chosen for a wide window: in a narrower one it
 // moves back until the points are in sight, or as much of them as in the wide one.
 function camera(command) {
-  const {target, eye, direction, up, points, field_of_view} = command;
+  const {eye, direction, points, field_of_view: fov} = command;
   const radius = Math.max(command.radius, girth());
-  const center = vector(target);
-  const toEye = vector(eye ?? direction);
-  if (eye) toEye.sub(center);
-  const distance = eye ? toEye.length() : 0;
+  const center = vector(command.target), up = vector(command.up);
+  const toEye = eye ? vector(eye).sub(center) : vector(direction);
+  const distance = toEye.length();
   toEye.normalize();
-  const tall = Math.tan(field_of_view * Math.PI / 360);
-  const {clientWidth, clientHeight} = viewer.dom_element;
+  const {clientWidth, clientHeight} = viewer.dom_element, height = clientHeight || 640;
   const aspect = clientWidth / clientHeight || 1.5;
-  const wide = tall * aspect;
-  const bar = Math.max(BAR, barHeight / (clientHeight || 640));
-  const title = Math.max(TITLE, legend.covered / (clientHeight || 640));
-  const right = vector(up).cross(toEye).normalize();
-  const above = toEye.clone().cross(right);
+  const tall = Math.tan(fov * Math.PI / 360), wide = tall * aspect;
+  const bar = Math.max(BAR, barHeight / height), title = Math.max(TITLE, legend.covered / height);
+  const right = up.clone().cross(toEye).normalize(), above = toEye.clone().cross(right);
   const offsets = points.map((point) => vector(point).sub(center));
   const needed = (offset) => {
     const x = Math.abs(offset.dot(right)) + radius, y = Math.abs(offset.dot(above)) + radius;
@@ -194,14 +164,14 @@ function camera(command) {
     return offset.dot(toEye) + Math.max(across, upwards);
   };
   let away = Math.max(...offsets.map(needed));
-  if (eye) away = Math.min(Math.max(away, distance), distance * Math.max(WIDE / aspect, 1));
+  if (eye) away = clamp(away, distance, distance * Math.max(WIDE / aspect, 1));
   const lens = viewer.camera;
-  Object.assign(lens, {fov: field_of_view, near: away / 100, far: away * 100});
-  lens.up.copy(vector(up));
+  Object.assign(lens, {fov, near: away / 100, far: away * 100});
+  lens.up.copy(up);
   lens.position.copy(center).addScaledVector(toEye, away);
   // To the right, to be beside the legend if there is space; the picture is 2 wide.
-  const half = (offset) => (away - offset.dot(toEye)) * wide;
-  const ends = (side) => offsets.map((o) => (o.dot(right) + side * radius) / half(o));
+  const ends = (side) => offsets.map((offset) =>
+    (offset.dot(right) + side * radius) / (wide * (away - offset.dot(toEye))));
   const edge = 2 * legend.reach / (clientWidth || Infinity) - 1;
   const shift = Math.max(Math.min(edge - Math.min(...ends(-1)), 1 - Math.max(...ends(1))), 0);
   lens.setViewOffset(1, 1, -shift / 2, (bar - title) / 2, 1, 1);
@@ -209,14 +179,13 @@ function camera(command) {
   viewer.controls.dispose();
   viewer.set_camera(lens);  // new controls, which orbit about the new up direction
   viewer.controls.target.copy(center);
-  placed = {command, position: lens.position.clone(), target: center.clone(), slack: 1e-9 * away};
+  placed = {command, position: lens.position.clone(), target: center, slack: 1e-9 * away};
 }
 
-// Whether the camera is where the program placed it.
 function untouched() {
-  const {camera: lens, controls} = viewer;
-  return placed !== null && lens.position.distanceTo(placed.position) < placed.slack
-    && controls.target.distanceTo(placed.target) < placed.slack;
+  const near = (one, other) => one.distanceTo(other) < placed.slack;
+  return placed !== null && near(viewer.camera.position, placed.position)
+    && near(viewer.controls.target, placed.target);
 }
 
 // Place the camera again for another size of the window, unless the user has moved it.
@@ -226,19 +195,16 @@ function refit() {
   viewer.set_dirty();
 }
 
-// -- mesh files --
-
 // Meshcat merges the parts of a mesh file into one geometry. It loses which triangles of a
 // part have which material, and then does not draw them; and it fails if only some parts
 // have texture coordinates. Both are corrected here.
 function set_object(command) {
   const {BufferGeometry, BufferAttribute} = MeshCat.THREE;
   const apply = BufferGeometry.prototype.applyMatrix4;
-  const parts = [];
   BufferGeometry.prototype.applyMatrix4 = function (matrix) {  // called for each part
-    parts.push(this);
-    const {position, uv} = this.attributes;
-    if (!uv) this.setAttribute("uv", new BufferAttribute(new Float32Array(2 * position.count), 2));
+    const {groups, attributes: {position: {count}, uv}} = this;
+    if (!uv) this.setAttribute("uv", new BufferAttribute(new Float32Array(2 * count), 2));
+    this.userData = {groups};  // which the merged geometry keeps
     return apply.call(this, matrix);
   };
   try {
@@ -248,7 +214,7 @@ function set_object(command) {
   }
   node(command.path).traverse((object) => {
     const {geometry, material} = object;
-    if (Array.isArray(material) && material.some(Array.isArray)) assignMaterials(object, parts);
+    if (geometry?.userData.mergedUserData && Array.isArray(material)) assignMaterials(object);
     // Without normals, a mesh would be black.
     if (geometry?.isBufferGeometry && !geometry.attributes.normal) geometry.computeVertexNormals();
     if (material) object.material = Array.isArray(object.material)
@@ -256,36 +222,24 @@ function set_object(command) {
   });
 }
 
-// A material of a mesh file, lit as all others are.
+// A material, lit as all others are.
 function lit(material) {
   if (!material.isMeshPhongMaterial && !material.isMeshLambertMaterial) return material;
-  const standard = new MeshCat.THREE.MeshStandardMaterial({roughness: 0.5});
-  for (const name of ["color", "map", "opacity", "transparent", "side"]) {
-    standard[name] = material[name] ?? standard[name];
-  }
-  return standard;
+  const {color, map = null, opacity, transparent, side} = material;
+  const look = {color, map, opacity, transparent, side, roughness: 0.5};
+  return new MeshCat.THREE.MeshStandardMaterial(look);
 }
 
-// Assign its material to each group of triangles of a merged mesh.
-function assignMaterials(mesh, parts) {
-  const size = ({attributes}) => attributes.position.count;
-  const number = mesh.material.length;
-  const first = parts.findIndex((_, k) => {
-    const own = parts.slice(k, k + number);
-    return own.length === number
-      && own.reduce((total, part) => total + size(part), 0) === size(mesh.geometry);
-  });
-  if (first < 0) return;
+// Assign its material to each group of triangles of a merged mesh, which has a group for each part.
+function assignMaterials(mesh) {
+  const {groups: parts, userData: {mergedUserData: own}} = mesh.geometry, materials = [];
   mesh.geometry.clearGroups();
-  const materials = [];
-  let offset = 0;
-  parts.slice(first, first + number).forEach((part, k) => {
-    const whole = {start: 0, count: size(part), materialIndex: 0};
-    for (const {start, count, materialIndex} of part.groups.length ? part.groups : [whole]) {
-      mesh.geometry.addGroup(offset + start, count, materials.length);
-      materials.push([mesh.material[k]].flat()[materialIndex]);
+  parts.forEach(({start: first, count: size}, part) => {
+    const whole = {start: 0, count: size, materialIndex: 0}, {groups} = own[part];
+    for (const {start, count, materialIndex} of groups.length ? groups : [whole]) {
+      mesh.geometry.addGroup(first + start, count, materials.length);
+      materials.push([mesh.material[part]].flat()[materialIndex]);
     }
-    offset += size(part);
   });
   mesh.material = materials;
 }
