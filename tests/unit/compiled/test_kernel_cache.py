@@ -103,7 +103,7 @@ def test_only_an_edit_of_what_it_is_made_of_compiles_again(installed: Path) -> N
     # Whatever is neither a kernel nor read by one.
     control = package / "control" / "controller.py"
     control.write_text(control.read_text() + "\n# A comment.\n")
-    version = package / "compiled" / "version.py"
+    version = package / "common" / "version.py"
     version.write_text(version.read_text() + '"""Another."""\n')
     # Comments, docstrings and lines that move, in the kernels' own files as well.
     linalg = package / "compiled" / "linalg.py"
