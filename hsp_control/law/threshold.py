@@ -29,8 +29,8 @@ A level of springs asks for as little at its edge as it can have: that fades wit
 mobility, and the directions in which it pulls in vain turn as 1/s. So it lends them to
 what is below, as far as it pulls.
 
-All but ε_0 is meant for the identity as metric. Another one makes J L⁻ᵀ longer than J,
-or shorter, and ε with it.
+All but ε_0 is meant for the identity as metric. Another one that makes J L⁻ᵀ longer
+than J makes the same arm as steep at an ε that is larger.
 
 The null space turns by at most 1.09 |∂J/∂q|/ε: where an arm is held ε grows with g.
 """
@@ -96,7 +96,7 @@ class Thresholds(NamedTuple):
     own: Array  # ε of each level
     follows: Array  # the part of it that follows f
     lends: Array  # ε from which springs lend their directions to those below; 0: never
-    scales: Array  # ‖J L⁻ᵀ‖/‖J‖, what ε is measured in: 1 where W = I
+    scales: Array  # by how much J L⁻ᵀ is longer than J, at least 1: the unit of ε
 
     @classmethod
     def allocate(cls, levels: int) -> Self:
@@ -164,7 +164,7 @@ def write_thresholds(
                 tracks = True
                 square += asked[k] * asked[k]
                 more += (yields[k] - 1.0) * asked[k] * asked[k]
-        scale = np.sqrt(whitened / plain) if plain > 0.0 else 1.0
+        scale = np.sqrt(max(whitened / plain, 1.0)) if plain > 0.0 else 1.0
         norm, share = np.sqrt(square), np.sqrt(pull)
         if following.modest > 0.0:
             share = max(share, norm / following.modest)

@@ -89,8 +89,7 @@ def test_it_bounds_what_the_feedback_asks_for_over_its_square(
     few = written(asked, ends, following, yields=3.0)[1].own  # a third of L
     exact = own > LEAST
     np.testing.assert_allclose(few[exact] ** 2, 3.0 * own[exact] ** 2)
-    exact &= scaled.own > LEAST
-    np.testing.assert_allclose(scaled.own[exact], scale * own[exact])
+    np.testing.assert_allclose(scaled.own[exact], max(scale, 1.0) * own[exact])
     for counts, kind in ((1.0, NOT), (0.0, following)):
         assert (written(asked, ends, kind, yields=counts)[1].own == LEAST).all()
 
