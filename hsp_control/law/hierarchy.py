@@ -35,7 +35,6 @@ from hsp_control.law.samples import VARYING, FieldSample, MetricSample, TaskSamp
 from hsp_control.law.threshold import (
     Following,
     Thresholds,
-    held_by_springs,
     how_held,
     threshold_below,
 )
@@ -107,7 +106,7 @@ def resolve_levels(
     for i in range(n):
         a[i] = drawn[i] = 0.0
     start, held, above = 0, 0.0, np.inf
-    own, lends = thresholds.own, thresholds.lends
+    own, _, lends, scales = thresholds
     for level in range(ends.shape[0]):
         end = ends[level]
         block = slice(start, end)
@@ -134,8 +133,7 @@ def resolve_levels(
             _inverted(V, x, threshold, shares, G_inv)
         own[level] = threshold
         if pulls:
-            s = max(np.sqrt(smallest), threshold) / thresholds.scales[level]
-            above = min(above, s)
+            above = min(above, max(np.sqrt(smallest), threshold) / scales[level])
         if smallest < threshold * threshold:
             wanted = lacking = 0.0
             for k in range(start, end):
@@ -147,7 +145,8 @@ def resolve_levels(
                 wanted += asked[k] * asked[k]
                 lacking += lack * lack
             held = max(held, how_held(lacking, wanted, following))
-            held = max(held, held_by_springs(smallest, lends[level]))
+            if lends[level] > 0.0:
+                held = max(held, 1.0 - smallest / (lends[level] * lends[level]))
             if damped == 0:
                 damped = level + 1
         _close_level(Q, QJ[:, block], G_inv, pushed)

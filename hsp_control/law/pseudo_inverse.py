@@ -1,50 +1,21 @@
 """The weighted pseudo-inverse, exact away from singularities and bounded through them.
 
-Written for the whitened Jacobian B = J L⁻ᵀ with W = L Lᵀ, in which every metric is the
-Euclidean one. It is kept as the two factors of `bounded_inverse`, which the law
-multiplies by one after the other: J# = L⁻ᵀ Qᵀ X.
+    J# = W⁻¹Jᵀ q(JW⁻¹Jᵀ) = L⁻ᵀ B#,    B = J L⁻ᵀ,    W = L Lᵀ
+
+In the whitened Jacobian B every metric is the Euclidean one, and B# = Qᵀ X is that of
+`bounded_inverse`: it stays in these two factors, which the law multiplies by one after
+the other. See ``docs/law.md``, Near singularities.
 """
 
 from hsp_control.common.arrays import Array
 from hsp_control.compiled.kernels import kernel
 from hsp_control.compiled.linalg import (
-    bounded_inverse,
     multiply,
     multiply_transposed,
     solve_lower,
     solve_lower_transposed,
 )
 from hsp_control.law.samples import IDENTITY
-
-
-@kernel
-def weighted_pseudo_inverse(
-    J: Array,
-    L: Array,
-    form: int,
-    threshold: float,
-    B: Array,
-    Q: Array,
-    X: Array,
-) -> bool:
-    """Write the factors of J# = W⁻¹Jᵀ q(JW⁻¹Jᵀ), and return whether it was damped.
-
-    q(x) = 1/x for x ≥ threshold² and (2 - x/threshold²)/threshold² below it
-    (docs/law.md, Near singularities): continuously differentiable, exactly the inverse
-    while every singular value of J L⁻ᵀ is above the threshold, and bounded: ‖J# in
-    whitened coordinates‖ ≤ 1.09/threshold. Rank loss is a special case.
-
-    Args:
-        J: Task Jacobian, shape (m, nv), m ≤ nv.
-        L: Cholesky factor of the metric, shape (nv, nv).
-        form: The metric's form.
-        threshold: Singular value below which damping starts.
-        B: Scratch, shape (m, nv); holds the whitened Jacobian afterwards.
-        Q: Rows that span those of B, shape (m, nv).
-        X: Shape (m, m).
-    """
-    whiten(J, L, form, B)
-    return bounded_inverse(B, threshold, Q, X)
 
 
 @kernel

@@ -70,7 +70,7 @@ class Resolved(NamedTuple):
 
 
 class Factors(NamedTuple):
-    """The two factors of the stack's pseudo-inverse, see `weighted_pseudo_inverse`."""
+    """The two factors of the stack's pseudo-inverse, see `pseudo_inverse.py`."""
 
     Q: Array  # (m, nv)
     X: Array  # (m, m)

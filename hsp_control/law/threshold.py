@@ -17,7 +17,8 @@ the whole size, and the spring moves the whole arm. So an error of one component
 third of L, one of two components half.
 
 Below a level of the singular value s_1 the null space turns by up to |∂J/∂q|/s_1, and
-what a level there asks for with it: it follows with L s_1/size where that is less.
+what is asked for there with it. A level follows with L s_1/size where that is less; a
+field costs those above it an ε that grows with g, where they are held.
 
 A level that is held at its edge leaves to those below the very directions in which it
 is drawn there: along them its spring must outweigh what they ask for. They ask for
@@ -31,8 +32,6 @@ what is below, as far as it pulls.
 
 All but ε_0 is meant for the identity as metric. Another one that makes J L⁻ᵀ longer
 than J makes the same arm as steep at an ε that is larger.
-
-The null space turns by at most 1.09 |∂J/∂q|/ε: where an arm is held ε grows with g.
 """
 
 from typing import NamedTuple, Self
@@ -86,8 +85,7 @@ class Following(NamedTuple):
         return cls(size, STIFFNESS / size, size * modest)
 
 
-NOT = Following(0.0, np.inf, 0.0)
-"""The thresholds do not follow."""
+NOT = Following(0.0, np.inf, 0.0)  # nothing follows
 
 
 class Thresholds(NamedTuple):
@@ -200,7 +198,7 @@ def threshold_below(
 
     Args:
         asked: f - J a_f of the level, shape (m,).
-        held: How much levels above are held, see `how_held` and `held_by_springs`.
+        held: How much levels above are held, see `how_held`.
         above: Their least singular value s_1, in their scale; inf: nobody turns.
         level: Which one.
         following: f_0 and L.
@@ -229,15 +227,3 @@ def how_held(lacking: float, wanted: float, following: Following) -> float:
         return 0.0
     lacks = min(np.sqrt(lacking / wanted), 1.0)
     return float(lacks * beyond / (beyond + following.modest))
-
-
-@kernel
-def held_by_springs(smallest: float, lends: float) -> float:
-    """Return how much a level of springs is held, 1 at its very edge.
-
-    Args:
-        smallest: The smallest x = s².
-        lends: From which s the level lends its directions.
-    """
-    square = lends * lends
-    return float(1.0 - smallest / square) if smallest < square else 0.0

@@ -7,8 +7,9 @@ import pytest
 
 from hsp_control import Robot
 from hsp_control.common.arrays import Array
+from hsp_control.compiled.linalg import bounded_inverse
 from hsp_control.law import CONSTANT, IDENTITY
-from hsp_control.law.pseudo_inverse import weighted_pseudo_inverse
+from hsp_control.law.pseudo_inverse import whiten
 
 
 def pseudo_inverse(J: Array, W: Array | None, threshold: float) -> tuple[Array, bool]:
@@ -16,7 +17,8 @@ def pseudo_inverse(J: Array, W: Array | None, threshold: float) -> tuple[Array, 
     m, n = J.shape
     form, L = (IDENTITY, np.eye(n)) if W is None else (CONSTANT, np.linalg.cholesky(W))
     B, Q, X = (np.full(shape, np.nan) for shape in ((m, n), (m, n), (m, m)))
-    damped = weighted_pseudo_inverse(J, L, form, threshold, B, Q, X)
+    whiten(J, L, form, B)
+    damped = bounded_inverse(B, threshold, Q, X)
     return np.linalg.solve(L.T, Q.T @ X), damped
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError
-from hsp_control.compiled.linalg import cholesky
+from hsp_control.compiled.linalg import bounded_inverse, cholesky
 from hsp_control.constraints.limits.joint_numbers import Positives, by_dof
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.compensation.stage import Run, Stage
@@ -26,7 +26,7 @@ from hsp_control.declaration.quantities import Flag, Positive
 from hsp_control.law import VARYING
 from hsp_control.law.pseudo_inverse import (
     apply_pseudo_inverse_transpose,
-    weighted_pseudo_inverse,
+    whiten,
 )
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import Task
@@ -152,6 +152,7 @@ def task_wrench(
     X, part, force = np.zeros((m, m)), np.zeros(m), np.zeros(m)
     if not cholesky(state.mass_matrix, L):
         return np.full(m, np.nan)
-    weighted_pseudo_inverse(J, L, VARYING, threshold, B, Q, X)
+    whiten(J, L, VARYING, B)
+    bounded_inverse(B, threshold, Q, X)
     apply_pseudo_inverse_transpose(Q, X, L, VARYING, disturbance.copy(), part, force)
     return force

@@ -131,8 +131,6 @@ def test_moore_penrose_axioms_of_full_rank(
     assert not damped
     # Rounding, grown by the condition numbers of J (50) and of W (100).
     assert_moore_penrose(J, J_sharp, W, atol=1e-11)
-    expected = oracles.pseudo_inverse(J, W)
-    np.testing.assert_allclose(J_sharp, expected, rtol=0, atol=1e-10)
 
     J_plus, damped = pseudo_inverse(J, None, threshold=1e-3)
     assert not damped
@@ -154,10 +152,6 @@ def test_moore_penrose_axioms_at_rank_loss(
     assert damped
     # A zero that rounding lifts to 1e-16 comes in as 2e-16/threshold².
     assert_moore_penrose(J, J_sharp, W, atol=1e-11)
-    L = np.linalg.cholesky(W)
-    whitened = np.linalg.pinv(J @ np.linalg.inv(L).T, rcond=1e-9)
-    expected = np.linalg.inv(L).T @ whitened
-    np.testing.assert_allclose(J_sharp, expected, rtol=0, atol=1e-11)
 
 
 @given(
