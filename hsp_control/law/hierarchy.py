@@ -112,9 +112,9 @@ def resolve_levels(
         block = slice(start, end)
         G_inv, rest, opposed = G_inverse[block, block], rows[0], rows[3]
         threshold = own[level]
-        pulls = False  # contacts stay where they are, singular or not
+        turns = False  # contacts do not: they stay where they are
         for k in range(end - start):
-            pulls = pulls or springs[start + k] or yields[start + k] > 0.0
+            turns = turns or springs[start + k] or yields[start + k] > 0.0
             rest[k], opposed[k] = a_x[start + k], asked[start + k]
             for i in range(n):
                 rest[k] -= J_dot[start + k, i] * v[i] + J[start + k, i] * a[i]
@@ -132,7 +132,7 @@ def resolve_levels(
             threshold = lends[level]
             _inverted(V, x, threshold, shares, G_inv)
         own[level] = threshold
-        if pulls:
+        if turns:
             above = min(above, max(np.sqrt(smallest), threshold) / scales[level])
         if smallest < threshold * threshold:
             wanted = lacking = 0.0
