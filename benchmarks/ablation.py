@@ -53,9 +53,9 @@ INGREDIENTS: dict[str, tuple[Edit, ...]] = {
          "return np.inf, np.inf"),
     ),
     "threshold that follows": ((_EDGE, "STIFFNESS = 200.0", "STIFFNESS = 1e12"),),
-    "f₀": ((_EDGE, "ON_LEGS = 1.0, 10.0", "ON_LEGS = 0.0, 0.0"),),
+    "f₀": ((_EDGE, "ON_LEGS = 0.5, 10.0", "ON_LEGS = 0.0, 0.0"),),
     "threshold of the field": ((_EDGE, "QUICKEST = 50.0,", "QUICKEST = 1e12,"),),
-    "threshold below a held level": ((_EDGE, "BELOW = 50.0", "BELOW = 0.0"),),
+    "threshold below a held level": ((_EDGE, "BELOW = 40.0", "BELOW = 0.0"),),
     "what those above it draw": (
         ("law/hierarchy.py", "opposed[k] -= J[start", "opposed[k] -= 0.0 * J[start"),
     ),

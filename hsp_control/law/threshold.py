@@ -23,7 +23,7 @@ field costs those above it an ε that grows with g, where they are held.
 A level that is held at its edge leaves to those below the very directions in which it
 is drawn there: along them its spring must outweigh what they ask for. They ask for
 f - J a_f, with a_f what those above draw at rest: a task that is met undoes it. So a
-level below follows that with an L that is a fiftieth, as far as the one above lacks
+level below follows that with an L that is a fortieth, as far as the one above lacks
 what it asks for.
 
 A level of springs asks for as little at its edge as it can have: that fades with its
@@ -51,12 +51,12 @@ WHOLE, TURNS = 3, 0.8
 """Components of an error to which all of L belongs, one of m < 3 gets L/(4 - m); and by
 how much L is less for an orientation, whose error of 1 rad asks for thrice as much as
 the largest of a position."""
-BELOW = 50.0
+BELOW = 40.0
 """By how much L is less below a held level: its feedback then accelerates a joint by at
-most 1/50 of the spring of the level above."""
-MODEST, MODEST_ON_LEGS = 1.0, 10.0
-"""f_0 over the robot's size [1/s²]: what a position 1 % of the size away asks for at
-10 rad/s; and with a floating base, whose feet ask for more where they land."""
+most 1/40 of the spring of the level above."""
+MODEST, MODEST_ON_LEGS = 0.5, 10.0
+"""f_0 over the robot's size [1/s²]: what a position 0.5 % of the size away asks for
+at 10 rad/s; and with a floating base, whose feet ask for more where they land."""
 
 TURNING, QUARTER, QUICKEST = 50.0, 0.25, 7.0
 """How fast what a field asks for may change as its null space turns [1/s]: what is held
