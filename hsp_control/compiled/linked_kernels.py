@@ -20,8 +20,8 @@ from hsp_control.compiled.kernel_lowering import KernelLowering
 
 _target = cast("Any", registry).cpu_target
 _Library = cast("Any", codegen).JITCodeLibrary
-_LINEAR_ALGEBRA = "6common6linalg"
-"""What names of functions of this package's `compiled.linalg` contain."""
+_LINEAR_ALGEBRA = "".join(f"{len(x)}{x}" for x in (*__name__.split(".")[:-1], "linalg"))
+"""What names of functions of `linalg` contain in machine code."""
 
 
 class _LinkedLibrary(_Library):  # type: ignore[misc,valid-type]
