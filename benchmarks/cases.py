@@ -13,6 +13,7 @@ import pinocchio as pin
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
+from hsp_control.compiled.step_plan import planned
 from hsp_control.geometry import Scene
 from hsp_control.geometry.shapes import Sphere
 from hsp_control.geometry.start import Start
@@ -82,7 +83,7 @@ class Case:
         self._sample = FieldSample.allocate(robot.nv)
         self._state = hsp.RobotState(robot)
         self._pose = PoseSample.allocate()
-        self._follow = self.trajectory.follow(self._pose)
+        self._follow = planned(self.trajectory.calls(self._pose)).run
 
     # -- references of the peers ------------------------------------------------------
 

@@ -8,6 +8,7 @@ import pinocchio as pin
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
+from hsp_control.compiled.step_plan import planned
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants import RigidBodyPlant
 from hsp_control.trajectories import Blend, ComposedPose, HoldOrientation, PoseSample
@@ -105,7 +106,7 @@ class Poses:
         still.derivative(np.zeros(nv))
         desired = [PoseSample.allocate() for _ in tasks]
         followers = [
-            trajectory.follow(out)
+            planned(trajectory.calls(out)).run
             for trajectory, out in zip(self.trajectories, desired, strict=True)
         ]
         place, rate, rate_dot = np.zeros(12), np.zeros(6), np.zeros(6)

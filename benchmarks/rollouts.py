@@ -20,6 +20,7 @@ import numpy as np
 
 from hsp_control import Rollout, load_experiment
 from hsp_control.common.resources import bundled_configs
+from hsp_control.compiled.step_plan import planned
 
 PANDA: dict[str, Any] = {
     "robot": {"name": "panda"},
@@ -79,6 +80,7 @@ def step_costs(rounds: int) -> None:
     states = [(1e-3 * k, q + 1e-3 * np.sin(k + n), 1e-2 * np.cos(k + n))
               for k in range(1000)]  # fmt: skip
     dynamics = robot.bind_forward_dynamics(q, v, np.zeros(robot.nv))
+    forward_dynamics = planned(dynamics.calls).call()
     found: dict[tuple[str, str], list[float]] = {case: [] for case in cases}
     for round_ in range(rounds + 1):
         for case, each in cases.items():
@@ -88,7 +90,7 @@ def step_costs(rounds: int) -> None:
             law = (perf_counter() - begin) / len(states)
             begin = perf_counter()
             for _ in states:
-                dynamics.compute(0.0)
+                forward_dynamics()
             forward = (perf_counter() - begin) / len(states)
             rows: list[float] = []
             each.run(lambda _, rows=rows: rows.append(perf_counter()))  # type: ignore

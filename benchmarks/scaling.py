@@ -25,6 +25,7 @@ import hsp_control as hsp
 from hsp_control.common.arrays import Array
 from hsp_control.companions.plots import new_figure, styled
 from hsp_control.companions.plots.palette import SERIES as SERIES_COLORS
+from hsp_control.compiled.step_plan import planned
 from hsp_control.geometry.shapes import Sphere
 from hsp_control.null_space.fields import (
     InverseCondition,
@@ -224,7 +225,7 @@ def tsid_positions(
         positions.append(task)
         samples.append(tsid.TrajectorySample(12, 6))
         desired.append(TrajectorySample.allocate(3))
-        followers.append(path.follow(desired[-1]))
+        followers.append(planned(path.calls(desired[-1])).run)
     posture = tsid.TaskJointPosture("posture", wrapper)
     posture.setKp(10.0 * np.ones(nv))
     posture.setKd(11.0 * np.ones(nv))

@@ -11,7 +11,11 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from functools import partial
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import Any, NamedTuple, Self, TypeVar, cast
+
+import numpy as np
+
+from hsp_control.common.arrays import Array, Indices
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -19,7 +23,36 @@ KernelCall = tuple[Callable[..., Any], tuple[Any, ...]]
 """A kernel, or another function, with its first arguments: what a part's mathematics
 is. Who calls it adds the others. See `native.planned` for what may be among them."""
 
-KernelCalls = Sequence[KernelCall]
+TIME = object()
+"""The last argument of a call that brings a reference up to a time [s]."""
+
+
+class Once(NamedTuple):
+    """Calls that are made unless they were made at this stamp."""
+
+    calls: "KernelCalls"
+    stamp: Indices  # shape (1,)
+    made: Indices  # the stamp at which they were made last, shape (1,)
+
+    @classmethod
+    def at(cls, stamp: Indices, *calls: KernelCall) -> Self:
+        """Return calls that were not made yet."""
+        return cls(calls, stamp, np.full(1, -1))
+
+
+class OnlyIf(NamedTuple):
+    """Calls that are made if ``found[1]`` is not zero.
+
+    Their result is ``found[0]``, and what the last of them returns if they are made.
+    """
+
+    calls: "KernelCalls"
+    found: Array  # shape (2,)
+
+
+AnyCall = KernelCall | Once | OnlyIf
+
+KernelCalls = Sequence[AnyCall]
 """What a part does in each step: its calls with all their arguments, in this order."""
 
 

@@ -2,31 +2,18 @@
 
 From Python, each array argument costs 6 ns, the entry into compiled code 50 ns, and one
 step of a loop 60 ns. For a kernel of 0.1 µs with ten arrays that is more than its work.
-`bind` packs the arguments once into words of memory, and compiles an adapter that reads
-them there. All adapters have one signature, whatever the kernel's, so that `run` can
-call them by their addresses.
-
-A part says its mathematics as a kernel with its arguments, a `KernelCall`. An argument
-may be something that has to be brought up to date first: the kinematics of a frame, a
-trajectory, what another kernel writes. Its method ``supplied`` returns what the kernel
-reads, and the calls that write it: those of the time, and those that read the state.
-`planned` makes a step plan of it all: the calls of a step, decided once.
+A `NativeCall` packs the arguments once into words of memory, and compiles an adapter
+that reads them there. All adapters have one signature, whatever the kernel's, so that
+`run` can call them by their addresses.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
-from itertools import groupby
-from typing import Any, NamedTuple, Self, TypeGuard
+from typing import Any, Self, TypeGuard
 
 import numpy as np
 
-from hsp_control.common.arrays import Array, Indices
-from hsp_control.compiled.kernels import (
-    KernelCalls,
-    KernelOutput,
-    is_compiled,
-    with_outputs,
-)
+from hsp_control.common.arrays import Indices
 
 
 class NativeCall(partial[float]):
@@ -99,63 +86,6 @@ def rows_of(calls: Sequence[NativeCall]) -> Indices:
     return np.concatenate([none, *(call.args[0] for call in calls)])
 
 
-def bind(
-    function: Callable[..., Any], *arguments: Any, timed: bool = False
-) -> Callable[..., Any]:
-    """Return a call of a kernel with these arguments.
-
-    Args:
-        function: The kernel; it returns nothing or one number.
-        arguments: Arrays, numbers, and tuples or records of them. The call reads and
-            writes the memory of these arrays each time; numbers are constants.
-        timed: Whether the kernel has one more argument, the time, given to the call.
-    """
-    if is_compiled(function):
-        from hsp_control.compiled import adapters  # here: plain runs need no Numba
-
-        if adapters.AVAILABLE:
-            return NativeCall.of(function, arguments, timed)
-    return partial(function, *arguments)
-
-
-def once(calls: Sequence[Callable[[], object]], stamp: Indices) -> Callable[[], object]:
-    """Return one call that makes several, unless it made them at this stamp, (1,)."""
-    made = np.full(1, -1)
-    if not are_native(calls):
-        return partial(_make_once, calls, stamp, made)
-    from hsp_control.compiled.adapters import run_once
-
-    return NativeCall.over(run_once, calls, stamp, made)
-
-
-def _make_once(
-    calls: Sequence[Callable[[], object]], stamp: Indices, made: Indices
-) -> None:
-    """Do the same, where calls are made one by one."""
-    if made[0] != stamp[0]:
-        made[0] = stamp[0]
-        for call in calls:
-            call()
-
-
-def only_if(calls: Sequence[Callable[[], float]], found: Array) -> Callable[[], float]:
-    """Return one call that makes several if ``found[1]`` is not zero, found (2,)."""
-    if not are_native(calls):
-        return partial(_make_if, calls, found)
-    from hsp_control.compiled.adapters import run_if
-
-    return NativeCall.over(run_if, calls, found)
-
-
-def _make_if(calls: Sequence[Callable[[], float]], found: Array) -> float:
-    """Do the same, where calls are made one by one."""
-    value, last = float(found[0]), 0.0
-    if found[1] != 0.0:
-        for call in calls:
-            last = call()
-    return value + last
-
-
 def sequence(calls: Sequence[NativeCall], *free: float) -> NativeCall:
     """Return one call of the time that makes several; it returns the last result."""
     from hsp_control.compiled import adapters
@@ -163,107 +93,3 @@ def sequence(calls: Sequence[NativeCall], *free: float) -> NativeCall:
     call = NativeCall(adapters.entry(), rows_of(calls), *free)
     call.recipe = sequence, (calls, *free)
     return call
-
-
-def stay(t: float) -> None:
-    """Do nothing: the follower of a constant sample that is already written."""
-
-
-class StepPlan(NamedTuple):
-    """The calls that evaluate one part of a controller, at whatever the state is."""
-
-    # calls of the time [s] that update references
-    follow: tuple[Callable[[float], object], ...] = ()
-    # calls without arguments that read the state and write the results
-    write: tuple[Callable[[], Any], ...] = ()
-
-    def run(self, t: float) -> Any:
-        """Make the calls at a time [s]; return what the last one returns."""
-        value = None
-        for follow in self.follow:
-            follow(t)
-        for write in self.write:
-            value = write()
-        return value
-
-
-def planned(calls: KernelCalls) -> StepPlan:
-    """Return the plan of a part's calls; one that comes twice is bound once."""
-    follow: list[Callable[[float], object]] = []
-    write: list[Callable[[], Any]] = []
-    bound: dict[int, tuple[Callable[[], Any], ...]] = {}
-    for call in calls:
-        if id(call) not in bound:
-            function, arguments = call
-            given, first, before = supplied(arguments)
-            follow += [each for each in first if each is not stay]
-            bound[id(call)] = *before, bind(function, *given)
-        write += bound[id(call)]
-    return StepPlan(tuple(follow), tuple(write))
-
-
-def supplied(argument: Any) -> tuple[Any, tuple[Any, ...], tuple[Any, ...]]:
-    """Return an argument as a kernel reads it, and the calls that write it."""
-    if type(argument) is KernelOutput:
-        return argument.out, *planned([with_outputs(*argument)])
-    if hasattr(argument, "supplied"):
-        found: tuple[Any, tuple[Any, ...], tuple[Any, ...]] = argument.supplied()
-        return found
-    if type(argument) is not tuple:
-        return argument, (), ()
-    parts = [supplied(each) for each in argument]
-    follow = tuple(call for _, calls, _ in parts for call in calls)
-    write = tuple(call for _, _, calls in parts for call in calls)
-    return tuple(value for value, _, _ in parts), follow, write
-
-
-class CallSequence:
-    """Several calls as one, with the result of the last."""
-
-    def __init__(self, *calls: Callable[..., Any]) -> None:
-        self.calls = calls  # the calls, in order
-
-    def __call__(self, *arguments: float) -> Any:
-        """Make the calls in order."""
-        return [call(*arguments) for call in self.calls][-1]
-
-
-def one_call(calls: Sequence[Callable[..., Any]], *free: float) -> Callable[..., Any]:
-    """Return one call for several, with the result of the last: native if all are."""
-    return sequence(calls, *free) if are_native(calls) else CallSequence(*calls)
-
-
-def steps(
-    plans: Iterable[StepPlan], last: Callable[[], Any]
-) -> list[Callable[[float], Any]]:
-    """Return the calls of a step: all references first; native ones as one call."""
-    plans = list(plans)
-    parts = [part for p in plans for follow in p.follow for part in _parts(follow)]
-    for write in [*(write for p in plans for write in p.write), last]:
-        parts += [
-            part if isinstance(part, NativeCall) else _whenever(part)
-            for part in _parts(write)
-        ]
-    found: list[Callable[[float], Any]] = []
-    for _, group in groupby(parts, lambda part: isinstance(part, NativeCall)):
-        calls = [*group]
-        found += [sequence(calls)] if are_native(calls) else calls
-    return found
-
-
-def in_order(calls: Sequence[Callable[[], object]]) -> list[Callable[[float], Any]]:
-    """Return calls without arguments as calls of the time, native ones as one."""
-    return steps([StepPlan(write=tuple(calls[:-1]))], calls[-1])
-
-
-def _parts(call: Callable[..., Any]) -> Iterator[Callable[..., Any]]:
-    """Yield the single calls of a call."""
-    if isinstance(call, CallSequence):
-        for each in call.calls:
-            yield from _parts(each)
-    elif call is not stay:
-        yield call
-
-
-def _whenever(call: Callable[[], Any]) -> Callable[[float], Any]:
-    return lambda t: call()

@@ -32,17 +32,17 @@ _TEMPLATE = "IdLi0ENS_25JointCollectionDefaultTplEN5Eigen3RefI"
 _IN_IMPL = "KNS3_6MatrixIdLin1ELi1ELi0ELin1ELi1EEELi0ENS3_11InnerStrideILi1EEEEE"
 _OUTSIDE = "KNS2_6MatrixIdLin1ELi1ELi0ELin1ELi1EEELi0ENS2_11InnerStrideILi1EEEEE"
 _NAMES = {
-    "jacobians": (
+    "computeJointJacobiansTimeVariation": (
         f"_ZN9pinocchio4impl34computeJointJacobiansTimeVariation{_TEMPLATE}{_IN_IMPL}"
         "SA_EERKNS_7DataTplIT_XT0_ET1_E8Matrix6xERKNS_8ModelTplISC_XT0_ESD_EERSE_"
         "RKNS3_10MatrixBaseIT2_EERKNSN_IT3_EE"
     ),
-    "centroidal": (
+    "computeCentroidalMapTimeVariation": (
         f"_ZN9pinocchio4impl33computeCentroidalMapTimeVariation{_TEMPLATE}{_IN_IMPL}"
         "SA_EERKNS_7DataTplIT_XT0_ET1_E8Matrix6xERKNS_8ModelTplISC_XT0_ESD_EERSE_"
         "RKNS3_10MatrixBaseIT2_EERKNSN_IT3_EE"
     ),
-    "coriolis": (
+    "computeCoriolisMatrix": (
         f"_ZN9pinocchio4impl21computeCoriolisMatrix{_TEMPLATE}{_IN_IMPL}"
         "SA_EERKNS_7DataTplIT_XT0_ET1_E8MatrixXsERKNS_8ModelTplISC_XT0_ESD_EERSE_"
         "RKNS3_10MatrixBaseIT2_EERKNSN_IT3_EE"
@@ -63,18 +63,11 @@ _NAMES = {
         "ESC_EERSD_RKNS2_10MatrixBaseIT2_EERKNSM_IT3_EERKNSM_IT4_EENS_10ConventionE"
     ),
 }
-"""The C++ names of the functions; ``c++filt`` reads them."""
+"""The C++ names of the functions, by Pinocchio's own; ``c++filt`` reads them."""
 
-_BINDINGS: dict[str, Callable[..., object]] = {
-    "jacobians": pin.computeJointJacobiansTimeVariation,
-    "centroidal": pin.computeCentroidalMapTimeVariation,
-    "coriolis": pin.computeCoriolisMatrix,
-    "rnea": pin.rnea,
-    "crba": pin.crba,
-    "aba": pin.aba,
-}
-
-_WITHOUT_MIMICS = "centroidal", "coriolis", "aba"
+_WITHOUT_MIMICS = (
+    "computeCentroidalMapTimeVariation", "computeCoriolisMatrix", "aba",
+)  # fmt: skip
 """What Pinocchio does not support for models with mimic joints: the bindings know."""
 
 _QUERY = "_ZN5boost6python9converter8registry5queryENS0_9type_infoE"
@@ -144,15 +137,21 @@ def _missing() -> str:
     return ""
 
 
+def is_pinocchio(function: Callable[..., object]) -> bool:
+    """Return whether `bind_pinocchio` knows a function."""
+    return type(function) is type(pin.crba) and function.__name__ in _NAMES
+
+
 def bind_pinocchio(
     what: str, model: pin.Model, data: pin.Data, *vectors: Array
 ) -> Callable[[], object]:
     """Return a call that computes from what these arrays then hold, into the data.
 
     Args:
-        what: ``jacobians`` (q, v), into J and dJ; ``centroidal`` (q, v), into Ag and
-            dAg; ``coriolis`` (q, v), into C; ``rnea`` (q, v, a), into tau; ``crba``
-            (q), into M, both triangles; ``aba`` (q, v, tau), into ddq.
+        what: The function: ``computeJointJacobiansTimeVariation`` (q, v), into J and
+            dJ; ``computeCentroidalMapTimeVariation`` (q, v), into Ag and dAg;
+            ``computeCoriolisMatrix`` (q, v), into C; ``rnea`` (q, v, a), into tau;
+            ``crba`` (q), into M, both triangles; ``aba`` (q, v, tau), into ddq.
         model: The model.
         data: Its data.
         vectors: The arrays; they are kept. What is no packed vector of doubles of the
@@ -164,7 +163,7 @@ def bind_pinocchio(
         addresses = _object_address(model, _MODEL), _object_address(data, _DATA)
         if all(addresses):
             return _native(what, addresses, (model, data, *vectors))
-    return partial(_BINDINGS[what], model, data, *vectors)
+    return partial(getattr(pin, what), model, data, *vectors)
 
 
 def _fits(vector: Array, size: int) -> bool:

@@ -8,8 +8,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import NonFiniteError
-from hsp_control.compiled.kernels import KernelCall
-from hsp_control.compiled.native import planned, steps
+from hsp_control.compiled.kernels import AnyCall
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.contacts.contact import UnactuatedRows, unactuated_count
 from hsp_control.control.actuation.support import Support
@@ -86,7 +85,7 @@ class ActiveStack:
         # tasks with a largest error: the name, the first row, and `Feedback.largest`
         self.bounds: list[tuple[str, slice, Callable[[Array], float]]] = []
         self._parts: list[tuple[Task | Contact, TaskSample]] = []
-        self._calls: list[KernelCall] = []
+        self._calls: list[AnyCall] = []
         row = 0
         for contact in self.contacts:
             sample = self.rows.rows(row, row + contact.rows)
@@ -179,12 +178,26 @@ class ActiveStack:
         else:
             self.term_samples = (sample,)
             calls += field.calls(state, problem.metric, form, sample)
-        law = self.resolution.compile(state.v, controls=field.controls)
-        return steps([planned(calls)], law)
+        calls.append(self.resolution.call(state.v, controls=field.controls))
+        return state.plan(calls).steps()
 
     def field_value(self) -> float:
         """Return the field's value at the state that logs have: bound only for it."""
         return self._field.value(self._state.seen)
+
+    def diagnose(self) -> tuple[float, float, bytes]:
+        """Return ‖e_N‖_W, the tasks' manipulability, and what `singular_values` takes.
+
+        They are those of the last `resolve`.
+        """
+        call, triangle, length = self._diagnosis
+        manipulability = call()
+        return length.item(), manipulability, triangle.tobytes()
+
+    @cached_property
+    def _diagnosis(self) -> tuple[Callable[[], float], Array, Array]:
+        call, triangle, length = self.resolution.diagnosis(self.first_task_row)
+        return self._state.plan([call]).call(), triangle, length
 
     def flow(self) -> Array:
         """Return J# x_d' + P g, shape (nv,), where it was resolved, at rest."""
@@ -200,7 +213,8 @@ class ActiveStack:
                 flow.problem.task.acceleration[self.task_rows[task.name]] = rate
         flow.problem.field.g[:] = law.problem.field.g
         flow.problem.metric.W[:], flow.problem.metric.L[:] = law.problem.metric[:2]
-        return flow.resolve(state.v).acceleration
+        state.run([flow.call(state.v)])
+        return flow.acceleration
 
     def raise_not_finite(self) -> NoReturn:
         """Say what made a step's effort NaN or infinite."""

@@ -633,8 +633,7 @@ class Controller:
     def diagnose(self) -> Diagnostics:
         """Return quantities to plot, after `compute`, at the same state."""
         active = self.active_stack
-        found = active.resolution.diagnose(active.first_task_row)
-        return Diagnostics(active.field_value(), *found)
+        return Diagnostics(active.field_value(), *active.diagnose())
 
     def flow(self, t: float, q: ArrayLike) -> Array:
         """Return v = J# x_d' + P g, shape (nv,): the robot once both errors have died.

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.compiled.kernels import kernel
-from hsp_control.compiled.native import NativeCall, are_native
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation import Actuation, Delivered
 from hsp_control.control.actuation.actuation import LOOK
@@ -21,7 +20,6 @@ from hsp_control.control.gains_in_force import GainsInForce
 from hsp_control.control.setup import PlannedTask, Setup, levels_of
 from hsp_control.law.resolution import BEYOND_ANY_LEVEL, DAMPED, NOT_FINITE
 from hsp_control.robot import RobotState
-from hsp_control.robot.robot import Move
 
 AccelerationModifier = Callable[
     [RobotState, ActiveStack, Array], tuple[Array, Array | None]
@@ -258,11 +256,11 @@ class BoundStep:
 
     @cached_property
     def free(self) -> "FreeStep | None":
-        """What a compiled loop calls instead; None if a part is no native call."""
+        """What a compiled loop calls instead; None if more is needed than that."""
         if self.active.streamed or not self.direct:
             return None
         sending = self._limits.applying(self.active.acceleration)
-        return free_step(self.move, self._state.effort, sending)
+        return FreeStep(self.move, self._state.effort, sending)
 
 
 class FreeStep(NamedTuple):
@@ -270,22 +268,11 @@ class FreeStep(NamedTuple):
 
     # (t, q, v) ↦ a number that `is_free` understands; the effort and the acceleration
     # are written
-    move: Any
+    move: Callable[[float, Array, Array], float]
     effort: Array  # M a + N, shape (nv,) [N·m or N]
     # calls of the time that record that this effort is held from now on, for the period
     # of the last `Controller.applied`
-    sending: Sequence[NativeCall]
-
-
-def free_step(
-    move: Move, effort: Array, sending: Sequence[Callable[[float], Any]]
-) -> FreeStep | None:
-    """Return a free step of these parts; None where one of them is not native."""
-    from hsp_control.robot.native_move import NativeMove  # here: it imports Numba
-
-    if not isinstance(move, NativeMove) or not are_native(sending):
-        return None
-    return FreeStep(move, effort, sending)
+    sending: Sequence[Callable[[float], Any]]
 
 
 @kernel

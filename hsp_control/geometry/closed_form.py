@@ -14,7 +14,7 @@ gradient; the product rule gives its rate.
 """
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import coal
 import numpy as np
@@ -70,11 +70,12 @@ class ClosedFormDistances:
         self._pairs, self._places = pairs, places
         used = np.unique(pairs)
         self._motion = np.zeros((len(obstacles), MOTION_SIZE))
-        self._moving = tuple(
-            obstacle.follow(self._motion[k])
+        self._moving: KernelCalls = [
+            call
             for k, obstacle in enumerate(obstacles)
             if len(links) + k in used
-        )
+            for call in obstacle.calls(self._motion[k])
+        ]
         solids = [_obstacle(obstacle.shape) for obstacle in obstacles]
         rows = [_link(link) for link in links] + [row for _, row in solids]
         self._sizes = np.array(rows).reshape(-1, 7)
@@ -106,7 +107,7 @@ class ClosedFormDistances:
             lambda state, *arrays: state.plan(self.calls(state, *arrays))
         )
         self._derivatives = IdentityCache(
-            lambda state, *arrays: state.plan(self.derivatives(state, *arrays)).write[0]
+            lambda state, *arrays: state.plan(self.derivatives(state, *arrays)).call()
         )
 
     def measure(self, state: RobotState, distances: Array) -> None:
@@ -120,9 +121,9 @@ class ClosedFormDistances:
         work = self._places, self._segments, self._cores, self._scratch
         return [(_measure, (*given, *work, distances))]
 
-    def supplied(self) -> "tuple[_Bodies, tuple[Any, ...], tuple[Any, ...]]":
+    def supplied(self) -> "tuple[_Bodies, KernelCalls]":
         """Return the bodies as a kernel reads them, and the calls that move them."""
-        return self._bodies, self._moving, ()
+        return self._bodies, self._moving
 
     def witness(self, k: int) -> tuple[Array, Array, Array]:
         """Return the witness points [m] and the unit normal from first to second."""

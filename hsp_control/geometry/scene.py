@@ -11,6 +11,7 @@ from pydantic import AfterValidator, Field
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SceneError, TrajectoryError
 from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.compiled.kernels import KernelCalls
 from hsp_control.declaration import Part
 from hsp_control.declaration.nested import BY_NAME, parts_within, stored
 from hsp_control.declaration.quantities import ArrayField, Name
@@ -23,7 +24,6 @@ from hsp_control.trajectories import (
     TrajectorySample,
 )
 from hsp_control.trajectories.streams.stream import Streamed
-from hsp_control.trajectories.trajectory import Follower, follow_all
 
 
 def _in_space(center: Trajectory) -> Trajectory:
@@ -78,11 +78,11 @@ class Obstacle(Part, error=SceneError):
         rotation = self.orientation.sample(t).rotation
         return pin.SE3(rotation, self.center.sample(t).position)
 
-    def follow(self, motion: Array) -> Follower:
-        """Return what writes R by rows, c, c' and ω (18,) at a time."""
+    def calls(self, motion: Array) -> KernelCalls:
+        """Return the calls that write R by rows, c, c' and ω (18,) at a time."""
         center = TrajectorySample(motion[9:12], motion[12:15], np.zeros(3))
         turn = OrientationSample(motion[:9].reshape(3, 3), motion[15:18], np.zeros(3))
-        return follow_all(self.center.follow(center), self.orientation.follow(turn))
+        return [*self.center.calls(center), *self.orientation.calls(turn)]
 
 
 class Scene(Part, Mapping[str, Obstacle], error=SceneError):

@@ -3,7 +3,6 @@
 from .problem import Problem as Problem
 from .resolution import Outcome as Outcome
 from .resolution import Resolution as Resolution
-from .resolution import Resolved as Resolved
 from .resolution import singular_values as singular_values
 from .samples import CONSTANT as CONSTANT
 from .samples import IDENTITY as IDENTITY

@@ -1,6 +1,6 @@
 """The law with its buffers: from tasks and a field to one acceleration."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from enum import IntEnum
 from math import isqrt
 from typing import NamedTuple
@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array, Flags, Indices
-from hsp_control.compiled.kernels import kernel
+from hsp_control.compiled.kernels import KernelCall, kernel
 from hsp_control.compiled.linalg import (
     bounded_inverse,
     norm,
@@ -16,7 +16,6 @@ from hsp_control.compiled.linalg import (
     squared_norm,
     triangularise_rows,
 )
-from hsp_control.compiled.native import bind
 from hsp_control.law.hierarchy import LevelScratch, resolve_levels
 from hsp_control.law.law import acceleration, null_space_command
 from hsp_control.law.problem import Problem
@@ -61,14 +60,6 @@ def outcome_of(code: float) -> Outcome:
     return DAMPED if code < BEYOND_ANY_LEVEL else NOT_FINITE
 
 
-class Resolved(NamedTuple):
-    """The law's result at one state."""
-
-    acceleration: Array  # a, shape (nv,)
-    null_space_error: Array  # e_N = P(g - v), shape (nv,)
-    outcome: Outcome  # whether the law is exact
-
-
 class Factors(NamedTuple):
     """The two factors of the stack's pseudo-inverse, see `pseudo_inverse.py`."""
 
@@ -104,18 +95,18 @@ class Resolution:
     It has scratch memory but no state: the same input gives the same output.
 
     Attributes:
-        problem: The input, to be written before `resolve`.
+        problem: The input, to be written before `call` is made.
         ends: End of each level's rows in the stack.
         form: The metric's form.
         threshold: ε_0, the singular value below which the inverse is always bounded.
-        thresholds: ε of each level at the last `resolve`, shape (levels,).
-        acceleration: a of the last `resolve`, shape (nv,).
-        null_space_error: e_N of the last `resolve`, shape (nv,).
-        code: What the last `resolve` returned, see `outcome_of`, shape (1,).
-        factors: The stack's pseudo-inverse at the last `resolve`.
+        thresholds: ε of each level, as `call` wrote it last, shape (levels,).
+        acceleration: a, as `call` wrote it last, shape (nv,).
+        null_space_error: e_N, as `call` wrote it last, shape (nv,).
+        code: What `call` returned last, see `outcome_of`, shape (1,).
+        factors: The stack's pseudo-inverse then.
         alone: Whether the tasks of one level are resolved at once, whatever happens.
-        projectors: The levels' projectors at the last `resolve`, if its code is not 0
-            and the level is not alone.
+        projectors: The levels' projectors then, if the code is not 0 and the level is
+            not alone.
     """
 
     def __init__(
@@ -153,15 +144,9 @@ class Resolution:
         self.acceleration = self.problem.record.acceleration
         self.null_space_error = self.problem.record.null_space_error
         self.code: Indices = np.zeros(1, dtype=np.int64)
-        self._triangles: dict[int, tuple[Callable[[], float], Array, Array]] = {}
 
-    def resolve(self, v: Array, *, controls_null_space: bool = True) -> Resolved:
-        """Return the acceleration that tracks the tasks and the field."""
-        code = self.compile(v, controls=controls_null_space)()
-        return Resolved(self.acceleration, self.null_space_error, outcome_of(code))
-
-    def compile(self, v: Array, *, controls: bool) -> Callable[[], float]:
-        """Return the call that `resolve` makes; it returns what `outcome_of` takes."""
+    def call(self, v: Array, *, controls: bool = True) -> KernelCall:
+        """Return the call that writes a and e_N; it returns what `outcome_of` takes."""
         problem = self.problem
         step = (
             *(problem.task, problem.field, problem.metric, self.form),
@@ -171,36 +156,32 @@ class Resolution:
             *(self.null_space_error, self.acceleration, self.code),
         )
         resolve = _resolve_at_once if self.alone else _resolve_levels
-        return bind(resolve, LawStep._make(step))
+        return resolve, (LawStep._make(step),)
 
-    def diagnose(self, first: int = 0) -> tuple[float, float, bytes]:
-        """Return what tells how near the last `resolve` was to singular and to rest.
+    def diagnosis(self, first: int) -> tuple[KernelCall, Array, Array]:
+        """Return a call that finds how near the law is to singular and to rest.
 
         Args:
             first: The first row of the tasks: those before it belong to contacts.
 
         Returns:
-            ‖e_N‖_W, the square root of 2 V; det(J W⁻¹ Jᵀ) without the rows before
-            ``first``, the paper's manipulability; and what `singular_values` takes.
+            The call, which returns det(J W⁻¹ Jᵀ) without the rows before ``first``, the
+            paper's manipulability; and what it writes: what `singular_values` takes,
+            and ‖e_N‖_W, the square root of 2 V, shape (1,).
         """
-        found = self._triangles.get(first)
-        if found is None:
-            J, metric = self.problem.task.jacobian[first:], self.problem.metric
-            small, large = sorted(J.shape)
-            scratch, e_N = np.zeros((2, large, large)), self.null_space_error
-            T, length = np.zeros((small, small)), np.zeros(1)
-            call = bind(_diagnose, J, *metric[:2], self.form, e_N, scratch, T, length)
-            self._triangles[first] = found = call, T, length
-        call, T, length = found
-        manipulability = call()
-        return length.item(), manipulability, T.tobytes()
+        J, metric = self.problem.task.jacobian[first:], self.problem.metric
+        small, large = sorted(J.shape)
+        scratch, e_N = np.zeros((2, large, large)), self.null_space_error
+        T, length = np.zeros((small, small)), np.zeros(1)
+        given = J, *metric[:2], self.form, e_N, scratch, T, length
+        return (_diagnose, given), T, length
 
 
 def singular_values(triangle: bytes) -> Array:
     """Return the singular values of J L⁻ᵀ, the largest first, shape (min(m, nv),).
 
     Args:
-        triangle: What `Resolution.diagnose` returned.
+        triangle: What the call of `Resolution.diagnosis` wrote, as bytes.
     """
     T = np.frombuffer(triangle).copy()
     values = np.zeros(isqrt(len(T)))

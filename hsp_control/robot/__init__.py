@@ -11,6 +11,6 @@ from .integrators import Integrator as Integrator
 from .integrators import Rk4 as Rk4
 from .integrators import SemiImplicitEuler as SemiImplicitEuler
 from .robot import Robot as Robot
-from .robot import RobotState as RobotState
+from .state import RobotState as RobotState
 
 __dir__ = own_names(__name__)

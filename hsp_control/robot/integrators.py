@@ -14,11 +14,12 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array
 from hsp_control.common.entry_points import own_names
 from hsp_control.common.exceptions import HspControlError, SimulationError
-from hsp_control.compiled.kernels import kernel
-from hsp_control.compiled.native import NativeCall, are_native, bind, in_order
+from hsp_control.compiled.kernels import TIME, AnyCall, KernelCalls, kernel
+from hsp_control.compiled.native import NativeCall
+from hsp_control.compiled.step_plan import in_equal_steps, planned
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Positive
-from hsp_control.robot.motion import Acceleration, number_of_steps
+from hsp_control.robot.kinematics import Term
 from hsp_control.robot.robot import Robot
 
 Dynamics = Callable[[float, Array, Array], Array]
@@ -81,7 +82,7 @@ class TangentChart:
         return not self.robot.flat and largest > CHART_RADIUS
 
 
-Bind = Callable[[Array, Array], Acceleration]
+Bind = Callable[[Array, Array], Term]
 """(q, v) ↦ v', computed for the values that these two arrays have then."""
 
 Advance = Callable[[float, float, Array, Array], tuple[Array, Array]]
@@ -124,13 +125,13 @@ class Integrator(Part, ABC, family="integrators", error=SimulationError):
 def bound(dynamics: Dynamics) -> Bind:
     """Return dynamics as integrators call them: of arrays that stay the same."""
 
-    def bind_dynamics(q: Array, v: Array) -> Acceleration:
+    def bind_dynamics(q: Array, v: Array) -> Term:
         value = np.zeros_like(v)
 
         def compute(t: float) -> None:
             value[:] = dynamics(t, q, v)
 
-        return Acceleration(compute, value)
+        return Term(value, [(compute, (TIME,))])
 
     return bind_dynamics
 
@@ -172,65 +173,51 @@ class Steps(ABC):
         v: Velocity there, shape (nv,).
         acceleration: v' there.
         interval: Beginning and end of what is integrated [s], shape (2,).
+        now: Beginning of the present step [s], shape (1,).
         h: The step [s], shape (1,).
-        native: Integrates q and v over the interval; None where a part of a step, for
-            example v', is not native.
+        take: Integrates q and v over the interval.
+        native: Whether `take` is one native call; not if a part of a step, for example
+            v', is none.
     """
 
     def __init__(self, robot: Robot, bind_dynamics: Bind, longest: float) -> None:
         """Allocate, and bind the calls of a step."""
-        self.robot, self._longest = robot, longest
+        self.robot = robot
         self.q, self.v = robot.neutral(), np.zeros(robot.nv)
         self.acceleration = bind_dynamics(self.q, self.v)
-        self.interval, self.h = np.zeros(2), np.zeros(1)
-        self._t = 0.0
-        self._calls = in_order(self._bind())
-        self.native: NativeCall | None = None
-        if are_native(self._calls):
-            from hsp_control.robot.native_move import make_steps
-
-            self.native = NativeCall.over(
-                make_steps, self._calls, self.interval, longest, self.h
-            )
+        self.interval, self.now, self.h = np.zeros(2), np.zeros(1), np.zeros(1)
+        calls = planned(self._calls()).steps()
+        self.take = in_equal_steps(calls, self.interval, longest, self.now, self.h)
+        self.native = isinstance(self.take, NativeCall)
 
     @abstractmethod
-    def _bind(self) -> list[Callable[[], object]]:
+    def _calls(self) -> KernelCalls:
         """Return the calls of a step."""
 
     def __call__(self, t: float, end: float, q: Array, v: Array) -> tuple[Array, Array]:
         """Return (q, v) at ``end``; see `Integrator.advance`."""
         self.q[:], self.v[:] = q, v
-        if self.native is not None:
-            self.interval[0], self.interval[1] = t, end
-            self.native()
-        else:
-            self._step_by_step(t, end)
+        self.interval[0], self.interval[1] = t, end
+        self.take()
         return self.q.copy(), self.v.copy()
 
-    def _step_by_step(self, t: float, end: float) -> None:
-        """Do what `native` does, where the calls are made one by one."""
-        steps = number_of_steps(end - t, self._longest)
-        h = self.h[0] = (end - t) / steps
-        for k in range(steps):
-            self._t = t + k * h
-            for call in self._calls:
-                call(self._t)
-
-    def compute_at(self, fraction: float) -> Callable[[], object]:
-        """Return the call that writes v' at this fraction of the step."""
-        compute, _, timeless = self.acceleration
-        return timeless or (lambda: compute(self._t + fraction * self.h[0]))
+    def compute_at(self, fraction: float) -> KernelCalls:
+        """Return the calls that write v' at this fraction of the step."""
+        calls = self.acceleration.calls
+        plan = planned(calls)
+        if not plan.follow:
+            return calls
+        return [(lambda: plan.run(self.now.item() + fraction * self.h.item()), ())]
 
 
 class _SemiImplicitEuler(Steps):
-    def _bind(self) -> list[Callable[[], object]]:
+    def _calls(self) -> KernelCalls:
         robot = self.robot
         self._moved = np.zeros(robot.nv)
         q, a = self.q if robot.linear else np.zeros(0), self.acceleration.value
-        parts = [self.compute_at(0.0), bind(_euler, self.h, a, q, self.v, self._moved)]
-        if not robot.linear:
-            parts.append(self._place)
-        return parts
+        step = _euler, (self.h, a, q, self.v, self._moved)
+        place = [] if robot.linear else [(self._place, ())]
+        return [*self.compute_at(0.0), step, *place]
 
     def _place(self) -> None:
         self.q[:] = self.robot.integrate(self.q, self._moved)
@@ -239,27 +226,27 @@ class _SemiImplicitEuler(Steps):
 class _Rk4(Steps):
     """The four stages of a step, in the chart q = base ⊕ δ."""
 
-    def _bind(self) -> list[Callable[[], object]]:
+    def _calls(self) -> KernelCalls:
         robot = self.robot
         self._D, A = np.zeros((2, 4, robot.nv))
         self._delta, v0 = np.zeros((2, robot.nv))
         self._chart = TangentChart(robot, self.q)
         self._base = self._chart.base
         base, q = self._base, self.q
-        begin = bind(_begin, q, self.v, base, v0, self._D)
+        begin = _begin, (q, self.v, base, v0, self._D)
         if not robot.linear:
             base = q = np.zeros(0)
         slopes = self.h, self._D, A, self.acceleration.value
         point = base, v0, self._delta, q, self.v
-        parts = [begin, self.compute_at(0.0)]
+        parts: list[AnyCall] = [begin, *self.compute_at(0.0)]
         for i, fraction in enumerate((0.5, 0.5, 1.0)):
-            parts.append(bind(_next_stage, i, fraction, *slopes, *point))
+            parts.append((_next_stage, (i, fraction, *slopes, *point)))
             if not robot.linear:
-                parts.append(partial(self._place, i + 1))
-            parts.append(self.compute_at(fraction))
-        parts.append(bind(_weighted_step, *slopes, *point))
+                parts.append((self._place, (i + 1,)))
+            parts += self.compute_at(fraction)
+        parts.append((_weighted_step, (*slopes, *point)))
         if not robot.linear:
-            parts.append(partial(self._place, None))
+            parts.append((self._place, (None,)))
         return parts
 
     def _place(self, stage: int | None) -> None:
@@ -389,10 +376,11 @@ def _of_new_arrays(robot: Robot, bind_dynamics: Bind) -> Dynamics:
     """Return dynamics that copy their arguments to where they are bound."""
     q, v = robot.neutral(), np.zeros(robot.nv)
     acceleration = bind_dynamics(q, v)
+    compute = planned(acceleration.calls)
 
     def dynamics(t: float, q_new: Array, v_new: Array) -> Array:
         q[:], v[:] = q_new, v_new
-        acceleration.compute(t)
+        compute.run(t)
         return acceleration.value
 
     return dynamics

@@ -7,7 +7,8 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.robot.robot import Robot, RobotState
+from hsp_control.robot.robot import Robot
+from hsp_control.robot.state import RobotState
 
 _STEPS = 200
 _LONGEST = 0.5

@@ -1,17 +1,14 @@
 """Placements of joints and frames, and of the mass: Jacobians, exact rates, drift."""
 
-from collections.abc import Callable
-from functools import partial
-from typing import Any, NamedTuple
+from math import atan2
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array, Indices, kept_view, matrix_view
 from hsp_control.common.exceptions import ModelError
-from hsp_control.compiled.kernels import kernel
-from hsp_control.compiled.native import bind, once
-from hsp_control.compiled.pinocchio_calls import bind_pinocchio
+from hsp_control.compiled.kernels import KernelCalls, Once, kernel
 
 
 class FrameMotion(NamedTuple):
@@ -66,7 +63,7 @@ class FrameKinematics:
     This is Pinocchio's LOCAL_WORLD_ALIGNED.
 
     Attributes:
-        compute: Updates the attributes below to the state, if they are not up to date.
+        calls: Bring the attributes below up to date, if they are not.
         motion: The first five of them, as a record.
         rotation: Rotation matrix from frame axes to world axes, shape (3, 3).
         position: The frame's origin in the world [m], shape (3,).
@@ -78,7 +75,7 @@ class FrameKinematics:
     """
 
     __slots__ = (
-        "compute",
+        "calls",
         "drift",
         "jacobian",
         "jacobian_dot",
@@ -107,13 +104,12 @@ class FrameKinematics:
             frame.placement.translation.copy(),
             *joint_support(model, frame.parentJoint),
         )
-        self.compute: Callable[[], object] = bind(
-            frame_kinematics, stamp, np.array([-1]), carrier, v, motion, self.drift
-        )
+        given = stamp, np.array([-1]), carrier, v, motion, self.drift
+        self.calls: KernelCalls = [(frame_kinematics, given)]
 
-    def supplied(self) -> tuple[Any, ...]:
+    def supplied(self) -> tuple[FrameMotion, KernelCalls]:
         """Return the motion as an argument of a kernel; see `planned`."""
-        return self.motion, (), (self.compute,)
+        return self.motion, self.calls
 
 
 @kernel
@@ -193,14 +189,14 @@ def copy_rows(
 
 
 class Term(NamedTuple):
-    """An array of a state, and the call that brings it up to date."""
+    """An array, and the calls that bring it up to date."""
 
     value: Array
-    compute: Callable[[], object]
+    calls: KernelCalls
 
-    def supplied(self) -> tuple[Any, ...]:
+    def supplied(self) -> tuple[Array, KernelCalls]:
         """Return the array as an argument of a kernel; see `planned`."""
-        return self.value, (), (self.compute,)
+        return self.value, self.calls
 
 
 def inertia_terms(
@@ -208,15 +204,14 @@ def inertia_terms(
 ) -> tuple[Term, Term]:
     """Return M (CRBA) and M' = C + Cᵀ along v, shape (nv, nv) each."""
     mass_matrix = kept_view(matrix_view(data.M), data)
-    M = Term(mass_matrix, once([bind_pinocchio("crba", model, data, q)], stamp))
+    M = Term(mass_matrix, [Once.at(stamp, (pin.crba, (model, data, q)))])
     M_dot = np.zeros((model.nv, model.nv))
-    calls: list[Callable[[], object]]
     if model.mimicking_joints:  # Pinocchio has no C of such a model
-        calls = [partial(_write_difference, model, model.createData(), q, v, M_dot)]
-    else:
-        coriolis = bind_pinocchio("coriolis", model, data, q, v)
-        calls = [coriolis, bind(_write_sum, matrix_view(data.C), M_dot)]
-    return M, Term(M_dot, once(calls, stamp))
+        given = model, model.createData(), q, v, M_dot
+        return M, Term(M_dot, [Once.at(stamp, (_write_difference, given))])
+    coriolis = pin.computeCoriolisMatrix, (model, data, q, v)
+    add = _write_sum, (matrix_view(data.C), M_dot)
+    return M, Term(M_dot, [Once.at(stamp, coriolis, add)])
 
 
 @kernel
@@ -285,7 +280,7 @@ class CentroidalMotion:
     """Centre of mass and centroidal angular momentum of a robot, in world axes.
 
     Attributes:
-        compute: Updates the attributes below to the state, if they are not up to date.
+        calls: Bring the attributes below up to date, if they are not.
         mass: Total mass [kg].
         position: The centre of mass c [m], shape (3,).
         velocity: c' = J v [m/s], shape (3,).
@@ -299,7 +294,7 @@ class CentroidalMotion:
     def __init__(
         self, model: pin.Model, data: pin.Data, q: Array, v: Array, stamp: Indices
     ) -> None:
-        """Allocate the arrays; `compute` takes the values that q and v have then."""
+        """Allocate the arrays; `calls` take the values that q and v have then."""
         # Pinocchio allocates these results at the first call; take views after it.
         pin.computeCentroidalMapTimeVariation(model, data, q, v)
         self.mass: float = pin.computeTotalMass(model)
@@ -309,26 +304,17 @@ class CentroidalMotion:
         self.jacobian_dot: Array = np.zeros((3, model.nv))
         self.momentum_matrix: Array = np.zeros((3, model.nv))
         self.momentum_matrix_dot: Array = np.zeros((3, model.nv))
-        momentum = bind_pinocchio("centroidal", model, data, q, v)
-        extract = bind(
-            _extract,
-            matrix_view(data.Ag),
-            matrix_view(data.dAg),
-            self.mass,
-            v,
-            self.velocity,
-            self.jacobian,
-            self.jacobian_dot,
-            self.momentum_matrix,
-            self.momentum_matrix_dot,
-        )
-        self.compute: Callable[[], object] = once([momentum, extract], stamp)
+        momentum = pin.computeCentroidalMapTimeVariation, (model, data, q, v)
+        found = self.velocity, self.jacobian, self.jacobian_dot
+        angular = self.momentum_matrix, self.momentum_matrix_dot
+        sums = matrix_view(data.Ag), matrix_view(data.dAg), self.mass, v
+        extract = _extract, (*sums, *found, *angular)
+        self.calls: KernelCalls = [Once.at(stamp, momentum, extract)]
 
-    def supplied(self) -> tuple[Any, ...]:
+    def supplied(self) -> tuple[PointMotion, KernelCalls]:
         """Return the centre's motion as an argument of a kernel; see `planned`."""
         J, J_dot = self.jacobian, self.jacobian_dot
-        center = PointMotion(J, J_dot, self.position, self.velocity)
-        return center, (), (self.compute,)
+        return PointMotion(J, J_dot, self.position, self.velocity), self.calls
 
 
 @kernel
@@ -363,3 +349,21 @@ def _extract(
         angular_dot[0, j] = A_dot[3, j] - (y * pz - z * py)
         angular_dot[1, j] = A_dot[4, j] - (z * px - x * pz)
         angular_dot[2, j] = A_dot[5, j] - (x * py - y * px)
+
+
+@kernel
+def joint_displacements(
+    q: Array, reference: Array, single_dof_joints: Indices, out: Array
+) -> None:
+    """Write q ⊖ reference for single-dof joints; continuous joints are within ±π."""
+    for k in range(single_dof_joints.shape[0]):
+        i, at, size = (
+            single_dof_joints[k, 0],
+            single_dof_joints[k, 1],
+            single_dof_joints[k, 2],
+        )
+        if size == 1:
+            out[i] = q[at] - reference[at]
+        else:  # (cos, sin)
+            c, s, c_ref, s_ref = q[at], q[at + 1], reference[at], reference[at + 1]
+            out[i] = atan2(s * c_ref - c * s_ref, c * c_ref + s * s_ref)

@@ -19,9 +19,8 @@ from hsp_control.common.exceptions import (
     SimulationError,
 )
 from hsp_control.common.suggestions import did_you_mean, listing
-from hsp_control.compiled.pinocchio_calls import bind_pinocchio
 from hsp_control.robot.description.loading import moving_joints
-from hsp_control.robot.motion import Acceleration
+from hsp_control.robot.kinematics import Term
 
 _ARM_RATE, _LEG_RATE = 11.0, 500.0
 """Maximum rate of an effort in maximum efforts [1/s]: with a fixed base, and of a robot
@@ -479,17 +478,17 @@ class RobotModel:
             return np.array(pin.aba(self.model, self._data, q, v, tau))
         return self._forward_dynamics_of_mimics(q, v, tau)
 
-    def bind_forward_dynamics(self, q: Array, v: Array, tau: Array) -> Acceleration:
+    def bind_forward_dynamics(self, q: Array, v: Array, tau: Array) -> Term:
         """Return `forward_dynamics` for what these arrays hold when it is computed."""
         if not self.mimics:
-            call = bind_pinocchio("aba", self.model, self._data, q, v, tau)
-            return Acceleration(lambda t: call(), self._data.ddq, call)
+            given = self.model, self._data, q, v, tau
+            return Term(self._data.ddq, [(pin.aba, given)])
         value = np.zeros(self.nv)
 
-        def compute(t: float) -> None:
+        def compute(q: Array, v: Array, tau: Array) -> None:
             value[:] = self._forward_dynamics_of_mimics(q, v, tau)
 
-        return Acceleration(compute, value)
+        return Term(value, [(compute, (q, v, tau))])
 
     def _forward_dynamics_of_mimics(self, q: Array, v: Array, tau: Array) -> Array:
         mass_matrix = pin.crba(self.model, self._data, q)

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.compiled.kernels import KernelCalls, kernel
+from hsp_control.compiled.kernels import KernelCall, kernel
 from hsp_control.constraints.limits import RobotLimits
 from hsp_control.control.measurement import LogChannel
 from hsp_control.robot import Robot
@@ -38,7 +38,9 @@ class LimitExcess:
         if limits is not None:
             _see(*self._arguments(limits, q, v))
 
-    def seeing(self, limits: RobotLimits | None, q: Array, v: Array) -> KernelCalls:
+    def seeing(
+        self, limits: RobotLimits | None, q: Array, v: Array
+    ) -> list[KernelCall]:
         """Return `see` of what these arrays then hold, as calls."""
         if limits is None:
             return []

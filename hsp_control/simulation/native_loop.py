@@ -13,11 +13,11 @@ import numpy as np
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.compiled.adapters import run
 from hsp_control.compiled.kernels import kernel
-from hsp_control.compiled.native import NativeCall, rows_of
+from hsp_control.compiled.native import NativeCall, are_native, rows_of
+from hsp_control.compiled.native_move import NativeMove, make_move
 from hsp_control.control.controller import Controller
 from hsp_control.control.mixture import FreeStep, is_free
 from hsp_control.robot.integrators import Steps
-from hsp_control.robot.native_move import move_to
 from hsp_control.simulation.limit_excess import LimitExcess
 from hsp_control.simulation.plants import IntegratedPlant
 
@@ -48,7 +48,7 @@ class NativeLoop:
         """Move on from the beginning of period k, under tau, to that of a later one.
 
         Returns (q, v) there, in new arrays, and which period begins; None where the
-        controller has no free steps.
+        controller has no free steps, or a part of one is no native call.
         """
         if periods - k < 2:
             return None
@@ -66,28 +66,28 @@ class NativeLoop:
         step: FreeStep,
     ) -> int:
         """Make periods from the k-th on; return how many."""
-        if self._loop is None or step is not self._step:
+        if step is not self._step:
             self._step, self._loop = step, self._bind(step)
+        if self._loop is None:
+            return 0
         self._plant.hold(self._steps, tau)
         which = self._which
         which[0], which[1], which[2] = start, span, periods
         which[3], which[4] = k, min(periods, k + MOST)
-        made = int(self._loop()) - k
-        if made > 1:  # calls in Python read it
-            state = vars(self._controller.state)  # q and v are there already
-            state["t"] = start + (k + made - 1) * span / periods
-        return made
+        return int(self._loop()) - k
 
-    def _bind(self, step: FreeStep) -> NativeCall:
-        """Return the loop of these steps."""
-        steps = self._steps
-        assert steps.native is not None
+    def _bind(self, step: FreeStep) -> NativeCall | None:
+        """Return the loop of these steps; None where one of them is not native."""
+        steps, move, sending = self._steps, step.move, step.sending
+        if not isinstance(move, NativeMove) or not are_native(sending):
+            return None
+        assert isinstance(steps.take, NativeCall)
         # Rows are addresses: what they lead to is kept, here and in the steps.
         seeing = self._excess.seeing(self._controller.limits, steps.q, steps.v)
         self._seeing = [NativeCall.of(*call, timed=False) for call in seeing]
-        moving = rows_of([steps.native, *self._seeing])
+        moving = rows_of([steps.take, *self._seeing])
         own = steps.q, steps.v, self._plant.effort, step.effort, steps.interval
-        calls = moving, *step.move.args, rows_of(step.sending)
+        calls = moving, *move.args, rows_of(sending)
         return NativeCall.of(_periods, (*calls, *own, self._which), timed=False)
 
 
@@ -95,6 +95,7 @@ class NativeLoop:
 def _periods(
     moving: Indices,
     law: Indices,
+    t_law: Array,
     q_law: Array,
     v_law: Array,
     unit_blocks: Indices,
@@ -123,7 +124,7 @@ def _periods(
         run(moving, t)
         if k == last:
             break
-        code = move_to(law, q_law, v_law, unit_blocks, stamp, t, q, v)
+        code = make_move(law, t_law, q_law, v_law, unit_blocks, stamp, t, q, v)
         if not is_free(code):
             return k
         square = 0.0

@@ -84,10 +84,10 @@ class TrackingTask(SecondOrderTask):
         def make() -> tuple[Any, Any]:
             followed: Any = self.followed
             sample = followed.sample(state.t)
-            return sample, followed.follow(sample)
+            return sample, followed.calls(sample)
 
-        sample, follow = state.made(self, "reference", make)
-        follow(state.t)
+        sample, follow = state.prepared(self, "reference", make)
+        follow()
         return sample
 
 

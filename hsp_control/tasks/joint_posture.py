@@ -14,8 +14,8 @@ from hsp_control.declaration.quantities import Names
 from hsp_control.geometry.start import Start
 from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
-from hsp_control.robot.motion import joint_displacements
-from hsp_control.robot.robot import Posture, configuration
+from hsp_control.robot.kinematics import joint_displacements
+from hsp_control.robot.state import Posture, configuration
 from hsp_control.tasks.compliant_task import CompliantTask
 from hsp_control.tasks.feedback import ErrorPart, Feedback, add_feedback
 from hsp_control.trajectories import Hold, Stream, Trajectory, TrajectorySample

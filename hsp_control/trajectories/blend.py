@@ -20,6 +20,7 @@ from hsp_control.compiled.rotations import (
     rotate,
     turn,
 )
+from hsp_control.compiled.step_plan import planned
 from hsp_control.declaration.quantities import Number, Positive, Vector, Vector3
 from hsp_control.declaration.rotation import Rotation, matrix_of
 from hsp_control.trajectories import checks
@@ -32,7 +33,6 @@ from hsp_control.trajectories.schedule import smooth_step
 from hsp_control.trajectories.trajectory import (
     Trajectory,
     TrajectorySample,
-    call_once,
 )
 
 
@@ -176,7 +176,8 @@ class BlendOrientation(OrientationTrajectory, type="blend"):
         omega_dot = np.asarray(self.start_angular_acceleration)
         w_dot = R.T @ (omega_dot - omega_d_dot - np.cross(omega, R @ w))
         y, y_dot, y_ddot = np.empty((3, 3))
-        call_once(_offset, R_d, R, w, w_dot, np.empty((3, 3)), y, y_dot, y_ddot)
+        given = R_d, R, w, w_dot, np.empty((3, 3)), y, y_dot, y_ddot
+        planned([(_offset, given)]).run(0.0)
         return y, y_dot, y_ddot
 
     def kernel(self) -> KernelCall:

@@ -10,14 +10,14 @@ from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TrajectoryError
-from hsp_control.compiled.kernels import KernelCall, kernel
+from hsp_control.compiled.kernels import KernelCall, KernelCalls, kernel
 from hsp_control.compiled.rotations import compose_back, log3, rotate, turn
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Number, Vector, Vector3
 from hsp_control.declaration.rotation import Rotation, Rotations, matrix_of
 from hsp_control.trajectories import checks
 from hsp_control.trajectories.schedule import smooth_step
-from hsp_control.trajectories.trajectory import Follower, follow_sampled, sampled
+from hsp_control.trajectories.trajectory import calls_of_sample, sampled
 
 
 class OrientationSample(NamedTuple):
@@ -90,14 +90,14 @@ class OrientationTrajectory(Part, ABC, family="orientations", error=TrajectoryEr
         sample: OrientationSample = sampled(self, t, self._output(out))
         return sample
 
-    def follow(self, out: OrientationSample) -> Follower:
-        """Return a call that writes ``out`` for a time [s]; see `Trajectory.follow`."""
-        return follow_sampled(self, self._output(out))
+    def calls(self, out: OrientationSample) -> KernelCalls:
+        """Return the calls that write ``out`` at a time; see `Trajectory.calls`."""
+        return calls_of_sample(self, self._output(out))
 
-    def supplied(self) -> tuple[Any, ...]:
+    def supplied(self) -> tuple[OrientationSample, KernelCalls]:
         """Return its sample as an argument of a kernel; see `planned`."""
         sample = OrientationSample.allocate()
-        return sample, (self.follow(sample),), ()
+        return sample, self.calls(sample)
 
     def _output(self, out: OrientationSample | None) -> OrientationSample:
         """Return ``out``, or a new sample if it is None."""

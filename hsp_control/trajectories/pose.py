@@ -3,14 +3,14 @@
 from abc import ABC, abstractmethod
 from dataclasses import KW_ONLY, replace
 from functools import cached_property
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TrajectoryError
-from hsp_control.compiled.kernels import kernel
+from hsp_control.compiled.kernels import TIME, KernelCalls, kernel
 from hsp_control.compiled.rotations import compose_back, jlog3, log3, stumpff, turn
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Number, Positive, Vector3, numbers
@@ -22,11 +22,9 @@ from hsp_control.trajectories.orientation import (
 )
 from hsp_control.trajectories.schedule import smooth_step
 from hsp_control.trajectories.trajectory import (
-    Follower,
     Trajectory,
     TrajectorySample,
-    follow_all,
-    follow_by,
+    write_sample,
 )
 
 
@@ -58,8 +56,8 @@ class PoseTrajectory(Part, ABC, family="poses", error=TrajectoryError):
     """M(t) = (R(t), x(t)) in SE(3); a value, defined at every t.
 
     Body to world; x is the body's origin [m], all rates are in world axes. A subclass
-    declares its parameters as fields and implements `sample`; it may override `follow`,
-    see `Trajectory.follow`. If it can be relative to where the robot starts, it
+    declares its parameters as fields and implements `sample`; it may override `calls`,
+    see `Trajectory.calls`. If it can be relative to where the robot starts, it
     overrides `relative` and `anchored`.
     """
 
@@ -85,22 +83,17 @@ class PoseTrajectory(Part, ABC, family="poses", error=TrajectoryError):
             ``out``, or the new sample.
         """
 
-    def follow(self, out: PoseSample) -> Follower:
-        """Return a call that writes ``out`` for a time [s]; see `Trajectory.follow`."""
+    def calls(self, out: PoseSample) -> KernelCalls:
+        """Return the calls that write ``out`` at a time; see `Trajectory.calls`."""
+        return [(write_sample, (self.sample, out, TIME))]
 
-        def sampler(t: float, own: tuple[Array, ...]) -> tuple[Array, ...]:
-            sample = self.sample(t, out)
-            return own if sample is out else (*sample.position, *sample.orientation)
-
-        return follow_by(sampler, (*out.position, *out.orientation))
-
-    def supplied(self) -> tuple[Any, ...]:
+    def supplied(self) -> tuple[Array, KernelCalls]:
         """Return its sample as an argument of a kernel, in one array; see `planned`.
 
         The rows are x, x', x'', R (three), ω and ω', shape (8, 3).
         """
         desired = np.zeros((8, 3))
-        return desired, (self.follow(PoseSample.over(desired)),), ()
+        return desired, self.calls(PoseSample.over(desired))
 
 
 class ComposedPose(PoseTrajectory, type="composed"):
@@ -139,11 +132,10 @@ class ComposedPose(PoseTrajectory, type="composed"):
         self.orientation.sample(t, out.orientation)
         return out
 
-    def follow(self, out: PoseSample) -> Follower:
-        """Return a function of time that updates ``out``; see `Trajectory.follow`."""
-        return follow_all(
-            self.position.follow(out.position), self.orientation.follow(out.orientation)
-        )
+    def calls(self, out: PoseSample) -> KernelCalls:
+        """Return those of both; see `Trajectory.calls`."""
+        orientation = self.orientation.calls(out.orientation)
+        return [*self.position.calls(out.position), *orientation]
 
 
 class HoldPose(PoseTrajectory, type="hold_pose"):
@@ -183,9 +175,9 @@ class HoldPose(PoseTrajectory, type="hold_pose"):
         """Return the pose and zero rates; see `PoseTrajectory.sample`."""
         return self._parts.sample(t, out)
 
-    def follow(self, out: PoseSample) -> Follower:
-        """Write ``out`` once, and return a follower that does nothing."""
-        return self._parts.follow(out)
+    def calls(self, out: PoseSample) -> KernelCalls:
+        """Write ``out`` once, and return no calls."""
+        return self._parts.calls(out)
 
     @cached_property
     def _parts(self) -> ComposedPose:

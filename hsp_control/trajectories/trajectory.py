@@ -1,4 +1,4 @@
-"""The abstract trajectory of a point in Rⁿ, and what follows trajectories in steps."""
+"""The abstract trajectory of a point in Rⁿ, and the calls that sample trajectories."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -10,12 +10,8 @@ from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ShapeError, TrajectoryError
-from hsp_control.compiled.kernels import KernelCall, says
-from hsp_control.compiled.native import bind, one_call, stay, supplied
+from hsp_control.compiled.kernels import TIME, KernelCall, KernelCalls, says
 from hsp_control.declaration import Part
-
-Follower = Callable[[float], object]
-"""A function of time [s] that writes the sample at that time into fixed memory."""
 
 
 def sampled(trajectory: Any, t: float, out: Any) -> Any:
@@ -26,41 +22,28 @@ def sampled(trajectory: Any, t: float, out: Any) -> Any:
     return out
 
 
-def call_once(function: Callable[..., Any], *arguments: Any) -> Any:
-    """Call a kernel from Python, with the code that followers have."""
-    return bind(function, *arguments)()
-
-
-def follow_sampled(trajectory: Any, out: Any) -> Follower:
-    """Return the follower of a trajectory that says its kernel, or its sample."""
+def calls_of_sample(trajectory: Any, out: Any) -> KernelCalls:
+    """Return the calls of a trajectory that says its kernel, or its sample."""
     if trajectory.constant:
         trajectory.sample(0.0, out)
-        return stay
+        return []
     if says(trajectory, "kernel", "sample") == "kernel":
         function, arguments = trajectory.kernel()
-        given, follow, _ = supplied(arguments)
-        return follow_all(*follow, bind(function, *given, out, timed=True))
-    return follow_by(trajectory.sample, out)
+        return [(function, (*arguments, out, TIME))]
+    return [(write_sample, (trajectory.sample, out, TIME))]
 
 
-def follow_all(*followers: Follower) -> Follower:
-    """Return a follower that calls others in order, without those that are `stay`."""
-    moving = [follower for follower in followers if follower is not stay]
-    if len(moving) < 2:
-        return moving[0] if moving else stay
-    return one_call(moving)
+def write_sample(sampler: Callable[[float, Any], Any], out: Any, t: float) -> None:
+    """Call ``sampler(t, out)``, and write ``out`` if it returns another sample."""
+    _copy(sampler(t, out), out)
 
 
-def follow_by(sampler: Callable[[float, Any], Any], out: Any) -> Follower:
-    """Return a follower that calls ``sampler(t, out)`` and writes ``out``."""
-
-    def follower(t: float) -> None:
-        sample = sampler(t, out)
-        if sample is not out:
-            for own, other in zip(out, sample, strict=True):
-                own[:] = other
-
-    return follower
+def _copy(sample: Any, out: Any) -> None:
+    for own, other in zip(out, sample, strict=True):
+        if isinstance(own, tuple):
+            _copy(other, own)
+        elif own is not other:
+            own[:] = other
 
 
 class TrajectorySample(NamedTuple):
@@ -183,19 +166,18 @@ class Trajectory(Part, ABC, family="trajectories", error=TrajectoryError):
         sample: TrajectorySample = sampled(self, t, self._output(out))
         return sample
 
-    def follow(self, out: TrajectorySample) -> Follower:
-        """Return a function of time [s] that writes the sample into ``out``.
+    def calls(self, out: TrajectorySample) -> KernelCalls:
+        """Return the calls that write the sample into ``out``, at a `TIME`.
 
-        It does what `sample` does, faster, for repeated sampling into the same memory.
-        After this call nothing else may write into ``out``, because a follower may
-        skip entries that do not change.
+        From now on nothing else may write into ``out``, because calls may skip entries
+        that do not change.
         """
-        return follow_sampled(self, self._output(out))
+        return calls_of_sample(self, self._output(out))
 
-    def supplied(self) -> tuple[Any, ...]:
+    def supplied(self) -> tuple[TrajectorySample, KernelCalls]:
         """Return its sample as an argument of a kernel; see `planned`."""
         sample = TrajectorySample.allocate(self.dimension)
-        return sample, (self.follow(sample),), ()
+        return sample, self.calls(sample)
 
     def _output(self, out: TrajectorySample | None) -> TrajectorySample:
         """Return ``out``, or a new sample if it is None."""

@@ -6,7 +6,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array
+from hsp_control.compiled.step_plan import planned
 from hsp_control.law import IDENTITY, VARYING, Outcome, Problem, Resolution
+from hsp_control.law.resolution import outcome_of
 
 
 def orthogonal(seed: int, n: int, m: int) -> Array:
@@ -84,6 +86,6 @@ def resolve(
     m, n = x.J.shape
     resolution = Resolution(levels or [m], n, form, x.K_N, threshold)
     fill(resolution.problem, x)
-    out = resolution.resolve(x.v, controls_null_space=controls)
-    damped = out.outcome is Outcome.DAMPED
-    return out.acceleration.copy(), out.null_space_error.copy(), damped
+    code = planned([resolution.call(x.v, controls=controls)]).run(0.0)
+    a, e_N = resolution.acceleration, resolution.null_space_error
+    return a.copy(), e_N.copy(), outcome_of(code) is Outcome.DAMPED

@@ -19,9 +19,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.compiled.kernels import kernel
+from hsp_control.compiled.kernels import KernelCall, KernelCalls, kernel
 from hsp_control.compiled.linalg import copy
-from hsp_control.compiled.native import bind, in_order
 from hsp_control.constraints.limits.acceleration_bounds import (
     EFFORT,
     MOTION,
@@ -84,13 +83,14 @@ class Actuation:
         # which limits are violated, see `violated_limits`; and the `Status` of the QP
         # if it was solved at once
         self.found: Indices = np.zeros(2, dtype=np.int64)
-        self._checks = [
-            *in_order([state.bind_inverse_dynamics(wanted.acceleration)]),
-            self._bind_check(),
-        ]
+        self._solve_if = np.zeros(2)
+        self._checks = [state.rnea(wanted.acceleration), self._check()]
+        self._check_wanted = state.plan(self._checks)
         self._tau = support.tau if support.size else wanted.effort
-        self._effort_within = bind(within, wanted.effort, *bounds[2:])
-        self._tau_within = bind(within, self._tau, *bounds[2:])
+        self._effort_within, self._tau_within = (
+            state.plan([(within, (effort, *bounds[2:]))]).call()
+            for effort in (wanted.effort, self._tau)
+        )
         self._qp: LimitedStep | None = None
         if limits.limits is not None or support.size:
             held = limits.limits.static_effort if limits.limits else None
@@ -99,17 +99,15 @@ class Actuation:
             # what is delivered where it was solved at once
             self._solved = Delivered(*self._qp.result, LIMITED, 0.0)
 
-    def _bind_check(self) -> Callable[[float], float]:
+    def _check(self) -> KernelCall:
         """Return the call that compares a and M a + N with their bounds."""
-        state, code, self._solve_if = self._state, self._law.code, np.zeros(2)
-        if self._limits.limits is None:
-            return bind(_unlimited, code, self.found, timed=True)
-        limits, wanted = self._limits, self._wanted.acceleration
-        return bind(
-            _check, state.q, state.v, wanted, state.effort, state.robot.dof_indices,
-            limits.motion, limits.sent.held, limits.bounds, code, self.found,
-            self._solve_if, timed=True,
-        )  # fmt: skip
+        state, limits, found = self._state, self._limits, (self._law.code, self.found)
+        if limits.limits is None:
+            return _unlimited, found
+        moving = state.time, state.q, state.v, self._wanted.acceleration, state.effort
+        within = limits.motion, limits.sent.held, limits.bounds
+        given = *moving, state.robot.dof_indices, *within, *found, self._solve_if
+        return _check, given
 
     def calls(self) -> list[Callable[[float], Any]]:
         """Return the calls of the time that deliver the law's own acceleration.
@@ -119,12 +117,11 @@ class Actuation:
         that is needed where a bound is violated, it is solved at once.
         """
         law, wanted = self._law.acceleration, self._wanted
-        calls = [*in_order([bind(copy, law, wanted.acceleration)]), *self._checks]
-        if self._qp is None or not self.direct:
-            return calls
-        keep = bind(copy, self._state.effort, wanted.effort)
-        solve = self._qp.nearest_if(keep, self._solve_if)
-        return [*calls, *in_order([solve])]
+        calls: KernelCalls = [(copy, (law, wanted.acceleration)), *self._checks]
+        if self._qp is not None and self.direct:
+            keep = copy, (self._state.effort, wanted.effort)
+            calls = [*calls, self._qp.nearest_if(keep, self._solve_if)]
+        return self._state.plan(calls).steps()
 
     def deliver(self, a: Array, offset: Array | None = None) -> Delivered:
         """Return efforts and forces for the acceleration that is nearest to a.
@@ -134,8 +131,7 @@ class Actuation:
             offset: Effort besides M a + N, shape (nv,); None: none.
         """
         self._wanted.acceleration[:] = a
-        for call in self._checks:
-            call(self._state.t)
+        self._check_wanted.run(self._state.t)
         return self.delivered(a, offset)
 
     def delivered(self, a: Array, offset: Array | None = None) -> Delivered:
@@ -224,7 +220,7 @@ class Actuation:
 
 
 @kernel
-def _unlimited(code: Indices, found: Indices, t: float) -> float:
+def _unlimited(code: Indices, found: Indices) -> float:
     """Return what `_check` does where nothing is limited."""
     found[0], found[1] = 0, UNSOLVED
     if code[0] >= BEYOND_ANY_LEVEL:
@@ -234,6 +230,7 @@ def _unlimited(code: Indices, found: Indices, t: float) -> float:
 
 @kernel
 def _check(
+    time: Array,
     q: Array,
     v: Array,
     a: Array,
@@ -245,12 +242,11 @@ def _check(
     code: Indices,
     found: Indices,
     solve_if: Array,
-    t: float,
 ) -> float:
     """Observe the last period's effort, and return whether to look; see `LOOK`."""
     # Which limits the next effort violates is written to ``found``; and to
     # ``solve_if``, as `only_if` reads it.
-    observe(v, held, t)
+    observe(v, held, time[0])
     flags = violated_limits(
         q,
         v,
@@ -264,7 +260,7 @@ def _check(
         held.disturbance,
         bounds,
     )
-    look = _unlimited(code, found, t) if flags == 0 else LOOK
+    look = _unlimited(code, found) if flags == 0 else LOOK
     found[0], found[1] = flags, UNSOLVED
     solve_if[0], solve_if[1] = look, flags
     return look

@@ -14,15 +14,14 @@ and the bounds of x: those on a from position, velocity and acceleration limits,
 those of f.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from enum import IntEnum
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.compiled.kernels import kernel
-from hsp_control.compiled.native import bind, one_call, only_if
+from hsp_control.compiled.kernels import KernelCall, OnlyIf, kernel
 from hsp_control.constraints.limits.acceleration_bounds import Bounds
 from hsp_control.control.actuation.deviation_cost import (
     Directions,
@@ -332,24 +331,23 @@ class LimitedStep:
             self.result,
             status,
         )
-        self._write_mass_matrix = state.inertia.compute
-        self._again = bind(solve_step, NEAREST_AGAIN, step)
-        self._least_violation = bind(solve_step, LEAST_VIOLATION, step)
-        self._nearest = bind(solve_step, NEAREST, step)
-        forces = bind(solve_step, FORCES, step)
-        self._find_forces = one_call([self._write_mass_matrix, forces], 0.0)
-        nearest = [self._write_mass_matrix, self._nearest]
-        self._find_nearest = one_call(nearest, 0.0)
 
-    def nearest_if(
-        self, before: Callable[[], Any], found: Array
-    ) -> Callable[[], float]:
+        def solving(goal: int) -> KernelCall:
+            return solve_step, (goal, step)
+
+        self._nearest = [*state.inertia.calls, solving(NEAREST)]
+        forces = [*state.inertia.calls, solving(FORCES)]
+        self._find_forces = state.plan(forces).call()
+        self._find_nearest = state.plan(self._nearest).call()
+        self._least_violation = state.plan([solving(LEAST_VIOLATION)]).call()
+        self._again = state.plan([solving(NEAREST_AGAIN)]).call()
+
+    def nearest_if(self, before: KernelCall, found: Array) -> OnlyIf:
         """Return a call that writes the nearest, as `solve`, if ``found[1]`` is not 0.
 
         A call is made before. It returns ``found[0]``, or more if the QP was solved.
         """
-        calls: list[Callable[[], Any]] = [self._write_mass_matrix, before]
-        return only_if([*calls, self._nearest], found)
+        return OnlyIf([before, *self._nearest], found)
 
     def solve(
         self, redistribute: bool, barriers: Barriers

@@ -10,9 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.compiled.kernels import kernel
+from hsp_control.compiled.kernels import KernelCall, kernel
 from hsp_control.compiled.linalg import copy
-from hsp_control.compiled.native import bind, in_order
 from hsp_control.constraints.limits import RobotLimits
 from hsp_control.constraints.limits.acceleration_bounds import Bounds, MotionLimits
 from hsp_control.control.evolution import Evolution, PlannedLimits
@@ -61,7 +60,7 @@ class SentEffort:
         self.last = np.zeros(nv + 1)
         self.held = Held(np.zeros(2), *(np.zeros(nv) for _ in range(6)))
         self._acceleration = np.zeros(nv)
-        self._expect = self.expecting(self._acceleration)
+        self._expect = state.plan([self.expecting(self._acceleration)]).call()
         self.forget()
 
     def record(self, tau: Array, acceleration: Array, period: float) -> None:
@@ -73,20 +72,20 @@ class SentEffort:
         """Record the acceleration that an effort is to give, and not the effort."""
         self._acceleration[:] = acceleration
         self.held.timing[1] = period
-        self._expect(self._state.t)
+        self._expect()
 
-    def expecting(self, acceleration: Array) -> Callable[[float], float]:
-        """Return `record_acceleration` of what an array then holds, at a time.
+    def expecting(self, acceleration: Array) -> KernelCall:
+        """Return `record_acceleration` of what an array then holds.
 
         The period is that of the last one.
         """
-        held = self.held
+        state, held = self._state, self.held
         arrays = acceleration, held.disturbance, held.timing, held.expected
-        return bind(_expect, self._state.v, *arrays, timed=True)
+        return _expect, (state.time, state.v, *arrays)
 
-    def recording(self) -> Callable[[], float]:
+    def recording(self) -> KernelCall:
         """Return a call that makes `RobotState.effort` the last effort."""
-        return bind(copy, self._state.effort, self.last[:-1])
+        return copy, (self._state.effort, self.last[:-1])
 
     def forget_rate(self) -> None:
         """Forget the last effort: the rate of the next one has no limit."""
@@ -112,10 +111,15 @@ class SentEffort:
 
 @kernel
 def _expect(
-    v: Array, a: Array, disturbance: Array, timing: Array, expected: Array, t: float
+    time: Array,
+    v: Array,
+    a: Array,
+    disturbance: Array,
+    timing: Array,
+    expected: Array,
 ) -> None:
     """Write the end of a period that begins now, and the velocity there."""
-    timing[0] = t + timing[1]
+    timing[0] = time[0] + timing[1]
     for i in range(v.shape[0]):
         expected[i] = v[i] + timing[1] * (a[i] + disturbance[i])
 
@@ -155,7 +159,10 @@ def effort_window(
 class LimitSet:
     """One set of limits, as kernels read it; None: nothing is limited."""
 
-    def __init__(self, limits: RobotLimits | None, nv: int, sent: SentEffort) -> None:
+    def __init__(
+        self, limits: RobotLimits | None, state: RobotState, sent: SentEffort
+    ) -> None:
+        nv = state.robot.nv
         self.limits, self.sent = limits, sent
         # bounds of the next step; those on the effort are always up to date
         self.bounds = Bounds(
@@ -172,12 +179,11 @@ class LimitSet:
         self.rate = bool(np.isfinite(limits.effort_rate).any())
         numbers = (np.array(each) for each in limits.motion)
         self.motion = MotionLimits(*numbers)
-        # Writes the bounds on the next effort.
-        self.update: Callable[[], object] = bind(
-            effort_window,
-            *(sent.last, np.array(limits.effort), np.array(limits.effort_rate)),
-            *(self.bounds.tau_lower, self.bounds.tau_upper),
-        )
+        # writes the bounds on the next effort
+        most = np.array(limits.effort), np.array(limits.effort_rate)
+        window = self.bounds.tau_lower, self.bounds.tau_upper
+        self.updating: KernelCall = effort_window, (sent.last, *most, *window)
+        self.update: Callable[[], object] = state.plan([self.updating]).call()
         self.update()
 
 
@@ -199,9 +205,9 @@ class LimitsInForce:
         """Follow other limits from now on; t is the present time [s]."""
         if not self._rate:
             self.sent.forget_rate()
-        nv, known = self._state.robot.nv, {id(each.limits): each for each in self.all}
+        state, known = self._state, {id(each.limits): each for each in self.all}
         self._all = [
-            (known.get(id(limits)) or LimitSet(limits, nv, self.sent), share)
+            (known.get(id(limits)) or LimitSet(limits, state, self.sent), share)
             for limits, share in planned.sets
         ]
         self._rate = any(each.rate for each, _ in self._all)
@@ -245,9 +251,9 @@ class LimitsInForce:
             return []
         calls = [self.sent.expecting(acceleration)]
         if self._rate:
-            windows = [each.update for each in self.all if each.rate]
-            calls += in_order([self.sent.recording(), *windows])
-        return calls
+            windows = [each.updating for each in self.all if each.rate]
+            calls += [self.sent.recording(), *windows]
+        return self._state.plan(calls).steps()
 
     def update(self) -> None:
         """Find what the last effort leaves for the next one."""

@@ -17,7 +17,6 @@ from hsp_control.compiled.linalg import (
     solve_lower,
     solve_lower_transposed,
 )
-from hsp_control.compiled.native import bind, in_order
 from hsp_control.constraints.contacts import Contact, SlidingContact
 from hsp_control.constraints.contacts.contact import NORMAL, WRENCH, shares
 from hsp_control.control.evolution import PlannedContact
@@ -81,7 +80,7 @@ class Support:
             friction = planned.contact.friction
             full = np.tile([friction**2, friction**2, 1.0], where.stop - where.start)
             if planned.contact.force is not None:
-                command = CommandedForces(planned)
+                command = CommandedForces(planned, state)
                 full[command.mask] *= COMMANDED_INVERSE_COST
                 self._commanded.append((planned, command, self.reference[columns]))
             self.inverse_cost[columns] = full
@@ -107,14 +106,13 @@ class Support:
     @cached_property
     def _write_maps(self) -> list[Callable[[float], Any]]:
         """The calls that write the map and the positions."""
-        calls: list[Callable[[], object]] = []
+        calls = []
         for contact, where in zip(self.contacts, self.points, strict=True):
             frame = self._state.frame(contact.frame)
             points, shift = np.array(contact.points), np.array(contact.shift)
             own = points, shift, np.array(contact.axes), where.start
-            write = bind(force_map, frame.motion, *own, self.positions, self.map)
-            calls += [frame.compute, write]
-        return in_order(calls)
+            calls.append((force_map, (frame, *own, self.positions, self.map)))
+        return self._state.plan(calls).steps()
 
     def minimum_norm_forces(self, wanted: Array) -> Array:
         """Return the forces of minimum Σ (f - f_ref)²/e, and write `tau`."""
@@ -125,17 +123,16 @@ class Support:
     @cached_property
     def _solve(self) -> Callable[[], object]:
         n, zeros = len(self.base), np.zeros
-        return bind(
-            minimum_norm_forces,
-            *(self.map, self.base, self.inverse_cost, self.reference, self._wanted),
-            *(zeros((n, self.size)), zeros((n, n)), zeros((n, n)), zeros((2, n))),
-            *(self.forces, self.tau),
-        )
+        given = self.map, self.base, self.inverse_cost, self.reference, self._wanted
+        work = zeros((n, self.size)), zeros((n, n)), zeros((n, n)), zeros((2, n))
+        call = minimum_norm_forces, (*given, *work, self.forces, self.tau)
+        return self._state.plan([call]).call()
 
     @cached_property
     def permits(self) -> Callable[[], float]:
         """The call that says whether `forces` are within cones and bounds."""
-        return bind(within_cones, self.cone, self.forces, self.lower, self.upper)
+        given = self.cone, self.forces, self.lower, self.upper
+        return self._state.plan([(within_cones, given)]).call()
 
     def in_world(self, forces: Array) -> Array:
         """Return the forces in world axes, shape (size/3, 3) [N]."""
@@ -168,14 +165,14 @@ cheaper than a miss of the tasks."""
 class CommandedForces:
     """Writes f_ref for the points of one contact, and how dear other forces are."""
 
-    def __init__(self, planned: PlannedContact) -> None:
+    def __init__(self, planned: PlannedContact, state: RobotState) -> None:
         """Follow the command of a contact."""
         contact = planned.contact
         assert contact.force is not None
         self._contact, self._offset = contact, planned.force_offset
         n = contact.force.dimension
         self._command = TrajectorySample.allocate(n)
-        self._follow = contact.force.followed.follow(self._command)
+        self._follow = state.plan(contact.force.followed.calls(self._command))
         k = len(contact.points)
         self._varies = n == WRENCH  # with the arms
         self._shares = np.zeros((3 * k, n))
@@ -190,7 +187,7 @@ class CommandedForces:
         self, state: RobotState, weight: float, resolution: Resolution, out: Array
     ) -> None:
         """Write f_ref."""
-        self._follow(state.t)
+        self._follow.run(state.t)
         command = self._command.position.copy()
         command[self._normal] = max(command[self._normal] + self._offset[0], 0.0)
         contact = self._contact

@@ -13,7 +13,7 @@ from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Count
 from hsp_control.robot import Robot
 from hsp_control.robot.integrators import Rk4
-from hsp_control.robot.motion import Acceleration
+from hsp_control.robot.kinematics import Term
 
 
 class Predictor(Part, error=CompensationError):
@@ -74,5 +74,5 @@ class RunningPredictor(Stage):
             q, v = self._advance(0.0, period, q, v)
         return np.asarray(q), np.asarray(v)
 
-    def _bind(self, q: Array, v: Array) -> Acceleration:
+    def _bind(self, q: Array, v: Array) -> Term:
         return self._robot.bind_forward_dynamics(q, v, self._tau)

@@ -149,7 +149,7 @@ class Clearance(Cost):
             slopes, curvatures = np.zeros((2, len(proximity.pairs)))
             arguments = proximity.distances, self.influence, slopes, curvatures
             call = barrier, arguments
-            add_barriers = state.plan([call]).write[0]
+            add_barriers = state.plan([call]).call()
             return _Work(proximity, slopes, curvatures, call, add_barriers)
 
         return state.made(self, "proximity", make)

@@ -12,7 +12,7 @@ from pydantic import AfterValidator, InstanceOf
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
-from hsp_control.compiled.kernels import KernelCall, KernelCalls, kernel, says
+from hsp_control.compiled.kernels import AnyCall, KernelCalls, kernel, says
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import NonNegative, OrInstance
 from hsp_control.geometry.start import Start
@@ -215,7 +215,7 @@ class FieldSum(NullSpaceField):
         samples: Sequence[FieldSample],
     ) -> KernelCalls:
         """Return the calls, which also write the weighted sample of each term."""
-        calls: list[KernelCall] = []
+        calls: list[AnyCall] = []
         for k, (term, sample) in enumerate(zip(self.terms, samples, strict=True)):
             calls += term.calls(state, metric, form, sample)
             weights = np.zeros(2)

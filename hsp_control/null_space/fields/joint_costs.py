@@ -16,8 +16,8 @@ from hsp_control.declaration.quantities import Fraction, Names, Weights
 from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields.cost import Cost, barrier_at
 from hsp_control.robot import Robot, RobotState
-from hsp_control.robot.motion import joint_displacements
-from hsp_control.robot.robot import Posture, configuration
+from hsp_control.robot.kinematics import joint_displacements
+from hsp_control.robot.state import Posture, configuration
 from hsp_control.trajectories import Hold, Trajectory, TrajectorySample
 
 

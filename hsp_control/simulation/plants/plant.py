@@ -9,11 +9,12 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
+from hsp_control.compiled.kernels import TIME
 from hsp_control.control.measurement import NO_WRENCHES, Inertial, LogChannel
 from hsp_control.declaration import Part
 from hsp_control.robot import Robot
 from hsp_control.robot.integrators import Advance, Integrator, Steps
-from hsp_control.robot.motion import Acceleration
+from hsp_control.robot.kinematics import Term
 
 Kind = TypeVar("Kind", bound="Imperfection")
 
@@ -93,14 +94,14 @@ class ContinuousPlant(Plant, ABC):
         The arrays may be overwritten after the call: copy what is to be kept.
         """
 
-    def bind(self, q: Array, v: Array, tau: Array) -> Acceleration:
+    def bind(self, q: Array, v: Array, tau: Array) -> Term:
         """Return v' for what these arrays hold when it is computed."""
         value = np.zeros(self.robot.nv)
 
         def compute(t: float) -> None:
             value[:] = self.acceleration(t, q, v, tau)
 
-        return Acceleration(compute, value)
+        return Term(value, [(compute, (TIME,))])
 
 
 class SampledPlant(Plant, ABC):
@@ -179,7 +180,7 @@ class IntegratedPlant(SampledPlant):
         Whoever calls them begins with `hold`, and ends with `moved`.
         """
         steps = self._advance or self._begin()
-        return steps if isinstance(steps, Steps) and steps.native is not None else None
+        return steps if isinstance(steps, Steps) and steps.native else None
 
     def hold(self, steps: Steps, tau: Array) -> None:
         """Write the present state and an effort, (nv,), where native steps read it."""

@@ -9,10 +9,11 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.compiled.kernels import kernel
+from hsp_control.compiled.moves import number_of_steps
 from hsp_control.robot import Robot
 from hsp_control.robot.friction import JointFriction
 from hsp_control.robot.integrators import Integrator
-from hsp_control.robot.motion import Acceleration, number_of_steps
+from hsp_control.robot.kinematics import Term
 from hsp_control.simulation.plants.plant import (
     ContinuousPlant,
     Plant,
@@ -40,7 +41,7 @@ class RigidBodyPlant(ContinuousPlant):
             tau = tau + self.pushes.effort(t, q)
         return self.robot.forward_dynamics(q, v, tau)
 
-    def bind(self, q: Array, v: Array, tau: Array) -> Acceleration:
+    def bind(self, q: Array, v: Array, tau: Array) -> Term:
         """Return v'; see `ContinuousPlant.bind`."""
         changed = type(self).acceleration is not RigidBodyPlant.acceleration
         pushed = self.pushes.pushes or self.pushes.reachable

@@ -10,6 +10,7 @@ from hsp_control import FramePose
 from hsp_control.common.exceptions import TrajectoryError
 from hsp_control.companions.walking.fed import Fed, FedOrientation
 from hsp_control.companions.walking.switch import Switch
+from hsp_control.compiled.step_plan import planned
 from hsp_control.trajectories import ComposedPose, OrientationSample, TrajectorySample
 
 H = 1e-6
@@ -28,17 +29,17 @@ def test_between_two_writings_its_derivatives_fit_it():
     )
 
 
-def test_a_follower_reads_what_is_written_later():
+def test_its_calls_read_what_is_written_later():
     reference, sample = Fed(2), TrajectorySample.allocate(2)
     reference.anchored([0.0, 0.0])
-    follow = reference.follow(sample)
+    calls = planned(reference.calls(sample))
     reference.write(1.0, [1.0, 2.0], [3.0, 0.0])
-    follow(1.5)
+    calls.run(1.5)
     assert sample.position.tolist() == [2.5, 2.0]
     turning, pose = FedOrientation(), OrientationSample.allocate()
-    follow = turning.anchored(np.eye(3)).follow(pose)
+    calls = planned(turning.anchored(np.eye(3)).calls(pose))
     turning.write(0.0, np.diag([1.0, -1.0, -1.0]))
-    follow(0.0)
+    calls.run(0.0)
     assert pose.rotation.tolist() == np.diag([1.0, -1.0, -1.0]).tolist()
 
 

@@ -17,15 +17,16 @@ pytestmark = pytest.mark.process
 
 KERNELS = """
 import numpy as np
-from hsp_control.compiled import adapters, native
+from hsp_control.compiled import adapters
 from hsp_control.compiled.linalg import multiply
+from hsp_control.compiled.step_plan import bind
 from hsp_control.law.pseudo_inverse import apply_pseudo_inverse
 
 out, part = np.zeros(2), np.zeros(2)
 multiply(3.0 * np.eye(2), np.ones(2), out)
 assert (out == 3.0).all(), out
 apply_pseudo_inverse(np.eye(2), np.eye(2), np.eye(2), 0, np.ones(2), part, out)
-native.bind(apply_pseudo_inverse, np.eye(2), np.eye(2), np.eye(2), 0, part, part, out)()
+bind(apply_pseudo_inverse, np.eye(2), np.eye(2), np.eye(2), 0, part, part, out)()
 loaded = [sum(k.stats.cache_hits.values()) for k in (multiply, apply_pseudo_inverse)]
 print(*loaded, adapters._codes[-1].cache_hits)
 """

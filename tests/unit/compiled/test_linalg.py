@@ -10,7 +10,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from hsp_control.common.arrays import Array
-from hsp_control.compiled import linalg
+from hsp_control.compiled import linalg, moves
 from hsp_control.compiled.linalg import (
     cholesky,
     multiply,
@@ -23,7 +23,7 @@ from hsp_control.compiled.linalg import (
     triangularise_rows,
 )
 from hsp_control.law import CONSTANT, law
-from hsp_control.robot import kinematics, motion
+from hsp_control.robot import kinematics
 from hsp_control.tasks import TaskSample
 
 EPS = float(np.finfo(float).eps)
@@ -284,7 +284,8 @@ def arguments(name: str) -> tuple[Any, ...]:
             *(normal(19, n - 1), kinematics.FrameMotion.allocate(n - 1), np.zeros(6)),
         ),
         "copy_valid": (
-            *(0.5, np.array([0.6, 0.8, 3.0]), sample[0], np.zeros(3), np.zeros(n)),
+            *(0.5, np.array([0.6, 0.8, 3.0]), sample[0]),
+            *(np.zeros(1), np.zeros(3), np.zeros(n)),
             *(np.array([[0, 2]]), np.array([4])),
         ),
     }[name]
@@ -298,7 +299,7 @@ KERNELS: dict[str, Callable[..., Any]] = {
     },
     "acceleration": law.acceleration,
     "frame_kinematics": kinematics.frame_kinematics,
-    "copy_valid": motion.copy_valid,
+    "copy_valid": moves.copy_valid,
 }
 
 

@@ -4,7 +4,6 @@ import copy
 import gc
 import weakref
 from functools import partial
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,17 +13,9 @@ from hypothesis import strategies as st
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
 from hsp_control.compiled import adapters
-from hsp_control.compiled.kernels import PLAIN, kernel
-from hsp_control.compiled.native import (
-    CallSequence,
-    NativeCall,
-    StepPlan,
-    bind,
-    once,
-    only_if,
-    sequence,
-    steps,
-)
+from hsp_control.compiled.kernels import PLAIN, TIME, KernelCall, Once, OnlyIf, kernel
+from hsp_control.compiled.native import NativeCall, sequence
+from hsp_control.compiled.step_plan import bind, planned
 
 compiled = pytest.mark.skipif(
     not hasattr(kernel(lambda: None), "py_func"), reason="NUMBA_DISABLE_JIT is set"
@@ -135,26 +126,27 @@ def test_steps_are_references_then_what_reads_them_then_the_law() -> None:
     def own_write() -> None:
         _note(log, 7.0)
 
-    timed = bind(_note_time, log, 20.0, timed=True)
-    pair = CallSequence(bind(_note, log, 2.0), bind(_note, log, 3.0))
-    bounds = [
-        StepPlan((CallSequence(timed, own), own), (bind(_note, log, 1.0), own_write)),
-        StepPlan((), (pair,)),
-    ]
-    found = steps(bounds, bind(_note, log, 4.0))
-    outcome = [step(0.5) for step in found][-1]
-    assert outcome == 4.0
-    assert called(log) == [20.5, 100.5, 100.5, 1.0, 7.0, 2.0, 3.0, 4.0]
+    pair = planned([(_note, (log, 2.0)), (_note, (log, 3.0))]).call()
+    calls = [
+        (_note, (log, 1.0)), (own_write, ()), (_note_time, (log, 20.0, TIME)),
+        (own, (TIME,)), (pair, ()), (_note, (log, 4.0)),
+    ]  # fmt: skip
+    plan = planned(calls)
+    assert [step(0.5) for step in plan.steps()][-1] == plan.run(0.5) == 4.0
+    assert called(log) == 2 * [20.5, 100.5, 1.0, 7.0, 2.0, 3.0, 4.0]
+
+
+def two_notes(log: Array, *, plain: bool) -> list[KernelCall]:
+    """Return calls, of which the second is in Python if ``plain``."""
+    last = (partial(_note, log, 2.0), ()) if plain else (_note, (log, 2.0))
+    return [(_note, (log, 1.0)), last]
 
 
 @pytest.mark.parametrize("plain", [False, True])
 def test_calls_are_made_once_at_a_stamp(plain: bool) -> None:
     """Also by a copy, which counts the stamps of its own array."""
     log, stamp = np.zeros(20), np.zeros(1, dtype=np.int64)
-    calls: list[Any] = [bind(_note, log, 1.0), bind(_note, log, 2.0)]
-    if plain:
-        calls[1] = partial(_note, log, 2.0)
-    call = once(calls, stamp)
+    call = planned([Once.at(stamp, *two_notes(log, plain=plain))]).call()
     if not plain and not PLAIN:
         assert isinstance(call, NativeCall)
     gc.collect()  # nothing that the call points to may be gone
@@ -175,10 +167,7 @@ def test_calls_are_made_once_at_a_stamp(plain: bool) -> None:
 def test_calls_are_made_only_if_something_was_found(plain: bool) -> None:
     """Also by a copy, which looks at its own array."""
     log, found = np.zeros(20), np.array([16.0, 0.0])
-    calls: list[Any] = [bind(_note, log, 1.0), bind(_note, log, 2.0)]
-    if plain:
-        calls[1] = partial(_note, log, 2.0)
-    call = only_if(calls, found)
+    call = planned([OnlyIf(two_notes(log, plain=plain), found)]).call()
     if not plain and not PLAIN:
         assert isinstance(call, NativeCall)
     gc.collect()  # nothing that the call points to may be gone

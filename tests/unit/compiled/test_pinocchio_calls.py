@@ -13,7 +13,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.compiled import pinocchio_calls
 from hsp_control.compiled.kernels import PLAIN
 from hsp_control.compiled.native import NativeCall
-from hsp_control.compiled.pinocchio_calls import bind_pinocchio
+from hsp_control.compiled.step_plan import bind
 
 compiled = pytest.mark.skipif(PLAIN, reason="plain Python has no native calls")
 
@@ -23,9 +23,9 @@ def both(
 ) -> tuple[pin.Data, pin.Data, Any]:
     """Return the data after the native call and after the bindings', and the call."""
     native, bound = model.createData(), model.createData()
-    call = bind_pinocchio(what, model, native, *vectors)
+    call = bind(getattr(pin, what), model, native, *vectors)
     call()
-    pinocchio_calls._BINDINGS[what](model, bound, *vectors)
+    getattr(pin, what)(model, bound, *vectors)
     return native, bound, call
 
 
@@ -36,13 +36,13 @@ def test_native_calls_equal_the_bindings(case: str) -> None:
     robot, q, v, rng = draw(case, seed=21)
     a, model = rng.standard_normal(robot.nv), robot.model
     calls = {
-        "jacobians": ((q, v), ("J", "dJ", "ov")),
+        "computeJointJacobiansTimeVariation": ((q, v), ("J", "dJ", "ov")),
         "rnea": ((q, v, a), ("tau",)),
         "crba": ((q,), ("M",)),
     }
     if not robot.mimics:
-        calls["coriolis"] = (q, v), ("C",)
-        calls["centroidal"] = (q, v), ("Ag", "dAg")
+        calls["computeCoriolisMatrix"] = (q, v), ("C",)
+        calls["computeCentroidalMapTimeVariation"] = (q, v), ("Ag", "dAg")
         calls["aba"] = ((q, v, a), ("ddq",))
     for what, (vectors, results) in calls.items():
         native, bound, call = both(what, model, *vectors)
@@ -55,7 +55,7 @@ def test_native_calls_equal_the_bindings(case: str) -> None:
         a[:] = rng.standard_normal(robot.nv)
         call()
         again = model.createData()
-        pinocchio_calls._BINDINGS[what](model, again, *vectors)
+        getattr(pin, what)(model, again, *vectors)
         for name in results[-1:]:
             found, expected = getattr(native, name), getattr(again, name)
             np.testing.assert_array_equal(np.array(found), np.array(expected))
@@ -80,10 +80,12 @@ def test_what_is_not_packed_is_left_to_the_bindings() -> None:
     robot, q, v, _ = draw("panda", seed=24)
     spread = np.zeros((robot.nv, 2))
     spread[:, 0] = v
-    native, bound, call = both("jacobians", robot.model, q, spread[:, 0])
+    native, bound, call = both(
+        "computeJointJacobiansTimeVariation", robot.model, q, spread[:, 0]
+    )
     assert not isinstance(call, NativeCall)
     np.testing.assert_array_equal(native.dJ, bound.dJ)
-    call = bind_pinocchio("crba", robot.model, native, q[:-1])
+    call = bind(pin.crba, robot.model, native, q[:-1])
     with pytest.raises(ValueError, match="size"):
         call()
 
@@ -107,7 +109,7 @@ def test_without_the_functions_the_bindings_are_called(
     expected = everything(robot.state(0.0, q, v), frame)
     request.getfixturevalue("no_library")
     state = robot.state(0.0, q, v)
-    assert not isinstance(state._compute_jacobians, NativeCall)
+    assert not isinstance(state._inverse_dynamics, NativeCall)
     if not PLAIN:
         assert "computeJointJacobiansTimeVariation" in pinocchio_calls.unknown()
     assert_equal_terms(everything(state, frame), expected)

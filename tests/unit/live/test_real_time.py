@@ -11,7 +11,7 @@ import pytest
 
 import hsp_control as hsp
 from hsp_control.common.exceptions import SimulationError
-from hsp_control.compiled import adapters, native
+from hsp_control.compiled import adapters, kernels
 from hsp_control.live import loop
 from hsp_control.live.loop import rehearse
 from hsp_control.live.real_time import no_garbage_collection, real_time_priority
@@ -54,7 +54,7 @@ def needed(
 
 
 @pytest.mark.skipif(
-    not native.is_compiled(adapters.run), reason="plain runs compile nothing"
+    not kernels.is_compiled(adapters.run), reason="plain runs compile nothing"
 )
 def test_nothing_new_is_asked_for_in_the_loop(asked: set[Any]) -> None:
     _, late = needed(asked, inf, lambda *_: None)

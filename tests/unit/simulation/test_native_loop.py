@@ -22,6 +22,7 @@ from hsp_control.config import Experiment
 from hsp_control.constraints.limits import RobotLimits
 from hsp_control.control.changes import Changes
 from hsp_control.control.controller import Controller
+from hsp_control.control.mixture import BoundStep, FreeStep
 from hsp_control.robot.integrators import SemiImplicitEuler
 from hsp_control.simulation import loops
 from hsp_control.simulation.limit_excess import LimitExcess
@@ -115,6 +116,26 @@ def test_the_same_to_the_last_bit(case: tuple[str, ...], counted: Counted) -> No
     periods = 0.9 * 0.3 / 0.001
     assert sum(counted.many) > 0.5 * periods
     assert max(counted.many) <= MOST
+
+
+@pytest.mark.parametrize("part", ["move", "sending"])
+def test_calls_in_python_are_not_left_out(
+    part: str, counted: Counted, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where one is within a move, or records what was sent, periods are made alone."""
+    ours = short("panda_obstacle").run()
+    before, made = sum(counted.many), BoundStep.free.func
+
+    def with_python(bound: BoundStep) -> FreeStep:
+        step = made(bound)
+        assert step is not None
+        if part == "move":
+            return step._replace(move=lambda *at: step.move(*at))
+        return step._replace(sending=[*step.sending, float])
+
+    monkeypatch.setattr(BoundStep, "free", property(with_python))
+    assert_same(short("panda_obstacle").run(), ours)
+    assert sum(counted.many) == before > 0
 
 
 def test_periods_in_which_a_limit_binds_are_made_alone(counted: Counted) -> None:

@@ -27,6 +27,7 @@ from values import assert_is_a_value
 
 import hsp_control.trajectories as family
 from hsp_control.common.exceptions import TrajectoryError
+from hsp_control.compiled.step_plan import planned
 from hsp_control.trajectories import (
     Blend,
     BlendOrientation,
@@ -228,7 +229,7 @@ def assert_relative(trajectory: Any, sample: Any) -> None:
         with pytest.raises(TrajectoryError, match="the robot starts, which only a"):
             use(0.0)
     with pytest.raises(TrajectoryError, match="the robot starts, which only a"):
-        trajectory.follow(sample)(0.0)
+        planned(trajectory.calls(sample)).run(0.0)
 
 
 @every_placed
@@ -335,7 +336,7 @@ def test_poses_start_where_the_robot_starts(name: str) -> None:
     with pytest.raises(TrajectoryError, match="the robot starts, which only a"):
         trajectory.sample(0.0)
     with pytest.raises(TrajectoryError, match="the robot starts, which only a"):
-        trajectory.follow(PoseSample.allocate())(0.0)
+        planned(trajectory.calls(PoseSample.allocate())).run(0.0)
     start = pose(9)
     anchored = trajectory.anchored(start)
     assert anchored == expected(start)

@@ -9,33 +9,27 @@ from numba import types
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.compiled.adapters import entry_point, run
 from hsp_control.compiled.kernels import kernel
+from hsp_control.compiled.moves import REFUSED, Memory, copy_valid, number_of_steps
 from hsp_control.compiled.native import NativeCall, rows_of
-from hsp_control.robot.motion import REFUSED, copy_valid, number_of_steps
 
 
 class NativeMove(partial[float]):
-    """Copies valid q and v, and makes native calls; the last result, or `REFUSED`."""
+    """Copies valid t, q and v, and makes native calls; see `moves.move`."""
 
     calls: Sequence[NativeCall]  # the calls, which own the memory of their arguments
 
     @classmethod
-    def of(
-        cls,
-        calls: Sequence[NativeCall],
-        q: Array,
-        v: Array,
-        unit_blocks: Indices,
-        stamp: Indices,
-    ) -> Self:
+    def of(cls, calls: Sequence[NativeCall], memory: Memory) -> Self:
         """Put the calls' rows together."""
-        move = cls(_entry(), rows_of(calls), q, v, unit_blocks, stamp)
+        move = cls(_entry(), rows_of(calls), *memory)
         move.calls = calls
         return move
 
 
 @kernel
-def move_to(
+def make_move(
     calls: Indices,
+    time: Array,
     q: Array,
     v: Array,
     unit_blocks: Indices,
@@ -44,8 +38,8 @@ def move_to(
     q_in: Array,
     v_in: Array,
 ) -> float:
-    """Copy q and v and make the calls; see `NativeMove`."""
-    if not copy_valid(t, q_in, v_in, q, v, unit_blocks, stamp):
+    """Copy t, q and v and make the calls; see `NativeMove`."""
+    if not copy_valid(t, q_in, v_in, time, q, v, unit_blocks, stamp):
         return REFUSED
     return run(calls, t)
 
@@ -54,8 +48,9 @@ def move_to(
 def _entry() -> Callable[..., float]:
     own, table = types.float64[::1], types.int64[:, ::1]
     given = types.float64[:]  # with any strides
-    kinds = table, own, own, table, types.int64[::1], types.float64, given, given
-    entry: Callable[..., float] = entry_point(move_to, kinds)
+    memory = own, own, own, table, types.int64[::1]
+    kinds = table, *memory, types.float64, given, given
+    entry: Callable[..., float] = entry_point(make_move, kinds)
     return entry
 
 
@@ -63,10 +58,13 @@ _count = kernel(number_of_steps)
 
 
 @kernel
-def make_steps(calls: Indices, interval: Array, longest: float, h: Array) -> None:
-    """Divide an interval into equal steps [s], and make the calls of each."""
+def make_steps(
+    calls: Indices, interval: Array, longest: float, now: Array, h: Array
+) -> None:
+    """Divide an interval into equal steps, and make the calls of each."""
     t, duration = interval[0], interval[1] - interval[0]
     steps = _count(duration, longest)
     h[0] = duration / steps
     for k in range(steps):
-        run(calls, t + k * h[0])
+        now[0] = t + k * h[0]
+        run(calls, now[0])

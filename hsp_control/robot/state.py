@@ -1,0 +1,346 @@
+"""The robot at one time: kinematic and dynamic terms, each computed once per state.
+
+The controller gets its kinematics and dynamics from `RobotState`, which calls Pinocchio
+here and in `kinematics`. Other modules call Pinocchio directly only for what a state
+does not offer: loading and checks of models, integration, collision geometry,
+derivatives of gravity, plants with models of their own, and the viewer.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeVar
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from hsp_control.common.arrays import Array, Indices, kept_view, matrix_view
+from hsp_control.common.exceptions import ImmutableError, NonFiniteError, ShapeError
+from hsp_control.compiled.kernels import AnyCall, KernelCall, KernelCalls, Once
+from hsp_control.compiled.moves import REFUSED, Memory, Move
+from hsp_control.compiled.step_plan import StepPlan, moving, planned
+from hsp_control.declaration.quantities import Vector
+from hsp_control.robot.kinematics import (
+    CentroidalMotion,
+    FrameKinematics,
+    WorldKinematics,
+    inertia_terms,
+    joint_placements,
+)
+
+if TYPE_CHECKING:  # a robot and its state name each other; it makes the state
+    from hsp_control.robot.robot import Robot
+
+Made = TypeVar("Made")
+
+_DOUBLE = np.dtype(np.float64)
+
+_MADE_LIMIT = 1000
+"""Number of parts whose memory a state keeps; then it starts anew."""
+
+
+class RobotState:
+    """The robot at one time, with all its kinematic and dynamic terms.
+
+    A term is computed at its first use and kept until the next `update`. The returned
+    arrays belong to the state and change with it: copy an array to keep its values. Use
+    a state in one thread only.
+
+    Attributes:
+        robot: The robot.
+        q: Configuration, shape (nq,).
+        v: Velocity, shape (nv,).
+        time: `t` as an array of shape (1,), for kernels.
+        stamp_array: `stamp` as an array of shape (1,), for kernels.
+        inertia: M(q) as an argument of kernels; see `mass_matrix`.
+        inertia_rate: M' as an argument of kernels; see `mass_matrix_rate`.
+        effort: What `inverse_dynamics` wrote last, shape (nv,) [N·m or N].
+        data: Pinocchio's data at (q, v), for terms that this class does not offer.
+    """
+
+    def __init__(self, robot: "Robot") -> None:
+        """Allocate the memory; call `update` before using any term."""
+        self.robot = robot
+        self.time: Array = np.zeros(1)
+        self.q: Array = robot.neutral()
+        self.v: Array = np.zeros(robot.nv)
+        self.stamp_array: Indices = np.zeros(1, dtype=np.int64)
+        blocks = np.array(robot.unit_blocks, dtype=np.int64).reshape(-1, 2)
+        # writable, also where `seen` binds calls
+        self._memory: Memory = self.time, self.q, self.v, blocks, self.stamp_array
+        self._seen: RobotState | None = None
+        self.data: pin.Data = robot.model.createData()
+        self.effort: Array = kept_view(self.data.tau, self.data)
+        self._at = robot.model, self.data, self.q, self.v  # what Pinocchio is given
+        self._acceleration: Array = np.zeros(robot.nv)
+        self._inverse_dynamics = self._bound(self.rnea(self._acceleration))
+        self._world: WorldKinematics | None = None
+        self._frames: dict[str, tuple[FrameKinematics, Callable[[], object]]] = {}
+        stamp = self.stamp_array
+        self.inertia, self.inertia_rate = inertia_terms(*self._at, stamp)
+        self._compute_inertia = self._bound(*self.inertia.calls)
+        self._compute_inertia_rate = self._bound(*self.inertia_rate.calls)
+        effects = pin.nonLinearEffects, self._at
+        self._compute_effects = self._bound(Once.at(stamp, effects))
+        self._centroidal: tuple[CentroidalMotion, Callable[[], object]] | None = None
+        self._displaced: RobotState | None = None
+        self._made: dict[tuple[int, str], tuple[object, Any]] = {}
+        self._move = self.bind_move()
+
+    def _bound(self, *calls: AnyCall) -> Callable[[], object]:
+        return self.plan(calls).call()
+
+    @property
+    def t(self) -> float:
+        """Time [s]."""
+        return self.time.item()
+
+    def update(self, t: float, q: ArrayLike, v: ArrayLike) -> Self:
+        """Move to time t [s], configuration q (nq,) and velocity v (nv,), in place.
+
+        Raises:
+            ShapeError: If q or v has the wrong shape.
+            NonFiniteError: If t, q or v contains NaN or inf.
+            ConfigurationError: If a quaternion or a (cos, sin) pair is not of norm 1.
+        """
+        self.advance(self._move, t, q, v)
+        return self
+
+    def advance(self, move: Move, t: float, q: ArrayLike, v: ArrayLike) -> float:
+        """`update`, with the calls of `bind_move`; return what the last one returns."""
+        q_in: Any = q
+        v_in: Any = v
+        try:
+            known = q_in.dtype is v_in.dtype is _DOUBLE and q_in.ndim == v_in.ndim == 1
+        except AttributeError:  # a list, for example
+            known = False
+        if not known:
+            q_in = self.robot.check_configuration(q)
+            v_in = self.robot.check_tangent(v, "velocity v")
+        try:
+            value = move(t, q_in, v_in)
+        except TypeError:
+            if isinstance(t, float | int | np.number):
+                raise
+            value = REFUSED
+        if value == REFUSED:
+            self._refuse(t, q, v)
+        return value
+
+    def bind_move(self, calls: Sequence[Callable[[float], Any]] = ()) -> Move:
+        """Return how `advance` moves this state, with calls of the time that follow."""
+        jacobians = pin.computeJointJacobiansTimeVariation, self._at
+        return moving(self._memory, [*self.plan([jacobians]).steps(), *calls])
+
+    def _refuse(self, t: float, q: ArrayLike, v: ArrayLike) -> None:
+        """Raise the error that says what is wrong with t, q and v."""
+        if not isinstance(t, float | int | np.number) or not np.isfinite(t):
+            raise NonFiniteError(f"time t is {t!r}; needs a finite number of seconds")
+        self.robot.check_configuration(q)
+        self.robot.check_tangent(v, "velocity v")
+        raise NonFiniteError(f"t = {t!r}, q = {q!r}, v = {v!r}: their sum overflows")
+
+    @property
+    def seen(self) -> "RobotState":
+        """This state, as users may have it: t, q and v change only by `update`."""
+        if self._seen is None:
+            self._seen = SeenState(self)
+        return self._seen
+
+    def frame(self, name: str) -> FrameKinematics:
+        """Return the placement, the Jacobian and the motion of a frame.
+
+        Raises:
+            FrameNotFoundError: If the robot has no such frame.
+        """
+        found = self._frames.get(name)
+        if found is None:
+            index, (model, data, _, v) = self.robot.frame_id(name), self._at
+            frame = FrameKinematics(model, data, v, self.stamp_array, index)
+            self._frames[name] = found = frame, self._bound(*frame.calls)
+        frame, compute = found
+        compute()
+        return frame
+
+    def position(self, frame: str) -> Array:
+        """Return the origin of a frame in the world [m], shape (3,)."""
+        return self.frame(frame).position
+
+    @property
+    def centroidal(self) -> CentroidalMotion:
+        """The centre of mass, the angular momentum about it, and their Jacobians."""
+        if self._centroidal is None:
+            center = CentroidalMotion(*self._at, self.stamp_array)
+            self._centroidal = center, self._bound(*center.calls)
+        center, compute = self._centroidal
+        compute()
+        return center
+
+    @property
+    def mass_matrix(self) -> Array:
+        """M(q), shape (nv, nv) (CRBA)."""
+        self._compute_inertia()
+        return self.inertia.value
+
+    @property
+    def mass_matrix_rate(self) -> Array:
+        """M' along v, shape (nv, nv)."""
+        self._compute_inertia_rate()
+        return self.inertia_rate.value
+
+    @property
+    def nonlinear_effects(self) -> Array:
+        """N(q, v): Coriolis, centrifugal and gravity efforts, shape (nv,) (RNEA)."""
+        self._compute_effects()
+        return kept_view(self.data.nle, self.data)
+
+    def inverse_dynamics(self, acceleration: Array) -> Array:
+        """Return the effort M a + N, shape (nv,), for an acceleration (nv,) (RNEA)."""
+        self._acceleration[:] = acceleration
+        self._inverse_dynamics()
+        return self.effort
+
+    def rnea(self, acceleration: Array) -> KernelCall:
+        """Return a call that writes `effort` for what this array (nv,) then holds."""
+        return pin.rnea, (*self._at, acceleration)
+
+    @property
+    def stamp(self) -> int:
+        """A number that changes with every `update`: use it to invalidate caches."""
+        return int(self.stamp_array[0])
+
+    @property
+    def world(self) -> WorldKinematics:
+        """Placements and Jacobians of all joints at the world's origin, as views."""
+        if self._world is None:
+            self._world = WorldKinematics(
+                joint_placements(self.data),
+                matrix_view(self.data.J),
+                matrix_view(self.data.dJ),
+                self._at[3],
+            )
+        return self._world
+
+    def made(self, part: object, what: str, make: Callable[[], Made]) -> Made:
+        """Return what ``make`` returned for a part and this state; it is called once.
+
+        ``what`` tells apart what a class and its subclasses keep.
+
+        Parts are values and have no memory. What they compute with at a state, such as
+        buffers and compiled calls, is kept here, so that one part may serve many
+        states, in many threads.
+        """
+        key = id(part), what
+        found = self._made.get(key)
+        if found is None:
+            if len(self._made) >= _MADE_LIMIT:
+                self._made.clear()
+            self._made[key] = found = part, make()  # keeps the part, and its id
+        made: Made = found[1]
+        return made
+
+    def run(self, calls: KernelCalls) -> Any:
+        """Make calls now, once; return what the last one returns."""
+        return self.plan(calls).run(self.t)
+
+    def plan(self, calls: KernelCalls) -> StepPlan:
+        """Return calls as they are made at any time: `StepPlan.run`."""
+        return planned(calls)
+
+    def prepared(
+        self, part: object, what: str, make: Callable[[], tuple[Made, KernelCalls]]
+    ) -> tuple[Made, Callable[[], Any]]:
+        """Return what `made` does, and a call that makes the calls of ``make`` now."""
+
+        def plan() -> tuple[Made, StepPlan]:
+            memory, calls = make()
+            return memory, self.plan(calls)
+
+        memory, calls = self.made(part, what, plan)
+        return memory, lambda: calls.run(self.t)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"robot": self.robot, "t": self.t, "q": self.q, "v": self.v}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__init__(state["robot"])  # type: ignore[misc]
+        self.update(state["t"], state["q"], state["v"])
+
+    def displaced(self, dt: float, displacement: Array) -> "RobotState":
+        """Return the state at (t + dt, q ⊕ displacement) with the same velocity.
+
+        For finite differences. Each call overwrites and returns the same object, the
+        companion of this state.
+
+        Args:
+            dt: Time difference [s].
+            displacement: Shape (nv,) [rad or m].
+        """
+        if self._displaced is None:
+            self._displaced = RobotState(self.robot)
+        q = pin.integrate(self.robot.model, self.q, displacement)
+        return self._displaced.update(self.t + dt, q, self.v)
+
+    def ahead(self, dt: float) -> "RobotState":
+        """Return the companion state at (t + dt, q ⊕ v dt), see `displaced`; dt [s]."""
+        return self.displaced(dt, self.v * dt)
+
+
+class SeenState(RobotState):
+    """A state whose t, q and v change only together, by `update`.
+
+    It shares all memory with the state that it shows: the arrays at whose addresses
+    native calls read q and v stay writable there, and are read-only here.
+    """
+
+    __slots__ = ("_own", "_shown")
+    _own: RobotState
+    _shown: tuple[Array, Array]
+
+    def __init__(self, own: RobotState) -> None:
+        self.__dict__ = own.__dict__
+        self._own, self._shown = own, (own.q.view(), own.v.view())
+        for view in self._shown:
+            view.flags.writeable = False
+
+    q = property(lambda self: self._shown[0])
+    v = property(lambda self: self._shown[1])
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if name in ("t", "q", "v"):
+            raise ImmutableError(
+                f"state.{name} cannot be assigned, as all terms belong to one t, q and "
+                "v: call state.update(t, q, v)"
+            )
+        super().__setattr__(name, value)
+
+    def update(self, t: float, q: ArrayLike, v: ArrayLike) -> Self:
+        """Move the state that it shows; see `RobotState.update`."""
+        self._own.update(t, q, v)
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _copy, (self.robot, self.t, np.array(self.q), np.array(self.v))
+
+
+def _copy(robot: "Robot", t: float, q: Array, v: Array) -> RobotState:
+    """Return a state of its own: what a copy, or a pickle, is."""
+    return RobotState(robot).update(t, q, v)
+
+
+Posture = Annotated[Literal["start", "home"] | Vector, "posture"]
+"""``start``, ``home``, the positions of the joints, shape (nv,) [rad or m], or a
+configuration, shape (nq,); see `configuration`."""
+
+
+def configuration(posture: ArrayLike | str, start: RobotState) -> Array:
+    """Return the configuration of a `Posture`, shape (nq,)."""
+    robot = start.robot
+    if isinstance(posture, str):
+        return start.q.copy() if posture == "start" else robot.home()
+    given = np.asarray(posture, dtype=float)
+    if given.shape == (robot.nq,):
+        return np.array(robot.check_configuration(given))
+    if given.shape == (robot.nv,):
+        return robot.integrate(robot.neutral(), robot.check_tangent(given, "posture"))
+    numbers = f"{robot.nv}" if robot.nv == robot.nq else f"{robot.nv} or {robot.nq}"
+    raise ShapeError(f"a posture has shape {given.shape}; needs {numbers} numbers")
