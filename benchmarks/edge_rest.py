@@ -190,7 +190,7 @@ def controller(case: Case, robot: hsp.Robot) -> hsp.Controller:
 def rests_from(case: Case, robot: hsp.Robot) -> float:
     """Return the time from which a hand should rest [s]."""
     slowest = float(np.min(robot.model.velocityLimit))
-    turn = np.pi / slowest if slowest < SLOWEST else 0.0
+    turn = round(np.pi / slowest, 1) if slowest < SLOWEST else 0.0
     long = {"push": PUSH, "stream": LONG + AT_LEAST, "drag": DRAGGED + AT_LEAST}
     return BEGIN + long.get(case.kind, PUSH) + REST + turn
 

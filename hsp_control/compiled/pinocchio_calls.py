@@ -65,9 +65,7 @@ _NAMES = {
 }
 """The C++ names of the functions, by Pinocchio's own; ``c++filt`` reads them."""
 
-_WITHOUT_MIMICS = (
-    "computeCentroidalMapTimeVariation", "computeCoriolisMatrix", "aba",
-)  # fmt: skip
+_WITHOUT_MIMICS = "computeCentroidalMapTimeVariation", "computeCoriolisMatrix", "aba"
 """What Pinocchio does not support for models with mimic joints: the bindings know."""
 
 _QUERY = "_ZN5boost6python9converter8registry5queryENS0_9type_infoE"

@@ -172,6 +172,20 @@ def own_maximum(own: Array, robot: Robot) -> Array:
     return limit
 
 
+def own_speeds(robot: Robot) -> Array:
+    """Return a URDF's largest speeds (nv,), inf where it has none.
+
+    A joint without one gets the largest of the others of its unit: what these cannot do
+    for a task, it would do instead, at any speed.
+    """
+    speeds = own_maximum(robot.model.velocityLimit, robot)
+    for unit in ("rad", "m"):
+        same = [i for i, *_ in robot.single_dof_joints if robot.units[i] == unit]
+        known = speeds[same][np.isfinite(speeds[same])]
+        speeds[same] = np.minimum(speeds[same], known.max(initial=0.0) or np.inf)
+    return speeds
+
+
 class PositionRange(Part, error=LimitError):
     """Joint position limits in numbers.
 

@@ -21,6 +21,7 @@ from hsp_control.constraints.limits.joint_numbers import (
     by_dof,
     maximum,
     none_for_nothing,
+    own_speeds,
 )
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import (
@@ -316,7 +317,7 @@ class Limits(Part, error=LimitError):
     change, it is 500 times."""
     velocity: Maximum = "robot"
     """Maximum speed [rad/s or m/s]: the robot's own, none, a factor, numbers by joint,
-    one number or nv."""
+    one number or nv. A joint without an own one has the largest of the others."""
     acceleration: Positives | None = None
     """Maximum acceleration [rad/s² or m/s²], one number or nv. Unlimited by default."""
     position: Annotated[
@@ -350,7 +351,7 @@ class Limits(Part, error=LimitError):
         with within("effort"):
             effort = maximum(self.effort, robot.model.effortLimit, robot)
         with within("velocity"):
-            velocity = maximum(self.velocity, robot.model.velocityLimit, robot)
+            velocity = maximum(self.velocity, own_speeds(robot), robot)
         with within("position"):
             lower, upper, margin = self._positions(robot)
         distances = []

@@ -331,16 +331,13 @@ class LimitedStep:
             self.result,
             status,
         )
-
-        def solving(goal: int) -> KernelCall:
-            return solve_step, (goal, step)
-
-        self._nearest = [*state.inertia.calls, solving(NEAREST)]
-        forces = [*state.inertia.calls, solving(FORCES)]
-        self._find_forces = state.plan(forces).call()
+        again, soft = (NEAREST_AGAIN, step), (LEAST_VIOLATION, step)
+        self._nearest = [*state.inertia.calls, (solve_step, (NEAREST, step))]
+        forces = [*state.inertia.calls, (solve_step, (FORCES, step))]
         self._find_nearest = state.plan(self._nearest).call()
-        self._least_violation = state.plan([solving(LEAST_VIOLATION)]).call()
-        self._again = state.plan([solving(NEAREST_AGAIN)]).call()
+        self._find_forces = state.plan(forces).call()
+        self._least_violation = state.plan([(solve_step, soft)]).call()
+        self._again = state.plan([(solve_step, again)]).call()
 
     def nearest_if(self, before: KernelCall, found: Array) -> OnlyIf:
         """Return a call that writes the nearest, as `solve`, if ``found[1]`` is not 0.

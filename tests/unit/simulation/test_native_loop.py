@@ -18,11 +18,14 @@ from hsp_control import (
 )
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.compiled.kernels import PLAIN
+from hsp_control.compiled.moves import REFUSED
 from hsp_control.config import Experiment
 from hsp_control.constraints.limits import RobotLimits
+from hsp_control.control.actuation import Status
+from hsp_control.control.actuation.actuation import LOOK
 from hsp_control.control.changes import Changes
 from hsp_control.control.controller import Controller
-from hsp_control.control.mixture import BoundStep, FreeStep
+from hsp_control.control.mixture import BoundStep, FreeStep, is_free
 from hsp_control.robot.integrators import SemiImplicitEuler
 from hsp_control.simulation import loops
 from hsp_control.simulation.limit_excess import LimitExcess
@@ -116,6 +119,14 @@ def test_the_same_to_the_last_bit(case: tuple[str, ...], counted: Counted) -> No
     periods = 0.9 * 0.3 / 0.001
     assert sum(counted.many) > 0.5 * periods
     assert max(counted.many) <= MOST
+
+
+def test_a_step_is_free_whose_law_is_finite_within_limits() -> None:
+    """Also with a bounded inverse, 1; `LOOK`: a limit is violated."""
+    assert is_free(0.0)
+    assert is_free(1.0)
+    for value in (REFUSED, LOOK, LOOK + Status.LIMITED, np.nan, np.inf):
+        assert not is_free(value)
 
 
 @pytest.mark.parametrize("part", ["move", "sending"])
