@@ -150,7 +150,7 @@ def _no_maximum(name: str, which: Sequence[str]) -> Finding:
         "limit",
         name,
         f"no {' and no '.join(which)} limit: none is kept"
-        + (", but of speeds the other joints' largest" if "velocity" in which else ""),
+        + (", except the other joints' top speed" if "velocity" in which else ""),
         "give it in the URDF, or under limits: in the configuration",
     )
 
