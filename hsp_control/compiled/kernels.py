@@ -21,7 +21,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 KernelCall = tuple[Callable[..., Any], tuple[Any, ...]]
 """A kernel, or another function, with its first arguments: what a part's mathematics
-is. Who calls it adds the others. See `native.planned` for what may be among them."""
+is. Who calls it adds the others. See `step_plan` for what may be among them."""
 
 TIME = object()
 """The last argument of a call that brings a reference up to a time [s]."""
@@ -51,7 +51,6 @@ class OnlyIf(NamedTuple):
 
 
 AnyCall = KernelCall | Once | OnlyIf
-
 KernelCalls = Sequence[AnyCall]
 """What a part does in each step: its calls with all their arguments, in this order."""
 

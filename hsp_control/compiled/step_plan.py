@@ -81,11 +81,12 @@ def _plan(call: AnyCall) -> StepPlan:
         follow, write = planned(call.calls)
         return StepPlan(follow, (_among(write, call),))
     function, arguments = call
-    if arguments and arguments[-1] is TIME:
-        given, (follow, _) = supplied(arguments[:-1])
-        return StepPlan((*follow, bind(function, *given, timed=True)))
-    given, (follow, write) = supplied(arguments)
-    return StepPlan(follow, (*write, bind(function, *given)))
+    timed = bool(arguments) and arguments[-1] is TIME
+    given, (follow, write) = supplied(arguments[:-1] if timed else arguments)
+    own = bind(function, *given, timed=timed)
+    if timed:
+        return StepPlan((*follow, own), write)
+    return StepPlan(follow, (*write, own))
 
 
 def supplied(argument: Any) -> tuple[Any, StepPlan]:

@@ -122,10 +122,8 @@ def test_no_joint_does_at_any_speed_what_the_others_cannot() -> None:
     """Three joints without limits in their URDF, and motors that gravity overloads."""
     robot = hsp.Robot.load("bravo7_no_ee")  # it was 1e18 rad/s after 30 ms
     made = hsp.Controller(robot, [hsp.FramePose(robot.end_effector)])
-    assert made.limits is not None
-    assert (made.limits.velocity == 0.5).all()  # the largest of the others
     run = hsp.simulate(made, robot.home(), duration=1.0, control_period=1e-3)
-    assert np.abs(run.v[:, [0, 3, 5]]).max() < 0.5
+    assert np.abs(run.v[:, [0, 3, 5]]).max() < 0.5  # the largest of the others
 
 
 def rests(robot: hsp.Robot, q0: Array, *tasks: hsp.Task, period: float = 1e-3) -> bool:

@@ -123,8 +123,7 @@ def test_the_same_to_the_last_bit(case: tuple[str, ...], counted: Counted) -> No
 
 def test_a_step_is_free_whose_law_is_finite_within_limits() -> None:
     """Also with a bounded inverse, 1; `LOOK`: a limit is violated."""
-    assert is_free(0.0)
-    assert is_free(1.0)
+    assert all(map(is_free, (0.0, 1.0)))
     for value in (REFUSED, LOOK, LOOK + Status.LIMITED, np.nan, np.inf):
         assert not is_free(value)
 
