@@ -15,8 +15,8 @@ import hsp_control as hsp
 from hsp_control.common.arrays import Array
 from hsp_control.compiled.step_plan import planned
 from hsp_control.geometry import Scene
+from hsp_control.geometry.scene import Start
 from hsp_control.geometry.shapes import Sphere
-from hsp_control.geometry.start import Start
 from hsp_control.law import IDENTITY
 from hsp_control.null_space.fields import FieldSample, ObstacleClearance
 from hsp_control.null_space.metrics import IdentityMetric, MetricSample

@@ -93,6 +93,9 @@ def _namespace(name: str, module: ModuleType, homes: dict[str, str]) -> str:
         if isclass(value):
             make_plain(value)
             lines += ["   :members:", f"   :exclude-members: {_overridden(value)}"]
+            # Those of the files that one class is written in have no page.
+            if (bases := _bases(value)) and not any(_home(b) in homes for b in bases):
+                lines.append("   :inherited-members: Part")
         lines += ["```", ""]
     return "\n".join(lines)
 
@@ -103,3 +106,9 @@ def _overridden(value: type) -> str:
     theirs = {name for base in bases for name in vars(base)}
     fields = set(vars(value).get("__annotations__", ()))
     return ", ".join(sorted(theirs & set(vars(value)) - fields)) or "model_config"
+
+
+def _bases(value: type) -> list[type]:
+    """Return the bases that say what a class is, not how it is declared."""
+    bases = [each for each in value.__mro__[1:] if each.__module__.startswith("hsp_")]
+    return [each for each in bases if ".declaration." not in each.__module__]

@@ -22,10 +22,9 @@ from hsp_control.control.setup import (
     planned_terms,
 )
 from hsp_control.declaration import AnyOf, Part, within
-from hsp_control.declaration.nested import parts_within
+from hsp_control.declaration.nested import parts_within, with_memories_copied
 from hsp_control.declaration.quantities import Flag, Gain, NonNegative, Number
-from hsp_control.geometry.scene import Obstacle, Scene
-from hsp_control.geometry.start import Start
+from hsp_control.geometry.scene import Obstacle, Scene, Start
 from hsp_control.null_space.fields import FieldSum, NullSpaceField, Rest
 from hsp_control.tasks import Gains, Impedance, Task
 from hsp_control.tasks.compliant_task import impedance_of
@@ -36,7 +35,6 @@ from hsp_control.trajectories import (
     Trajectory,
     crossfade,
 )
-from hsp_control.trajectories.remembering import with_memories_copied
 from hsp_control.trajectories.streams.stream import Streamed, stream_for
 
 

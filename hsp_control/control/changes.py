@@ -27,7 +27,7 @@ from hsp_control.control.change import (
 from hsp_control.control.setup import Setup
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Gain
-from hsp_control.geometry.start import Start
+from hsp_control.geometry.scene import Start
 from hsp_control.null_space.fields import NullSpaceField
 from hsp_control.tasks import Gains, Impedance, Task
 from hsp_control.trajectories import Trajectory

@@ -31,8 +31,7 @@ from hsp_control.control.evolution import (
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.language import check_kind, shortened
 from hsp_control.declaration.nested import parts_within, with_parts_replaced
-from hsp_control.geometry.scene import Obstacle, Scene
-from hsp_control.geometry.start import Start
+from hsp_control.geometry.scene import Obstacle, Scene, Start
 from hsp_control.law import VARYING, MetricSample
 from hsp_control.null_space.fields import FieldSum, NullSpaceField, Rest
 from hsp_control.null_space.fields.field import terms_of

@@ -1,6 +1,7 @@
-"""Parts inside parts: in mappings by name, to find those of a kind, to replace them."""
+"""Parts inside parts: in mappings by name, to find, replace or copy those of a kind."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from copy import deepcopy
 from dataclasses import replace
 from functools import partial
 from typing import Any, TypeVar
@@ -102,3 +103,21 @@ def with_parts_replaced(
         same = all(a is b for a, b in zip(items, value, strict=True))
         return value if same else type(value)(items)
     return value
+
+
+class Remembering(Part):
+    """A part with a memory: whoever has the value may feed it.
+
+    A deep copy goes on by itself, from what the memory held then.
+    """
+
+
+Holder = TypeVar("Holder", bound=Part)
+
+
+def with_memories_copied(part: Holder, memo: dict[int, Any]) -> Holder:
+    """Return the deep copy of a part: the part itself, but for those with a memory."""
+    copied: Holder = with_parts_replaced(
+        part, Remembering, lambda each: deepcopy(each, memo)
+    )
+    return copied

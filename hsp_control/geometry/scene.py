@@ -1,8 +1,8 @@
-"""Obstacles in the robot's world, fixed or moving."""
+"""Obstacles in the robot's world, fixed or moving, and where it starts there."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -16,6 +16,7 @@ from hsp_control.declaration import Part
 from hsp_control.declaration.nested import BY_NAME, parts_within, stored
 from hsp_control.declaration.quantities import ArrayField, Name
 from hsp_control.geometry.shapes import Shape
+from hsp_control.robot import RobotState
 from hsp_control.trajectories import (
     HoldOrientation,
     OrientationSample,
@@ -120,3 +121,18 @@ class Scene(Part, Mapping[str, Obstacle], error=SceneError):
 
     def __len__(self) -> int:
         return len(self._by_name)
+
+
+class Start(NamedTuple):
+    """What parts are placed at: relative points and names of obstacles refer to it.
+
+    Attributes:
+        state: The robot's state at the start.
+        scene: The obstacles.
+        known: Whether the robot really starts there; if not, the state only serves to
+            check the parts.
+    """
+
+    state: RobotState
+    scene: Scene
+    known: bool = True

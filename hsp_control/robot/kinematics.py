@@ -1,4 +1,4 @@
-"""Placements of joints and frames, and of the mass: Jacobians, exact rates, drift."""
+"""Placements of joints and frames: Jacobians, their exact rates, motion."""
 
 from math import atan2
 from typing import NamedTuple
@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from hsp_control.common.arrays import Array, Indices, kept_view, matrix_view
+from hsp_control.common.arrays import Array, Indices, matrix_view
 from hsp_control.common.exceptions import ModelError
-from hsp_control.compiled.kernels import KernelCalls, Once, kernel
+from hsp_control.compiled.kernels import KernelCalls, kernel
 
 
 class FrameMotion(NamedTuple):
@@ -199,41 +199,6 @@ class Term(NamedTuple):
         return self.value, self.calls
 
 
-def inertia_terms(
-    model: pin.Model, data: pin.Data, q: Array, v: Array, stamp: Indices
-) -> tuple[Term, Term]:
-    """Return M (CRBA) and M' = C + Cᵀ along v, shape (nv, nv) each."""
-    mass_matrix = kept_view(matrix_view(data.M), data)
-    M = Term(mass_matrix, [Once.at(stamp, (pin.crba, (model, data, q)))])
-    M_dot = np.zeros((model.nv, model.nv))
-    if model.mimicking_joints:  # Pinocchio has no C of such a model
-        given = model, model.createData(), q, v, M_dot
-        return M, Term(M_dot, [Once.at(stamp, (_write_difference, given))])
-    coriolis = pin.computeCoriolisMatrix, (model, data, q, v)
-    add = _write_sum, (matrix_view(data.C), M_dot)
-    return M, Term(M_dot, [Once.at(stamp, coriolis, add)])
-
-
-@kernel
-def _write_sum(C: Array, M_dot: Array) -> None:
-    """Write C + Cᵀ."""
-    for i in range(C.shape[0]):
-        for j in range(C.shape[0]):
-            M_dot[i, j] = C[i, j] + C[j, i]
-
-
-def _write_difference(
-    model: pin.Model, data: pin.Data, q: Array, v: Array, M_dot: Array
-) -> None:
-    """Write M' along v by differences."""
-    h = 1e-3 / max(1.0, float(np.abs(v).max()))
-
-    def M(s: float) -> Array:
-        return np.array(pin.crba(model, data, pin.integrate(model, q, s * v)))
-
-    M_dot[:] = (8.0 * (M(h) - M(-h)) - (M(2.0 * h) - M(-2.0 * h))) / (12.0 * h)
-
-
 def joint_support(model: pin.Model, joint: int) -> tuple[Indices, Indices]:
     """Return the columns of Pinocchio's J that move a joint, and their indices in v."""
     columns: list[int] = []
@@ -265,90 +230,6 @@ def joint_placements(data: pin.Data) -> Array:
     return np.lib.stride_tricks.as_strided(
         first.T.reshape(9), (len(turns), 12), (strides.pop() if strides else 96, 8)
     )
-
-
-class PointMotion(NamedTuple):
-    """The part of a `FrameMotion` that a point without axes has."""
-
-    jacobian: Array
-    jacobian_dot: Array
-    position: Array
-    velocity: Array
-
-
-class CentroidalMotion:
-    """Centre of mass and centroidal angular momentum of a robot, in world axes.
-
-    Attributes:
-        calls: Bring the attributes below up to date, if they are not.
-        mass: Total mass [kg].
-        position: The centre of mass c [m], shape (3,).
-        velocity: c' = J v [m/s], shape (3,).
-        jacobian: J, shape (3, nv).
-        jacobian_dot: J' = dJ/dt along v, exact, shape (3, nv).
-        momentum_matrix: A, where A v is the angular momentum about c [kg·m²/s], shape
-            (3, nv).
-        momentum_matrix_dot: A' = dA/dt along v, exact, shape (3, nv).
-    """
-
-    def __init__(
-        self, model: pin.Model, data: pin.Data, q: Array, v: Array, stamp: Indices
-    ) -> None:
-        """Allocate the arrays; `calls` take the values that q and v have then."""
-        # Pinocchio allocates these results at the first call; take views after it.
-        pin.computeCentroidalMapTimeVariation(model, data, q, v)
-        self.mass: float = pin.computeTotalMass(model)
-        self.position: Array = kept_view(data.com[0], data)
-        self.velocity: Array = np.zeros(3)
-        self.jacobian: Array = np.zeros((3, model.nv))
-        self.jacobian_dot: Array = np.zeros((3, model.nv))
-        self.momentum_matrix: Array = np.zeros((3, model.nv))
-        self.momentum_matrix_dot: Array = np.zeros((3, model.nv))
-        momentum = pin.computeCentroidalMapTimeVariation, (model, data, q, v)
-        found = self.velocity, self.jacobian, self.jacobian_dot
-        angular = self.momentum_matrix, self.momentum_matrix_dot
-        sums = matrix_view(data.Ag), matrix_view(data.dAg), self.mass, v
-        extract = _extract, (*sums, *found, *angular)
-        self.calls: KernelCalls = [Once.at(stamp, momentum, extract)]
-
-    def supplied(self) -> tuple[PointMotion, KernelCalls]:
-        """Return the centre's motion as an argument of a kernel; see `planned`."""
-        J, J_dot = self.jacobian, self.jacobian_dot
-        return PointMotion(J, J_dot, self.position, self.velocity), self.calls
-
-
-@kernel
-def _extract(
-    A: Array,
-    A_dot: Array,
-    mass: float,
-    v: Array,
-    velocity: Array,
-    J: Array,
-    J_dot: Array,
-    angular: Array,
-    angular_dot: Array,
-) -> None:
-    """Write the linear rows divided by the mass, and the angular rows with their rate.
-
-    Pinocchio's A' is the rate about a point at rest, but the centre of mass moves. The
-    rate of the angular rows about c is A' - m c' × J (checked against finite
-    differences; Pinocchio's product A'v is right as it is, since c' × c' = 0).
-    """
-    for i in range(3):
-        velocity[i] = 0.0
-    for j in range(v.shape[0]):
-        for i in range(3):
-            J[i, j] = A[i, j] / mass
-            J_dot[i, j] = A_dot[i, j] / mass
-            angular[i, j] = A[3 + i, j]
-            velocity[i] += J[i, j] * v[j]
-    x, y, z = velocity[0], velocity[1], velocity[2]
-    for j in range(v.shape[0]):
-        px, py, pz = A[0, j], A[1, j], A[2, j]
-        angular_dot[0, j] = A_dot[3, j] - (y * pz - z * py)
-        angular_dot[1, j] = A_dot[4, j] - (z * px - x * pz)
-        angular_dot[2, j] = A_dot[5, j] - (x * py - y * px)
 
 
 @kernel

@@ -19,11 +19,10 @@ from hsp_control.compiled.kernels import AnyCall, KernelCall, KernelCalls, Once
 from hsp_control.compiled.moves import REFUSED, Memory, Move
 from hsp_control.compiled.step_plan import StepPlan, moving, planned
 from hsp_control.declaration.quantities import Vector
+from hsp_control.robot.inertia import CentroidalMotion, inertia_terms
 from hsp_control.robot.kinematics import (
-    CentroidalMotion,
     FrameKinematics,
     WorldKinematics,
-    inertia_terms,
     joint_placements,
 )
 

@@ -5,7 +5,8 @@ import numpy as np
 from hsp_control.common.arrays import Indices
 from hsp_control.compiled.kernels import kernel
 from hsp_control.law import TaskSample
-from hsp_control.robot.kinematics import FrameMotion, PointMotion
+from hsp_control.robot.inertia import PointMotion
+from hsp_control.robot.kinematics import FrameMotion
 from hsp_control.tasks.feedback import Feedback, add_feedback
 from hsp_control.trajectories import TrajectorySample
 

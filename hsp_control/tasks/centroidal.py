@@ -8,7 +8,7 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.compiled.kernels import KernelCall
 from hsp_control.declaration.quantities import Axes, Positive
-from hsp_control.geometry.start import Start
+from hsp_control.geometry.scene import Start
 from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.axes import axis_indices, track_axes

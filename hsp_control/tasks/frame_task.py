@@ -11,7 +11,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TaskError
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Positive
-from hsp_control.geometry.start import Start
+from hsp_control.geometry.scene import Start
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.tasks.task import SecondOrderTask, default_name

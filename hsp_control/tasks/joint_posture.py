@@ -11,7 +11,7 @@ from hsp_control.common.exceptions import TaskError
 from hsp_control.compiled.kernels import KernelCall, kernel
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Names
-from hsp_control.geometry.start import Start
+from hsp_control.geometry.scene import Start
 from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.kinematics import joint_displacements

@@ -16,9 +16,9 @@ from hsp_control.compiled.kernels import (
     with_outputs,
 )
 from hsp_control.declaration import Part, within
-from hsp_control.declaration.nested import parts_within
+from hsp_control.declaration.nested import parts_within, with_memories_copied
 from hsp_control.declaration.quantities import PositiveCount
-from hsp_control.geometry.start import Start
+from hsp_control.geometry.scene import Start
 from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.feedback import (
@@ -32,7 +32,6 @@ from hsp_control.tasks.feedback import (
 from hsp_control.tasks.gains import Gains
 from hsp_control.trajectories import Schedule
 from hsp_control.trajectories.crossfade import AnyReference
-from hsp_control.trajectories.remembering import with_memories_copied
 from hsp_control.trajectories.streams.stream import Streamed
 
 Drawn = Literal["position", "orientation", "direction"]

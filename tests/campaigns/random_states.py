@@ -19,8 +19,7 @@ import numpy as np
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.geometry.scene import Scene
-from hsp_control.geometry.start import Start
+from hsp_control.geometry.scene import Scene, Start
 from hsp_control.robot import RobotState
 
 BATCH = 1000

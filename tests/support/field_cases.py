@@ -44,7 +44,7 @@ from field_oracles import (
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
 from hsp_control.geometry import Scene
-from hsp_control.geometry.start import Start
+from hsp_control.geometry.scene import Start
 
 Field = TypeVar("Field", bound=hsp.NullSpaceField)
 

@@ -30,7 +30,7 @@ from hsp_control import (
 from hsp_control.common.arrays import Array
 from hsp_control.declaration.quantities import Matrix
 from hsp_control.geometry import Scene
-from hsp_control.geometry.start import Start
+from hsp_control.geometry.scene import Start
 from hsp_control.tasks import RelativePose
 
 Kind = TypeVar("Kind", bound=Task | NullSpaceField)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsp_control.declaration import within
-from hsp_control.geometry.start import Start
+from hsp_control.geometry.scene import Start
 from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
 from hsp_control.tasks import ErrorPart, Feedback, SecondOrderTask

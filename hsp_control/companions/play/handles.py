@@ -26,7 +26,7 @@ from hsp_control.companions.plots.palette import FIELD
 from hsp_control.control.changes import Changes
 from hsp_control.control.controller import Controller
 from hsp_control.control.targets import DELAY, RAMP, new_stream
-from hsp_control.declaration.nested import parts_within
+from hsp_control.declaration.nested import Remembering, parts_within
 from hsp_control.geometry.scene import Obstacle
 from hsp_control.null_space.fields import TargetPosture
 from hsp_control.null_space.fields.field import terms_of
@@ -35,7 +35,6 @@ from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import FrameOrientation, FramePose, FramePosition, Task
 from hsp_control.trajectories import Stream
 from hsp_control.trajectories.crossfade import AnyReference
-from hsp_control.trajectories.remembering import Remembering
 from hsp_control.trajectories.streams.stream import Streamed
 
 BACK = 1.5

@@ -3,7 +3,7 @@
 from typing import Any, Self
 
 from hsp_control.common.arrays import Array
-from hsp_control.trajectories.remembering import Remembering
+from hsp_control.declaration.nested import Remembering
 
 
 class Written(Remembering):

@@ -18,7 +18,7 @@ from hsp_control.compiled.kernels import (
     with_outputs,
 )
 from hsp_control.declaration import Part, within
-from hsp_control.declaration.nested import parts_within
+from hsp_control.declaration.nested import parts_within, with_memories_copied
 from hsp_control.declaration.quantities import (
     ArrayField,
     Number,
@@ -26,12 +26,11 @@ from hsp_control.declaration.quantities import (
     Vector3,
     read_only,
 )
-from hsp_control.geometry.start import Start
+from hsp_control.geometry.scene import Start
 from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.trajectories import Hold, Trajectory
-from hsp_control.trajectories.remembering import with_memories_copied
 from hsp_control.trajectories.schedule import Schedule
 from hsp_control.trajectories.streams.stream import Streamed
 

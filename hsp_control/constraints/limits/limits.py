@@ -33,8 +33,7 @@ from hsp_control.declaration.quantities import (
     Share,
     read_only,
 )
-from hsp_control.geometry.scene import Scene
-from hsp_control.geometry.start import Start
+from hsp_control.geometry.scene import Scene, Start
 from hsp_control.null_space.fields import Clearance, ObstacleClearance, SelfClearance
 from hsp_control.null_space.fields.clearance import ObstacleOrName
 from hsp_control.robot import Robot, RobotState

@@ -16,8 +16,7 @@ from hsp_control.compiled.kernels import KernelCall, KernelCalls, says
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Name, Names, OrInstance, Positive
 from hsp_control.geometry import LinkShape, Proximity, Proxy, link_shapes, self_pairs
-from hsp_control.geometry.scene import Obstacle
-from hsp_control.geometry.start import Start
+from hsp_control.geometry.scene import Obstacle, Start
 from hsp_control.law import FieldSample, MetricSample
 from hsp_control.null_space.differences import rate_along_flow
 from hsp_control.null_space.fields.cost import Cost, barrier, descend

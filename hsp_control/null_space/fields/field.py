@@ -15,7 +15,7 @@ from hsp_control.common.exceptions import FieldError
 from hsp_control.compiled.kernels import AnyCall, KernelCalls, kernel, says
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import NonNegative, OrInstance
-from hsp_control.geometry.start import Start
+from hsp_control.geometry.scene import Start
 from hsp_control.law import FieldSample, MetricSample
 from hsp_control.null_space.fields.weight import Ramp, Weight, product, sample_weight
 from hsp_control.robot import RobotState

@@ -13,7 +13,7 @@ from hsp_control.common.exceptions import FieldError
 from hsp_control.compiled.kernels import KernelCall, kernel
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Fraction, Names, Weights
-from hsp_control.geometry.start import Start
+from hsp_control.geometry.scene import Start
 from hsp_control.null_space.fields.cost import Cost, barrier_at
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.kinematics import joint_displacements

@@ -20,7 +20,7 @@ from hsp_control.compiled.linalg import (
 )
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Matrix, Positive, Vector
-from hsp_control.geometry.start import Start
+from hsp_control.geometry.scene import Start
 from hsp_control.null_space.fields.jacobian_cost import JacobianCost, Rows
 
 FLOOR = 1e-6

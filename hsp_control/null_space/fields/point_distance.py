@@ -11,8 +11,7 @@ from hsp_control.common.exceptions import FieldError
 from hsp_control.compiled.kernels import KernelCall, kernel
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Name, Names, OrInstance
-from hsp_control.geometry.scene import Obstacle
-from hsp_control.geometry.start import Start
+from hsp_control.geometry.scene import Obstacle, Start
 from hsp_control.null_space.fields.cost import Cost
 from hsp_control.robot import RobotState
 from hsp_control.robot.kinematics import FrameMotion

@@ -28,7 +28,7 @@ from hsp_control.declaration.quantities import (
     numbers,
     read_only,
 )
-from hsp_control.geometry.start import Start
+from hsp_control.geometry.scene import Start
 from hsp_control.law import CONSTANT, IDENTITY, VARYING, MetricSample
 from hsp_control.robot import RobotState
 

@@ -13,6 +13,7 @@ from pydantic import AfterValidator
 
 from hsp_control.common.exceptions import StreamError, TrajectoryError
 from hsp_control.declaration.families import value_fields
+from hsp_control.declaration.nested import Remembering
 from hsp_control.declaration.quantities import (
     NonNegative,
     Positive,
@@ -26,7 +27,6 @@ from hsp_control.trajectories.orientation import (
     OrientationTrajectory,
 )
 from hsp_control.trajectories.pose import PoseSample, PoseTrajectory
-from hsp_control.trajectories.remembering import Remembering
 from hsp_control.trajectories.streams.chart import Chart, State
 from hsp_control.trajectories.streams.mailbox import (
     Mailbox,

@@ -37,8 +37,8 @@ from hsp_control.compiled import kernels
 from hsp_control.control.actuation import Status
 from hsp_control.geometry import Proximity, Scene, link_shapes
 from hsp_control.geometry.proximity import CoalDistances
+from hsp_control.geometry.scene import Start
 from hsp_control.geometry.shapes import Box, Capsule, Cylinder, HalfSpace, Shape, Sphere
-from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields import (
     EqualJointAngles,
     FieldSample,

@@ -23,8 +23,7 @@ from hsp_control.constraints.contacts.contact import UnactuatedRows
 from hsp_control.control.actuation import Status
 from hsp_control.control.actuation.support import Support
 from hsp_control.control.evolution import PRESENT, PlannedContact
-from hsp_control.geometry.scene import Scene
-from hsp_control.geometry.start import Start
+from hsp_control.geometry.scene import Scene, Start
 from hsp_control.simulation.plants import ContactPlant, RigidContact
 from hsp_control.tasks import TaskSample
 from hsp_control.trajectories import Blend, HoldOrientation

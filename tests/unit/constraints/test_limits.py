@@ -31,9 +31,8 @@ from hsp_control.constraints.limits import (
     Scaled,
     SelfDistance,
 )
-from hsp_control.geometry.scene import Scene
+from hsp_control.geometry.scene import Scene, Start
 from hsp_control.geometry.shapes import Box
-from hsp_control.geometry.start import Start
 from hsp_control.trajectories import Lissajous
 
 

@@ -16,7 +16,7 @@ from hsp_control.constraints.limits.acceleration_bounds import acceleration_boun
 from hsp_control.control.actuation import Status
 from hsp_control.control.actuation.limits_in_force import SentEffort, observe
 from hsp_control.geometry import Scene
-from hsp_control.geometry.start import Start
+from hsp_control.geometry.scene import Start
 from hsp_control.simulation.plants import Push, RigidBodyPlant
 from hsp_control.trajectories import Lissajous
 

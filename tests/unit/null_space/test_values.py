@@ -20,7 +20,7 @@ from hsp_control import trajectories as paths
 from hsp_control.common.arrays import Array
 from hsp_control.declaration import Part
 from hsp_control.geometry import Scene, shapes
-from hsp_control.geometry.start import Start
+from hsp_control.geometry.scene import Start
 from hsp_control.law import VARYING
 from hsp_control.null_space import fields as null_space_fields
 from hsp_control.null_space import metrics

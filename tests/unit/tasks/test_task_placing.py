@@ -34,7 +34,7 @@ from hsp_control.common.exceptions import (
     TrajectoryError,
 )
 from hsp_control.geometry import Scene
-from hsp_control.geometry.start import Start
+from hsp_control.geometry.scene import Start
 from hsp_control.law import TaskSample
 from hsp_control.tasks import AngularMomentum, RelativePose
 from hsp_control.trajectories import (

@@ -1,0 +1,411 @@
+"""What a controller is composed of, and what of it counts at a time."""
+
+from collections.abc import Iterable, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import ControllerError, ImmutableError
+from hsp_control.constraints.contacts import Contact
+from hsp_control.constraints.limits import Limits, RobotLimits
+from hsp_control.control.actuation.limits_in_force import LimitsInForce
+from hsp_control.control.changes import Change, Changes, TimeLine
+from hsp_control.control.gains_in_force import GainsInForce, check_held
+from hsp_control.control.mixture import BoundStep, Mixture
+from hsp_control.control.setup import Base, DeclaredController
+from hsp_control.control.targets import RAMP, followed_stream, new_stream, target_of
+from hsp_control.geometry.scene import Obstacle, Scene, Start
+from hsp_control.null_space.fields import NullSpaceField
+from hsp_control.null_space.metrics import Metric
+from hsp_control.robot import Robot, RobotState
+from hsp_control.tasks import Task
+from hsp_control.tasks.compliant_task import impedance_of
+from hsp_control.tasks.feedback import Feedback
+from hsp_control.tasks.impedance import parts_of
+from hsp_control.trajectories.streams.stream import Streamed
+
+
+class Composition:
+    """What a controller is made of, and what of it counts at a time."""
+
+    _lock: AbstractContextManager[None]  # held while something is computed
+
+    def __init__(
+        self,
+        robot: Robot,
+        tasks: Sequence[Task],
+        field: NullSpaceField | None = None,
+        *,
+        null_space_gain: ArrayLike = 10.0,
+        metric: Metric | None = None,
+        singularity_threshold: float = 0.03,
+        limits: Limits | None = Limits(),
+        contacts: Sequence[Contact] = (),
+        base: Base | None = None,
+        scene: Scene | Iterable[Obstacle] = (),
+        start: ArrayLike | None = None,
+        changes: Sequence[Change] = (),
+    ) -> None:
+        """Compose a controller.
+
+        Args:
+            robot: The robot.
+            tasks: One task or more, with distinct names. Tasks of the same priority
+                form one level; see `Task.priority`.
+            field: The field g that the self-motion follows; None: `Rest`, g = 0.
+            null_space_gain: K_N > 0 [1/s]: scalar, shape (nv,) or (nv, nv). Where the
+                metric changes with q, a multiple of the identity.
+            metric: Joint-space metric; None: the identity, or the mass matrix if a task
+                has an impedance: then a push on the hand does not move the null space.
+            singularity_threshold: Singular value of the stacked Jacobian (in the
+                metric) below which its inverse is bounded instead of exact. For
+                position tasks choose about 3 % of the arm's reach [m]. Near a
+                singularity the efforts grow with the inverse cube of this value.
+            limits: Limits on efforts and motion, by default those of the robot's
+                URDF; None: no limits.
+            contacts: The contacts that may support a robot with a free-flyer root.
+            base: What moves the free-flyer root besides contacts. ``flying``: nothing;
+                ``driven``: something outside, for example a simulator.
+            scene: The obstacles that fields and limits name.
+            start: The configuration that relative parts refer to, shape (nq,); None:
+                that of the first `compute`.
+            changes: Changes while running; see `at`.
+
+        Raises:
+            ControllerError: If tasks, field and robot do not belong together, or the
+                tasks of one level have more rows than the robot has dofs.
+            ContactError: If a floating base has neither contacts nor ``base``, or a
+                fixed base has either.
+            GainError: If K_N might not make the null-space error decay.
+            HspControlError: If a part does not fit the robot; the message contains its
+                key path.
+        """
+        self._declared = DeclaredController(
+            robot,
+            tasks,
+            field,
+            null_space_gain,
+            metric,
+            singularity_threshold,
+            limits,
+            contacts,
+            base,
+            scene,
+            start,
+        )
+        self._allocate(changes)
+
+    def _allocate(self, changes: Sequence[Change]) -> None:
+        """Set up what a copy has of its own, and compose the parts."""
+        robot, given = self._declared.robot, self._declared.start
+        self._state = RobotState(robot)
+        self._gains = GainsInForce(robot.nv)
+        self._run = PresentRun(self._declared.robot.nv)
+        q = robot.home() if given is None else given
+        state = robot.state(0.0, q, np.zeros(robot.nv))
+        start = Start(state, self._declared.scene, known=given is not None)
+        self._compose(start, changes)
+
+    # -- what counts at a time --------------------------------------------------------
+
+    def _compose(self, start: Start, changes: Sequence[Change]) -> None:
+        """Place all parts, and apply the changes."""
+        placed, robot = self._declared.placed(start), self._declared.robot
+        driven = self._declared.base == "driven"
+        time_line = TimeLine.of(placed, changes)
+        self._limits = LimitsInForce(self._state, placed.limits)
+        self._mixture = Mixture(
+            self._state,
+            () if driven else robot.unactuated,
+            self._limits,
+            self._gains,
+            time_line.setup,
+            self._declared.threshold,
+        )
+        self._follow(time_line)
+
+    def _follow(self, time_line: TimeLine) -> None:
+        """Let the steps follow a time line."""
+        self._run.bound = None
+        self._time_line, self._setup = time_line, time_line.setup
+        exchanged = self._gains.plan(self._setup, self._latest)
+        self._limits.plan(self._setup.limits, self._latest)
+        self._mixture.plan(self._setup, exchanged=exchanged)
+
+    @property
+    def _latest(self) -> float:
+        """The latest time of a step [s]; -inf before the first one."""
+        run = self._run
+        return max(run.now, self._state.t) if run.begun else -np.inf
+
+    def _here(self) -> Start:
+        """Return where the robot was at the last step."""
+        state = self._state
+        here = self._declared.robot.state(state.t, state.q, state.v)
+        return Start(here, self._setup.start.scene)
+
+    # -- changes while running --------------------------------------------------------
+
+    def at(self, t: float) -> Changes:
+        """Return what makes changes that begin at a time [s].
+
+        ``controller.at(2.0).ramp(0.5).gains("hand", hsp.Gains(natural_frequency=20))``.
+        Changes count in the order of their times, whatever the order of the calls; each
+        continues from what is then in force, so that several may overlap, and efforts
+        stay continuous. A time that has passed means now, with the whole ramp.
+        """
+        return Changes(self.change, t)
+
+    def set_target(self, task: str, target: ArrayLike | pin.SE3) -> Streamed:
+        """Let a task go to a target from now on, smoothly, until the next one is set.
+
+        ``controller.set_target("hand", pose)``, at any time and as often as needed. A
+        stream takes over from the task's trajectory, with a crossfade, and goes there
+        as fast as it may: at 0.5 m/s and 3 m/s², 1.5 rad/s and 8 rad/s². A task that
+        was given a stream, with bounds of its own, goes on with that.
+        ``controller.at(t).reference(task, trajectory)`` ends it.
+
+        Args:
+            task: Name of the task.
+            target: For a pose a pin.SE3, x, y, z and a quaternion (x, y, z, w), or a
+                matrix; for an orientation a quaternion or a matrix; else the numbers of
+                the task's trajectory [m, or the task's unit].
+
+        Returns:
+            The stream, which counts what it has taken.
+
+        Raises:
+            ControllerError: If there is no such task, it follows no trajectory, or the
+                target is of another kind.
+            StreamError: If the target is not valid.
+        """
+        present = self._setup.task(task).task
+        value = target_of(present, target)
+        stream = followed_stream(present, self._time_line.made)
+        if stream is not None:
+            stream.send(value)
+            return stream
+        stream = new_stream(present.followed)
+        stream.send(value)
+        reference: Any = stream
+        self.at(self._state.t).ramp(RAMP).reference(task, reference)
+        return stream
+
+    def change(self, change: Change) -> None:
+        """Make a change; `at` is the shorter way.
+
+        Raises:
+            ControllerError: If it names something that does not exist at its time.
+            UnstableRateError: If gains that follow make the running loop unstable at
+                its period, without delays, where the robot is now.
+            HspControlError: If its parts do not fit the robot.
+        """
+        with self._lock:
+            here, now = None, self._latest
+            if self._run.begun:
+                change = replace(change, at=max(change.at, now))
+                here = self._here()
+            time_line = self._time_line.with_change(change, here)
+            if period := self._limits.sent.period:
+                state = (here or time_line.start).state
+                check_held(self._setup, time_line.setup, state, period)
+            self._follow(time_line)
+            if self._run.begun:  # compile now, not in a step
+                self._mixture.prepare(self._mixture.stack_at(now))
+
+    # -- what it is made of -----------------------------------------------------------
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return self._declared.robot
+
+    @property
+    def tasks(self) -> tuple[Task, ...]:
+        """The tasks that count now or fade, placed, the highest priority first."""
+        return tuple(task for level in self.levels for task in level)
+
+    @property
+    def levels(self) -> tuple[tuple[Task, ...], ...]:
+        """The tasks that count now or fade, by level, the highest priority first."""
+        now = self._latest
+        levels = [
+            tuple(each.task for each in level if each.presence.at(now) > 0.0)
+            for level in self._mixture.levels
+        ]
+        return tuple(level for level in levels if level)
+
+    @property
+    def field(self) -> NullSpaceField:
+        """The null-space field, placed; while it changes, all terms of old and new."""
+        return self._mixture.field
+
+    @property
+    def null_space_gain(self) -> Array:
+        """K_N in force, shape (nv, nv) [1/s]."""
+        return self._gains.null_space.copy()
+
+    @property
+    def metric(self) -> Metric:
+        """The joint-space metric."""
+        return self._setup.metric
+
+    @property
+    def singularity_threshold(self) -> float:
+        """Singular value below which an inverse is bounded instead of exact."""
+        return self._declared.threshold
+
+    @property
+    def limits(self) -> RobotLimits | None:
+        """The limits, as numbers of this robot."""
+        return self._limits.limits
+
+    @property
+    def contacts(self) -> tuple[Contact, ...]:
+        """The contacts."""
+        return tuple(each.contact for each in self._setup.contacts)
+
+    @property
+    def base(self) -> Base | None:
+        """What else than contacts acts on a floating base."""
+        return self._declared.base
+
+    @property
+    def scene(self) -> Scene:
+        """The obstacles that fields and limits name."""
+        return self._setup.start.scene
+
+    @property
+    def changes(self) -> tuple[Change, ...]:
+        """All changes that were made, in order of their times."""
+        return tuple(sorted(self._time_line.made, key=lambda each: each.at))
+
+    def feedback(self, task: str) -> Feedback:
+        """Return a task's gains and offset in force; compensators write the offset.
+
+        Raises:
+            ControllerError: If there is no such task.
+        """
+        return self._gains.feedback[self._setup.task(task).key].feedback
+
+    def _linear_feedback(self, task: str, state: RobotState) -> dict[float, Feedback]:
+        """Return a task's feedback for small errors, by the time when it begins [s]."""
+        # That is -inf for the present one, and the ends of the changes that are open.
+        planned = self._setup.present_task(task, self._latest)
+        now = planned.task.linear_feedback(state, self._gains.feedback[planned.key])
+        found = {-np.inf: now}
+        for each in planned.gains.transitions:
+            later = planned.task.in_force()
+            later.numbers[:] = each.target
+            found[each.end] = planned.task.linear_feedback(state, later)
+        return found
+
+    def stiffness(self, task: str) -> Array:
+        """Return the stiffness K in force of a task with an impedance, shape (m, m).
+
+        A change of it waits where it would add energy; see `ChangeImpedance`.
+
+        Raises:
+            ControllerError: If there is no such task, or it has no impedance.
+        """
+        planned = self._setup.present_task(task, self._latest)
+        if impedance_of(planned.task) is None:
+            raise ControllerError(f"task {task!r} has gains, and no stiffness")
+        return parts_of(self._gains.feedback[planned.key].numbers)[0].copy()
+
+    def weight_of(self, task: str, t: float) -> float:
+        """Return how much a task counts at time t [s], in [0, 1].
+
+        Raises:
+            ControllerError: If there is no such task.
+        """
+        return self._setup.task(task).weight(t)
+
+    def bearing_of(self, contact: str, t: float) -> float:
+        """Return how much a contact bears at time t [s], in [0, 1].
+
+        Raises:
+            ControllerError: If there is no such contact.
+        """
+        return self._setup.contact(contact).weight(t)
+
+    def _force_offset(self, contact: str) -> Array:
+        """Return what compensators add to a contact's commanded force, (1,) [N]."""
+        return self._setup.contact(contact).force_offset
+
+    def __repr__(self) -> str:
+        gain = self.null_space_gain
+        same = np.array_equal(gain, gain[0, 0] * np.eye(len(gain)))
+        tasks = (f"{each.name!r} ({type(each).__name__})" for each in self.tasks)
+        return (
+            f"Controller of {self.robot.name}: {', '.join(tasks)}; field "
+            f"{self.field.name}, K_N = {f'{gain[0, 0]:g}' if same else 'a matrix'}, "
+            f"{type(self.metric).__name__}; {'' if self.limits else 'no '}limits"
+        )
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if name.startswith("_"):
+            object.__setattr__(self, name, value)
+        elif hasattr(type(self), name):
+            instead = _INSTEAD.get(name, "build another one")
+            raise ImmutableError(f"Controller.{name} cannot be assigned: {instead}")
+        else:
+            raise ImmutableError(
+                f"Controller has no {name!r} to assign; at(t) changes it while it runs"
+            )
+
+    # -- copies -----------------------------------------------------------------------
+
+    def __getstate__(self) -> dict[str, Any]:
+        state = self._state
+        return {
+            "declared": self._declared,
+            "time_line": self._time_line,
+            "begun": self._run.begun,
+            "now": self._run.now,
+            "at": (state.t, state.q.copy(), state.v.copy()),
+            "gains": self._gains.memory(),
+            "sent": self._limits.sent.memory(),
+        }
+
+    def __setstate__(self, saved: dict[str, Any]) -> None:
+        self._declared = saved["declared"]
+        self._allocate(())
+        self._run.begun, self._run.now = saved["begun"], saved["now"]
+        self._follow(saved["time_line"])
+        self._gains.remember(saved["gains"])
+        self._state.update(*saved["at"])
+        self._limits.remember(saved["sent"])
+
+
+class PresentRun:
+    """What a controller knows of the present run."""
+
+    # Not on the controller itself, whose own attributes cost 0.4 µs to set.
+    __slots__ = ("acceleration", "begun", "bound", "now")
+
+    def __init__(self, nv: int) -> None:
+        self.acceleration = np.zeros(nv)  # what the last step delivered
+        self.begun, self.now = False, -np.inf  # latest time of a step [s]
+        self.bound: BoundStep | None = None  # the step, while nothing changes
+
+
+_INSTEAD = {
+    "tasks": "use at(t).add(task) and at(t).remove(name)",
+    "levels": "use at(t).add(task) and at(t).remove(name)",
+    "field": "use at(t).field(...)",
+    "null_space_gain": "use at(t).null_space_gain(...)",
+    "limits": "use at(t).limits(...)",
+    "contacts": "use at(t).contact(name, bears=...)",
+    "scene": "use at(t).obstacle(name, center)",
+    "changes": "use at(t)",
+    "state": "call compute",
+    "active_stack": "call compute",
+    "task_rows": "call compute",
+}
+"""What to do instead of assigning an attribute."""
