@@ -85,19 +85,9 @@ class Composition:
             HspControlError: If a part does not fit the robot; the message contains its
                 key path.
         """
-        self._declared = DeclaredController(
-            robot,
-            tasks,
-            field,
-            null_space_gain,
-            metric,
-            singularity_threshold,
-            limits,
-            contacts,
-            base,
-            scene,
-            start,
-        )
+        law = tasks, field, null_space_gain, metric, singularity_threshold
+        around = limits, contacts, base, scene, start
+        self._declared = DeclaredController(robot, *law, *around)
         self._allocate(changes)
 
     def _allocate(self, changes: Sequence[Change]) -> None:

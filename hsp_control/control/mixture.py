@@ -205,16 +205,9 @@ class Mixture:
                 [each for each in level if each.key in on] for level in self.levels
             ]
             support = Support(bearing, self._state, self._base)
-            stack = ActiveStack(
-                self._state,
-                support,
-                levels,
-                self._gains.feedback,
-                self._setup.metric,
-                self.field,
-                self._gains.null_space,
-                self._threshold,
-            )
+            gains, metric = self._gains, self._setup.metric
+            law = gains.feedback, metric, self.field, gains.null_space, self._threshold
+            stack = ActiveStack(self._state, support, levels, *law)
             for limits in self._limits.all:
                 self.actuation(stack, limits)
             self._stacks[key] = stack

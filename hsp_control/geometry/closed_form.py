@@ -283,15 +283,9 @@ def _differentiate(
     kinds, sizes, motion = bodies.kinds, bodies.sizes, bodies.motion
     for p in range(gradient.shape[0]):
         gradient[p] = rate[p] = 0.0
-    core, core_dot = scratch[0:3], scratch[3:6]  # x, y and n
-    x, y, n, x_dot, y_dot, n_dot = (
-        scratch[0],
-        scratch[1],
-        scratch[2],
-        scratch[3],
-        scratch[4],
-        scratch[5],
-    )
+    core, core_dot = scratch[0:3], scratch[3:6]
+    x, y, n = core[0], core[1], core[2]
+    x_dot, y_dot, n_dot = core_dot[0], core_dot[1], core_dot[2]
     # Twists of both bodies at the world's origin.
     twist_i, twist_j = scratch[6:8], scratch[8:10]
     work = scratch[10:]

@@ -63,7 +63,7 @@ TURNING, QUARTER, QUICKEST = 50.0, 0.25, 7.0
 for a period h is stable below 2/h, and periods are up to 10 ms. A velocity counts for a
 quarter, and nothing for more than 7 rad/s: no field costs the task all that it has."""
 
-SPRING = 0.4
+SPRING = 0.5
 """ε, over the robot's size, from which a level lends its directions whose springs pull
 with all their force: that of a feedback with its largest error."""
 

@@ -238,12 +238,8 @@ def joint_displacements(
 ) -> None:
     """Write q ⊖ reference for single-dof joints; continuous joints are within ±π."""
     for k in range(single_dof_joints.shape[0]):
-        i, at, size = (
-            single_dof_joints[k, 0],
-            single_dof_joints[k, 1],
-            single_dof_joints[k, 2],
-        )
-        if size == 1:
+        i, at = single_dof_joints[k, 0], single_dof_joints[k, 1]
+        if single_dof_joints[k, 2] == 1:
             out[i] = q[at] - reference[at]
         else:  # (cos, sin)
             c, s, c_ref, s_ref = q[at], q[at + 1], reference[at], reference[at + 1]

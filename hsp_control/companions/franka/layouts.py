@@ -19,7 +19,7 @@ PERIOD = 1e-3
 JOINTS = 7
 
 
-class Command(IntEnum):
+class FrankaCommand(IntEnum):
     """What a request asks for."""
 
     CONNECT = 0
@@ -37,7 +37,7 @@ class Command(IntEnum):
 
 
 class MoveStatus(IntEnum):
-    """Answers to `Command.MOVE`: one when it starts, one when it ends."""
+    """Answers to `FrankaCommand.MOVE`: one when it starts, one when it ends."""
 
     SUCCESS = 0
     MOTION_STARTED = 1
@@ -53,7 +53,7 @@ class MoveStatus(IntEnum):
     ABORTED = 11
 
 
-class Status(IntEnum):
+class FrankaStatus(IntEnum):
     """Answers to all other requests, as far as the box gives them."""
 
     SUCCESS = 0
@@ -63,7 +63,7 @@ class Status(IntEnum):
 
 
 INCOMPATIBLE_VERSION = 1
-"""The status of a `Command.CONNECT` that is refused."""
+"""The status of a `FrankaCommand.CONNECT` that is refused."""
 
 
 class MotionGenerator(IntEnum):
@@ -77,7 +77,7 @@ class MotionGenerator(IntEnum):
     NONE = 5
 
 
-class Controller(IntEnum):
+class ControllerMode(IntEnum):
     """What computes the efforts."""
 
     JOINT_IMPEDANCE = 0
@@ -193,15 +193,15 @@ COMMAND = np.dtype(
 
 _NOTHING = np.dtype([])
 REQUESTS = {
-    Command.CONNECT: np.dtype(_fields("<u2", version=1, udp_port=1)),
-    Command.MOVE: np.dtype(
+    FrankaCommand.CONNECT: np.dtype(_fields("<u2", version=1, udp_port=1)),
+    FrankaCommand.MOVE: np.dtype(
         _fields("<u4", controller=1, motion_generator=1)
         + _doubles(path_deviation=3, goal_deviation=3)
         + _bytes(asynchronous=1)
         + _doubles(maximum_velocity=7)
     ),
-    Command.STOP_MOVE: _NOTHING,
-    Command.SET_COLLISION_BEHAVIOR: np.dtype(
+    FrankaCommand.STOP_MOVE: _NOTHING,
+    FrankaCommand.SET_COLLISION_BEHAVIOR: np.dtype(
         _doubles(
             lower_torque_acceleration=7,
             upper_torque_acceleration=7,
@@ -213,19 +213,19 @@ REQUESTS = {
             upper_force_nominal=6,
         )
     ),
-    Command.SET_JOINT_IMPEDANCE: np.dtype(_doubles(K_theta=7)),
-    Command.SET_CARTESIAN_IMPEDANCE: np.dtype(_doubles(K_x=6)),
-    Command.SET_GUIDING_MODE: np.dtype(_bytes(axes=6, null_space=1)),
-    Command.SET_EE_TO_K: np.dtype(_doubles(EE_T_K=16)),
-    Command.SET_NE_TO_EE: np.dtype(_doubles(NE_T_EE=16)),
-    Command.SET_LOAD: np.dtype(_doubles(m_load=1, F_x_Cload=3, I_load=9)),
-    Command.AUTOMATIC_ERROR_RECOVERY: _NOTHING,
-    Command.GET_ROBOT_MODEL: _NOTHING,
+    FrankaCommand.SET_JOINT_IMPEDANCE: np.dtype(_doubles(K_theta=7)),
+    FrankaCommand.SET_CARTESIAN_IMPEDANCE: np.dtype(_doubles(K_x=6)),
+    FrankaCommand.SET_GUIDING_MODE: np.dtype(_bytes(axes=6, null_space=1)),
+    FrankaCommand.SET_EE_TO_K: np.dtype(_doubles(EE_T_K=16)),
+    FrankaCommand.SET_NE_TO_EE: np.dtype(_doubles(NE_T_EE=16)),
+    FrankaCommand.SET_LOAD: np.dtype(_doubles(m_load=1, F_x_Cload=3, I_load=9)),
+    FrankaCommand.AUTOMATIC_ERROR_RECOVERY: _NOTHING,
+    FrankaCommand.GET_ROBOT_MODEL: _NOTHING,
 }
 """Payload of each request."""
 
 CONNECTED = np.dtype(_bytes(status=1) + _fields("<u2", version=1))
-"""The answer to `Command.CONNECT`, with the version of the box."""
+"""The answer to `FrankaCommand.CONNECT`, with the version of the box."""
 
 
 def message(command: int, number: int, payload: bytes) -> bytes:

@@ -12,8 +12,8 @@ from hsp_control.companions.franka.layouts import (
     PORT,
     REQUESTS,
     VERSION,
-    Command,
-    Status,
+    FrankaCommand,
+    FrankaStatus,
     message,
 )
 
@@ -50,21 +50,21 @@ def _received(address: str) -> str:
     ):
         states.bind(("", 0))
         port = states.getsockname()[1]
-        hello = np.array((VERSION, port), REQUESTS[Command.CONNECT]).tobytes()
-        answer = _asked(link, Command.CONNECT, 0, hello)
+        hello = np.array((VERSION, port), REQUESTS[FrankaCommand.CONNECT]).tobytes()
+        answer = _asked(link, FrankaCommand.CONNECT, 0, hello)
         if len(answer) < CONNECTED.itemsize:
             raise HardwareError(
                 f"the control box at {address} answered with {len(answer)} bytes; "
                 f"needs {CONNECTED.itemsize}"
             )
         status, version = np.frombuffer(answer, CONNECTED, 1)[0]
-        if status != Status.SUCCESS:
+        if status != FrankaStatus.SUCCESS:
             raise HardwareError(
                 f"the control box at {address} speaks version {version} of the "
                 f"research interface; this is version {VERSION}"
             )
-        answer = _asked(link, Command.GET_ROBOT_MODEL, 1, b"")
-        if answer[0] != Status.SUCCESS:
+        answer = _asked(link, FrankaCommand.GET_ROBOT_MODEL, 1, b"")
+        if answer[0] != FrankaStatus.SUCCESS:
             raise HardwareError(
                 f"the control box at {address} does not hand out its model now: "
                 "unlock the joints, end other programs"

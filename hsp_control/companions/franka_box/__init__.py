@@ -6,7 +6,7 @@ from hsp_control.companions.shared import at_first_use
 
 if TYPE_CHECKING:  # for type checkers; a help text must not import what is slow
     from .arm import Arm as Arm
-    from .box import Box as Box
+    from .box import ControlBox as ControlBox
     from .server import DEADLINE as DEADLINE
     from .server import Server as Server
 
@@ -14,7 +14,7 @@ __getattr__, __dir__ = at_first_use(
     __name__,
     {
         "arm": "Arm",
-        "box": "Box",
+        "box": "ControlBox",
         "server": "DEADLINE Server",
     },
 )

@@ -10,12 +10,12 @@ from hsp_control.common.exceptions import LiveError
 from hsp_control.companions.franka.layouts import (
     JOINTS,
     PERIOD,
-    Command,
-    Controller,
+    ControllerMode,
+    FrankaCommand,
+    FrankaStatus,
     MotionGenerator,
     MoveStatus,
     RobotMode,
-    Status,
     message,
 )
 from hsp_control.companions.franka_box import impedance, reference, reflexes
@@ -25,8 +25,8 @@ from hsp_control.companions.franka_box.model import Model
 from hsp_control.companions.franka_box.motion import Motion, finished, is_finite
 from hsp_control.companions.franka_box.readings import Readings
 from hsp_control.companions.franka_box.reflexes import (
+    LinkDistances,
     Reference,
-    SelfDistance,
     Violation,
 )
 from hsp_control.simulation.plants import SampledPlant
@@ -44,7 +44,7 @@ Say = Callable[[str], object]
 """Called with a line for the user."""
 
 
-class Box:
+class ControlBox:
     """A simulated arm, moved period by period as the control box of a Franka moves it.
 
     A client's effort acts together with gravity's, which the box computes with its own
@@ -86,7 +86,7 @@ class Box:
         self.model, self.readings = Model(arm), Readings()
         self.motion: Motion | None = None
         self.mode = RobotMode.IDLE
-        self.thresholds = reflexes.Thresholds.none()
+        self.thresholds = reflexes.ReflexThresholds.none()
         self.joint_stiffness: Array = impedance.JOINT_STIFFNESS
         self.cartesian_stiffness: Array = impedance.CARTESIAN_STIFFNESS
         self.outbox: list[bytes] = []
@@ -96,7 +96,7 @@ class Box:
         self.q, self.v = q.copy(), np.zeros(JOINTS)
         plant.reset(0.0, self.q, self.v)
         self.model.state.update(0.0, self.q, self.v)
-        self._self_distance = SelfDistance(self.model.state)
+        self._self_distance = LinkDistances(self.model.state)
         for line in self._self_distance.unwatched:
             say(line)
         self.tau: Array = self.model.gravity
@@ -126,14 +126,14 @@ class Box:
             fields["tau_J_d"][:] = motion.effort  # from which its rate is taken
         fields["message_id"][0] = self._id
         fields["robot_mode"][0] = self.mode
-        idle = MotionGenerator.IDLE, Controller.OTHER
+        idle = MotionGenerator.IDLE, ControllerMode.OTHER
         modes = (motion.kind, motion.controller) if motion else idle
         fields["motion_generator_mode"][0], fields["controller_mode"][0] = modes
         rate = motion.success_rate if motion else 0.0
         fields["control_command_success_rate"][0] = rate
         return self._id, self.readings.datagram()
 
-    def begin(self, number: int, by: Controller, kind: MotionGenerator) -> None:
+    def begin(self, number: int, by: ControllerMode, kind: MotionGenerator) -> None:
         """Start the motion of a request.
 
         Args:
@@ -145,7 +145,7 @@ class Box:
         made = generator(kind, start, self.arm.limits, self.model)
         self.motion = Motion(number, by, kind, made)
         self.mode, self.at_rest = RobotMode.MOVE, False
-        self._respond(Command.MOVE, number, MoveStatus.MOTION_STARTED)
+        self._respond(FrankaCommand.MOVE, number, MoveStatus.MOTION_STARTED)
         self._say(f"motion: {self.motion}")
 
     def end(self, status: MoveStatus, why: str) -> None:
@@ -159,7 +159,7 @@ class Box:
         if motion is None:
             return
         self.mode = RobotMode.IDLE
-        self._respond(Command.MOVE, motion.number, status)
+        self._respond(FrankaCommand.MOVE, motion.number, status)
         self._say(
             f"motion ended: {why} ({motion.commands} commands, "
             f"{motion.lost_in_all} lost)"
@@ -179,9 +179,11 @@ class Box:
         if self.mode is not RobotMode.REFLEX:
             recovers = self.mode is RobotMode.AUTOMATIC_ERROR_RECOVERY
             status = (
-                Status.COMMAND_NOT_POSSIBLE_REJECTED if recovers else Status.SUCCESS
+                FrankaStatus.COMMAND_NOT_POSSIBLE_REJECTED
+                if recovers
+                else FrankaStatus.SUCCESS
             )
-            self._respond(Command.AUTOMATIC_ERROR_RECOVERY, number, status)
+            self._respond(FrankaCommand.AUTOMATIC_ERROR_RECOVERY, number, status)
             return
         self.mode, self._recovery = RobotMode.AUTOMATIC_ERROR_RECOVERY, number
         if not self._is_allowed():
@@ -205,7 +207,7 @@ class Box:
             effort = motion.effort
         else:
             assert motion.reference is not None
-            of_hand = motion.controller is Controller.CARTESIAN_IMPEDANCE
+            of_hand = motion.controller is ControllerMode.CARTESIAN_IMPEDANCE
             effort = self._tracking_effort(motion.reference, gravity, of_hand=of_hand)
         self.tau = effort + gravity
         end = (self.periods + 1) * PERIOD
@@ -301,17 +303,19 @@ class Box:
             self._end_recovery()
 
     def _end_recovery(self) -> None:
-        request = Command.AUTOMATIC_ERROR_RECOVERY, self._recovery
+        request = FrankaCommand.AUTOMATIC_ERROR_RECOVERY, self._recovery
         if not self._is_allowed():
             self.mode = RobotMode.REFLEX
             self._say("recovery failed: the arm is still beyond a limit")
-            self._respond(*request, Status.MANUAL_ERROR_RECOVERY_REQUIRED_REJECTED)
+            self._respond(
+                *request, FrankaStatus.MANUAL_ERROR_RECOVERY_REQUIRED_REJECTED
+            )
             return
         self.mode = RobotMode.IDLE
         for name in ("errors", "joint_collision", "cartesian_collision"):
             self.readings.fields[name][:] = 0
         self._say("recovered from the reflex")
-        self._respond(*request, Status.SUCCESS)
+        self._respond(*request, FrankaStatus.SUCCESS)
 
     def _own_effort(self, gravity: Array) -> Array:
         """Return the effort that brakes, holds or retreats, without gravity."""
@@ -342,7 +346,7 @@ class Box:
             self.model, self.tau, effort, self.thresholds
         )
 
-    def _respond(self, command: Command, number: int, status: int) -> None:
+    def _respond(self, command: FrankaCommand, number: int, status: int) -> None:
         self.outbox.append(message(command, number, bytes([status])))
 
 

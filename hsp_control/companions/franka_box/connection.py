@@ -17,8 +17,8 @@ from hsp_control.companions.franka.layouts import (
     REQUESTS,
     STATE,
     VERSION,
-    Command,
-    Status,
+    FrankaCommand,
+    FrankaStatus,
     message,
 )
 
@@ -46,7 +46,7 @@ class Request(NamedTuple):
         payload: The rest.
     """
 
-    command: Command
+    command: FrankaCommand
     number: int
     payload: bytes
 
@@ -94,7 +94,7 @@ class Connection:
                 return
             payload = self._buffer[HEADER.itemsize : size]
             self._buffer = self._buffer[size:]
-            if self.connected and command is not Command.CONNECT:
+            if self.connected and command is not FrankaCommand.CONNECT:
                 yield Request(command, number, payload)
             else:
                 self._connect(Request(command, number, payload))
@@ -141,17 +141,17 @@ class Connection:
         self.udp.close()
 
     def _connect(self, request: Request) -> None:
-        if request.command is not Command.CONNECT or self.connected:
+        if request.command is not FrankaCommand.CONNECT or self.connected:
             raise ConnectionEnd(
                 f"{request.command.name.lower()} where the first request "
                 f"{'is over' if self.connected else 'has to be connect'}"
             )
-        asked = np.frombuffer(request.payload, REQUESTS[Command.CONNECT])[0]
+        asked = np.frombuffer(request.payload, REQUESTS[FrankaCommand.CONNECT])[0]
         version, port = (int(x) for x in asked)
         same = version == VERSION
-        status = Status.SUCCESS if same else INCOMPATIBLE_VERSION
+        status = FrankaStatus.SUCCESS if same else INCOMPATIBLE_VERSION
         payload = np.array((status, VERSION), CONNECTED).tobytes()
-        self.respond(message(Command.CONNECT, request.number, payload))
+        self.respond(message(FrankaCommand.CONNECT, request.number, payload))
         if not same:
             end = ConnectionEnd(
                 f"the client speaks version {version} of the research interface; this "
@@ -167,10 +167,10 @@ def break_off(tcp: socket.socket) -> None:
     tcp.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
 
 
-def _command(kind: int, size: int) -> Command:
+def _command(kind: int, size: int) -> FrankaCommand:
     """Return the command of a header, if its size is right."""
     try:
-        command = Command(kind)
+        command = FrankaCommand(kind)
     except ValueError:
         raise ConnectionEnd(
             f"malformed request: command {kind} does not exist"

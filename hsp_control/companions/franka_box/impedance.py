@@ -22,7 +22,7 @@ _SINGULAR = 0.03
 """Share of the largest singular value below which a direction is in the null space."""
 
 
-class Impedance(NamedTuple):
+class ArmImpedance(NamedTuple):
     """A spring and a damper between an arm and its desired motion.
 
     Attributes:
@@ -34,13 +34,13 @@ class Impedance(NamedTuple):
     damping: Array
 
 
-def of_joints(model: Model, stiffness: Array) -> Impedance:
+def of_joints(model: Model, stiffness: Array) -> ArmImpedance:
     """Return a spring in each joint, shape (7,) [N·m/rad], critically damped."""
     damping = 2.0 * np.sqrt(stiffness * np.diag(model.state.mass_matrix))
-    return Impedance(np.diag(stiffness), np.diag(damping))
+    return ArmImpedance(np.diag(stiffness), np.diag(damping))
 
 
-def of_hand(model: Model, stiffness: Array) -> Impedance:
+def of_hand(model: Model, stiffness: Array) -> ArmImpedance:
     """Return springs along and about the axes of the stiffness frame.
 
         K = Jᵀ K_x J + k (1 - J⁺J)
@@ -53,13 +53,13 @@ def of_hand(model: Model, stiffness: Array) -> Impedance:
     mobility = np.einsum("ij,ji->i", J, np.linalg.solve(model.state.mass_matrix, J.T))
     damping = 2.0 * np.sqrt(stiffness / mobility)
     free = np.eye(JOINTS) - np.linalg.pinv(J, rcond=_SINGULAR) @ J
-    return Impedance(
+    return ArmImpedance(
         (J.T * stiffness) @ J + _NULL_SPACE_STIFFNESS * free,
         (J.T * damping) @ J + _NULL_SPACE_DAMPING * free,
     )
 
 
-def tracking_effort(model: Model, wanted: Reference, impedance: Impedance) -> Array:
+def tracking_effort(model: Model, wanted: Reference, impedance: ArmImpedance) -> Array:
     """Return the effort without gravity that tracks a motion, shape (7,) [N·m].
 
         (M + h D + h² K) x = K (e + h e') + D e',    tau = M (q̈_d + x) + C v

@@ -5,7 +5,7 @@ from typing import Self
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LogError
-from hsp_control.companions.franka_box import Box
+from hsp_control.companions.franka_box import ControlBox
 from hsp_control.config import Experiment
 from hsp_control.control.measurement import LogChannel
 from hsp_control.live.live_log import DueRows
@@ -28,7 +28,7 @@ class BoxLog:
         path: The log.
     """
 
-    def __init__(self, path: Path, experiment: Experiment, box: Box) -> None:
+    def __init__(self, path: Path, experiment: Experiment, box: ControlBox) -> None:
         """Begin a journal beside the log, and watch the box."""
         if path.suffix != ".npz":
             raise LogError(f"--log {path}: the name of a log ends in .npz")

@@ -6,7 +6,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.companions.franka.layouts import JOINTS, Controller, MotionGenerator
+from hsp_control.companions.franka.layouts import (
+    JOINTS,
+    ControllerMode,
+    MotionGenerator,
+)
 from hsp_control.companions.franka_box.generators import Generator
 from hsp_control.companions.franka_box.reflexes import Reference, Violation, effort_rate
 
@@ -16,12 +20,12 @@ _WINDOW = 100
 OF_THE_HAND = {MotionGenerator.CARTESIAN_POSITION, MotionGenerator.CARTESIAN_VELOCITY}
 """Motion generators whose commands are the hand's."""
 _OF_THE_JOINTS = {MotionGenerator.JOINT_POSITION, MotionGenerator.JOINT_VELOCITY}
-SERVED = {(Controller.EXTERNAL, MotionGenerator.NONE)} | {
+SERVED = {(ControllerMode.EXTERNAL, MotionGenerator.NONE)} | {
     (controller, generator)
     for controller in (
-        Controller.EXTERNAL,
-        Controller.JOINT_IMPEDANCE,
-        Controller.CARTESIAN_IMPEDANCE,
+        ControllerMode.EXTERNAL,
+        ControllerMode.JOINT_IMPEDANCE,
+        ControllerMode.CARTESIAN_IMPEDANCE,
     )
     for generator in _OF_THE_JOINTS | OF_THE_HAND
 }
@@ -48,7 +52,7 @@ class Motion:
     def __init__(
         self,
         number: int,
-        controller: Controller,
+        controller: ControllerMode,
         kind: MotionGenerator,
         generator: Generator | None = None,
     ) -> None:
@@ -73,7 +77,7 @@ class Motion:
     @property
     def external(self) -> bool:
         """Whether the client computes the efforts."""
-        return self.controller is Controller.EXTERNAL
+        return self.controller is ControllerMode.EXTERNAL
 
     @property
     def success_rate(self) -> float:

@@ -10,7 +10,7 @@ from hsp_control.companions.franka.layouts import PERIOD, STATE
 from hsp_control.companions.franka_box.arm import ELBOW_FLIP
 from hsp_control.companions.franka_box.hand import HandMotion
 from hsp_control.companions.franka_box.model import Model
-from hsp_control.companions.franka_box.reflexes import Reference, Thresholds
+from hsp_control.companions.franka_box.reflexes import Reference, ReflexThresholds
 
 
 class Readings:
@@ -71,7 +71,7 @@ class Readings:
         )
 
     def set_measured(
-        self, model: Model, tau_J: Array, tau_J_d: Array, thresholds: Thresholds
+        self, model: Model, tau_J: Array, tau_J_d: Array, thresholds: ReflexThresholds
     ) -> Array:
         """Fill what is measured, once a period."""
         fields, state = self.fields, model.state

@@ -87,7 +87,7 @@ class Reference(NamedTuple):
     ddq: Array
 
 
-class Thresholds(NamedTuple):
+class ReflexThresholds(NamedTuple):
     """Thresholds of contacts and collisions.
 
     Attributes:
@@ -103,7 +103,7 @@ class Thresholds(NamedTuple):
     upper_wrench: Array
 
     @classmethod
-    def none(cls) -> "Thresholds":
+    def none(cls) -> "ReflexThresholds":
         """Return thresholds that nothing reaches."""
         joints, axes = np.full(JOINTS, np.inf), np.full(6, np.inf)
         return cls(joints, joints, axes, axes)
@@ -196,7 +196,7 @@ def commanded_elbow(
 
 
 def collisions(
-    effort: Array, wrench: Array, thresholds: Thresholds
+    effort: Array, wrench: Array, thresholds: ReflexThresholds
 ) -> Iterator[Violation]:
     """Yield whether estimated external efforts are those of a collision."""
     upper = thresholds.upper_effort
@@ -219,7 +219,7 @@ def communication(lost: int) -> Iterator[Violation]:
         )
 
 
-class SelfDistance:
+class LinkDistances:
     """The distances between the links of an arm that can collide.
 
     Attributes:
@@ -258,7 +258,7 @@ class SelfDistance:
 
 
 def self_collision(distance: float, links: str) -> Iterator[Violation]:
-    """Yield whether links touch; see `SelfDistance.nearest`."""
+    """Yield whether links touch; see `LinkDistances.nearest`."""
     if distance < 0.0:
         yield Violation(
             Error.SELF_COLLISION_AVOIDANCE_VIOLATION,

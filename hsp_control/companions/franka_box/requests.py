@@ -8,18 +8,18 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array
 from hsp_control.companions.franka.layouts import (
     REQUESTS,
-    Command,
-    Controller,
+    ControllerMode,
+    FrankaCommand,
+    FrankaStatus,
     MotionGenerator,
     MoveStatus,
     RobotMode,
-    Status,
     message,
 )
-from hsp_control.companions.franka_box.box import Box
+from hsp_control.companions.franka_box.box import ControlBox
 from hsp_control.companions.franka_box.hand import placement
 from hsp_control.companions.franka_box.motion import OF_THE_HAND, SERVED
-from hsp_control.companions.franka_box.reflexes import Thresholds
+from hsp_control.companions.franka_box.reflexes import ReflexThresholds
 from hsp_control.robot.description.inertias import is_possible
 
 Say = Callable[[str], object]
@@ -36,28 +36,30 @@ _STIFFEST = {"K_theta": np.full(7, 14250.0), "K_x": np.repeat([3000.0, 300.0], 3
 class Requests:
     """Answers the requests of a client, except the first, which connects it."""
 
-    def __init__(self, box: Box, say: Say) -> None:
+    def __init__(self, box: ControlBox, say: Say) -> None:
         """Set the box, and who is told what is refused."""
         self._box, self._say = box, say
-        self._handlers: dict[Command, Callable[[int, np.void], int | None]] = {
-            Command.MOVE: self._move,
-            Command.STOP_MOVE: self._stop_move,
-            Command.SET_COLLISION_BEHAVIOR: self._set_collision_behavior,
-            Command.SET_JOINT_IMPEDANCE: self._set_joint_impedance,
-            Command.SET_CARTESIAN_IMPEDANCE: self._set_cartesian_impedance,
-            Command.SET_GUIDING_MODE: self._set_guiding_mode,
-            Command.SET_EE_TO_K: self._set_ee_to_k,
-            Command.SET_NE_TO_EE: self._set_ne_to_ee,
-            Command.SET_LOAD: self._set_load,
-            Command.AUTOMATIC_ERROR_RECOVERY: self._recover,
+        self._handlers: dict[FrankaCommand, Callable[[int, np.void], int | None]] = {
+            FrankaCommand.MOVE: self._move,
+            FrankaCommand.STOP_MOVE: self._stop_move,
+            FrankaCommand.SET_COLLISION_BEHAVIOR: self._set_collision_behavior,
+            FrankaCommand.SET_JOINT_IMPEDANCE: self._set_joint_impedance,
+            FrankaCommand.SET_CARTESIAN_IMPEDANCE: self._set_cartesian_impedance,
+            FrankaCommand.SET_GUIDING_MODE: self._set_guiding_mode,
+            FrankaCommand.SET_EE_TO_K: self._set_ee_to_k,
+            FrankaCommand.SET_NE_TO_EE: self._set_ne_to_ee,
+            FrankaCommand.SET_LOAD: self._set_load,
+            FrankaCommand.AUTOMATIC_ERROR_RECOVERY: self._recover,
         }
 
-    def answer(self, command: Command, number: int, payload: bytes) -> None:
+    def answer(self, command: FrankaCommand, number: int, payload: bytes) -> None:
         """Answer a request, into the box's outbox."""
         outbox = self._box.outbox
-        if command is Command.GET_ROBOT_MODEL:
+        if command is FrankaCommand.GET_ROBOT_MODEL:
             urdf = self._box.arm.urdf.encode()
-            outbox.append(message(command, number, bytes([Status.SUCCESS]) + urdf))
+            outbox.append(
+                message(command, number, bytes([FrankaStatus.SUCCESS]) + urdf)
+            )
             return
         kind = REQUESTS[command]
         body = np.frombuffer(payload, kind)[0] if kind.itemsize else np.void(b"")
@@ -69,18 +71,18 @@ class Requests:
         if status is not None:
             outbox.append(message(command, number, bytes([status])))
 
-    def _impossible(self, command: Command, why: str) -> int:
+    def _impossible(self, command: FrankaCommand, why: str) -> int:
         self._say(f"refused: {_spelled(command)}: {why}")
-        return Status.COMMAND_NOT_POSSIBLE_REJECTED
+        return FrankaStatus.COMMAND_NOT_POSSIBLE_REJECTED
 
-    def _invalid(self, command: Command, what: str) -> int:
+    def _invalid(self, command: FrankaCommand, what: str) -> int:
         self._say(f"refused: {_spelled(command)}: {what}")
-        return Status.INVALID_ARGUMENT_REJECTED
+        return FrankaStatus.INVALID_ARGUMENT_REJECTED
 
     def _move(self, number: int, body: np.void) -> int | None:
         box = self._box
         try:
-            by = Controller(int(body["controller"]))
+            by = ControllerMode(int(body["controller"]))
             generator = MotionGenerator(int(body["motion_generator"]) + 1)
         except ValueError:
             self._say(
@@ -106,7 +108,7 @@ class Requests:
 
     def _stop_move(self, number: int, body: np.void) -> int:
         self._box.end(MoveStatus.PREEMPTED, "stopped by the client")
-        return Status.SUCCESS
+        return FrankaStatus.SUCCESS
 
     def _set_collision_behavior(self, number: int, body: np.void) -> int:
         """Set thresholds; of those for acceleration and for constant speed the larger.
@@ -118,60 +120,66 @@ class Requests:
             for kind in ("torque", "force"):
                 pair = [body[f"{bound}_{kind}_{at}"] for at in _PHASES]
                 limits[bound, kind] = np.maximum(*pair)
-        command = Command.SET_COLLISION_BEHAVIOR
+        command = FrankaCommand.SET_COLLISION_BEHAVIOR
         for kind in ("torque", "force"):
             low, high = limits["lower", kind], limits["upper", kind]
             if not (np.isfinite([low, high]).all() and (low >= 0.0).all()):
                 return self._invalid(command, "a threshold is negative or not finite")
             if (low > high).any():
                 return self._invalid(command, "a lower threshold is above the upper")
-        self._box.thresholds = Thresholds(
+        self._box.thresholds = ReflexThresholds(
             limits["lower", "torque"],
             limits["upper", "torque"],
             limits["lower", "force"],
             limits["upper", "force"],
         )
-        return Status.SUCCESS
+        return FrankaStatus.SUCCESS
 
     def _set_joint_impedance(self, number: int, body: np.void) -> int:
         stiffness = np.array(body["K_theta"])
         if not _is_stiffness(stiffness, "K_theta"):
-            return self._invalid(Command.SET_JOINT_IMPEDANCE, f"{stiffness} N·m/rad")
+            return self._invalid(
+                FrankaCommand.SET_JOINT_IMPEDANCE, f"{stiffness} N·m/rad"
+            )
         self._box.joint_stiffness = stiffness
-        return Status.SUCCESS
+        return FrankaStatus.SUCCESS
 
     def _set_cartesian_impedance(self, number: int, body: np.void) -> int:
         stiffness = np.array(body["K_x"])
         if not _is_stiffness(stiffness, "K_x"):
-            return self._invalid(Command.SET_CARTESIAN_IMPEDANCE, f"{stiffness}")
+            return self._invalid(FrankaCommand.SET_CARTESIAN_IMPEDANCE, f"{stiffness}")
         self._box.cartesian_stiffness = stiffness
-        return Status.SUCCESS
+        return FrankaStatus.SUCCESS
 
     def _set_guiding_mode(self, number: int, body: np.void) -> int:
         return self._impossible(
-            Command.SET_GUIDING_MODE, "nobody can take this arm by the hand"
+            FrankaCommand.SET_GUIDING_MODE, "nobody can take this arm by the hand"
         )
 
     def _set_ee_to_k(self, number: int, body: np.void) -> int:
         frame = placement(body["EE_T_K"])
         if frame is None:
-            return self._invalid(Command.SET_EE_TO_K, "not a homogeneous transform")
+            return self._invalid(
+                FrankaCommand.SET_EE_TO_K, "not a homogeneous transform"
+            )
         self._box.model.EE_T_K = frame
         self._box.readings.set_end_effector(self._box.model)
-        return Status.SUCCESS
+        return FrankaStatus.SUCCESS
 
     def _set_ne_to_ee(self, number: int, body: np.void) -> int:
         frame = placement(body["NE_T_EE"])
         if frame is None:
-            return self._invalid(Command.SET_NE_TO_EE, "not a homogeneous transform")
+            return self._invalid(
+                FrankaCommand.SET_NE_TO_EE, "not a homogeneous transform"
+            )
         self._box.model.NE_T_EE = frame
         self._box.readings.set_end_effector(self._box.model)
-        return Status.SUCCESS
+        return FrankaStatus.SUCCESS
 
     def _set_load(self, number: int, body: np.void) -> int:
         mass, com = float(body["m_load"]), np.array(body["F_x_Cload"])
         inertia = np.array(body["I_load"]).reshape(3, 3).T
-        command = Command.SET_LOAD
+        command = FrankaCommand.SET_LOAD
         where = f"{mass:g} kg at {com.tolist()} m"
         if not (mass >= 0.0 and np.isfinite(mass) and np.abs(com).max() <= _NEAR):
             return self._invalid(command, where)
@@ -188,7 +196,7 @@ class Requests:
         load.inertia = inertia  # the constructor refuses what rounding leaves below 0
         self._box.carry(load)
         self._box.readings.set_end_effector(self._box.model)
-        return Status.SUCCESS
+        return FrankaStatus.SUCCESS
 
     def _recover(self, number: int, body: np.void) -> None:
         self._box.recover(number)
@@ -201,5 +209,5 @@ def _is_stiffness(values: Array, of: str) -> bool:
     return bool(((values >= 0.0) & (values <= _STIFFEST[of])).all())
 
 
-def _spelled(item: Command | Controller | MotionGenerator) -> str:
+def _spelled(item: FrankaCommand | ControllerMode | MotionGenerator) -> str:
     return item.name.lower().replace("_", " ")

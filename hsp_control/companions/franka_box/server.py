@@ -12,7 +12,7 @@ import numpy as np
 
 from hsp_control.common.exceptions import HardwareError, LiveError
 from hsp_control.companions.franka.layouts import PERIOD, PORT, MoveStatus
-from hsp_control.companions.franka_box.box import Box, Say
+from hsp_control.companions.franka_box.box import ControlBox, Say
 from hsp_control.companions.franka_box.connection import (
     Connection,
     ConnectionEnd,
@@ -45,7 +45,7 @@ class Server:
 
     def __init__(
         self,
-        box: Box,
+        box: ControlBox,
         say: Say,
         *,
         host: str = "127.0.0.1",

@@ -9,7 +9,7 @@ from hsp_control.cli.live_experiment import of_a_robot
 from hsp_control.cli.loading import robot_access
 from hsp_control.common.exceptions import LiveError
 from hsp_control.companions.franka.layouts import PERIOD, PORT, VERSION
-from hsp_control.companions.franka_box import Arm, Box, Server
+from hsp_control.companions.franka_box import Arm, ControlBox, Server
 from hsp_control.companions.franka_box.gripper import Gripper
 from hsp_control.companions.franka_box.log import BoxLog
 from hsp_control.config import Experiment
@@ -97,9 +97,9 @@ def _experiment(options: argparse.Namespace) -> Experiment:
     return experiment
 
 
-def _box(experiment: Experiment, say: Callable[[str], object]) -> Box:
+def _box(experiment: Experiment, say: Callable[[str], object]) -> ControlBox:
     plant = sampled(experiment.plant, experiment.integrator, PERIOD)
-    return Box(Arm(experiment.robot), plant, experiment.q0, say)
+    return ControlBox(Arm(experiment.robot), plant, experiment.q0, say)
 
 
 class _Terminal:
@@ -111,7 +111,7 @@ class _Terminal:
     """
 
     def __init__(self) -> None:
-        self.box: Box | None = None
+        self.box: ControlBox | None = None
         self.server: Server | None = None
         self._live = sys.stderr.isatty()
         self._periods = 0

@@ -11,23 +11,23 @@ from hsp_control.companions.franka.layouts import (
     PERIOD,
     REQUESTS,
     STATE,
-    Command,
-    Controller,
+    ControllerMode,
     Error,
+    FrankaCommand,
+    FrankaStatus,
     MotionGenerator,
     MoveStatus,
     RobotMode,
-    Status,
 )
-from hsp_control.companions.franka_box import Box
+from hsp_control.companions.franka_box import ControlBox
 from hsp_control.companions.franka_box.requests import Requests
 from hsp_control.simulation.plants import Payload
 
 REST = np.zeros(7)
-TORQUE = Controller.EXTERNAL, MotionGenerator.NONE
+TORQUE = ControllerMode.EXTERNAL, MotionGenerator.NONE
 
 
-class Talking(Box):
+class Talking(ControlBox):
     """A box whose lines are kept."""
 
     def __init__(self, simulated: Any = None, q: Any = None) -> None:
@@ -36,22 +36,22 @@ class Talking(Box):
         super().__init__(panda(), simulated or plant(), start, self.said.append)
 
 
-def state(box: Box) -> Any:
+def state(box: ControlBox) -> Any:
     return np.frombuffer(box.state()[1], STATE)[0]
 
 
-def answers(box: Box) -> list[tuple[Command, int, int]]:
+def answers(box: ControlBox) -> list[tuple[FrankaCommand, int, int]]:
     """Return command, number and status of the responses, and empty the outbox."""
     found = []
     for data in box.outbox:
         kind, number, size = np.frombuffer(data, HEADER, 1)[0].item()
         assert size == len(data)
-        found.append((Command(kind), number, data[HEADER.itemsize]))
+        found.append((FrankaCommand(kind), number, data[HEADER.itemsize]))
     box.outbox.clear()
     return found
 
 
-def ask(box: Talking, kind: Command, number: int = 5, **fields: Any) -> list[Any]:
+def ask(box: Talking, kind: FrankaCommand, number: int = 5, **fields: Any) -> list[Any]:
     payload = np.zeros(1, REQUESTS[kind]) if REQUESTS[kind].itemsize else b""
     for name, value in fields.items():
         payload[name] = value  # type: ignore[index]
@@ -67,8 +67,8 @@ def test_a_payload_sinks_unless_its_load_is_set() -> None:
             plant(payload=Payload("panda_link8", 2.0, center=[0.0, 0.0, 0.1]))
         )
         flat = {"F_x_Cload": [0, 0, 0.1], "I_load": np.diag([-1e-9, 0, 0]).ravel()}
-        assert ask(box, Command.SET_LOAD, m_load=mass, **flat) == [
-            (Command.SET_LOAD, 5, Status.SUCCESS)
+        assert ask(box, FrankaCommand.SET_LOAD, m_load=mass, **flat) == [
+            (FrankaCommand.SET_LOAD, 5, FrankaStatus.SUCCESS)
         ]
         assert state(box)["m_load"] == mass
         box.begin(1, *TORQUE)
@@ -106,7 +106,7 @@ def test_lost_commands_hold_the_effort_and_the_twentieth_ends_the_motion() -> No
         np.testing.assert_allclose(state(box)["tau_J_d"], effort, rtol=1e-6)
     answers(box)
     box.step(None)
-    assert answers(box) == [(Command.MOVE, 1, MoveStatus.REFLEX_ABORTED)]
+    assert answers(box) == [(FrankaCommand.MOVE, 1, MoveStatus.REFLEX_ABORTED)]
     told = state(box)
     flags = np.flatnonzero(told["errors"]).tolist()
     assert flags == np.flatnonzero(told["reflex_reason"]).tolist()
@@ -137,14 +137,16 @@ def test_recovery_answers_when_the_arm_is_back() -> None:
     while box.motion is not None:
         push = min(push + 0.2, 4.0)
         box.step(command(tau_J_d=push * np.eye(7)[3] - 5.0 * box.v))
-    assert ask(box, Command.MOVE, controller=2, motion_generator=4)[-1] == (
-        Command.MOVE, 5, MoveStatus.COMMAND_NOT_POSSIBLE_REJECTED
+    assert ask(box, FrankaCommand.MOVE, controller=2, motion_generator=4)[-1] == (
+        FrankaCommand.MOVE, 5, MoveStatus.COMMAND_NOT_POSSIBLE_REJECTED
     )  # fmt: skip
-    assert ask(box, Command.AUTOMATIC_ERROR_RECOVERY, 9) == []
+    assert ask(box, FrankaCommand.AUTOMATIC_ERROR_RECOVERY, 9) == []
     assert state(box)["robot_mode"] == RobotMode.AUTOMATIC_ERROR_RECOVERY
     assert box.q[3] > upper
     box.settle()
-    assert answers(box) == [(Command.AUTOMATIC_ERROR_RECOVERY, 9, Status.SUCCESS)]
+    assert answers(box) == [
+        (FrankaCommand.AUTOMATIC_ERROR_RECOVERY, 9, FrankaStatus.SUCCESS)
+    ]
     assert box.q[3] < upper - 0.005
     told = state(box)
     assert told["robot_mode"] == RobotMode.IDLE
@@ -155,7 +157,7 @@ def test_recovery_answers_when_the_arm_is_back() -> None:
 def test_an_arm_that_folds_into_itself_stops() -> None:
     """Joints 4 and 6 fold the hand towards the base, within their limits."""
     box = Talking()
-    box.begin(1, Controller.JOINT_IMPEDANCE, MotionGenerator.JOINT_VELOCITY)
+    box.begin(1, ControllerMode.JOINT_IMPEDANCE, MotionGenerator.JOINT_VELOCITY)
     ramp = 0.0
     while box.motion is not None and box.periods < 6000:
         ramp = min(ramp + 0.004, 0.5)
@@ -169,15 +171,15 @@ def test_what_a_client_may_not_do_while_the_arm_moves() -> None:
     box = Talking()
     box.begin(1, *TORQUE)
     answers(box)
-    assert ask(box, Command.SET_LOAD, m_load=1.0) == [
-        (Command.SET_LOAD, 5, Status.COMMAND_NOT_POSSIBLE_REJECTED)
+    assert ask(box, FrankaCommand.SET_LOAD, m_load=1.0) == [
+        (FrankaCommand.SET_LOAD, 5, FrankaStatus.COMMAND_NOT_POSSIBLE_REJECTED)
     ]
-    assert ask(box, Command.MOVE, controller=2, motion_generator=4) == [
-        (Command.MOVE, 5, MoveStatus.COMMAND_NOT_POSSIBLE_REJECTED)
+    assert ask(box, FrankaCommand.MOVE, controller=2, motion_generator=4) == [
+        (FrankaCommand.MOVE, 5, MoveStatus.COMMAND_NOT_POSSIBLE_REJECTED)
     ]
-    assert ask(box, Command.STOP_MOVE, 8) == [
-        (Command.MOVE, 1, MoveStatus.PREEMPTED),
-        (Command.STOP_MOVE, 8, Status.SUCCESS),
+    assert ask(box, FrankaCommand.STOP_MOVE, 8) == [
+        (FrankaCommand.MOVE, 1, MoveStatus.PREEMPTED),
+        (FrankaCommand.STOP_MOVE, 8, FrankaStatus.SUCCESS),
     ]
 
 
@@ -194,23 +196,23 @@ def test_what_a_client_may_not_do_while_the_arm_moves() -> None:
     ({"controller": 77, "motion_generator": 4}, False),
 ])  # fmt: skip
 def test_which_motions_are_served(fields: dict[str, int], served: bool) -> None:
-    (answer,) = ask(Talking(), Command.MOVE, **fields)
+    (answer,) = ask(Talking(), FrankaCommand.MOVE, **fields)
     status = (
         MoveStatus.MOTION_STARTED
         if served
         else MoveStatus.COMMAND_NOT_POSSIBLE_REJECTED
     )
-    assert answer == (Command.MOVE, 5, status)
+    assert answer == (FrankaCommand.MOVE, 5, status)
 
 
 def test_a_hand_does_not_start_in_a_singular_posture() -> None:
     q = home()
     q[[1, 3, 5]] = 0.0, -0.0699, np.pi / 2 - 0.07  # the arm is nearly stretched
     box = Talking(q=q)
-    assert ask(box, Command.MOVE, controller=0, motion_generator=2) == [
-        (Command.MOVE, 5, MoveStatus.START_AT_SINGULAR_POSE_REJECTED)
+    assert ask(box, FrankaCommand.MOVE, controller=0, motion_generator=2) == [
+        (FrankaCommand.MOVE, 5, MoveStatus.START_AT_SINGULAR_POSE_REJECTED)
     ]
-    (answer,) = ask(box, Command.MOVE, controller=0, motion_generator=0)
+    (answer,) = ask(box, FrankaCommand.MOVE, controller=0, motion_generator=0)
     assert answer[2] == MoveStatus.MOTION_STARTED
 
 
@@ -219,29 +221,33 @@ def test_a_command_that_is_not_finite_ends_the_motion() -> None:
     box.begin(1, *TORQUE)
     answers(box)
     box.step(command(tau_J_d=[np.nan] * 7))
-    assert answers(box) == [(Command.MOVE, 1, MoveStatus.INPUT_ERROR_ABORTED)]
+    assert answers(box) == [(FrankaCommand.MOVE, 1, MoveStatus.INPUT_ERROR_ABORTED)]
     assert np.isfinite(box.q).all()
 
 
 @pytest.mark.parametrize(("kind", "fields"), [
-    (Command.SET_LOAD, {"m_load": np.nan}),
-    (Command.SET_LOAD, {"m_load": 1e300}),
-    (Command.SET_LOAD, {"m_load": 12.0, "F_x_Cload": [0.3, 0, 0.1]}),
-    (Command.SET_LOAD, {"m_load": 1.0, "F_x_Cload": [np.nan, 0, 0]}),
-    (Command.SET_LOAD, {"m_load": 1.0, "I_load": np.diag([1e300] * 3).ravel()}),
-    (Command.SET_LOAD, {"m_load": 1.0, "I_load": np.diag([-0.1, 1, 1]).ravel()}),
-    (Command.SET_LOAD, {"m_load": 1.0, "I_load": [1, 2, 3, 4, 5, 6, 7, 8, 9]}),
-    (Command.SET_EE_TO_K, {"EE_T_K": np.ones(16)}),
-    (Command.SET_NE_TO_EE, {"NE_T_EE": np.full(16, np.nan)}),
-    (Command.SET_JOINT_IMPEDANCE, {"K_theta": -np.ones(7)}),
-    (Command.SET_JOINT_IMPEDANCE, {"K_theta": np.full(7, 1e300)}),
-    (Command.SET_CARTESIAN_IMPEDANCE, {"K_x": np.full(6, np.nan)}),
-    (Command.SET_COLLISION_BEHAVIOR, {"lower_force_nominal": np.ones(6)}),
-    (Command.SET_COLLISION_BEHAVIOR, {"upper_torque_nominal": [np.inf] * 7}),
+    (FrankaCommand.SET_LOAD, {"m_load": np.nan}),
+    (FrankaCommand.SET_LOAD, {"m_load": 1e300}),
+    (FrankaCommand.SET_LOAD, {"m_load": 12.0, "F_x_Cload": [0.3, 0, 0.1]}),
+    (FrankaCommand.SET_LOAD, {"m_load": 1.0, "F_x_Cload": [np.nan, 0, 0]}),
+    (FrankaCommand.SET_LOAD, {"m_load": 1.0, "I_load": np.diag([1e300] * 3).ravel()}),
+    (FrankaCommand.SET_LOAD, {"m_load": 1.0, "I_load": np.diag([-0.1, 1, 1]).ravel()}),
+    (FrankaCommand.SET_LOAD, {"m_load": 1.0, "I_load": [1, 2, 3, 4, 5, 6, 7, 8, 9]}),
+    (FrankaCommand.SET_EE_TO_K, {"EE_T_K": np.ones(16)}),
+    (FrankaCommand.SET_NE_TO_EE, {"NE_T_EE": np.full(16, np.nan)}),
+    (FrankaCommand.SET_JOINT_IMPEDANCE, {"K_theta": -np.ones(7)}),
+    (FrankaCommand.SET_JOINT_IMPEDANCE, {"K_theta": np.full(7, 1e300)}),
+    (FrankaCommand.SET_CARTESIAN_IMPEDANCE, {"K_x": np.full(6, np.nan)}),
+    (FrankaCommand.SET_COLLISION_BEHAVIOR, {"lower_force_nominal": np.ones(6)}),
+    (FrankaCommand.SET_COLLISION_BEHAVIOR, {"upper_torque_nominal": [np.inf] * 7}),
 ])  # fmt: skip
-def test_invalid_arguments_are_refused(kind: Command, fields: dict[str, Any]) -> None:
+def test_invalid_arguments_are_refused(
+    kind: FrankaCommand, fields: dict[str, Any]
+) -> None:
     box = Talking()
-    assert ask(box, kind, **fields) == [(kind, 5, Status.INVALID_ARGUMENT_REJECTED)]
+    assert ask(box, kind, **fields) == [
+        (kind, 5, FrankaStatus.INVALID_ARGUMENT_REJECTED)
+    ]
     (line,) = box.said
     assert line.startswith("refused: set ")
 
@@ -250,12 +256,12 @@ def test_contacts_and_collisions_follow_the_thresholds() -> None:
     box = Talking(plant(payload=Payload("panda_tcp", 3.0)))
     ask(
         box,
-        Command.SET_COLLISION_BEHAVIOR,
+        FrankaCommand.SET_COLLISION_BEHAVIOR,
         lower_torque_nominal=np.full(7, 3.0),
         upper_torque_nominal=np.full(7, 9.0),
         upper_force_nominal=np.full(6, 100.0),
     )
-    box.begin(1, Controller.JOINT_IMPEDANCE, MotionGenerator.JOINT_POSITION)
+    box.begin(1, ControllerMode.JOINT_IMPEDANCE, MotionGenerator.JOINT_POSITION)
     while box.motion is not None and box.periods < 1000:
         box.step(command(q_c=box.motion.reference.q))  # type: ignore[union-attr]
     told = state(box)
@@ -267,18 +273,18 @@ def test_contacts_and_collisions_follow_the_thresholds() -> None:
 
 
 @pytest.mark.parametrize(("controller", "kind", "stiffness"), [
-    (Controller.JOINT_IMPEDANCE, Command.SET_JOINT_IMPEDANCE, [200.0] * 7),
-    (Controller.CARTESIAN_IMPEDANCE,
-     Command.SET_CARTESIAN_IMPEDANCE,
+    (ControllerMode.JOINT_IMPEDANCE, FrankaCommand.SET_JOINT_IMPEDANCE, [200.0] * 7),
+    (ControllerMode.CARTESIAN_IMPEDANCE,
+     FrankaCommand.SET_CARTESIAN_IMPEDANCE,
      [500.0, 500.0, 500.0, 300.0, 300.0, 300.0]),
 ])  # fmt: skip
 def test_an_unknown_payload_stretches_the_springs_that_are_set(
-    controller: Controller, kind: Command, stiffness: list[float]
+    controller: ControllerMode, kind: FrankaCommand, stiffness: list[float]
 ) -> None:
     """At rest the joints yield by tau / K, or the hand by its weight over K."""
     box = Talking(plant(payload=Payload("panda_tcp", 1.0)))
-    field = "K_theta" if kind is Command.SET_JOINT_IMPEDANCE else "K_x"
-    assert ask(box, kind, **{field: stiffness})[0][2] == Status.SUCCESS
+    field = "K_theta" if kind is FrankaCommand.SET_JOINT_IMPEDANCE else "K_x"
+    assert ask(box, kind, **{field: stiffness})[0][2] == FrankaStatus.SUCCESS
     before = box.model.O_T_EE
     box.begin(1, controller, MotionGenerator.JOINT_POSITION)
     for _ in range(2500):

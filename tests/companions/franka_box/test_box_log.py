@@ -11,10 +11,10 @@ from hsp_control.cli.main import main
 from hsp_control.common.exceptions import LogError
 from hsp_control.companions.franka.layouts import (
     COMMAND,
-    Controller,
+    ControllerMode,
     MotionGenerator,
 )
-from hsp_control.companions.franka_box import Box
+from hsp_control.companions.franka_box import ControlBox
 from hsp_control.companions.franka_box.log import BoxLog
 
 
@@ -22,12 +22,12 @@ def test_the_log_has_the_true_motion(tmp_path: Path) -> None:
     experiment = load_experiment(
         {"robot": {"name": "panda"}, "tasks": {"hand": {"type": "frame_pose"}}}
     )
-    box, seen = Box(panda(), plant(), home(), print), []
+    box, seen = ControlBox(panda(), plant(), home(), print), []
     with BoxLog(tmp_path / "run.npz", experiment, box) as log:
         log_row = box.on_period
         box.on_period = lambda: (seen.append((box.t, box.q)), log_row())
         box.step(None)
-        box.begin(1, Controller.EXTERNAL, MotionGenerator.NONE)
+        box.begin(1, ControllerMode.EXTERNAL, MotionGenerator.NONE)
         command = np.zeros(1, COMMAND)
         for step in range(100):
             command["tau_J_d"] = 0.01 * step
@@ -63,7 +63,7 @@ def test_a_mistake_is_one_line(
 
 
 def test_a_log_has_the_name_of_one(tmp_path: Path) -> None:
-    box = Box(panda(), plant(), home(), print)
+    box = ControlBox(panda(), plant(), home(), print)
     experiment = load_experiment(
         {"robot": {"name": "panda"}, "tasks": {"hand": {"type": "frame_pose"}}}
     )

@@ -9,7 +9,7 @@ from franka_boxes import home, panda
 
 from hsp_control.companions.franka.layouts import PERIOD
 from hsp_control.companions.franka_box import impedance
-from hsp_control.companions.franka_box.impedance import Impedance
+from hsp_control.companions.franka_box.impedance import ArmImpedance
 from hsp_control.companions.franka_box.model import Model
 from hsp_control.companions.franka_box.reflexes import Reference
 
@@ -23,7 +23,7 @@ def at(q: Any, v: Any = REST) -> Model:
     return model
 
 
-def springs(kind: str, scale: float, model: Model) -> Impedance:
+def springs(kind: str, scale: float, model: Model) -> ArmImpedance:
     if kind == "joints":
         return impedance.of_joints(model, scale * impedance.JOINT_STIFFNESS)
     return impedance.of_hand(model, scale * impedance.CARTESIAN_STIFFNESS)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hsp_control.companions.franka.layouts import (
     COMMAND,
     PERIOD,
-    Controller,
+    ControllerMode,
     Error,
     MotionGenerator,
 )
@@ -116,7 +116,7 @@ def test_braking_comes_to_rest_as_fast_as_it_may(speeds: list[float]) -> None:
 
 
 def test_success_is_counted_over_a_hundred_commands() -> None:
-    motion = Motion(1, Controller.EXTERNAL, MotionGenerator.NONE)
+    motion = Motion(1, ControllerMode.EXTERNAL, MotionGenerator.NONE)
     command = np.zeros(1, COMMAND)[0]
     motion.lose()  # before the first command nothing is lost
     assert (motion.success_rate, motion.lost) == (1.0, 0)

@@ -18,10 +18,10 @@ from hsp_control.companions.franka.layouts import (
     HEADER,
     PORT,
     STATE,
-    Command,
+    FrankaCommand,
     message,
 )
-from hsp_control.companions.franka_box import Box, Server
+from hsp_control.companions.franka_box import ControlBox, Server
 from hsp_control.companions.franka_box.connection import Connection
 
 LONGEST = 30.0
@@ -56,7 +56,7 @@ class RawClient:
 
     def connect(self, version: int = 10) -> bytes:
         port = self.udp.getsockname()[1]
-        return self.ask(Command.CONNECT, struct.pack("<HH", version, port))
+        return self.ask(FrankaCommand.CONNECT, struct.pack("<HH", version, port))
 
     def state(self) -> Any:
         data, self.box = self.udp.recvfrom(4096)
@@ -117,7 +117,7 @@ def test_a_command_is_late_by_when_it_arrived_not_by_when_it_is_read() -> None:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp, tcp:
             udp.bind(("127.0.0.1", 0))
             hello = struct.pack("<HH", 10, udp.getsockname()[1])
-            tcp.sendall(message(Command.CONNECT, 1, hello))
+            tcp.sendall(message(FrankaCommand.CONNECT, 1, hello))
             select([connection.tcp], [], [], LONGEST)
             assert not list(connection.requests())
             box = connection.udp.getsockname()
@@ -138,7 +138,7 @@ def test_datagrams_that_are_no_commands_are_ignored() -> None:
     with served(patience=LONGEST) as rig, client(rig) as noisy:
         assert noisy.connect()
         noisy.state()
-        assert noisy.ask(Command.MOVE, MOVE) == b"\1"
+        assert noisy.ask(FrankaCommand.MOVE, MOVE) == b"\1"
         while (state := noisy.state())["robot_mode"] != 2:
             pass
         good = np.zeros(1, COMMAND)
@@ -180,7 +180,7 @@ def test_in_real_time_a_command_after_the_deadline_is_lost() -> None:
     for deadline, in_time in ((1e-9, False), (1e-3, True)):
         with served(lockstep=False, deadline=deadline) as rig, client(rig) as quick:
             assert quick.connect()
-            assert quick.ask(Command.MOVE, MOVE) == b"\1"
+            assert quick.ask(FrankaCommand.MOVE, MOVE) == b"\1"
             for _ in range(50 if not in_time else 10_000):
                 good = np.zeros(1, COMMAND)
                 good["message_id"] = quick.state()["message_id"]
@@ -204,13 +204,13 @@ def test_in_real_time_a_command_after_the_deadline_is_lost() -> None:
     ({"cut": -1.0}, "cut -1 s"),
 ])  # fmt: skip
 def test_times_out_of_range_are_refused(option: dict[str, float], said: str) -> None:
-    box = Box(panda(), plant(), home(), print)
+    box = ControlBox(panda(), plant(), home(), print)
     with pytest.raises(LiveError, match=said):
         Server(box, print, **option)
 
 
 def test_addresses_beyond_loopback_and_taken_ones_are_refused() -> None:
-    box = Box(panda(), plant(), home(), print)
+    box = ControlBox(panda(), plant(), home(), print)
     for host in ("0.0.0.0", "10.0.0.1", "localhost"):
         with pytest.raises(HardwareError, match="listens on loopback only"):
             Server(box, print, host=host)

@@ -13,7 +13,7 @@ from hsp_control.companions.franka.layouts import (
     HEADER,
     REQUESTS,
     STATE,
-    Command,
+    FrankaCommand,
 )
 from hsp_control.companions.franka_box.arm import Arm, ArmLimits
 
@@ -32,18 +32,18 @@ def test_the_layouts_have_the_sizes_of_the_packed_structures() -> None:
     sizes = {command: layout.itemsize for command, layout in REQUESTS.items()}
     assert (HEADER.itemsize, STATE.itemsize, COMMAND.itemsize) == (12, 1377, 371)
     assert sizes == {
-        Command.CONNECT: 4,
-        Command.MOVE: 113,
-        Command.STOP_MOVE: 0,
-        Command.SET_COLLISION_BEHAVIOR: 416,
-        Command.SET_JOINT_IMPEDANCE: 56,
-        Command.SET_CARTESIAN_IMPEDANCE: 48,
-        Command.SET_GUIDING_MODE: 7,
-        Command.SET_EE_TO_K: 128,
-        Command.SET_NE_TO_EE: 128,
-        Command.SET_LOAD: 104,
-        Command.AUTOMATIC_ERROR_RECOVERY: 0,
-        Command.GET_ROBOT_MODEL: 0,
+        FrankaCommand.CONNECT: 4,
+        FrankaCommand.MOVE: 113,
+        FrankaCommand.STOP_MOVE: 0,
+        FrankaCommand.SET_COLLISION_BEHAVIOR: 416,
+        FrankaCommand.SET_JOINT_IMPEDANCE: 56,
+        FrankaCommand.SET_CARTESIAN_IMPEDANCE: 48,
+        FrankaCommand.SET_GUIDING_MODE: 7,
+        FrankaCommand.SET_EE_TO_K: 128,
+        FrankaCommand.SET_NE_TO_EE: 128,
+        FrankaCommand.SET_LOAD: 104,
+        FrankaCommand.AUTOMATIC_ERROR_RECOVERY: 0,
+        FrankaCommand.GET_ROBOT_MODEL: 0,
     }
 
 

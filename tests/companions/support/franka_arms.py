@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from hsp_control import Robot, load_experiment
 from hsp_control.companions.franka import FrankaHardware, connect
 from hsp_control.companions.franka.layouts import PERIOD
-from hsp_control.companions.franka_box import Arm, Box, Server
+from hsp_control.companions.franka_box import Arm, ControlBox, Server
 from hsp_control.config import Experiment
 from hsp_control.live import LiveSettings, Measurement
 from hsp_control.live.simulated_robot import sampled
@@ -139,7 +139,7 @@ def serving(experiment: Experiment, **options: Any) -> Iterator[RunningBox]:
     """Serve an experiment's plant in lockstep; options are the `Server`'s."""
     running, ended = RunningBox(host()), threading.Event()
     plant = sampled(experiment.plant, experiment.integrator, PERIOD)
-    box = Box(Arm(experiment.robot), plant, experiment.q0, running.lines.append)
+    box = ControlBox(Arm(experiment.robot), plant, experiment.q0, running.lines.append)
     server = Server(
         box,
         running.lines.append,

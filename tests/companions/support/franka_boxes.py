@@ -17,7 +17,7 @@ from hsp_control import Robot
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HardwareError
 from hsp_control.companions.franka.layouts import COMMAND, PERIOD
-from hsp_control.companions.franka_box import Arm, Box, Server
+from hsp_control.companions.franka_box import Arm, ControlBox, Server
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants import IntegratedPlant, RigidBody, SampledPlant
 
@@ -100,7 +100,7 @@ def served(
     """Serve a box in lockstep, in a thread, at an address that is free."""
     said: list[str] = []
     start = home() if q is None else q
-    box = Box(panda(), simulated or plant(), start, said.append)
+    box = ControlBox(panda(), simulated or plant(), start, said.append)
     patient = {"lockstep": True, "patience": PATIENCE, **options}
     with _anywhere(box, said, patient) as (server, host):
         running = threading.Event()
@@ -124,7 +124,7 @@ def addresses() -> Iterator[str]:
 
 @contextmanager
 def _anywhere(
-    box: Box, said: list[str], options: dict[str, Any]
+    box: ControlBox, said: list[str], options: dict[str, Any]
 ) -> Iterator[tuple[Server, str]]:
     for host in itertools.islice(addresses(), 20):
         try:
