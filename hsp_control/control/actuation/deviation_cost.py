@@ -356,9 +356,11 @@ def _project_out(N: Array, x: Array) -> None:
 
 
 @kernel
-def write_inverse_root(directions: Directions, first: int, JT: Array) -> int:
+def write_inverse_root(
+    directions: Directions, first: int, JT: Array, moving: Indices
+) -> None:
     """Write Jᵀ, J Jᵀ = H⁻¹, without the levels before the first that may move."""
-    # It returns the number of its rows. JT has shape (nv, at least nv).
+    # JT has shape (nv, at least nv); how many of its rows these are is ``moving``.
     N, root, L = directions.N, directions.root, directions.L
     n, rows = N.shape[0], 0
     for k in range(directions.kept[0] if first > 0 else 0, n):
@@ -367,4 +369,4 @@ def write_inverse_root(directions: Directions, first: int, JT: Array) -> int:
         if directions.form != IDENTITY:
             solve_lower_transposed(L, JT[rows, :n])
         rows += 1
-    return rows
+    moving[0] = rows

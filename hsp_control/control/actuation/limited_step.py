@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.compiled.kernels import KernelCall, OnlyIf, kernel
+from hsp_control.compiled.kernels import KernelCall, KernelCalls, OnlyIf, kernel
 from hsp_control.constraints.limits.acceleration_bounds import Bounds
 from hsp_control.control.actuation.deviation_cost import (
     Directions,
@@ -64,10 +64,6 @@ _LEAST_INVERSE_COST = 1e-6
 """While a contact fades its forces become dear, but not infinitely so."""
 UNSOLVED = 0
 """No `Status` of a QP: the constraints contradict each other, or the solver gave up."""
-FORCES, NEAREST, NEAREST_AGAIN, LEAST_VIOLATION = 0, 1, 2, 3
-"""What to find: forces for the law's acceleration, and if there are none the nearest
-acceleration; this acceleration at once; it again, with the rows as they are, those of
-the contacts too; or the least violation of the soft rows."""
 
 
 class Wanted(NamedTuple):
@@ -99,18 +95,6 @@ class Places(NamedTuple):
     base: int  # how many have no motor
 
 
-class Programmes(NamedTuple):
-    """The QPs of a step, on the same rows and unknowns, and their memories."""
-
-    forces: QP  # of the forces alone
-    nearest: QP  # of deviation and forces, at the law's cost
-    soft: QP  # of deviation and forces, all at the same cost, with soft rows
-    x: Array  # unknowns, shape (nv + p,)
-    force_memory: Workspace  # of the first
-    memory: Workspace  # of the second
-    soft_memory: Workspace  # of the third
-
-
 class Result(NamedTuple):
     """What is delivered: effort and acceleration, shape (nv,), forces, shape (p,)."""
 
@@ -119,84 +103,45 @@ class Result(NamedTuple):
     forces: Array
 
 
-class StepMemory(NamedTuple):
-    """All that `solve_step` reads and writes."""
-
-    wanted: Wanted
-    forces: Forces
-    directions: Directions
-    bounds: Bounds
-    places: Places
-    programmes: Programmes
-    result: Result
-    # the `Status`, shape (1,); or `UNSOLVED`, and then there is no result
-    status: Indices
-
-
 @kernel
-def solve_step(what: int, step: StepMemory) -> int:
-    """Assemble the QP, solve it, and write what is delivered; return the `Status`."""
-    qp, forces, status = step.programmes, step.forces, step.status
-    x = qp.x
-    status[0] = UNSOLVED
-    if what == LEAST_VIOLATION:
-        code = minimise(qp.soft, False, x, qp.soft_memory)
-        if code == SOLVED and _write_result(step):
-            status[0] = Status.RELAXED
-        return int(status[0])
-    if what != NEAREST_AGAIN:
-        _write_rows(step)
-        if what == FORCES:
-            _start(forces, x)
-            _write_force_factor(forces, 1.0, qp.forces)
-            code = minimise(qp.forces, True, x, qp.force_memory)
-            if code == SOLVED and _write_result(step):
-                status[0] = Status.REDISTRIBUTED
-                return int(status[0])
-        write_directions(step.directions)
-    _start(forces, x)
-    contacts_held = what != NEAREST_AGAIN and forces.first.shape[0] > 0
-    standing = 1 if contacts_held else 0
-    count = write_inverse_root(step.directions, standing, qp.nearest.JT)
-    _write_force_factor(forces, _FORCE_COST, qp.nearest)
-    problem, warm = _moving(qp.nearest, count), what != NEAREST_AGAIN
-    code = minimise(problem, warm, x, qp.memory)
-    if code == SOLVED and _write_result(step):
-        status[0] = Status.LIMITED
-    return int(status[0])
-
-
-@kernel
-def _start(forces: Forces, x: Array) -> None:
-    """Write the unconstrained optimum: no deviation, and forces of minimum norm."""
+def _begin(forces: Forces, cost: float, own: Array, x: Array) -> None:
+    """Write the forces' part of J, and no deviation, with forces of minimum norm."""
     n = x.shape[0] - forces.first.shape[0]
     for i in range(n):
         x[i] = 0.0
-    for j in range(forces.first.shape[0]):
+    for j in range(own.shape[0]):
+        own[j] = np.sqrt(max(forces.inverse_cost[j], _LEAST_INVERSE_COST) / cost)
         x[n + j] = forces.first[j] / forces.weight
 
 
 @kernel
-def _write_force_factor(forces: Forces, cost: float, problem: QP) -> None:
-    """Write the forces' part of J."""
-    for j in range(problem.own.shape[0]):
-        inverse_cost = max(forces.inverse_cost[j], _LEAST_INVERSE_COST)
-        problem.own[j] = np.sqrt(inverse_cost / cost)
+def _solve(
+    solved: int,
+    warm: int,
+    problem: QP,
+    moving: Indices,
+    x: Array,
+    work: Workspace,
+    status: Indices,
+) -> None:
+    """Overwrite x with the optimum, where ``moving`` says how many rows of Jᵀ move.
 
-
-@kernel
-def _moving(problem: QP, count: int) -> QP:
-    """Return a QP in which only the first rows of Jᵀ move."""
+    The `Status` is then ``solved``, else `UNSOLVED`.
+    """
     JT, own, A, begin, end, lower, upper, softness, equalities = problem
-    return QP(JT[:count], own, A, begin, end, lower, upper, softness, equalities)
+    rows = JT[: moving[0]]
+    found = QP(rows, own, A, begin, end, lower, upper, softness, equalities)
+    code = minimise(found, warm != 0, x, work)
+    status[0] = solved if code == SOLVED else UNSOLVED
 
 
 @kernel
-def _write_rows(step: StepMemory) -> None:
+def _write_rows(
+    wanted: Wanted, forces: Forces, bounds: Bounds, places: Places, rows: QP
+) -> None:
     """Write the rows of base and efforts, and the bounds of x."""
-    bounds, places, rows = step.bounds, step.places, step.programmes.nearest
-    M, a, effort = step.wanted
-    F, _, f_lower, f_upper, _, weight = step.forces
+    M, a, effort = wanted
+    F, _, f_lower, f_upper, _, weight = forces
     A, lower, upper = rows.A, rows.lower, rows.upper
     n, p = F.shape
     for r in range(places.dofs.shape[0]):
@@ -217,27 +162,43 @@ def _write_rows(step: StepMemory) -> None:
 
 
 @kernel
-def _write_result(step: StepMemory) -> bool:
-    """Write the result without the solver's violations; return whether it is finite."""
-    bounds, places, result = step.bounds, step.places, step.result
-    x, (M, a, effort) = step.programmes.x, step.wanted
-    F, _, f_lower, f_upper, _, weight = step.forces
+def _write_result(
+    wanted: Wanted,
+    forces: Forces,
+    bounds: Bounds,
+    places: Places,
+    x: Array,
+    result: Result,
+    status: Indices,
+    unsolved: Array,
+) -> int:
+    """Write the result without the solver's violations; return the `Status`.
+
+    It is `UNSOLVED` if there is none, or none that is finite. ``unsolved`` is as an
+    `OnlyIf` reads it.
+    """
+    M, a, effort = wanted
+    F, _, f_lower, f_upper, _, weight = forces
     n, p = F.shape
-    for j in range(p):
-        result.forces[j] = min(max(x[n + j] * weight, f_lower[j]), f_upper[j])
     sum_of_efforts = 0.0
-    for i in range(n):
-        total = effort[i]
-        for j in range(n):
-            total += M[i, j] * x[j]
+    if status[0] != UNSOLVED:
         for j in range(p):
-            total -= F[i, j] * result.forces[j]
-        result.effort[i] = min(max(total, bounds.tau_lower[i]), bounds.tau_upper[i])
-        result.acceleration[i] = a[i] + x[i]
-        sum_of_efforts += total
-    for r in range(places.base):
-        result.effort[places.dofs[r]] = 0.0
-    return bool(np.isfinite(sum_of_efforts))
+            result.forces[j] = min(max(x[n + j] * weight, f_lower[j]), f_upper[j])
+        for i in range(n):
+            total = effort[i]
+            for j in range(n):
+                total += M[i, j] * x[j]
+            for j in range(p):
+                total -= F[i, j] * result.forces[j]
+            result.effort[i] = min(max(total, bounds.tau_lower[i]), bounds.tau_upper[i])
+            result.acceleration[i] = a[i] + x[i]
+            sum_of_efforts += total
+        for r in range(places.base):
+            result.effort[places.dofs[r]] = 0.0
+    if not np.isfinite(sum_of_efforts):
+        status[0] = UNSOLVED
+    unsolved[0], unsolved[1] = status[0], status[0] == UNSOLVED
+    return int(status[0])
 
 
 _RELAXATION_COST = {"contacts": 1e3, "distances": 30.0, "motion": 1.0, "holding": 0.1}
@@ -281,6 +242,7 @@ class LimitedStep:
         self._J = resolution.problem.task.jacobian[:held]
         width = n + p
 
+        # The rows, and the bounds of x
         A, zeros = np.zeros((k, width)), np.zeros
         begin, end = np.zeros((2, k), dtype=np.int64)
         lower, upper = np.full((2, k + width), -np.inf)
@@ -295,49 +257,58 @@ class LimitedStep:
             point = (r - cones) // 4
             begin[r] = force_begin[r] = n + 3 * point
             end[r] = force_end[r] = n + 3 * point + 3
+        # The QPs on them: of the forces alone; of deviation and forces, at the law's
+        # cost; of both, all at the same cost, with soft rows
         alike = np.full(width, _REGULARISATION**-0.5)
-        self._soft, none = zeros(k + width), zeros(0)
-        shared = lower, upper, none, len(base)
-        self._rows = QP(zeros((n, n)), zeros(p), A, begin, end, *shared)
-        fixed = zeros((0, n))
+        self._soft, self._x = zeros(k + width), zeros(width)
+        hard = lower, upper, zeros(0), len(base)
+        self._rows = QP(zeros((n, n)), zeros(p), A, begin, end, *hard)
+        redistributed = QP(zeros((0, n)), zeros(p), A, force_begin, force_end, *hard)
         softened = lower, upper, self._soft, len(base)
-        programmes = Programmes(
-            forces=QP(fixed, zeros(p), A, force_begin, force_end, *shared),
-            nearest=self._rows,
-            soft=QP(zeros((0, 0)), alike, A, begin, end, *softened),
-            x=zeros(width),
-            force_memory=Workspace.of(width, k),
-            memory=Workspace.of(width, k),
-            soft_memory=Workspace.of(width, k, soft=True),
-        )
-        self._x = programmes.x
-        # Effort, acceleration and forces of the last step
+        soft = QP(zeros((0, 0)), alike, A, begin, end, *softened)
+        memories = [Workspace.of(width, k) for _ in range(2)]
+        soft_memory = Workspace.of(width, k, soft=True)
+
+        # What they read and write; the result is that of the last step
         self.result = Result(zeros(n), zeros(n), zeros(p))
         self._wanted = wanted
-        step = StepMemory(
-            wanted,
-            Forces(
-                support.map,
-                support.forces,
-                support.lower,
-                support.upper,
-                support.inverse_cost,
-                support.weight,
-            ),
-            Directions.of(resolution, p > 0, state.robot.size or 1.0),
-            bounds,
-            Places(np.array([*base, *limited], dtype=np.int64), len(base)),
-            programmes,
-            self.result,
-            status,
-        )
-        again, soft = (NEAREST_AGAIN, step), (LEAST_VIOLATION, step)
-        self._nearest = [*state.inertia.calls, (solve_step, (NEAREST, step))]
-        forces = [*state.inertia.calls, (solve_step, (FORCES, step))]
-        self._find_nearest = state.plan(self._nearest).call()
-        self._find_forces = state.plan(forces).call()
-        self._least_violation = state.plan([(solve_step, soft)]).call()
-        self._again = state.plan([(solve_step, again)]).call()
+        first, edges = support.forces, (support.lower, support.upper)
+        cost = support.inverse_cost, support.weight
+        forces = Forces(support.map, first, *edges, *cost)
+        places = Places(np.array([*base, *limited], dtype=np.int64), len(base))
+        directions = Directions.of(resolution, p > 0, state.robot.size or 1.0)
+        x, moving, none = self._x, np.zeros(1, np.int64), np.zeros(1, np.int64)
+        unsolved, around = np.zeros(2), (wanted, forces, bounds, places)
+
+        # The calls that solve them
+        def optimum(
+            qp: QP, count: Indices, work: Workspace, reached: Status, *, warm: bool
+        ) -> KernelCalls:
+            solve = int(reached), int(warm), qp, count, x, work, status
+            outcome = *around, x, self.result, status, unsolved
+            return [(_solve, solve), (_write_result, outcome)]
+
+        def nearest(*, standing: bool, warm: bool) -> KernelCalls:
+            root = directions, int(standing), self._rows.JT, moving
+            begin = forces, _FORCE_COST, self._rows.own, x
+            found = optimum(self._rows, moving, memories[0], LIMITED, warm=warm)
+            return [(write_inverse_root, root), (_begin, begin), *found]
+
+        rows = *state.inertia.calls, (_write_rows, (*around, self._rows))
+        law = (write_directions, (directions,)), *nearest(standing=p > 0, warm=True)
+        self._nearest = [*rows, *law]
+        self._find_nearest = self._find_forces = state.plan(self._nearest).call()
+        if p > 0:
+            begun = _begin, (forces, 1.0, redistributed.own, x)
+            at_once = optimum(
+                redistributed, none, memories[1], Status.REDISTRIBUTED, warm=True
+            )
+            calls = [*rows, begun, *at_once, OnlyIf(law, unsolved)]
+            self._find_forces = state.plan(calls).call()
+        # It again, with the rows as they are, those of the contacts too
+        self._again = state.plan(nearest(standing=False, warm=False)).call()
+        least = optimum(soft, none, soft_memory, RELAXED, warm=False)
+        self._least_violation = state.plan(least).call()
 
     def nearest_if(self, before: KernelCall, found: Array) -> OnlyIf:
         """Return a call that writes the nearest, as `solve`, if ``found[1]`` is not 0.

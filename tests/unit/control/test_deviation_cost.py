@@ -47,9 +47,10 @@ METRICS: dict[str, hsp.metrics.Metric] = {
 def inverse_cost(resolution: Resolution) -> Array:
     """Return J Jᵀ, which is to be H⁻¹."""
     directions = Directions.of(resolution, False, panda().size)
-    JT = np.zeros((7, 7))
+    JT, moving = np.zeros((7, 7)), np.zeros(1, dtype=np.int64)
     write_directions(directions)
-    assert write_inverse_root(directions, 0, JT) == 7
+    write_inverse_root(directions, 0, JT, moving)
+    assert moving[0] == 7
     return JT.T @ JT
 
 
