@@ -77,7 +77,6 @@ class Directions(NamedTuple):
     factors: Factors  # law's pseudo-inverse of the stack
     projectors: Projectors  # what its levels left, where it went level by level
     code: Indices  # law's outcome, see `Resolution.code`
-    alone: bool  # whether it never goes level by level
     wide: Array  # scratch, shape (m, nv)
     square: Array  # scratch, shape (m, m)
     inner: Array  # scratch, shape (3, nv, max(nv, m))
@@ -100,7 +99,7 @@ class Directions(NamedTuple):
             J, problem.metric.L, resolution.form, resolution.ends, problem.task.error,
             problem.springs, size, int(supported), least, resolution.thresholds,
             resolution.factors, resolution.projectors, resolution.code,
-            resolution.alone, np.empty((m, n)), np.empty((m, m)),
+            np.empty((m, n)), np.empty((m, m)),
             np.empty((3, n, max(n, m))), np.empty((2, max(n, m))), np.empty((n, n)),
             np.zeros(1, dtype=np.int64), np.empty(n), np.zeros((2, every + 1)),
         )  # fmt: skip
@@ -135,51 +134,66 @@ def _write_costs(directions: Directions) -> None:
 
 
 @kernel
-def write_directions(directions: Directions) -> None:
-    """Write the directions of all levels, and then those of the null space."""
-    # Where no singular value is small, the law has made the rows of all levels
-    # orthonormal, one after the other; else they are found here.
-    Q, N, ends = directions.factors.Q, directions.N, directions.ends
-    root, costs = directions.root, directions.costs
+def write_directions_at_once(directions: Directions) -> None:
+    """Write the directions of the only level, and then those of the null space.
+
+    It is for a law that is never resolved level by level, see `Resolution.alone`.
+    """
     _write_costs(directions)
-    n, first_damped = N.shape[0], directions.code[0]
-    last = costs.shape[1] - 1
-    exact = first_damped == 0
-    if exact and _orthonormalised(directions.factors):
-        count = Q.shape[0]
-        for r in range(count):
-            copy(Q[r], N[r])
-    elif exact:
-        count = _write_levels(directions, ends.shape[0])
-    elif directions.alone:
+    if directions.code[0] > 0:
         count = _write_damped_level(directions)
     else:
+        count = directions.jacobian.shape[0]
+        if not _copied(directions):
+            whiten(directions.jacobian, directions.L, directions.form, directions.wide)
+            rows = directions.N[:count]
+            orthonormalise_rows(directions.wide, rows, directions.square)
+        _write_roots(directions, count)
+    _complete(directions, count)
+
+
+@kernel
+def write_directions(directions: Directions) -> None:
+    """Write the directions of all levels, and then those of the null space."""
+    _write_costs(directions)
+    first_damped = directions.code[0]
+    if first_damped > 0:
         count = _write_levels(directions, first_damped)
-    if exact or not directions.alone:
-        k = 0
-        for r in range(count):
-            while r >= ends[k]:
-                k += 1
-            root[r] = costs[1, k]
-        directions.kept[0] = min(count, ends[0])
-    _complete(N, count, directions.scratch[0, :n], directions.scratch[1, :n])
-    for r in range(n - count):
-        root[n - 1 - r] = costs[1, last]
-    if not exact and not directions.alone:
+    elif _copied(directions):
+        count = directions.jacobian.shape[0]
+    else:
+        count = _write_levels(directions, directions.ends.shape[0])
+    _write_roots(directions, count)
+    _complete(directions, count)
+    if first_damped > 0:
         _write_shared(directions, count)
 
 
 @kernel
-def _orthonormalised(factors: Factors) -> bool:
-    """Return whether Q = X B has orthonormal rows, and X is lower triangular."""
-    # Both hold unless the law needed the spectrum: then the rows of Q are orthogonal,
-    # but not of length 1, or X combines each row with those after it.
-    Q, X = factors
+def _write_roots(directions: Directions, count: int) -> None:
+    """Write 1/√ρ of directions that each belong to one level."""
+    ends, k = directions.ends, 0
+    for r in range(count):
+        while r >= ends[k]:
+            k += 1
+        directions.root[r] = directions.costs[1, k]
+    directions.kept[0] = min(count, ends[0])
+
+
+@kernel
+def _copied(directions: Directions) -> bool:
+    """Copy the law's rows Q = X B, if they are orthonormal and X is lower triangular.
+
+    Both hold unless the law needed the spectrum: then the rows of Q are orthogonal, but
+    not of length 1, or X combines each row with those after it.
+    """
+    Q, X = directions.factors
     found = True
     for r in range(Q.shape[0]):
         found = found and abs(squared_norm(Q[r]) - 1.0) < 1e-12
         for k in range(Q.shape[0] - 1 - r):
             found = found and X[r, Q.shape[0] - 1 - k] == 0.0
+        copy(Q[r], directions.N[r])
     return bool(found)
 
 
@@ -305,14 +319,16 @@ def _write_shared(directions: Directions, count: int) -> None:
 
 
 @kernel
-def _complete(N: Array, count: int, remainders: Array, shares: Array) -> None:
-    """Complete the first rows of N to an orthonormal basis.
+def _complete(directions: Directions, count: int) -> None:
+    """Complete the first directions to an orthonormal basis, with the null space.
 
     Each new row is what the others leave of the unit vector of which they leave most.
     The components of a unit vector are entries of N. Where less than half of it
     remains, what rounding left is subtracted ("twice is enough", Giraud et al. 2005).
     """
+    N, scratch, free = directions.N, directions.scratch, directions.costs[1, -1]
     n = N.shape[0]
+    remainders, shares = scratch[0, :n], scratch[1, :n]
     for i in range(n):
         remainders[i] = 1.0
     for k in range(count):
@@ -320,6 +336,7 @@ def _complete(N: Array, count: int, remainders: Array, shares: Array) -> None:
             remainders[i] -= N[k, i] * N[k, i]
     for missing in range(n - count):
         new = count + missing
+        directions.root[new] = free
         best = 0
         for i in range(n):
             if remainders[i] > remainders[best]:

@@ -26,6 +26,7 @@ from hsp_control.constraints.limits.acceleration_bounds import Bounds
 from hsp_control.control.actuation.deviation_cost import (
     Directions,
     write_directions,
+    write_directions_at_once,
     write_inverse_root,
 )
 from hsp_control.control.actuation.dual_active_set import (
@@ -295,7 +296,8 @@ class LimitedStep:
             return [(write_inverse_root, root), (_begin, begin), *found]
 
         rows = *state.inertia.calls, (_write_rows, (*around, self._rows))
-        law = (write_directions, (directions,)), *nearest(standing=p > 0, warm=True)
+        write = write_directions_at_once if resolution.alone else write_directions
+        law = (write, (directions,)), *nearest(standing=p > 0, warm=True)
         self._nearest = [*rows, *law]
         self._find_nearest = self._find_forces = state.plan(self._nearest).call()
         if p > 0:

@@ -19,6 +19,7 @@ from hsp_control.control.actuation import Status
 from hsp_control.control.actuation.deviation_cost import (
     Directions,
     write_directions,
+    write_directions_at_once,
     write_inverse_root,
 )
 from hsp_control.law import Resolution
@@ -48,7 +49,8 @@ def inverse_cost(resolution: Resolution) -> Array:
     """Return J Jᵀ, which is to be H⁻¹."""
     directions = Directions.of(resolution, False, panda().size)
     JT, moving = np.zeros((7, 7)), np.zeros(1, dtype=np.int64)
-    write_directions(directions)
+    write = write_directions_at_once if resolution.alone else write_directions
+    write(directions)
     write_inverse_root(directions, 0, JT, moving)
     assert moving[0] == 7
     return JT.T @ JT
