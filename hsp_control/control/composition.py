@@ -106,17 +106,11 @@ class Composition:
     def _compose(self, start: Start, changes: Sequence[Change]) -> None:
         """Place all parts, and apply the changes."""
         placed, robot = self._declared.placed(start), self._declared.robot
-        driven = self._declared.base == "driven"
+        base = () if self._declared.base == "driven" else robot.unactuated
         time_line = TimeLine.of(placed, changes)
         self._limits = LimitsInForce(self._state, placed.limits)
-        self._mixture = Mixture(
-            self._state,
-            () if driven else robot.unactuated,
-            self._limits,
-            self._gains,
-            time_line.setup,
-            self._declared.threshold,
-        )
+        around = self._limits, self._gains, time_line.setup, self._declared.threshold
+        self._mixture = Mixture(self._state, base, *around)
         self._follow(time_line)
 
     def _follow(self, time_line: TimeLine) -> None:

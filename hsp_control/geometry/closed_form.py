@@ -21,7 +21,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.identity_cache import IdentityCache
-from hsp_control.compiled.kernels import KernelCalls, kernel
+from hsp_control.compiled.kernels import KernelCall, KernelCalls, kernel
 from hsp_control.compiled.rotations import cross, rotate, rotate_back
 from hsp_control.geometry.links import LinkShape
 from hsp_control.geometry.scene import Obstacle
@@ -67,7 +67,6 @@ class ClosedFormDistances:
         places: Indices,
     ) -> None:
         """Allocate; ``places`` are the pairs' indices among all of the `Proximity`."""
-        self._pairs, self._places = pairs, places
         used = np.unique(pairs)
         self._motion = np.zeros((len(obstacles), MOTION_SIZE))
         self._moving: KernelCalls = [
@@ -90,17 +89,17 @@ class ClosedFormDistances:
             end += len(own_columns)
         for k, (kind, _) in enumerate(solids):
             self._kinds[len(links) + k] = kind, -1 - k, 0, 0
-        self._bodies = _Bodies(
-            self._kinds,
-            self._sizes,
-            self._motion,
-            np.concatenate(columns),
-            np.concatenate(dofs),
-        )
+        moved = np.concatenate(columns), np.concatenate(dofs)
+        self._bodies = _Bodies(self._kinds, self._sizes, self._motion, *moved)
         self._used: Indices = used[self._kinds[used, 0] == SEGMENT]
         self._segments = np.zeros((len(rows), 2, 3))
         self._cores = np.zeros((len(pairs), 3, 3))
-        self._scratch = np.zeros((40, 3))
+        zeros = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((4, 3)), np.zeros((5, 3))
+        self._nearest = _Nearest(*zeros)
+        # bodies, place and core of each pair; then those of segments, and with solids
+        self._pairs = np.column_stack([pairs, places, np.arange(len(pairs))])
+        solid = self._kinds[pairs[:, 1], 0] != SEGMENT
+        self._of_segments, self._of_solids = self._pairs[~solid], self._pairs[solid]
         # number of calls of `measure`, at any state, shape (1,)
         self.measurements: Indices = np.zeros(1, dtype=np.int64)
         self._plans = IdentityCache(
@@ -117,9 +116,13 @@ class ClosedFormDistances:
     def calls(self, state: RobotState, distances: Array) -> KernelCalls:
         """Return the calls of `measure` for this state and this array."""
         placements, bodies = state.world.placements, self  # see `supplied`
-        given = self.measurements, placements, bodies, self._used, self._pairs
-        work = self._places, self._segments, self._cores, self._scratch
-        return [(_measure, (*given, *work, distances))]
+        given = self.measurements, placements, bodies, self._used, self._of_segments
+        work = self._segments, self._cores, distances
+        calls: list[KernelCall] = [(_measure, (*given, *work))]
+        if len(self._of_solids):  # who has none does not compile it
+            solids = self._bodies, self._of_solids, self._nearest.work
+            calls.append((_measure_solids, (*solids, *work)))
+        return calls
 
     def supplied(self) -> "tuple[_Bodies, KernelCalls]":
         """Return the bodies as a kernel reads them, and the calls that move them."""
@@ -128,32 +131,24 @@ class ClosedFormDistances:
     def witness(self, k: int) -> tuple[Array, Array, Array]:
         """Return the witness points [m] and the unit normal from first to second."""
         x, y, n = self._cores[k]
-        first, second = self._sizes[self._pairs[k], 6]
+        first, second = self._sizes[self._pairs[k, :2], 6]
         return x - first * n, y + second * n, -n
 
-    def differentiate(
-        self,
-        state: RobotState,
-        slopes: Array,
-        curvatures: Array,
-        gradient: Array,
-        rate: Array,
-    ) -> None:
-        """Write Σ b'(d_k) ∇d_k (nv,) and its rate, after `measure` at this state."""
-        self._derivatives.get(state, slopes, curvatures, gradient, rate)()
+    def differentiate(self, state: RobotState, *sums: Array) -> None:
+        """Write Σ b'(d_k) ∇d_k and its rate, after `measure` at this state.
 
-    def derivatives(
-        self,
-        state: RobotState,
-        slopes: Array,
-        curvatures: Array,
-        gradient: Array,
-        rate: Array,
-    ) -> KernelCalls:
+        ``sums`` are b' and b'' of all distances, and what is written, (nv,) each.
+        """
+        self._derivatives.get(state, *sums)()
+
+    def derivatives(self, state: RobotState, *sums: Array) -> KernelCalls:
         """Return the calls of `differentiate` for these arguments."""
-        given = state.world, self._bodies, self._pairs, self._places
-        work = self._segments, self._scratch
-        return [(_differentiate, (*given, *work, slopes, curvatures, gradient, rate))]
+        work = self._segments, self._nearest, _Sums(*sums)
+        given = state.world, self._bodies
+        calls: list[KernelCall] = [(_differentiate, (*given, self._of_segments, *work))]
+        if len(self._of_solids):
+            calls.append((_differentiate_solids, (*given, self._of_solids, *work)))
+        return calls
 
 
 def _link(link: LinkShape) -> list[float]:
@@ -193,6 +188,25 @@ class _Bodies(NamedTuple):
     dofs: Indices  # the indices in v of these columns
 
 
+class _Nearest(NamedTuple):
+    """Two bodies and their nearest points, of one pair after the other."""
+
+    core: Array  # the points x and y, and n, shape (3, 3)
+    core_dot: Array  # their rates, shape (3, 3)
+    # twists of both bodies at the world's origin: v, ω, v, ω, shape (4, 3)
+    twists: Array
+    work: Array  # scratch, shape (5, 3)
+
+
+class _Sums(NamedTuple):
+    """Σ b' ∇d and its rate, Σ (b'' d' ∇d + b' (∇d)'), over all distances."""
+
+    slopes: Array  # b'
+    curvatures: Array  # b''
+    gradient: Array  # shape (nv,)
+    rate: Array  # shape (nv,)
+
+
 @kernel
 def _measure(
     measurements: Indices,
@@ -200,10 +214,8 @@ def _measure(
     bodies: _Bodies,
     used: Indices,
     pairs: Indices,
-    places: Indices,
     segments: Array,
     cores: Array,
-    scratch: Array,
     distances: Array,
 ) -> None:
     """Write the segments in the world, and the distance and (x, y, n) of each pair."""
@@ -212,23 +224,35 @@ def _measure(
     for k in range(used.shape[0]):
         i = used[k]
         _place(placements, motion, sizes, i, kinds[i, 1], segments)
-    local, H = scratch[0], scratch[1:4]
     for k in range(pairs.shape[0]):
-        i, j = pairs[k, 0], pairs[k, 1]
-        core = cores[k]
-        if kinds[j, 0] == SEGMENT:
-            s, t, _, _ = nearest_on_segments(segments, i, j)
-            for a in range(3):
-                core[0, a] = segments[i, 0, a] + s * segments[i, 1, a]
-                core[1, a] = segments[j, 0, a] + t * segments[j, 1, a]
-            distances[places[k]] = direction(core) - sizes[i, 6] - sizes[j, 6]
-        else:
-            x, n, moving = segments[i, 0], core[2], motion[-1 - kinds[j, 1]]
-            distance = _to_solid(kinds[j, 0], sizes[j], moving, x, local, H, n)
-            for a in range(3):
-                core[0, a] = x[a]
-                core[1, a] = x[a] - distance * n[a]
-            distances[places[k]] = distance - sizes[i, 6]
+        i, j, core = pairs[k, 0], pairs[k, 1], cores[pairs[k, 3]]
+        s, t, _, _ = nearest_on_segments(segments, i, j)
+        for a in range(3):
+            core[0, a] = segments[i, 0, a] + s * segments[i, 1, a]
+            core[1, a] = segments[j, 0, a] + t * segments[j, 1, a]
+        distances[pairs[k, 2]] = direction(core) - sizes[i, 6] - sizes[j, 6]
+
+
+@kernel
+def _measure_solids(
+    bodies: _Bodies,
+    pairs: Indices,
+    work: Array,
+    segments: Array,
+    cores: Array,
+    distances: Array,
+) -> None:
+    """Write the distance and (x, y, n) of each sphere to a solid, after `_measure`."""
+    kinds, sizes, motion = bodies.kinds, bodies.sizes, bodies.motion
+    local, H = work[0], work[1:4]
+    for k in range(pairs.shape[0]):
+        i, j, core = pairs[k, 0], pairs[k, 1], cores[pairs[k, 3]]
+        x, n, moving = segments[i, 0], core[2], motion[-1 - kinds[j, 1]]
+        distance = _to_solid(kinds[j, 0], sizes[j], moving, x, local, H, n)
+        for a in range(3):
+            core[0, a] = x[a]
+            core[1, a] = x[a] - distance * n[a]
+        distances[pairs[k, 2]] = distance - sizes[i, 6]
 
 
 @kernel
@@ -271,51 +295,75 @@ def _differentiate(
     world: WorldKinematics,
     bodies: _Bodies,
     pairs: Indices,
-    places: Indices,
     segments: Array,
-    scratch: Array,
-    slopes: Array,
-    curvatures: Array,
-    gradient: Array,
-    rate: Array,
+    nearest: _Nearest,
+    sums: _Sums,
 ) -> None:
-    """Write Σ b' ∇d and Σ (b'' d' ∇d + b' (∇d)'), without pairs of b' = b'' = 0."""
-    kinds, sizes, motion = bodies.kinds, bodies.sizes, bodies.motion
-    for p in range(gradient.shape[0]):
-        gradient[p] = rate[p] = 0.0
-    core, core_dot = scratch[0:3], scratch[3:6]
-    x, y, n = core[0], core[1], core[2]
-    x_dot, y_dot, n_dot = core_dot[0], core_dot[1], core_dot[2]
-    # Twists of both bodies at the world's origin.
-    twist_i, twist_j = scratch[6:8], scratch[8:10]
-    work = scratch[10:]
+    """Write the sums of pairs of segments."""
+    for p in range(sums.gradient.shape[0]):
+        sums.gradient[p] = sums.rate[p] = 0.0
     for k in range(pairs.shape[0]):
-        slope, curvature = slopes[places[k]], curvatures[places[k]]
-        if slope == 0.0 and curvature == 0.0:
-            continue
-        i, j = pairs[k, 0], pairs[k, 1]
-        _twist(world, bodies, i, twist_i)
-        _twist(world, bodies, j, twist_j)
-        if kinds[j, 0] == SEGMENT:
-            _between_segments(segments, i, j, twist_i, twist_j, work, core, core_dot)
-        else:
-            size, moving = sizes[j], motion[-1 - kinds[j, 1]]
-            center, kind = segments[i, 0], kinds[j, 0]
-            _to_moving_solid(
-                kind, size, moving, center, twist_i, twist_j, work, core, core_dot
-            )
-        d_dot = 0.0
+        if _counts(world, bodies, pairs[k], nearest, sums):
+            _between_segments(segments, pairs[k, 0], pairs[k, 1], nearest)
+            _add_pair(world, bodies, pairs[k], nearest, sums)
+
+
+@kernel
+def _differentiate_solids(
+    world: WorldKinematics,
+    bodies: _Bodies,
+    pairs: Indices,
+    segments: Array,
+    nearest: _Nearest,
+    sums: _Sums,
+) -> None:
+    """Add the sums of spheres and solids, after `_differentiate`."""
+    for k in range(pairs.shape[0]):
+        if _counts(world, bodies, pairs[k], nearest, sums):
+            center, j = segments[pairs[k, 0], 0], pairs[k, 1]
+            _to_moving_solid(center, bodies, j, nearest)
+            _add_pair(world, bodies, pairs[k], nearest, sums)
+
+
+@kernel
+def _counts(
+    world: WorldKinematics,
+    bodies: _Bodies,
+    pair: Indices,
+    nearest: _Nearest,
+    sums: _Sums,
+) -> bool:
+    """Return whether b' or b'' of a pair is not zero; then write both twists."""
+    counts = sums.slopes[pair[2]] != 0.0 or sums.curvatures[pair[2]] != 0.0
+    if counts:
+        _twist(world, bodies, pair[0], nearest.twists[:2])
+        _twist(world, bodies, pair[1], nearest.twists[2:])
+    return bool(counts)
+
+
+@kernel
+def _add_pair(
+    world: WorldKinematics,
+    bodies: _Bodies,
+    pair: Indices,
+    nearest: _Nearest,
+    sums: _Sums,
+) -> None:
+    """Add b' ∇d of a pair and its rate."""
+    slope, curvature = sums.slopes[pair[2]], sums.curvatures[pair[2]]
+    n, n_dot = nearest.core[2], nearest.core_dot[2]
+    d_dot = 0.0
+    for a in range(3):
+        d_dot += n[a] * (nearest.core_dot[0, a] - nearest.core_dot[1, a])
+    # The force b' n and its rate on the first body; the opposite on the second.
+    for a in range(3):
+        n_dot[a] = slope * n_dot[a] + curvature * d_dot * n[a]
+        n[a] *= slope
+    _add_force(world, bodies, pair[0], nearest, 0, sums)
+    if bodies.kinds[pair[1], 1] >= 0:
         for a in range(3):
-            d_dot += n[a] * (x_dot[a] - y_dot[a])
-        # The force b' n and its rate on the first body; the opposite on the second.
-        for a in range(3):
-            n_dot[a] = slope * n_dot[a] + curvature * d_dot * n[a]
-            n[a] *= slope
-        _add_force(world, bodies, i, x, x_dot, n, n_dot, work, gradient, rate)
-        if kinds[j, 1] >= 0:
-            for a in range(3):
-                n[a], n_dot[a] = -n[a], -n_dot[a]
-            _add_force(world, bodies, j, y, y_dot, n, n_dot, work, gradient, rate)
+            n[a], n_dot[a] = -n[a], -n_dot[a]
+        _add_force(world, bodies, pair[1], nearest, 1, sums)
 
 
 @kernel
@@ -347,23 +395,15 @@ def _velocity(twist: Array, x: Array, out: Array) -> None:
 
 
 @kernel
-def _between_segments(
-    segments: Array,
-    i: int,
-    j: int,
-    twist_i: Array,
-    twist_j: Array,
-    work: Array,
-    core: Array,
-    core_dot: Array,
-) -> None:
+def _between_segments(segments: Array, i: int, j: int, nearest: _Nearest) -> None:
     """Write the nearest points x and y and the normal n, with their rates."""
+    core, core_dot, twists, work = nearest
     a, e, b, f = segments[i, 0], segments[i, 1], segments[j, 0], segments[j, 1]
     a_dot, e_dot, b_dot, f_dot = work[0], work[1], work[2], work[3]
-    _velocity(twist_i, a, a_dot)
-    _velocity(twist_j, b, b_dot)
-    cross(twist_i[1], e, e_dot)
-    cross(twist_j[1], f, f_dot)
+    _velocity(twists[:2], a, a_dot)
+    _velocity(twists[2:], b, b_dot)
+    cross(twists[1], e, e_dot)
+    cross(twists[3], f, f_dot)
     s, t, s_free, t_free = nearest_on_segments(segments, i, j)
     s_dot, t_dot = nearest_rates(
         a, a_dot, e, e_dot, b, b_dot, f, f_dot, s, t, s_free, t_free
@@ -385,27 +425,19 @@ def _between_segments(
 
 
 @kernel
-def _to_moving_solid(
-    kind: int,
-    size: Array,
-    motion: Array,
-    center: Array,
-    twist_i: Array,
-    twist_j: Array,
-    work: Array,
-    core: Array,
-    core_dot: Array,
-) -> None:
+def _to_moving_solid(center: Array, bodies: _Bodies, j: int, nearest: _Nearest) -> None:
     """Write the sphere's centre x, x', y', the normal n and n'.
 
     In the solid's axes the normal is the gradient of the distance at the point, so that
     n' = ω × n + R H Rᵀ(x' - y'), where y' is the velocity of the solid's point at x.
     """
+    core, core_dot, twists, work = nearest
     local, n_change, H = work[0], work[1], work[2:5]
     n, x_dot, y_dot, n_dot = core[2], core_dot[0], core_dot[1], core_dot[2]
-    _to_solid(kind, size, motion, center, local, H, n)
-    _velocity(twist_i, center, x_dot)
-    _velocity(twist_j, center, y_dot)
+    kind, motion = bodies.kinds[j, 0], bodies.motion[-1 - bodies.kinds[j, 1]]
+    _to_solid(kind, bodies.sizes[j], motion, center, local, H, n)
+    _velocity(twists[:2], center, x_dot)
+    _velocity(twists[2:], center, y_dot)
     R = motion[:9].reshape(3, 3)
     for a in range(3):
         core[0, a] = center[a]
@@ -413,7 +445,7 @@ def _to_moving_solid(
     rotate_back(R, local, local)
     rotate(H, local, n_change)
     rotate(R, n_change, n_change)
-    cross(twist_j[1], n, n_dot)
+    cross(twists[3], n, n_dot)
     for a in range(3):
         n_dot[a] += n_change[a]
 
@@ -423,16 +455,17 @@ def _add_force(
     world: WorldKinematics,
     bodies: _Bodies,
     i: int,
-    x: Array,
-    x_dot: Array,
-    force: Array,
-    force_dot: Array,
-    work: Array,
-    gradient: Array,
-    rate: Array,
+    nearest: _Nearest,
+    which: int,
+    sums: _Sums,
 ) -> None:
-    """Add J(x)ᵀ force and its rate; J is the linear Jacobian of a point of a link."""
-    J, J_dot = world.jacobian, world.jacobian_dot
+    """Add J(x)ᵀ n and its rate, x the first point or the second, where body i is.
+
+    J is the linear Jacobian of a point of a link.
+    """
+    J, J_dot, work = world.jacobian, world.jacobian_dot, nearest.work
+    x, x_dot = nearest.core[which], nearest.core_dot[which]
+    force, force_dot = nearest.core[2], nearest.core_dot[2]
     kinds, columns, dofs = bodies.kinds, bodies.columns, bodies.dofs
     moment, moment_dot, turned = work[0], work[1], work[2]
     cross(x, force, moment)
@@ -447,5 +480,5 @@ def _add_force(
             change += J[a, c] * force[a] + J[3 + a, c] * moment[a]
             change_dot += J_dot[a, c] * force[a] + J_dot[3 + a, c] * moment[a]
             change_dot += J[a, c] * force_dot[a] + J[3 + a, c] * moment_dot[a]
-        gradient[dofs[p]] += change
-        rate[dofs[p]] += change_dot
+        sums.gradient[dofs[p]] += change
+        sums.rate[dofs[p]] += change_dot

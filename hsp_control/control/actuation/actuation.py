@@ -68,12 +68,8 @@ class Actuation:
     ) -> None:
         """Compile what every step calls, also where a limit binds."""
         nv = state.robot.nv
-        self._state, self._law, self._support, self._limits = (
-            state,
-            law,
-            support,
-            limits,
-        )
+        self._state, self._law = state, law
+        self._support, self._limits = support, limits
         base, bounds = support.base, limits.bounds
         # Whether M a + N is the effort wherever it is within the bounds, and so is a.
         self.direct = limits.box and not base.size and not support.size
@@ -207,16 +203,9 @@ class Actuation:
         if limits is not None:
             some = np.isfinite(limits.effort) | np.isfinite(limits.effort_rate)
         motors = np.setdiff1d(np.arange(nv), self._support.base)
-        return LimitedStep(
-            self._state,
-            self._law,
-            self._support,
-            self._limits.bounds,
-            self._wanted,
-            motors[some[motors]],
-            self.found[1:],
-            1 << (count - 1).bit_length() if count else 0,
-        )
+        capacity = 1 << (count - 1).bit_length() if count else 0
+        law = self._state, self._law, self._support, self._limits.bounds, self._wanted
+        return LimitedStep(*law, motors[some[motors]], self.found[1:], capacity)
 
 
 @kernel
@@ -248,18 +237,9 @@ def _check(
     # ``solve_if``, as `only_if` reads it.
     observe(v, held, time[0])
     flags = violated_limits(
-        q,
-        v,
-        a,
-        tau,
-        where,
-        limits,
-        held.error,
-        held.drift,
-        held.steady,
-        held.disturbance,
-        bounds,
-    )
+        q, v, a, tau, where, limits, held.error, held.drift, held.steady,
+        held.disturbance, bounds,
+    )  # fmt: skip
     look = _unlimited(code, found) if flags == 0 else LOOK
     found[0], found[1] = flags, UNSOLVED
     solve_if[0], solve_if[1] = look, flags
