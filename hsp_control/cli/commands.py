@@ -33,7 +33,7 @@ from hsp_control.simulation.log_writer import LogWriter
 from hsp_control.simulation.measures import measures
 
 
-class _Page(Protocol):
+class _Shown(Protocol):
     """What a companion shows of a run."""
 
     def begin(self, experiment: Experiment) -> None:
@@ -96,7 +96,7 @@ def _run_and_save(
     experiment: Experiment,
     log: Path,
     tell: Callable[[Rollout, Path, Stopwatch], None],
-    page: _Page | None,
+    page: _Shown | None,
 ) -> int:
     status, journal = 0, log.with_suffix(".journal")  # readable if we are killed
     stopwatch = Stopwatch()

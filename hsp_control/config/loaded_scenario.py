@@ -16,12 +16,7 @@ from hsp_control.config.scenario import Scenario
 from hsp_control.config.streams import with_messages
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.located import locate
-from hsp_control.declaration.mistakes import (
-    Mistake,
-    domain_error,
-    explained,
-    findings,
-)
+from hsp_control.declaration.mistakes import Mistake, domain_error, explained, findings
 from hsp_control.declaration.schema import shape
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.shapes import Mesh

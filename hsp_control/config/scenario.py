@@ -160,7 +160,7 @@ class Scenario(Part, error=ConfigError):
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a configuration, for editors."""
-    schema = TypeAdapter(Scenario).json_schema(schema_generator=_Generator)
+    schema = TypeAdapter(Scenario).json_schema(schema_generator=_SchemaOfScenario)
     for model in schema["$defs"].values():
         if "const" in (kind := model.get("properties", {}).get("type", {})):
             kind.setdefault("description", f"{kind['const']}: {model['description']}")
@@ -170,7 +170,7 @@ def json_schema() -> dict[str, Any]:
     return schema
 
 
-class _Generator(GenerateJsonSchema):
+class _SchemaOfScenario(GenerateJsonSchema):
     """Pydantic's generator, with the defaults as YAML would give them."""
 
     def encode_default(self, dft: Any) -> Any:

@@ -32,12 +32,7 @@ from hsp_control.compiled.linalg import (
     squared_norm,
 )
 from hsp_control.law.samples import VARYING, FieldSample, MetricSample, TaskSample
-from hsp_control.law.threshold import (
-    Following,
-    Thresholds,
-    how_held,
-    threshold_below,
-)
+from hsp_control.law.threshold import Following, Thresholds, how_held, threshold_below
 
 
 class LevelScratch(NamedTuple):

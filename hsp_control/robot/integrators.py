@@ -154,7 +154,7 @@ class Rk4(FixedStep, type="rk4"):
 
     def begin(self, robot: Robot, bind_dynamics: Bind) -> "Steps":
         """Return what integrates; see `Integrator.begin`."""
-        return _Rk4(robot, bind_dynamics, self.step)
+        return _Rk4Stages(robot, bind_dynamics, self.step)
 
 
 class SemiImplicitEuler(FixedStep, type="semi_implicit_euler"):
@@ -162,7 +162,7 @@ class SemiImplicitEuler(FixedStep, type="semi_implicit_euler"):
 
     def begin(self, robot: Robot, bind_dynamics: Bind) -> "Steps":
         """Return what integrates; see `Integrator.begin`."""
-        return _SemiImplicitEuler(robot, bind_dynamics, self.step)
+        return _EulerStep(robot, bind_dynamics, self.step)
 
 
 class Steps(ABC):
@@ -210,7 +210,7 @@ class Steps(ABC):
         return [(lambda: plan.run(self.now.item() + fraction * self.h.item()), ())]
 
 
-class _SemiImplicitEuler(Steps):
+class _EulerStep(Steps):
     def _calls(self) -> KernelCalls:
         robot = self.robot
         self._moved = np.zeros(robot.nv)
@@ -223,7 +223,7 @@ class _SemiImplicitEuler(Steps):
         self.q[:] = self.robot.integrate(self.q, self._moved)
 
 
-class _Rk4(Steps):
+class _Rk4Stages(Steps):
     """The four stages of a step, in the chart q = base ⊕ δ."""
 
     def _calls(self) -> KernelCalls:

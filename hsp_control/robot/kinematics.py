@@ -44,7 +44,7 @@ class WorldKinematics(NamedTuple):
     v: Array  # the velocity, shape (nv,)
 
 
-class _Carrier(NamedTuple):
+class _ParentJoint(NamedTuple):
     """The joint that carries a frame."""
 
     J_world: Array  # the Jacobian of all joints at the world's origin, (6, nv_extended)
@@ -95,7 +95,7 @@ class FrameKinematics:
         self.rotation, self.position = motion.rotation, motion.position
         self.velocity = motion.velocity
         self.drift: Array = np.zeros(6)
-        carrier = _Carrier(
+        carrier = _ParentJoint(
             matrix_view(data.J),
             matrix_view(data.dJ),
             joint.rotation,
@@ -116,7 +116,7 @@ class FrameKinematics:
 def frame_kinematics(
     stamp: Indices,
     computed: Indices,
-    carrier: _Carrier,
+    carrier: _ParentJoint,
     v: Array,
     motion: FrameMotion,
     drift: Array,

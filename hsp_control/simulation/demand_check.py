@@ -190,10 +190,7 @@ _KEPT = 0.99
 
 
 def missed_forces(
-    controller: Controller,
-    q0: Array,
-    duration: float,
-    push_off: float = 0.0,
+    controller: Controller, q0: Array, duration: float, push_off: float = 0.0
 ) -> Iterator[str]:
     """Yield what there is to say of commanded forces that will be missed.
 

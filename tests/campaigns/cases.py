@@ -48,10 +48,7 @@ def warm_up() -> None:
 
 
 def count_cases(
-    function: str,
-    seed: int,
-    cases: int,
-    show: Callable[[Count], None] | None = None,
+    function: str, seed: int, cases: int, show: Callable[[Count], None] | None = None
 ) -> Count:
     """Return what came of the first cases of a seed."""
     count = Count()

@@ -12,13 +12,7 @@ import pytest
 import yaml
 from places import ROOT
 
-from hsp_control import (
-    Controller,
-    JointPosture,
-    RobotState,
-    Rollout,
-    load_experiment,
-)
+from hsp_control import Controller, JointPosture, RobotState, Rollout, load_experiment
 from hsp_control.common.resources import bundled_configs
 from hsp_control.config import Experiment
 from hsp_control.null_space.fields import FieldSum

@@ -243,9 +243,7 @@ TASKS: dict[str, TaskCase] = {
         lambda start: {
             "panda_tcp": off_by(start),
             "panda_tcp_pointing": lambda t, here: stereographic(
-                LEANT @ start.rotation, here.rotation[:, 2]),
-        },
-        5.0,
+        LEANT @ start.rotation, here.rotation[:, 2]), }, 5.0
     ),
 }  # fmt: skip
 every_task = pytest.mark.parametrize("which", TASKS)

@@ -24,10 +24,7 @@ def carriage(folder: Path) -> hsp.Robot:
 
 
 def check_that_it_is_the_loop(
-    x: NDArray[np.float64],
-    loop: LinearLoop,
-    other: LinearLoop,
-    rounding: float = 1e-12,
+    x: NDArray[np.float64], loop: LinearLoop, other: LinearLoop, rounding: float = 1e-12
 ) -> None:
     """By Cayley and Hamilton positions obey the transition's polynomial; not another's.
 

@@ -105,7 +105,7 @@ def _serve(
     Thread(target=_end_with_parent, daemon=True).start()
     try:
         pictures = _Pictures(compiled, memory, lock)
-        server = _Server((host, port), _Handler)
+        server = _Drawer((host, port), _Handler)
         server.pictures = pictures
     except ImportError as error:
         ready.send(f"{error} {_INSTALL}")
@@ -159,7 +159,7 @@ class _Pictures:
         return float(data.time), renderer.render()
 
 
-class _Server(HTTPServer):
+class _Drawer(HTTPServer):
     """Answers one request after another, in the thread that draws."""
 
     pictures: _Pictures
@@ -168,7 +168,7 @@ class _Server(HTTPServer):
 class _Handler(BaseHTTPRequestHandler):
     """Answers one request."""
 
-    server: _Server
+    server: _Drawer
     timeout = 1.0  # of a client that asks for nothing [s]
 
     def do_GET(self) -> None:

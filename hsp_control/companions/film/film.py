@@ -10,11 +10,7 @@ from typing import Any, NamedTuple
 from hsp_control.common.exceptions import ExportError
 from hsp_control.common.suggestions import did_you_mean
 from hsp_control.companions.film.chromium import headless_browser, open_page
-from hsp_control.companions.film.encoding import (
-    FORMATS,
-    encoder,
-    find_ffmpeg,
-)
+from hsp_control.companions.film.encoding import FORMATS, encoder, find_ffmpeg
 from hsp_control.companions.film.screenshots import frame_times, screenshots
 from hsp_control.companions.viewer.export_page import export_html
 from hsp_control.control.controller import Controller

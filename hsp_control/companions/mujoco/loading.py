@@ -36,12 +36,7 @@ from hsp_control.companions.mujoco.scene import (
     select,
 )
 from hsp_control.declaration import within
-from hsp_control.robot.description.access import (
-    ANYWHERE,
-    Access,
-    XmlError,
-    read_xml,
-)
+from hsp_control.robot.description.access import ANYWHERE, Access, XmlError, read_xml
 from hsp_control.robot.description.loading import completed
 from hsp_control.robot.description.robot_description import RobotDescription, ToolFrame
 from hsp_control.robot.description.sources import RobotSource

@@ -23,11 +23,7 @@ from hsp_control.companions.viewer.commands import (
 )
 from hsp_control.companions.viewer.motion import Layer, RunMotion
 from hsp_control.companions.viewer.obstacles import logged_shapes
-from hsp_control.companions.viewer.run_drawing import (
-    RunDrawing,
-    all_layers,
-    line_color,
-)
+from hsp_control.companions.viewer.run_drawing import RunDrawing, all_layers, line_color
 from hsp_control.null_space.fields import FieldSum, NullSpaceField, Rest
 from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.fields.weight import sample_weight

@@ -33,7 +33,7 @@ MAX_TICKS = 10  # with more frames, their times are not the ticks of the time sc
 
 def draw_frame(axes: Axes, rollout: Rollout, row: int, *, key: bool = True) -> None:
     """Draw robot and obstacles at one row, and the desired paths; ``key``: a scale."""
-    scene = _Scene.of(rollout)
+    scene = _Surroundings.of(rollout)
     skeleton, tree = rollout["skeleton"][row], parents(rollout)
     if not scene.view.names:
         draw_shadow(axes, scene.view, skeleton, tree, scene.floor)
@@ -64,7 +64,7 @@ def draw_superimposed(
     axes: Axes, rollout: Rollout, rows: Sequence[int], *, numbered: bool = True
 ) -> None:
     """Draw the robot at all rows in one plot; later rows are darker."""
-    scene, tree = _Scene.of(rollout), parents(rollout)
+    scene, tree = _Surroundings.of(rollout), parents(rollout)
     _draw_paths(axes, scene.view, rollout, 2.2)
     times = rollout.t[list(rows)]
     start, end = float(times.min()), float(times.max())
@@ -92,7 +92,7 @@ def draw_superimposed(
 
 def columns_for(rollout: Rollout, count: int, width: float, height: float) -> int:
     """Return the number of columns for which the frames are largest."""
-    scene = _Scene.of(rollout)
+    scene = _Surroundings.of(rollout)
     page = scene.view.project(scene.shown(shadows=True))
     w, h = (float(np.ptp(coordinate)) + 1e-9 for coordinate in page)
 
@@ -104,7 +104,7 @@ def columns_for(rollout: Rollout, count: int, width: float, height: float) -> in
     return max(range(1, count + 1), key=scale)
 
 
-class _Scene(NamedTuple):
+class _Surroundings(NamedTuple):
     """View, extent and floor that all frames of a log share."""
 
     view: View

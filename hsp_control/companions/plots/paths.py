@@ -28,7 +28,7 @@ from hsp_control.companions.plots.world import (
 from hsp_control.simulation import Rollout
 
 
-class _Edge(NamedTuple):
+class _LabelledEdge(NamedTuple):
     """The edge with the tick labels of an axis; the eye is at high x, low y, high z."""
 
     sides: tuple[int, int]  # the edge, as sides of the two other axes: 0 low, 1 high
@@ -37,9 +37,9 @@ class _Edge(NamedTuple):
 
 
 _EDGES = (
-    _Edge((0, 0), (-3.0, -4.0), "right"),
-    _Edge((1, 0), (4.0, -4.0), "left"),
-    _Edge((0, 0), (-5.0, 0.0), "right"),
+    _LabelledEdge((0, 0), (-3.0, -4.0), "right"),
+    _LabelledEdge((1, 0), (4.0, -4.0), "left"),
+    _LabelledEdge((0, 0), (-5.0, 0.0), "right"),
 )
 _DIGIT_WIDTH = 4.8  # width of a digit [pt]
 _NARROWEST = 115.0

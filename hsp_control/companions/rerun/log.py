@@ -102,9 +102,7 @@ def _layout(rollout: Rollout) -> Any:
     }
     plots = [
         blueprint.TimeSeriesView(
-            origin="/log",
-            name=title,
-            contents=[f"+ /log/{name}/**" for name in names],
+            origin="/log", name=title, contents=[f"+ /log/{name}/**" for name in names]
         )
         for title, names in shown.items()
         if any(name in rollout.columns for name in names)

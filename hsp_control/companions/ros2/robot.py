@@ -58,12 +58,7 @@ def _run(options: argparse.Namespace, requests: OperatorRequests) -> str:
     robot = simulated_robot(experiment)
     topics = RobotTopics(options.address, experiment.robot)
     print(f"{topics.states}, {topics.commands}: ready", flush=True)
-    serve(
-        robot,
-        topics,
-        stop_reason=lambda: requests.reason,
-        lockstep=options.lockstep,
-    )
+    serve(robot, topics, stop_reason=lambda: requests.reason, lockstep=options.lockstep)
     return robot.reason or _NOTHING
 
 

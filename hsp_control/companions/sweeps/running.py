@@ -48,11 +48,7 @@ def read_result(run: int, text: str) -> tuple[SweepRow, dict[str, Measure]]:
     found = {k: Measure(*measure) for k, measure in result.get("measures", {}).items()}
     metrics = {name: measure.value for name, measure in found.items()}
     row = SweepRow(
-        run,
-        result["status"],
-        result["message"],
-        metrics,
-        result.get("wall_time", 0.0),
+        run, result["status"], result["message"], metrics, result.get("wall_time", 0.0)
     )
     return row, found
 

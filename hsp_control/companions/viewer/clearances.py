@@ -21,12 +21,7 @@ from hsp_control.companions.viewer.commands import (
     set_transform,
     translucent,
 )
-from hsp_control.companions.viewer.motion import (
-    Layer,
-    RunMotion,
-    Track,
-    pose_tracks,
-)
+from hsp_control.companions.viewer.motion import Layer, RunMotion, Track, pose_tracks
 from hsp_control.companions.viewer.obstacles import (
     coal_surface,
     obstacle_tracks,

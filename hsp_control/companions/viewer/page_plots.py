@@ -15,11 +15,7 @@ from hsp_control.companions.viewer.commands import (
     page_command,
 )
 from hsp_control.companions.viewer.comparison import ComparedRun
-from hsp_control.companions.viewer.packing import (
-    CLOCK_STEP,
-    ArrayTable,
-    keyframe_rows,
-)
+from hsp_control.companions.viewer.packing import CLOCK_STEP, ArrayTable, keyframe_rows
 from hsp_control.control.controller import Controller
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout, measures
@@ -144,7 +140,7 @@ _FLOOR, _TOP = 1e-17, 1e-6
 """Values up to the floor are rounding errors; a logarithmic axis reaches the top."""
 
 
-class _Curve(NamedTuple):
+class _CurveOfRun(NamedTuple):
     """A curve of one of the runs."""
 
     run: int  # the number of its run
@@ -155,7 +151,7 @@ class _Curve(NamedTuple):
 def pack_panels(runs: Sequence[ComparedRun], arrays: ArrayTable) -> Json:
     """Return plots of runs for ``plots.js``, one for each title and unit."""
     panels: dict[tuple[str, str], Panel] = {}
-    curves: dict[tuple[str, str], list[_Curve]] = {}
+    curves: dict[tuple[str, str], list[_CurveOfRun]] = {}
     for number, run in enumerate(runs):
         for panel in panels_of(run.rollout, run.controller):
             key = panel.title, panel.unit
@@ -165,7 +161,7 @@ def pack_panels(runs: Sequence[ComparedRun], arrays: ArrayTable) -> Json:
             colors = {curve.series.name: curve.series.color for curve in known}
             for each in panel.series:
                 alike = each._replace(color=colors.get(each.name, each.color))
-                known.append(_Curve(number, run.rollout.t, alike))
+                known.append(_CurveOfRun(number, run.rollout.t, alike))
     return {
         "runs": [run.name for run in runs],
         "start": min(float(run.rollout.t[0]) for run in runs),
@@ -178,7 +174,7 @@ def pack_panels(runs: Sequence[ComparedRun], arrays: ArrayTable) -> Json:
     }
 
 
-def _packed(panel: Panel, curves: Sequence[_Curve], arrays: ArrayTable) -> Json:
+def _packed(panel: Panel, curves: Sequence[_CurveOfRun], arrays: ArrayTable) -> Json:
     measured = [c.series.values for c in curves if not c.series.predicted]
     low, high = _range(panel, np.concatenate(measured))
     span = high - low

@@ -24,11 +24,7 @@ from hsp_control.companions.viewer.obstacles import (
     solid_layer,
 )
 from hsp_control.companions.viewer.robot_drawing import RobotDrawing, robot_entry
-from hsp_control.companions.viewer.targets import (
-    desired_points,
-    paths,
-    target_markers,
-)
+from hsp_control.companions.viewer.targets import desired_points, paths, target_markers
 from hsp_control.config.scenario import ShownItems
 from hsp_control.control.controller import Controller
 from hsp_control.robot import Robot

@@ -345,10 +345,7 @@ class Viewer:
         return [*stage, *remove_clip(), *still]
 
     def _stage(
-        self,
-        scene: StageContent,
-        title: str | None,
-        fit: bool = False,
+        self, scene: StageContent, title: str | None, fit: bool = False
     ) -> list[PageCommand]:
         """Return the commands that clear the stage, fit it, and draw a scene."""
         view = self.view

@@ -11,12 +11,7 @@ from pydantic import AfterValidator
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import ContactError, TrajectoryError
-from hsp_control.compiled.kernels import (
-    KernelCall,
-    KernelCalls,
-    kernel,
-    with_outputs,
-)
+from hsp_control.compiled.kernels import KernelCall, KernelCalls, kernel, with_outputs
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.nested import parts_within, with_memories_copied
 from hsp_control.declaration.quantities import (

@@ -258,8 +258,8 @@ class LimitedStep:
             point = (r - cones) // 4
             begin[r] = force_begin[r] = n + 3 * point
             end[r] = force_end[r] = n + 3 * point + 3
-        # The QPs on them: of the forces alone; of deviation and forces, at the law's
-        # cost; of both, all at the same cost, with soft rows
+        # The QPs on them: of deviation and forces, at the law's cost; of the forces
+        # alone; of both, all at the same cost, with soft rows
         alike = np.full(width, _REGULARISATION**-0.5)
         self._soft, self._x = zeros(k + width), zeros(width)
         hard = lower, upper, zeros(0), len(base)

@@ -111,12 +111,7 @@ class SentEffort:
 
 @kernel
 def _expect(
-    time: Array,
-    v: Array,
-    a: Array,
-    disturbance: Array,
-    timing: Array,
-    expected: Array,
+    time: Array, v: Array, a: Array, disturbance: Array, timing: Array, expected: Array
 ) -> None:
     """Write the end of a period that begins now, and the velocity there."""
     timing[0] = time[0] + timing[1]

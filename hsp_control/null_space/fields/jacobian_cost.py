@@ -153,11 +153,7 @@ class JacobianCost(Cost):
 
 @kernel
 def _select(
-    motion: FrameMotion,
-    selected: Indices,
-    scale: Array,
-    J: Array,
-    J_dot: Array,
+    motion: FrameMotion, selected: Indices, scale: Array, J: Array, J_dot: Array
 ) -> None:
     """Write the selected rows of J and J', scaled."""
     J_frame, J_frame_dot = motion.jacobian, motion.jacobian_dot

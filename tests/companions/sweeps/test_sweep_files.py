@@ -19,11 +19,7 @@ from sweep_runs import MOVING, OVER, QUICK
 import hsp_control as hsp
 from hsp_control.cli import main
 from hsp_control.common.exceptions import ConfigError, HspControlError, SweepError
-from hsp_control.companions.sweeps import (
-    Choices,
-    Sweep,
-    local_workers,
-)
+from hsp_control.companions.sweeps import Choices, Sweep, local_workers
 from hsp_control.companions.sweeps.journal import Journal, journal_of
 
 pytestmark = [pytest.mark.process, pytest.mark.slow]

@@ -13,12 +13,7 @@ from hsp_control.companions.plots.log_series import held_period
 from hsp_control.companions.viewer import ComparedRun, export_html
 from hsp_control.companions.viewer.analysis import expected_floor
 from hsp_control.companions.viewer.packing import ArrayTable
-from hsp_control.companions.viewer.page_plots import (
-    Edge,
-    Panel,
-    pack_panels,
-    panels_of,
-)
+from hsp_control.companions.viewer.page_plots import Edge, Panel, pack_panels, panels_of
 
 PLANAR = "paper/4_moving_obstacle"
 

@@ -13,12 +13,7 @@ from browsers import until
 
 from hsp_control import Robot
 from hsp_control.companions.viewer import Viewer, threejs
-from hsp_control.companions.viewer.clip import (
-    Band,
-    Clip,
-    Track,
-    set_clip,
-)
+from hsp_control.companions.viewer.clip import Band, Clip, Track, set_clip
 from hsp_control.companions.viewer.commands import (
     set_object,
     set_trail,

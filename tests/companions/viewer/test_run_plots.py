@@ -3,12 +3,7 @@
 import pytest
 
 from hsp_control import Rollout, load_experiment
-from hsp_control.companions.viewer import (
-    ComparedRun,
-    InlineView,
-    SceneRecorder,
-    Viewer,
-)
+from hsp_control.companions.viewer import ComparedRun, InlineView, SceneRecorder, Viewer
 from hsp_control.companions.viewer.commands import PLOTS, key_of, unpack
 from hsp_control.companions.viewer.page_plots import (
     PREVIEW_ROWS,

@@ -8,18 +8,8 @@ import pinocchio as pin
 import pytest
 from clips import Clip, Recorder, told
 
-from hsp_control import (
-    Experiment,
-    Robot,
-    Rollout,
-    load_experiment,
-)
-from hsp_control.companions.viewer import (
-    ComparedRun,
-    LiveView,
-    Viewer,
-    live,
-)
+from hsp_control import Experiment, Robot, Rollout, load_experiment
+from hsp_control.companions.viewer import ComparedRun, LiveView, Viewer, live
 from hsp_control.companions.viewer.analysis import (
     null_space_projector,
     terms_of_type,

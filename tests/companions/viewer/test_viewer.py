@@ -262,10 +262,7 @@ def test_a_log_is_viewed_as_its_configuration_says(
 
 
 def test_a_log_whose_controller_is_gone_shows_what_its_columns_tell(
-    tmp_path: Path,
-    run: Rollout,
-    recorder: Recorder,
-    caplog: pytest.LogCaptureFixture,
+    tmp_path: Path, run: Rollout, recorder: Recorder, caplog: pytest.LogCaptureFixture
 ) -> None:
     config = {**(run.config or {})}
     field = {"type": "point_distance", "frames": ["gone"], "obstacle": "disk"}

@@ -277,7 +277,7 @@ def arguments(name: str) -> tuple[Any, ...]:
         ),
         "frame_kinematics": (
             *(np.array([2]), np.array([1])),
-            kinematics._Carrier(
+            kinematics._ParentJoint(
                 *(*world, np.eye(3), normal(18, 3), turned, normal(22, 3)),
                 *(index, shared),
             ),

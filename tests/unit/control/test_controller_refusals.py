@@ -99,11 +99,7 @@ TOGETHER = {"null_space_gain": indefinite_gain(), "metric": ConstantMetric(W1)}
             ControllerError,
             "^tasks contains lists; write the level as priority=1, 2, ... of each task",
         ),
-        (
-            {"tasks": lambda: [TCP]},
-            ControllerError,
-            "contains 'panda_tcp', a str",
-        ),
+        ({"tasks": lambda: [TCP]}, ControllerError, "contains 'panda_tcp', a str"),
         (
             {"field": [hsp.Rest()]},
             ControllerError,

@@ -10,16 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from places import ROOT
-from qp_cases import (
-    KINDS,
-    Case,
-    answer,
-    by_daqp,
-    cost,
-    defect,
-    degenerate,
-    dense,
-)
+from qp_cases import KINDS, Case, answer, by_daqp, cost, defect, degenerate, dense
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.actuation import dual_active_set

@@ -20,11 +20,7 @@ from robot_cases import load
 import hsp_control as hsp
 from hsp_control.cli.main import main
 from hsp_control.common.exceptions import ConfigurationError, ControllerError
-from hsp_control.control.first_state import (
-    JUMP,
-    StartWarning,
-    warn_of_jump,
-)
+from hsp_control.control.first_state import JUMP, StartWarning, warn_of_jump
 from hsp_control.control.first_state import REST as REST_SPEED
 
 REST = np.zeros(7)

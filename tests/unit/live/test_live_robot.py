@@ -10,13 +10,7 @@ from live_rigs import PERIOD, Array, Rig, gravity, law, panda, start, watched
 
 from hsp_control import Gains, Robot
 from hsp_control.control.compensation import Command, Compensation, MomentumObserver
-from hsp_control.live import (
-    LiveSettings,
-    Measurement,
-    Phase,
-    SimulatedRobot,
-    run_loop,
-)
+from hsp_control.live import LiveSettings, Measurement, Phase, SimulatedRobot, run_loop
 from hsp_control.live.effort_limiter import EffortLimiter
 from hsp_control.robot.integrators import SemiImplicitEuler
 from hsp_control.simulation.plants import IntegratedPlant, RigidBodyPlant

@@ -5,14 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from field_cases import draw, evaluate, metrics, placed, posture
-from field_oracles import (
-    OBSTACLE,
-    TIME,
-    load,
-    spread,
-    swirl_field,
-    target,
-)
+from field_oracles import OBSTACLE, TIME, load, spread, swirl_field, target
 
 from hsp_control import (
     Controller,

@@ -3,12 +3,7 @@
 import numpy as np
 import pytest
 from field_cases import MEMBERS, draw, evaluate, every_field, metrics
-from field_oracles import (
-    TIME,
-    derivative,
-    load,
-    plain,
-)
+from field_oracles import TIME, derivative, load, plain
 
 from hsp_control.common.arrays import Array
 from hsp_control.null_space import differences

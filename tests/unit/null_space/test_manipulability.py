@@ -170,10 +170,7 @@ MISTAKES: list[tuple[type, dict[str, Any], type[HspControlError], str]] = [
     ("kind", "options", "error", "message"), MISTAKES, ids=lambda x: str(x)[:30]
 )
 def test_every_mistake_is_named(
-    kind: type,
-    options: dict[str, Any],
-    error: type[HspControlError],
-    message: str,
+    kind: type, options: dict[str, Any], error: type[HspControlError], message: str
 ) -> None:
     robot = load("panda")
     with pytest.raises(error) as caught:

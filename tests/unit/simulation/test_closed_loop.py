@@ -4,21 +4,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from closed_loops import (
-    EXACT,
-    order,
-    panda_controller,
-    planar_controller,
-    planar_start,
-)
+from closed_loops import EXACT, order, panda_controller, planar_controller, planar_start
 
-from hsp_control import (
-    Controller,
-    FramePosition,
-    Gains,
-    Robot,
-    simulate,
-)
+from hsp_control import Controller, FramePosition, Gains, Robot, simulate
 from hsp_control.common.arrays import Array
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants import RigidBodyPlant

@@ -16,11 +16,7 @@ from hsp_control.common.exceptions import (
     SimulationError,
 )
 from hsp_control.robot.integrators import Dop853
-from hsp_control.simulation.plants import (
-    ContactPlant,
-    RigidBodyPlant,
-    RigidContact,
-)
+from hsp_control.simulation.plants import ContactPlant, RigidBodyPlant, RigidContact
 
 FEET = {
     "talos": ("surface", ["left_sole_link", "right_sole_link"]),

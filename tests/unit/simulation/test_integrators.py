@@ -8,14 +8,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from closed_loops import (
-    EXACT,
-    ROBOTS,
-    distance,
-    load,
-    order,
-    start,
-)
+from closed_loops import EXACT, ROBOTS, distance, load, order, start
 
 import hsp_control as hsp
 from hsp_control import Robot

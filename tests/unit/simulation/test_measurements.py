@@ -12,11 +12,7 @@ from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation import simulate
 from hsp_control.simulation.control_chain import ControlChain
 from hsp_control.simulation.loops import sampled_loop
-from hsp_control.simulation.plants import (
-    IntegratedPlant,
-    RigidContact,
-    RigidContacts,
-)
+from hsp_control.simulation.plants import IntegratedPlant, RigidContact, RigidContacts
 
 pytest.importorskip("example_robot_data")
 FEET = ("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT")
