@@ -92,12 +92,20 @@ def _namespace(name: str, module: ModuleType, homes: dict[str, str]) -> str:
         lines += ["```{eval-rst}", f".. auto{kind}:: {path}"]
         if isclass(value):
             make_plain(value)
+            _describe_arguments(value)
             lines += ["   :members:", f"   :exclude-members: {_overridden(value)}"]
             # Those of the files that one class is written in have no page.
             if (bases := _bases(value)) and not any(_home(b) in homes for b in bases):
                 lines.append("   :inherited-members: Part")
         lines += ["```", ""]
     return "\n".join(lines)
+
+
+def _describe_arguments(value: type) -> None:
+    """Let a class say what its constructor takes, as a part does."""
+    made: Any = value.__init__  # type: ignore[misc]
+    if "Args:" in (made.__doc__ or "") and ".declaration." not in made.__module__:
+        value.__doc__ = f"{getdoc(value)}\n\n{getdoc(made)}"
 
 
 def _overridden(value: type) -> str:
