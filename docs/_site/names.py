@@ -90,8 +90,8 @@ def _namespace(name: str, module: ModuleType, homes: dict[str, str]) -> str:
             continue
         kind = "class" if isclass(value) else "function"
         lines += ["```{eval-rst}", f".. auto{kind}:: {path}"]
+        make_plain(value)
         if isclass(value):
-            make_plain(value)
             _describe_arguments(value)
             lines += ["   :members:", f"   :exclude-members: {_overridden(value)}"]
             # Those of the files that one class is written in have no page.
