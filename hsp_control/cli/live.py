@@ -56,6 +56,7 @@ def live(options: argparse.Namespace) -> int:
             "--faults and --cameras are for the simulated robot: leave them out with "
             "--robot"
         )
+    # What runs
     name = Path(loaded.document.name).stem
     loop_log = options.out / f"{name}-live.journal"
     robot_log = options.out / f"{name}-robot.journal"
@@ -97,6 +98,7 @@ def live(options: argparse.Namespace) -> int:
                 publisher.ended(report.ended, report.reason)
             return report
 
+        # A dry run compiles everything, before there is a clock
         dry_run_robot = InProcessRobot(simulated_robot(experiment))
         run_loop(
             command,
@@ -104,6 +106,7 @@ def live(options: argparse.Namespace) -> int:
             duration=min(duration, _DRY_RUN if plan is None else _DRY_RUN_OF_A_PLAN),
             **options_of_loop,
         )
+        # A robot, and what else listens
         hardware: Hardware | None = None
         if options.robot is not None:
             hardware = connect(options.robot, experiment.robot, live_period(experiment))
@@ -133,6 +136,7 @@ def live(options: argparse.Namespace) -> int:
             told = fault is None or fault in report.reason
             print(f"hsp: {report.reason if told else fault}", file=sys.stderr)
             return 2
+        # Or a simulated one, in a process of its own
         with RobotProcess(
             experiment,
             faults=faults,
@@ -142,6 +146,7 @@ def live(options: argparse.Namespace) -> int:
         ) as robot:
             report = run(robot.hardware)
             robot_report = robot.wait()
+    # What became of it
     link = robot.hardware.link
     counts = {**link.counts, "lost": link.lost}
     out.print(_times(report, experiment))

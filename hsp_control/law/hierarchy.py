@@ -107,6 +107,7 @@ def resolve_levels(
         block = slice(start, end)
         G_inv, rest, opposed = G_inverse[block, block], rows[0], rows[3]
         threshold = own[level]
+        # What is left for the level to do, and of that f - J a_f, at rest
         turns = False  # contacts do not: they stay where they are
         for k in range(end - start):
             turns = turns or springs[start + k] or yields[start + k] > 0.0
@@ -118,11 +119,13 @@ def resolve_levels(
             opposed[: end - start], held, above, level, following, thresholds
         )
         threshold = max(threshold, least_here)
+        # What it does with what those above leave
         x, V = pushed, square[1, : end - start, : end - start]
         smallest = _open_level(J[block], Q, QJ[:, block], square[0], V, x)
         _inverted(V, x, threshold, shares, G_inv)
         _add_level(QJ[:, block], G_inv, rest, shares, a)
         _add_level(QJ[:, block], G_inv, opposed, shares, drawn)
+        # What it leaves to those below, and how much it turns or is held
         if lends[level] > threshold:
             threshold = lends[level]
             _inverted(V, x, threshold, shares, G_inv)
@@ -147,6 +150,7 @@ def resolve_levels(
         _close_level(Q, QJ[:, block], G_inv, pushed)
         start = end
 
+    # The null space: x = g - v, and what the levels take of it and of its motion
     x, Wx, Y, bent = rows[0, :n], rows[1, :n], rows[2, :n], rows[3, :n]
     for i in range(n):
         x[i] = g[i] - v[i]
@@ -167,6 +171,7 @@ def resolve_levels(
                 Y[i] += J[start + k, i] * w[k]
                 bent[i] += J_dot[start + k, i] * w[k]
 
+    # e_N = Q W x, and φ_N of Equation (13) over the metric
     multiply(Q, Wx, e_N)
     if not controls:
         return damped

@@ -134,6 +134,7 @@ def frame_kinematics(
     computed[0] = stamp[0]
     J_world, J_world_dot, R_joint, p_joint, R_local, p_local, columns, dofs = carrier
     J, J_dot, R, p, velocity = motion
+    # Placement
     for i in range(3):
         p[i] = p_joint[i]
         for j in range(3):
@@ -146,6 +147,7 @@ def frame_kinematics(
         for i in range(6):
             J[i, j] = 0.0
             J_dot[i, j] = 0.0
+    # J and the velocity J v
     for i in range(6):
         velocity[i] = 0.0
         drift[i] = 0.0
@@ -161,6 +163,7 @@ def frame_kinematics(
     for j in range(v.shape[0]):
         for i in range(6):
             velocity[i] += J[i, j] * v[j]
+    # J' and the drift J' v; the frame's origin moves with u = p'
     ux, uy, uz = velocity[0], velocity[1], velocity[2]
     for k in range(columns.shape[0]):
         c, j = columns[k], dofs[k]

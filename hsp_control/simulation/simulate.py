@@ -135,6 +135,7 @@ def simulate(
     elif isinstance(plant, PlantPart):
         with within("plant"):
             plant = plant.build(robot, integrator)
+    # Rows, periods, and where it begins
     rows, periods = _count_rows(duration, log_period, control_period)
     check_plant(plant, robot)
     q = robot.check_configuration(q0).copy()
@@ -149,6 +150,7 @@ def simulate(
         raise _no_period("a plan decides once a period: it needs")
     if estimators and not periods:
         raise _no_period("estimators estimate once a period: they need")
+    # The loop
     running: RunningPlan | None = None
     if isinstance(plant, ContinuousPlant):
         loop = continuous_loop(controller, plant, integrator, times, q, v)
@@ -173,6 +175,7 @@ def simulate(
     else:
         name = type(plant).__name__
         raise _no_period(f"{name} holds the effort during a period: it needs")
+    # The log, and the run
     description = {**plant.describe(), **differing_bodies(plant, robot)}
     writer = LogWriter(
         controller,
