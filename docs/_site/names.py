@@ -110,13 +110,15 @@ def _describe_arguments(value: type) -> None:
 
 def _overridden(value: type) -> str:
     """Return the members that a base of ours documents already."""
-    bases = [each for each in value.__mro__[1:] if each.__module__.startswith("hsp_")]
-    theirs = {name for base in bases for name in vars(base)}
+    theirs = {name for base in _ours(value) for name in vars(base)}
     fields = set(vars(value).get("__annotations__", ()))
     return ", ".join(sorted(theirs & set(vars(value)) - fields)) or "model_config"
 
 
 def _bases(value: type) -> list[type]:
     """Return the bases that say what a class is, not how it is declared."""
-    bases = [each for each in value.__mro__[1:] if each.__module__.startswith("hsp_")]
-    return [each for each in bases if ".declaration." not in each.__module__]
+    return [each for each in _ours(value) if ".declaration." not in each.__module__]
+
+
+def _ours(value: type) -> list[type]:
+    return [each for each in value.__mro__[1:] if each.__module__.startswith("hsp_")]

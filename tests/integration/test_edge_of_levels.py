@@ -71,6 +71,15 @@ def test_an_orientation_below_a_spring_out_of_reach_rests(
     assert rests(robot, robot.home(), hand, below, period=PERIOD)
 
 
+def test_a_spring_above_an_orientation_rests_where_a_joint_is_at_its_limit() -> None:
+    """It swung at 8.5 Hz with what springs lend from 0.4 of the size on."""
+    q0 = np.array([-0.2527, 0.469, -0.1675, -1.8041, 0.0461, 0.8357, 0.2226])
+    goal, frame = [0.3359, -0.151, -0.899], load("iiwa14").end_effector
+    hand = hsp.FramePosition(frame, hsp.Hold(goal), impedance=hsp.Impedance(126.8))
+    below = hsp.FrameOrientation(frame, priority=2)
+    assert rests(load("iiwa14"), q0, hand, below, period=0.01)
+
+
 @pytest.mark.parametrize(
     ("q0", "goal"),
     [

@@ -190,6 +190,26 @@ def test_two_links_of_one_robot_push_each_other() -> None:
             assert not either.gradient(state, np.zeros(1)).any()
 
 
+def test_pairs_of_all_kinds_at_once_are_what_each_is_alone() -> None:
+    """Spheres and solids are measured apart, whatever the order of the pairs."""
+    robot, rng = load("panda"), np.random.default_rng(9)
+    links = [LinkShape("own", 7, random_place(rng, 0.1), Sphere(0.05).geometry())]
+    obstacles = []
+    for kind in ("box", "sphere", "plane", "capsule", "box"):
+        place = random_place(rng, 0.6)
+        where = Hold(place.translation), HoldOrientation(place.rotation)
+        obstacles.append(Obstacle(f"{kind}{len(obstacles)}", KINDS[kind](rng), *where))
+    mixed = Proximity(robot, links, obstacles, [(0, 1 + k) for k in range(5)])
+    state = robot.state(0.0, robot.random_configuration(rng), np.zeros(7))
+    distances, gradient = mixed.measure(state), np.zeros(7)
+    for k, obstacle in enumerate(obstacles):
+        alone = Proximity(robot, links, [obstacle], [(0, 1)])
+        assert alone.measure(state)[0] == distances[k]
+        np.testing.assert_array_equal(mixed.witness(k), alone.witness(0))
+        gradient += alone.gradient(state, np.ones(1))
+    np.testing.assert_allclose(mixed.gradient(state, np.ones(5)), gradient, atol=1e-14)
+
+
 SOLIDS: dict[str, Shape] = {
     "ball": Sphere(0.1),
     "box": Box([0.1, 0.1, 0.1]),
