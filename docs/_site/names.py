@@ -96,7 +96,7 @@ def _namespace(name: str, module: ModuleType, homes: dict[str, str]) -> str:
             lines += ["   :members:", f"   :exclude-members: {_overridden(value)}"]
             # Those of the files that one class is written in have no page.
             if (bases := _bases(value)) and not any(_home(b) in homes for b in bases):
-                lines.append("   :inherited-members: Part")
+                lines.append("   :inherited-members: Part, Declared")
         lines += ["```", ""]
     return "\n".join(lines)
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from types import FunctionType, UnionType
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
-from numpy import typing
+from numpy import ndarray, typing
 from sphinx.application import Sphinx
 
 
@@ -18,6 +18,8 @@ def plain(annotation: Any) -> Any:
     origin, args = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
         return plain(args[0])
+    if origin is ndarray:
+        return ndarray
     if origin in {Union, UnionType}:
         if set(args) >= _ARRAY_LIKE:
             args = (ArrayLike, *(each for each in args if each not in _ARRAY_LIKE))
