@@ -105,7 +105,9 @@ def as_gain(value: ArrayLike, name: str) -> Array:
         raise GainError(f"{name} has shape {gain.shape}; a matrix gain must be square")
     if not np.isfinite(gain).all():
         raise GainError(f"{name} is {gain.tolist()}; needs finite numbers")
-    smallest = float(np.diag(gain).min() if gain.ndim == 2 else gain.min())
-    if smallest <= 0.0:
-        raise GainError(f"{name} is {gain.tolist()}; must be greater than 0")
+    diagonal = np.diag(gain) if gain.ndim == 2 else gain.reshape(-1)
+    if diagonal.min() <= 0.0:
+        place = [int(diagonal.argmin())] * gain.ndim
+        where = f"{name}{place}" if place else name
+        raise GainError(f"{where} is {diagonal.min():g}; must be greater than 0")
     return gain
