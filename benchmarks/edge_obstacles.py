@@ -47,8 +47,8 @@ def measured(seed: int, kind: str, period: float) -> dict[str, float]:
     if kind == "pose":
         hand = hsp.FramePose(arm.frame, ComposedPose(hsp.Hold(goal)))
     below = [hsp.FrameOrientation(arm.frame, priority=2)] * (kind == "levels")
-    distances = [ObstacleDistance(LEAST)]
-    limits = hsp.Limits(effort_rate=1000.0, distances=distances)
+    barriers = [ObstacleDistance(LEAST)]
+    limits = hsp.Limits(effort_rate=1000.0, barriers=barriers)
     made = hsp.Controller(
         robot, [hand, *below], hsp.JointCentering(), limits=limits, scene=[ball]
     )

@@ -35,7 +35,6 @@ from hsp_control.null_space.fields import (
     ObstacleClearance,
     Rest,
     TargetPosture,
-    Transmission,
 )
 from hsp_control.trajectories import ComposedPose, HoldOrientation, TrajectorySample
 
@@ -75,7 +74,7 @@ def tasks() -> Iterator[Point]:
 
 
 def fields() -> Iterator[Point]:
-    """A Panda's pose with 0 to 6 fields."""
+    """A Panda's pose with 0 to 5 fields."""
     robot = hsp.Robot.load("panda")
     available: list[hsp.NullSpaceField] = [
         JointCentering(),
@@ -83,7 +82,6 @@ def fields() -> Iterator[Point]:
         TargetPosture(robot.home()),
         Manipulability(HAND),
         InverseCondition(HAND),
-        Transmission(HAND, direction=[0.0, 0.0, 1.0]),
     ]
     for n in range(len(available) + 1):
         field: hsp.NullSpaceField = Rest()
@@ -335,9 +333,9 @@ Ratios are valid for other machines, microseconds are not.
 ABOUT = {
     "joints": "A position task (3 rows) at the tip of a chain, and a posture",
     "tasks": "Positions of a chain of 40 joints, 3 rows each, and a posture",
-    "fields": "A Panda's pose; centering, limit barrier, posture, manipulability, "
-    "inverse condition and transmission, in this order; the last three differentiate "
-    "Jacobians, which determines the exponent",
+    "fields": "A Panda's pose; centering, limit barrier, posture, manipulability and "
+    "inverse condition, in this order; the last two differentiate Jacobians, which "
+    "determines the exponent",
     "levels": "Positions of a chain of 40 joints, one per level; in conflict: with a "
     "conflicting task for the first one at the lowest level",
     "obstacles": "A Panda's pose, posture, and moving balls against its 12 capsules",

@@ -32,6 +32,7 @@ if TYPE_CHECKING:  # what a type checker reads; the names are looked up below
     from .config import load_experiment as load_experiment
     from .constraints import contacts as contacts
     from .constraints import limits as limits
+    from .constraints.limits import Barrier as Barrier
     from .constraints.limits import Limits as Limits
     from .control import Controller as Controller
     from .control import ControlOutput as ControlOutput
@@ -88,7 +89,7 @@ _NAMES = {
         "Cost FunctionCost JointCentering Manipulability NullSpaceField "
         "ObstacleClearance Rest SelfClearance TargetPosture"
     ),
-    "constraints.limits": "Limits",
+    "constraints.limits": "Barrier Limits",
     "control": "ControlOutput Controller",
     "simulation": "Rollout simulate",
     "live": "run_loop",

@@ -12,19 +12,20 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, TypeAdapter
 from pydantic.json_schema import GenerateJsonSchema
 
-from hsp_control.common.exceptions import ConfigError, ViewerError
+from hsp_control.common.exceptions import ConfigError, FieldError, ViewerError
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits, LimitsOrNone
 from hsp_control.control.changes import Change
 from hsp_control.control.compensation import Compensation
 from hsp_control.control.estimator import Estimators
 from hsp_control.control.plan import Plan
-from hsp_control.declaration import Part
+from hsp_control.declaration import Part, within
 from hsp_control.declaration.nested import BY_NAME
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.declaration.quantities import (
     READ_ONLY,
     Flag,
+    Gain,
     Name,
     Positive,
     ReadOnlyDict,
@@ -32,12 +33,47 @@ from hsp_control.declaration.quantities import (
 )
 from hsp_control.geometry.scene import Scene
 from hsp_control.live.settings import LiveSettings
-from hsp_control.null_space.settings import NullSpaceSettings
+from hsp_control.null_space.fields import FieldSum, NullSpaceField
+from hsp_control.null_space.metrics import Metric
 from hsp_control.robot.description.robot_description import RobotDescription
 from hsp_control.simulation.initial_state import InitialState, StartOrAuto
 from hsp_control.simulation.plants import AnyPlant, RigidBody
 from hsp_control.simulation.simulate import SimulationSettings
 from hsp_control.tasks import Task
+
+
+def _summable(fields: Sequence[NullSpaceField]) -> tuple[NullSpaceField, ...]:
+    """Return the fields in a tuple."""
+    for k, each in enumerate(fields):
+        if len(fields) > 1 and not each.controls:
+            with within(k):
+                raise FieldError(f"{each.name!r} cannot be combined with other fields")
+    return tuple(fields)
+
+
+class NullSpaceSettings(Part, error=FieldError):
+    """The control of self-motion."""
+
+    gain: Gain = 10.0
+    """Null-space gain K_N [1/s], the rate at which the null-space error decays: a
+    number, nv numbers, or a matrix; over a metric that changes with q, one number."""
+    metric: Metric | None = None
+    """The joint-space metric W [-]; by default the identity, or the mass matrix if a
+    task has an impedance."""
+    fields: Annotated[Sequence[NullSpaceField], AfterValidator(_summable)] = ()
+    """Fields [rad/s or m/s]; their sum is used. Without fields, self-motion comes to
+    rest."""
+    singularity_threshold: Positive = 0.03
+    """Singular value of the task Jacobian below which its pseudo-inverse is damped
+    [-]."""
+
+    @property
+    def field(self) -> NullSpaceField | None:
+        """The sum of the fields; None if there are none."""
+        if len(self.fields) == 1:
+            return self.fields[0]
+        return FieldSum(self.fields) if self.fields else None
+
 
 _COLOR = "^#[0-9A-Fa-f]{6}$"
 

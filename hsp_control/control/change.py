@@ -421,10 +421,10 @@ def _exchanged(part: Holder, old: Obstacle, new: Obstacle) -> Holder:
 
 def _elsewhere(limits: RobotLimits, old: Obstacle, new: Obstacle) -> RobotLimits:
     """Return limits in which one obstacle is replaced by another one."""
-    if not limits.distances:
+    if not limits.barriers:
         return limits
-    moved = tuple(_exchanged(each, old, new) for each in limits.distances)
-    return replace(limits, distances=moved)
+    moved = tuple(_exchanged(each, old, new) for each in limits.barriers)
+    return replace(limits, barriers=moved)
 
 
 def _is(value: object, obstacle: Obstacle) -> bool:

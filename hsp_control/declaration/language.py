@@ -29,7 +29,7 @@ _KINDS = {
     dict: "a mapping",
 }
 _NAMESPACES = {
-    "distances": "limits",
+    "barriers": "limits",
     "drives": "plants",
     "estimators": "estimation",
     "orientations": "trajectories",

@@ -15,23 +15,21 @@ RATE_STEP = 1e-3
 """Largest step of `rate_along_flow` [s]; smaller if an entry of v exceeds 1."""
 
 
-def gradient(function: Callable[[RobotState], float], state: RobotState) -> Array:
-    """Return ∇f in the tangent space, shape (nv,), by fourth-order differences.
+def gradient(function: Callable[[RobotState], Any], state: RobotState) -> Array:
+    """Return ∇f in the tangent space, (*shape of f, nv), by fourth-order differences.
 
     (f(-2h) - 8 f(-h) + 8 f(h) - f(2h)) / 12h along each degree of freedom: 4 nv
     evaluations, with an error of about 1e-11 of the size of f.
     """
-    nv = state.robot.nv
-    result = np.empty(nv)
-    step = np.zeros(nv)
-    for i in range(nv):
-        total = 0.0
+    columns, step = [], np.zeros(state.robot.nv)
+    for i in range(len(step)):
+        total: Any = 0.0
         for factor, weight in _STENCIL:
             step[i] = factor * GRADIENT_STEP
-            total += weight * function(state.displaced(0.0, step))
+            total = total + weight * function(state.displaced(0.0, step))
         step[i] = 0.0
-        result[i] = total / GRADIENT_STEP
-    return result
+        columns.append(total / GRADIENT_STEP)
+    return np.stack(columns, axis=-1)
 
 
 def rate_along_flow(function: Callable[[RobotState], Any], state: RobotState) -> Array:

@@ -119,7 +119,7 @@ def test_the_error_equation_in_closed_loop(
 def test_within_limits_beside_a_ball_and_pushed(robot: Robot) -> None:
     ball = Obstacle("ball", Sphere(0.1), Hold([0.3, 0.0, 0.1]))
     clearance = ObstacleClearance([ball])
-    limits = Limits(distances=[ObstacleDistance(0.02, obstacles=[ball])])
+    limits = Limits(barriers=[ObstacleDistance(0.02, obstacles=[ball])])
     task = FramePosition("tip", Hold([0.39]), gains=gains(), axes="x", name="it")
     controller = Controller(
         robot, [task], clearance, null_space_gain=5.0, limits=limits

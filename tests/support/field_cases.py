@@ -18,7 +18,6 @@ from field_oracles import (
     barrier_oracle,
     centering_oracle,
     coupling,
-    direction,
     distance_oracle,
     equal_oracle,
     frames_of,
@@ -194,17 +193,6 @@ MEMBERS: dict[str, Member] = {
     "inverse_condition": of_spectrum(
         hsp.fields.InverseCondition,
         lambda n, G: -(len(G) ** 2) / np.trace(G) / np.trace(np.linalg.inv(G)),
-    ),
-    "transmission, velocity": of_spectrum(
-        hsp.fields.Transmission,
-        lambda n, G: -((direction(n) @ np.linalg.inv(G) @ direction(n)) ** -0.5),
-        direction=lambda n: 3.0 * direction(n),
-    ),
-    "transmission, force": of_spectrum(
-        hsp.fields.Transmission,
-        lambda n, G: -((direction(n) @ G @ direction(n)) ** -0.5),
-        direction=direction,
-        kind="force",
     ),
     "function_cost": of_cost(reach_cost, reach_oracle, accuracy=1e-9),
     "function_cost, gradient": of_cost(

@@ -363,11 +363,6 @@ def root_of_determinant(G: Array) -> float:
     return -float(np.sqrt(np.linalg.det(G)))
 
 
-def direction(name: str) -> Array:
-    u = np.array([0.6, -0.8, 0.5])[: len(position_axes(name))]
-    return u / np.linalg.norm(u)
-
-
 def coupling(name: str) -> Array:
     """Return a metric that couples all joints."""
     nv = load(name).nv

@@ -81,7 +81,7 @@ def _for_robot(name: str) -> dict[str, Any]:
         "center": {"type": "hold", "point": _listed(elbow + 6.0 * radius * across)},
     }
     clear = _above_the_floor(robot, 0.05 * size)
-    below = {"type": "obstacles", "obstacles": ["floor"], "links": clear}
+    below = {"type": "obstacle_distance", "obstacles": ["floor"], "links": clear}
     pose = robot.nv >= 6
     has_home = bool(np.any(robot.home() != robot.neutral()))
     return {
@@ -90,7 +90,9 @@ def _for_robot(name: str) -> dict[str, Any]:
         **({} if has_home else {"start": "auto"}),
         "scene": {"obstacles": {"ball": ball, **({"floor": floor} if clear else {})}},
         "tasks": {"hand": {"type": "frame_pose" if pose else "frame_position"}},
-        "limits": {"distances": [*([below] if clear else []), {"type": "self"}]},
+        "limits": {
+            "barriers": [*([below] if clear else []), {"type": "self_distance"}]
+        },
         "null_space": {
             "gain": 10,
             "fields": [

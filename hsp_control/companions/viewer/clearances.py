@@ -27,6 +27,7 @@ from hsp_control.companions.viewer.obstacles import (
     obstacle_tracks,
     surface_of,
 )
+from hsp_control.constraints.limits import MinimumDistance
 from hsp_control.control.controller import Controller
 from hsp_control.geometry.links import LinkShape
 from hsp_control.geometry.scene import Obstacle
@@ -78,7 +79,9 @@ def _clearances(controller: Controller) -> Iterator[Clearance]:
     """Yield the clearance fields, and those of the limits on distances."""
     yield from terms_of_type(controller.field, Clearance)  # type: ignore[type-abstract]
     if controller.limits is not None:
-        yield from (each.clearance for each in controller.limits.distances)
+        for each in controller.limits.barriers:
+            if isinstance(each, MinimumDistance):
+                yield each.clearance
 
 
 def _measured_shapes(

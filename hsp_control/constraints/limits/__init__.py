@@ -1,18 +1,19 @@
-"""Limits of motors, joints and distances."""
+"""Limits of motors and joints, and barriers."""
 
 from hsp_control.common.entry_points import own_names
 
+from .barriers import Barrier as Barrier
+from .barriers import MinimumDistance as MinimumDistance
+from .barriers import ObstacleDistance as ObstacleDistance
+from .barriers import SelfDistance as SelfDistance
+from .barriers import StaticEffort as StaticEffort
 from .joint_numbers import ByJoint as ByJoint
 from .joint_numbers import PositionRange as PositionRange
 from .joint_numbers import PositionsByJoint as PositionsByJoint
 from .joint_numbers import Scaled as Scaled
 from .limits import Limits as Limits
 from .limits import LimitsOrNone as LimitsOrNone
-from .limits import MinimumDistance as MinimumDistance
-from .limits import ObstacleDistance as ObstacleDistance
 from .limits import RobotLimits as RobotLimits
-from .limits import SelfDistance as SelfDistance
-from .limits import StaticEffort as StaticEffort
 from .limits import own_limits as own_limits
 
 __dir__ = own_names(__name__)

@@ -1,18 +1,16 @@
-"""Limits of a robot: what is declared, and what it is for one robot, distances too."""
+"""Limits of a robot: what is declared, and what it is for one robot."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import KW_ONLY, dataclass, replace
-from functools import cached_property
-from typing import Annotated, Literal, Self
+from dataclasses import KW_ONLY, dataclass
+from typing import Annotated, Literal
 
 import numpy as np
-import pinocchio as pin
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator
 
-from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LimitError
 from hsp_control.constraints.limits.acceleration_bounds import MotionLimits
+from hsp_control.constraints.limits.barriers import Barrier, StaticEffort
 from hsp_control.constraints.limits.joint_numbers import (
     Maximum,
     PositionRange,
@@ -27,187 +25,13 @@ from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import (
     ArrayField,
     Fraction,
-    Names,
     NonNegative,
     Positive,
     Share,
     read_only,
 )
 from hsp_control.geometry.scene import Scene, Start
-from hsp_control.null_space.fields import Clearance, ObstacleClearance, SelfClearance
-from hsp_control.null_space.fields.clearance import ObstacleOrName
-from hsp_control.robot import Robot, RobotState
-
-_STEP = 3e-4
-"""Step of the differences of efforts along the motion [s]: rounding and truncation
-errors are equal near 1e-7."""
-_SPAN = 3e-3
-"""Step of those of distances [s]. The curvature of a capsule jumps where its side ends,
-and so would efforts: this far ahead and behind makes a ramp of it, at an error of a
-hundredth of a m/s² at 2 m/s, 0.1 m away."""
-_TURN = 1e-4
-"""How far joints turn to see what an acceleration does to distances [rad]."""
-_AHEAD = 0.5
-"""A pair gets a row if its distance may come close to the minimum within this time [s]
-at its present rate."""
-_NEAR = 0.5
-"""A motor gets one if gravity takes more than this part of what it may take, now or
-within the time `_AHEAD` at the present rate."""
-
-
-class MinimumDistance(Part, ABC, family="distances", error=LimitError):
-    """The distances of some pairs of shapes stay above a minimum.
-
-    With h = d - minimum, the rows require h'' + 2α h' + α² h ≥ 0 (an exponential
-    control barrier function). h'' = ∇d·a + the drift of d' at constant velocity; the
-    drift includes the motion of the obstacles and of the nearest points.
-
-    A subclass implements `clearance` and, if it refers to the scene, `placed`. `rows`
-    and `check_start` are for placed ones.
-    """
-
-    minimum: NonNegative
-    """The minimum distance [m]."""
-
-    @property
-    @abstractmethod
-    def clearance(self) -> Clearance:
-        """The field that knows the pairs of shapes."""
-
-    def placed(self, start: Start) -> Self:
-        """Return the distances with obstacles instead of their names, checked."""
-        self.clearance.proximity(start.state)
-        return self
-
-    def rows(
-        self, state: RobotState, bandwidth: float, wanted: Array
-    ) -> tuple[Array, Array]:
-        """Return the rows A a ≥ b, (k, nv) and (k,), of pairs close or approaching.
-
-        Others have one as soon as the wanted acceleration, shape (nv,), takes half of
-        what b leaves: an effort with a limited rate could not follow a row that is
-        violated where it appears.
-        """
-        proximity = self.clearance.proximity(state)
-        d = proximity.measure(state).copy()
-        ahead = self._distances(state.ahead(_SPAN))
-        behind = self._distances(state.ahead(-_SPAN))
-        rate = (ahead - behind) / (2.0 * _SPAN)
-        drift = (ahead - 2.0 * d + behind) / _SPAN**2
-        h = d - self.minimum
-        near = h + _AHEAD * np.minimum(rate, 0.0) < 2.0 / bandwidth
-        b = -drift - 2.0 * bandwidth * rate - bandwidth**2 * h
-        # no joint moves a point by more than the robot's size for each radian
-        most = float(np.sqrt(len(wanted) * (wanted @ wanted)))
-        if np.where(near, -np.inf, b).max() > -2.0 * state.robot.size * most:
-            step = _TURN / max(most, 1.0)
-            turned = self._distances(state.displaced(0.0, step * wanted))
-            near |= (turned - d) / step < 0.5 * b
-        chosen = np.flatnonzero(near)
-        A = np.zeros((len(chosen), state.robot.nv))
-        for row, k in enumerate(chosen):
-            slopes = np.zeros(len(d))
-            slopes[k] = 1.0
-            A[row] = proximity.gradient(state, slopes)
-        return A, b[chosen]
-
-    def _distances(self, state: RobotState) -> Array:
-        return self.clearance.proximity(state).measure(state).copy()
-
-    def check_start(self, state: RobotState) -> None:
-        """Check that no pair starts closer than the minimum distance."""
-        distance, pair = self.clearance.proximity(state).nearest(state)
-        if distance < self.minimum:
-            raise LimitError(
-                f"the start is outside the limits: {pair} are {distance:.4g} m apart, "
-                f"must be at least {self.minimum:g} m"
-            )
-
-
-class ObstacleDistance(MinimumDistance, type="obstacles"):
-    """Minimum distance between links and obstacles."""
-
-    minimum: NonNegative = 0.02
-    """The minimum distance [m]."""
-    _: KW_ONLY
-    obstacles: (
-        Annotated[Sequence[ObstacleOrName], Field(min_length=1), AfterValidator(tuple)]
-        | None
-    ) = None
-    """Names of the obstacles; or, in Python, the obstacles themselves [-]; all of the
-    scene by default."""
-    links: Names | None = None
-    """Names of the links [-]; all moving links by default."""
-
-    @cached_property
-    def clearance(self) -> ObstacleClearance:
-        """The field that knows the pairs of shapes."""
-        return ObstacleClearance(obstacles=self.obstacles, links=self.links)
-
-    def placed(self, start: Start) -> Self:
-        """Return the distances, checked; see `MinimumDistance.placed`."""
-        obstacles = self.clearance.fitted(start).obstacles
-        return super(ObstacleDistance, replace(self, obstacles=obstacles)).placed(start)
-
-
-class SelfDistance(MinimumDistance, type="self"):
-    """Minimum distance between links."""
-
-    minimum: NonNegative = 0.01
-    """The minimum distance [m]."""
-
-    @cached_property
-    def clearance(self) -> SelfClearance:
-        """The field that knows the pairs of shapes."""
-        return SelfClearance()
-
-
-@dataclass(frozen=True, eq=False)
-class StaticEffort:
-    """Gravity takes at most a part of every motor's effort.
-
-    Else an arm reaches postures in which its motors cannot hold it, and falls. A
-    motor's gravity effort, G_i(q), depends on the posture only, so this is a limit on
-    postures: with h = share - |G_i|/effort_i, the rows require h'' + 2α h' + α² h ≥ 0,
-    with G_i'' = ∇G_i·a + the drift of G_i' at constant velocity. Robots with mimic
-    joints are not supported.
-
-    Attributes:
-        effort: Maximum effort, shape (nv,) [N·m or N]; inf where unlimited.
-        share: The part of it that gravity may take, in (0, 1].
-    """
-
-    effort: Array
-    share: float
-
-    def rows(
-        self, state: RobotState, bandwidth: float, excluded: Indices
-    ) -> tuple[Array, Array]:
-        """Return the rows A a ≥ b, (k, nv) and (k,), of the motors near their limit.
-
-        Efforts of ``excluded`` dofs, from root to contact, depend on contact forces.
-        """
-        robot, model = state.robot, state.robot.model
-        data = state.made(self, "data", model.createData)
-        slope = pin.computeGeneralizedGravityDerivatives(model, data, state.q)
-
-        def gravity(dt: float) -> Array:
-            """Return G(q ⊕ v dt), shape (nv,)."""
-            q = pin.integrate(model, state.q, dt * state.v) if dt else state.q
-            return np.array(pin.computeGeneralizedGravity(model, data, q))
-
-        G, ahead, behind = gravity(0.0), gravity(_STEP), gravity(-_STEP)
-        rate = slope @ state.v
-        sign = np.where(G < 0.0, -1.0, 1.0)
-        used, growth = sign * G / self.effort, sign * rate / self.effort
-        soon = used + _AHEAD * np.maximum(growth, 0.0)
-        near = np.isfinite(self.effort) & (soon > _NEAR * self.share)
-        near[[*robot.unactuated, *excluded]] = False
-        i = np.flatnonzero(near)
-        side = (sign / self.effort)[i]
-        drift = side * (ahead - 2.0 * G + behind)[i] / _STEP**2
-        b = drift + 2.0 * bandwidth * growth[i] - bandwidth**2 * (self.share - used[i])
-        return -side[:, None] * slope[i], b
+from hsp_control.robot import Robot
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -225,7 +49,7 @@ class RobotLimits:
         upper: Upper joint position limit, shape (nv,) [rad or m].
         motion: What the barriers keep: position and velocity limits less their margins,
             the maximum acceleration and α, as a record for kernels.
-        distances: The minimum distances.
+        barriers: Minimum distances, and other barriers.
         static_effort: The limit on the effort against gravity, if any.
     """
 
@@ -236,7 +60,7 @@ class RobotLimits:
     lower: Array
     upper: Array
     motion: MotionLimits
-    distances: tuple[MinimumDistance, ...] = ()
+    barriers: tuple[Barrier, ...] = ()
     static_effort: StaticEffort | None = None
 
     @property
@@ -250,7 +74,7 @@ class RobotLimits:
         return float(self.motion.bandwidth[0])
 
     def check_start(self, q: Array, v: Array) -> None:
-        """Check that a start is within the limits; distances are those at t = 0."""
+        """Check that a start is within the limits; barriers are those at t = 0."""
         names = self.robot.dof_names
         positions = self.robot.joint_positions(q)
         outside = np.flatnonzero((positions < self.lower) | (positions > self.upper))
@@ -261,7 +85,7 @@ class RobotLimits:
                 f" its limits are {self.lower[i]:.6g} to {self.upper[i]:.6g}"
             )
         state = self.robot.state(0.0, q, v)
-        for each in self.distances:
+        for each in self.barriers:
             each.check_start(state)
         fast = np.flatnonzero(np.abs(v) > self.velocity)
         if fast.size:
@@ -280,7 +104,7 @@ _HELD = 0.95
 
 
 class Limits(Part, error=LimitError):
-    """Limits on effort, joint motion and distances, which the controller keeps.
+    """Limits on effort, joint motion and barriers, which the controller keeps.
 
     The limits on efforts and their rate are hard. Those on position, velocity and
     acceleration become bounds on the acceleration, by barriers that let the robot
@@ -295,7 +119,7 @@ class Limits(Part, error=LimitError):
     margin. j is what the effort's rate can do to the acceleration. Distances and the
     effort against gravity have barriers of their own. Where limits contradict each
     other they are relaxed in this order: static effort, acceleration, velocity,
-    position, distance. Effort limits are never relaxed.
+    position, barriers. Effort limits are never relaxed.
 
     Where a limit binds, the null space deviates from the law first, and then the tasks,
     the lowest priority first.
@@ -331,8 +155,8 @@ class Limits(Part, error=LimitError):
     α², but not by its mean of late, once `Controller.applied` tells the period."""
     velocity_margin: Share = 0.02
     """Margin inside the speed limits, as a fraction of the limit [-]."""
-    distances: Annotated[Sequence[MinimumDistance], AfterValidator(tuple)] = ()
-    """Minimum distances [m]."""
+    barriers: Annotated[Sequence[Barrier], AfterValidator(tuple)] = ()
+    """Minimum distances, and other functions of the posture that have a minimum [-]."""
     bandwidth: Positive | None = None
     """Bandwidth α of the barriers [1/s]: 10 by default, or what a plan needs. Motors
     can follow 5 to 20: faster barriers act so late that they need more than the effort
@@ -353,10 +177,10 @@ class Limits(Part, error=LimitError):
             velocity = maximum(self.velocity, own_speeds(robot), robot)
         with within("position"):
             lower, upper, margin = self._positions(robot)
-        distances = []
-        for k, each in enumerate(self.distances):
-            with within("distances", k):
-                distances.append(each.placed(start))
+        barriers = []
+        for k, each in enumerate(self.barriers):
+            with within("barriers", k):
+                barriers.append(each.placed(start))
         with within("effort_rate"):
             effort_rate = maximum(self.effort_rate, robot.effort_rate, robot)
         return RobotLimits(
@@ -374,7 +198,7 @@ class Limits(Part, error=LimitError):
                 read_only(effort_rate / robot.largest_inertias),
                 read_only([BANDWIDTH if self.bandwidth is None else self.bandwidth]),
             ),
-            distances=tuple(distances),
+            barriers=tuple(barriers),
             static_effort=self._static_effort(robot, effort),
         )
 

@@ -161,18 +161,18 @@ class Actuation:
         return self._nearest(a, motion_ok, barriers)
 
     def _barriers(self) -> Barriers:
-        """Return the rows A a ≥ lower for distances and static efforts, by kind."""
+        """Return the rows A a ≥ lower for barriers and static efforts, by kind."""
         limits, state = self._limits.limits, self._state
         found: dict[str, tuple[Array, Array]] = {}
         if limits is None:
             return found
-        if limits.distances:
+        if limits.barriers:
             wanted = self._wanted.acceleration
             parts = [
-                each.rows(state, limits.bandwidth, wanted) for each in limits.distances
+                each.rows(state, limits.bandwidth, wanted) for each in limits.barriers
             ]
             A, lower = (np.concatenate(each) for each in zip(*parts, strict=True))
-            found["distances"] = A, lower
+            found["barriers"] = A, lower
         if limits.static_effort is not None:
             found["holding"] = limits.static_effort.rows(
                 state, limits.bandwidth, self._support.supporting_dofs

@@ -6,7 +6,7 @@ g the contact forces in robot weights. The rows, in this order:
     base        (M a + N - F f)_base = 0                          no motor acts there
     effort      bounds on M a + N - F f, within the rate limit of the last effort
     cones       friction cones of f
-    barriers    ∇d·a and ∇G·a from `MinimumDistance` and `StaticEffort`
+    barriers    ∇h·a and ∇G·a from `Barrier` and `StaticEffort`
     contacts    J_c δ = 0, only where limits contradict each other: else it holds
                 because no direction of the contacts is among those that may move
 
@@ -202,7 +202,7 @@ def _write_result(
     return int(status[0])
 
 
-_RELAXATION_COST = {"contacts": 1e3, "distances": 30.0, "motion": 1.0, "holding": 0.1}
+_RELAXATION_COST = {"contacts": 1e3, "barriers": 30.0, "motion": 1.0, "holding": 0.1}
 """Cost of a violation, where limits contradict each other: the most expensive kind is
 relaxed last."""
 _REGULARISATION, _ROUNDS = 1e-6, 4
@@ -214,7 +214,7 @@ violation."""
 _STATUS = tuple(Status)  # by index: a call of `Status` takes 0.3 µs
 
 Barriers = Mapping[str, tuple[Array, Array]]
-"""Rows A a ≥ b by kind, ``distances`` or ``holding``: A, shape (k, nv), and b, (k,)."""
+"""Rows A a ≥ b by kind, ``barriers`` or ``holding``: A, shape (k, nv), and b, (k,)."""
 
 
 class LimitedStep:
@@ -351,7 +351,7 @@ class LimitedStep:
 
     def _relax(self, barriers: dict[str, Indices]) -> tuple[Status | None, float]:
         """Relax the limits as little as possible, and solve again."""
-        # Contacts are kept longest, then distances, then joint motion, see
+        # Contacts are kept longest, then barriers, then joint motion, see
         # `_RELAXATION_COST`.
         A, end = self._rows.A, self._rows.end
         lower, upper = self._rows.lower, self._rows.upper

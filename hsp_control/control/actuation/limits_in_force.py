@@ -167,7 +167,7 @@ class LimitSet:
             np.full(nv, np.inf),
         )
         # whether there are but bounds on accelerations and efforts
-        self.box = limits is None or not (limits.distances or limits.static_effort)
+        self.box = limits is None or not (limits.barriers or limits.static_effort)
         self.rate = False  # whether the effort's rate is limited
         if limits is None:
             return
@@ -276,7 +276,7 @@ def _mean(
 ) -> RobotLimits | None:
     """Return the limits that a mixture keeps: the weighted mean of the numbers."""
     # The bounds on efforts and accelerations are linear in them. Where one of them is
-    # inf, so is the mean. Distances are those of all sets.
+    # inf, so is the mean. Barriers are those of all sets.
     if len(sets) == 1:
         return sets[0][0]
     numbers = np.sum([w * _numbers(each, robot.nv) for each, w in sets], axis=0)
@@ -290,7 +290,7 @@ def _mean(
         lower=lower,
         upper=upper,
         motion=MotionLimits._make((*motion, numbers[-1:])),
-        distances=tuple(one for each, _ in sets if each for one in each.distances),
+        barriers=tuple(one for each, _ in sets if each for one in each.barriers),
     )
 
 

@@ -18,7 +18,6 @@ from .joint_costs import LimitBarrier as LimitBarrier
 from .joint_costs import TargetPosture as TargetPosture
 from .manipulability import InverseCondition as InverseCondition
 from .manipulability import Manipulability as Manipulability
-from .manipulability import Transmission as Transmission
 from .point_distance import PointDistance as PointDistance
 from .vector_field import FunctionField as FunctionField
 from .vector_field import Rest as Rest

@@ -259,11 +259,11 @@ def test_minimum_distances_of_limits_are_drawn_and_unmeasured_links_are_not(
     experiment, rollout = planar
     assert not drawn(experiment, rollout, recorder).paths("/capsules")
     assert not any("(measured)" in name for name in names(recorder))
-    limits = "limits={distances: [{type: self}]}"
+    limits = "limits={barriers: [{type: self_distance}]}"
     kept = load_experiment(SPATIAL, limits, "null_space.fields=[{type: rest}]")
     layer = capsules(kept.controller, "/capsules")
     assert kept.controller.limits is not None
-    (limit,) = kept.controller.limits.distances
+    (limit,) = kept.controller.limits.barriers
     shapes = limit.clearance.proximity(kept.controller.state)
     joints = {shapes.links[i].joint for pair in shapes.pairs for i in pair}
     nodes = {f"/capsules/{kept.robot.model.names[joint]}" for joint in joints}

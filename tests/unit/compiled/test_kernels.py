@@ -53,7 +53,6 @@ from hsp_control.null_space.fields import (
     Rest,
     SelfClearance,
     TargetPosture,
-    Transmission,
 )
 from hsp_control.null_space.metrics import (
     ConstantMetric,
@@ -132,8 +131,6 @@ def fields(robot: Robot, frame: str) -> dict[str, NullSpaceField]:
         "root": Manipulability(frame, rows="pose", length=0.5),
         "log": Manipulability(frame, form="log", metric=2.0 * np.eye(robot.nv)),
         "condition": InverseCondition(frame),
-        "velocity": Transmission(frame, direction=[0.0, 0.6, 0.8]),
-        "force": Transmission(frame, direction=[0.0, 0.6, 0.8], kind="force"),
         "point": PointDistance([frame], ball),
         "sum": JointCentering()
         + Ramp(initial=0.0, final=1.0, start=0.0, duration=2.0) * Manipulability(frame),

@@ -22,6 +22,12 @@ class Nod(hsp.Cost, type="nod_of_a_test"):
     '''How high [m].'''
     def value(self, state):
         return (state.q[3] - self.height) ** 2
+class Above(hsp.Barrier, type="above_of_a_test"):
+    '''A frame stays above a height.'''
+    frame: str
+    '''Its name.'''
+    def values(self, state):
+        return state.position(self.frame)[2]
 """
 CONFIG = """
 robot: {name: panda}
@@ -29,6 +35,7 @@ tasks: {hand: {type: frame_position}}
 null_space:
   fields: [{type: function_cost, function: elbow, weight: 20},
            {type: nod_of_a_test, height: 1}]
+limits: {barriers: [{type: above_of_a_test, frame: panda_tcp, minimum: 0.2}]}
 simulation: {duration: 0.02, control_period: 0.001}
 """
 
@@ -43,6 +50,7 @@ def costs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     yield path
     sys.modules.pop(path.stem, None)
     hsp.NullSpaceField.family.members.pop("nod_of_a_test", None)
+    hsp.Barrier.family.members.pop("above_of_a_test", None)
 
 
 def test_yaml_names_what_a_file_has(
@@ -60,6 +68,8 @@ def test_yaml_names_what_a_file_has(
     elbow, nod = experiment.controller.field.terms  # type: ignore[attr-defined]
     assert elbow == 20.0 * hsp.FunctionCost(sys.modules[costs.stem].elbow)
     assert nod.height == 1.0
+    (above,) = experiment.scenario.limits.barriers  # type: ignore[union-attr]
+    assert above.minimum == 0.2
     assert "function: elbow" in experiment.to_yaml()
 
 

@@ -28,14 +28,13 @@ from hsp_control.common.resources import bundled_configs
 from hsp_control.config import json_schema
 from hsp_control.config.document import Document
 from hsp_control.config.loaded_scenario import validate
-from hsp_control.config.scenario import Scenario
+from hsp_control.config.scenario import NullSpaceSettings, Scenario
 from hsp_control.constraints.limits import ObstacleDistance, Scaled
 from hsp_control.control.changes import ChangeGains
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.geometry import Obstacle
 from hsp_control.geometry.scene import Scene
 from hsp_control.null_space.metrics import MassMatrixMetric
-from hsp_control.null_space.settings import NullSpaceSettings
 from hsp_control.tasks import FramePosition
 from hsp_control.trajectories import Hold
 
@@ -55,7 +54,8 @@ EVERYTHING: dict[str, Any] = {
     "limits": {"effort": {"scale": {"panda_joint1": 0.5}}, "velocity": "none",
      "acceleration": [None, 1, 1, 1, 1, 1, 1],
      "position": {"lower": -3, "upper": [3, 3, 3, None, 3, 3, 3]},
-     "distances": [{"type": "obstacles", "obstacles": ["ball"]}, {"type": "self"}]},
+     "barriers": [{"type": "obstacle_distance", "obstacles": ["ball"]},
+                  {"type": "self_distance"}]},
     "null_space": {"gain": [[2, 1], [0, 2]],
      "metric": {"type": "constant", "matrix": [1, 2]}, "fields": [
         {"type": "joint_centering", "weight": {"final": 1, "duration": 2}},
@@ -180,7 +180,7 @@ def test_obstacles_that_parts_hold_are_in_the_scene() -> None:
     """YAML names obstacles; what holds one in Python is written with its name."""
     ball = Obstacle("ball", Sphere(0.1), Hold([0.6, 0.4, 0.6]))
     field = JointCentering() + 20.0 * ObstacleClearance([ball])
-    limits = Limits(distances=[ObstacleDistance(obstacles=[ball])])
+    limits = Limits(barriers=[ObstacleDistance(obstacles=[ball])])
     experiment = Experiment("panda", [FramePose("panda_tcp")], field, limits=limits)
     assert experiment.scenario.scene == Scene([ball])
     again = load_experiment(yaml.safe_load(experiment.to_yaml()))

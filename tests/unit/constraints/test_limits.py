@@ -76,7 +76,7 @@ def test_by_default_they_are_the_robots_own() -> None:
     np.testing.assert_array_equal(limits.motion.jerk, jerk)
     assert np.isinf(limits.acceleration).all()
     assert limits.bandwidth == 10.0
-    assert limits.distances == ()
+    assert limits.barriers == ()
 
 
 def test_by_default_gravity_may_overload_no_motor_of_an_arm() -> None:
@@ -183,12 +183,12 @@ MISFITS: list[tuple[Any, dict[str, Any], type[HspControlError], str, str]] = [
         *("static_effort", "does not support mimic joints; panda has some"),
     ),
     (
-        *(panda, {"distances": [SelfDistance(), ObstacleDistance(obstacles=["bal"])]}),
-        *(SceneError, "distances.1.obstacles.0", "obstacle 'bal'; did you mean 'ball'"),
+        *(panda, {"barriers": [SelfDistance(), ObstacleDistance(obstacles=["bal"])]}),
+        *(SceneError, "barriers.1.obstacles.0", "obstacle 'bal'; did you mean 'ball'"),
     ),
     (
-        *(panda, {"distances": [ObstacleDistance(links=["panda_hnd"])]}, FieldError),
-        *("distances.0.links.0", "'panda_hnd' has no geometry; did you mean 'panda_h"),
+        *(panda, {"barriers": [ObstacleDistance(links=["panda_hnd"])]}, FieldError),
+        *("barriers.0.links.0", "'panda_hnd' has no geometry; did you mean 'panda_h"),
     ),
 ]
 

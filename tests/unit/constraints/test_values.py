@@ -21,9 +21,9 @@ from hsp_control.constraints.contacts import (
     SurfaceContact,
 )
 from hsp_control.constraints.limits import (
+    Barrier,
     ByJoint,
     Limits,
-    MinimumDistance,
     ObstacleDistance,
     PositionRange,
     PositionsByJoint,
@@ -70,7 +70,7 @@ TRIED = [
     Limits(effort="none", velocity=Scaled({"b": 0.5, "a": 2}), position="none"),
     Limits(effort=np.ones(7), acceleration=[3.0, None], static_effort=1),
     Limits(position=PositionRange(-1.0, [1.0, None]), effort=ByJoint({"b": 5, "a": 2})),
-    Limits(distances=(ObstacleDistance(0.1, obstacles=[BALL]), SelfDistance(0.0))),
+    Limits(barriers=(ObstacleDistance(0.1, obstacles=[BALL]), SelfDistance(0.0))),
 ]
 """And what is given in some other form."""
 
@@ -93,9 +93,9 @@ def test_they_are_values(part: Part) -> None:
             PointContact("a", schedule=Schedule([(None, 1.0)])),
         ),
         (
-            MinimumDistance,
-            {"type": "obstacles", "minimum": 0.1, "obstacles": ["a"], "links": ["b"]},
-            ObstacleDistance(0.1, obstacles=["a"], links=["b"]),
+            Barrier,
+            {"type": "obstacle_distance", "obstacles": ["a"], "links": ["b"]},
+            ObstacleDistance(obstacles=["a"], links=["b"]),
         ),
     ],
 )
@@ -110,7 +110,10 @@ def test_limits_as_yaml_says_them() -> None:
         "effort_rate": 1000,
         "acceleration": [1, None],
         "position": {"lower": [-1, None], "upper": [1, 2]},
-        "distances": [{"type": "self"}, {"type": "obstacles", "minimum": 0.1}],
+        "barriers": [
+            {"type": "self_distance"},
+            {"type": "obstacle_distance", "minimum": 0.1},
+        ],
     }
     assert Limits(**data) == Limits(
         effort=Scaled({"a": 0.5}),
@@ -118,7 +121,7 @@ def test_limits_as_yaml_says_them() -> None:
         effort_rate=1000.0,
         acceleration=[1.0, np.inf],
         position=PositionRange([-1.0, -np.inf], [1.0, 2.0]),
-        distances=(SelfDistance(), ObstacleDistance(0.1)),
+        barriers=(SelfDistance(), ObstacleDistance(0.1)),
     )
 
 
@@ -156,8 +159,8 @@ WRONG: dict[type[Part], list[tuple[str, Any, str]]] = {
         ("position", {"least": 0}, r"'least' \(allowed: lower, upper, joints\)"),
         ("position_margin", -0.1, "must be at least 0"),
         ("velocity_margin", 1.0, "must be less than 1"),
-        ("distances", [{"type": "obstacle"}], "0.type: unknown type 'obstacle'; did"),
-        ("distances", [Sphere(0.1)], "distances"),
+        ("barriers", [{"type": "obstacle"}], "0.type: unknown type 'obstacle'; did"),
+        ("barriers", [Sphere(0.1)], "barriers"),
         ("bandwidth", 0.0, "must be greater than 0"),
         ("static_effort", 1.01, "must be at most 1"),
     ],

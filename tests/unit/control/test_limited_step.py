@@ -172,13 +172,13 @@ def test_distances_are_relaxed_less_than_motion_and_motion_less_than_holding() -
     made.compute(0.0, panda().home(), np.zeros(7))
     bounds, first = actuation_of(made)._limits.bounds, np.eye(7)[5]
     bounds.tau_lower[:], bounds.tau_upper[:] = -np.inf, np.inf
-    for kind, cost in (("distances", 30.0), ("holding", 0.1)):
+    for kind, cost in (("barriers", 30.0), ("holding", 0.1)):
         bounds.a_upper[5], bounds.a_lower[5] = 1.0, -np.inf
         _, a, _, status, relaxation = repeated(made, {kind: row(first, 5.0)})
         assert status == Status.RELAXED
         assert (a[5] - 1.0) / (5.0 - a[5]) == pytest.approx(cost, rel=1e-3)
         assert relaxation == pytest.approx(max(a[5] - 1.0, 5.0 - a[5]), rel=1e-4)
-    both = {"distances": row(first, 5.0), "holding": row(-first, 5.0)}
+    both = {"barriers": row(first, 5.0), "holding": row(-first, 5.0)}
     bounds.a_upper[5] = np.inf
     a = repeated(made, both)[1]
     assert (a[5] + 5.0) / (5.0 - a[5]) == pytest.approx(300.0, rel=1e-2)
@@ -190,7 +190,7 @@ def test_contacts_are_relaxed_less_than_distances() -> None:
     rise = stack.resolution.problem.task.jacobian[2]
     a = stack.resolution.acceleration
     asked = row(rise, float(rise @ a) + 4.0)
-    _, found, _, status, _ = repeated(made, {"distances": asked})
+    _, found, _, status, _ = repeated(made, {"barriers": asked})
     assert status == Status.RELAXED
     moved = float(rise @ (found - a))
     assert moved / (4.0 - moved) == pytest.approx(30.0 / 1e3, rel=0.05)

@@ -328,7 +328,7 @@ def test_things_stay_apart() -> None:
     proximity = clearance.proximity(at_home(robot).state)
     least: dict[bool, float] = {}
     for limited in (False, True):
-        limits = hsp.Limits(distances=[ObstacleDistance(0.02)])
+        limits = hsp.Limits(barriers=[ObstacleDistance(0.02)])
         law = elbow(limits if limited else None)
         rollout = held(law, robot.home(), duration=1.6)
         least[limited] = min(

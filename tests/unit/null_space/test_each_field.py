@@ -28,7 +28,6 @@ from hsp_control.null_space.fields import (
     PointDistance,
     Ramp,
     StateWeight,
-    Transmission,
     Uncontrolled,
 )
 from hsp_control.null_space.fields.weight import Product
@@ -105,11 +104,7 @@ def test_frames_obstacles_and_terms_are_placed() -> None:
     state = robot.state(0.0, robot.home(), np.zeros(7))
     far = replace(OBSTACLE, name="far", center=Hold([9.0, 9.0, 9.0]))
     scene = [OBSTACLE, far]
-    for field in (
-        Manipulability(),
-        InverseCondition(axes="xy"),
-        Transmission(direction=[0, 0, 1]),
-    ):
+    for field in (Manipulability(), InverseCondition(axes="xy")):
         found = placed(field, state)
         assert found.frame == robot.end_effector
         assert found == replace(field, frame=robot.end_effector)

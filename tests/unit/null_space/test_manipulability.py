@@ -22,7 +22,7 @@ from hsp_control.common.exceptions import (
 )
 from hsp_control.declaration.quantities import Positive
 from hsp_control.null_space import differences
-from hsp_control.null_space.fields import InverseCondition, Manipulability, Transmission
+from hsp_control.null_space.fields import InverseCondition, Manipulability
 from hsp_control.null_space.fields.jacobian_cost import (
     JacobianCost,
     JacobianTerms,
@@ -82,11 +82,6 @@ def singular_members(robot: Robot, frame: str, axes: str) -> dict[str, JacobianC
                     frame, rows=rows, axes=axes, **options
                 )
         members[f"condition {rows}"] = InverseCondition(frame, rows=rows, axes=axes)
-    for kind in ("velocity", "force"):
-        for u in np.eye(len(axes)):
-            members[f"{kind} {u}"] = Transmission(
-                frame, direction=u, kind=kind, axes=axes
-            )
     return members
 
 
@@ -131,7 +126,6 @@ def test_finite_at_every_singularity(name: str) -> None:
 # -- what cannot be --------------------------------------------------------------------
 
 PANDA = {"frame": "panda_tcp"}
-UP = {"direction": [0.0, 0.0, 1.0]}
 MISTAKES: list[tuple[type, dict[str, Any], type[HspControlError], str]] = [
     (Manipulability, {"frame": "panda_tpc"}, FrameNotFoundError,
      "frame: no frame 'panda_tpc'; did you mean 'panda_tcp'? (the model has "),
@@ -141,7 +135,7 @@ MISTAKES: list[tuple[type, dict[str, Any], type[HspControlError], str]] = [
      "Manipulability: rows: unknown value 'positions'; did you mean 'position'?"),
     (InverseCondition, {"axes": "xw"}, FieldError, "axes: 'xw' must be distinct"),
     (Manipulability, {"length": 0.0}, FieldError, "length: 0.0 is too small; must be"),
-    (Transmission, UP | {"length": 1.0}, FieldError, "length: unknown argument 'len"),
+    (InverseCondition, {"size": 1.0}, FieldError, "size: unknown argument 'size'"),
     (Manipulability, {"metric": np.ones((6, 7))}, FieldError,
      "Manipulability: metric has shape (6, 7); needs (nv, nv), symmetric"),
     (Manipulability, {"metric": np.ones((7, 7))}, FieldError,
@@ -153,16 +147,6 @@ MISTAKES: list[tuple[type, dict[str, Any], type[HspControlError], str]] = [
      "are singular everywhere"),
     (InverseCondition, {"frame": "panda_link5", "rows": "pose"}, FieldError,
      "6 rows of frame 'panda_link5', which only 5 degrees"),
-    (Transmission, {"direction": [0, 0, 0]}, FieldError,
-     "Transmission: direction [0.0, 0.0, 0.0] needs 3 numbers, one for each of the "
-     "axes 'xyz', of a length that is not 0 or infinite"),
-    (Transmission, {}, FieldError, "Transmission: missing argument 'direction'"),
-    (Transmission, {"direction": [1, 0, 0], "axes": "xy"}, FieldError,
-     "needs 2 numbers, one for each of the axes 'xy'"),
-    (Transmission, {"direction": [1, np.nan, 0]}, FieldError,
-     "Transmission: direction.1: nan is not a finite number"),
-    (Transmission, UP | {"kind": "speed"}, FieldError,
-     "Transmission: kind: unknown value 'speed' (allowed: velocity, force)"),
 ]  # fmt: skip
 
 
