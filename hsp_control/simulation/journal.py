@@ -4,14 +4,15 @@ An ``.npz`` has all rows of a column in one place and its directory at the end, 
 can only be written when a run is over. Until then the rows stand in a file to which
 is only appended: the line `MAGIC`, then frames, each of
 
-    kind     1 byte: H a heading, R a row, E the end
+    kind     1 byte: H a heading, R a row, N a note, E the end
     length   4 bytes, of the payload
     check    4 bytes, CRC-32 of kind and payload
     payload
 
 all little-endian. A heading is JSON: the log's meta data and the shape of every column;
 another one follows when columns are added or grow. A row is the columns' numbers in
-the order of the heading. The end is JSON: the status of the run and more.
+the order of the heading. The end is JSON: the status of the run and more. A note is
+JSON of another kind: a sweep's journal has one for each run.
 Each frame is one `write`. After that the operating system has it, and a killed process
 loses nothing that it wrote. Reading stops at the first incomplete frame.
 """
@@ -36,7 +37,7 @@ MAGIC = b"hsp_control journal 1\n"
 KILLED = "the journal has no end: its writer was killed"
 
 _FRAME = struct.Struct("<cII")
-_HEADING, _ROW, _END = b"H", b"R", b"E"
+_HEADING, _ROW, _NOTE, _END = b"H", b"R", b"N", b"E"
 
 Shapes = Mapping[str, tuple[int, ...]]
 """The shape of each column in one row."""
@@ -45,8 +46,11 @@ Shapes = Mapping[str, tuple[int, ...]]
 class JournalWriter:
     """Writes a journal."""
 
-    def __init__(self, path: Path) -> None:
-        """Begin a journal; an existing file is overwritten, unless a run writes it."""
+    def __init__(self, path: Path, resumed: "JournalReader | None" = None) -> None:
+        """Begin a journal, or go on after what a reader of it has read.
+
+        Else an existing file is overwritten, unless another process writes it.
+        """
         self.path = path  # the file
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -56,9 +60,11 @@ class JournalWriter:
             raise self._failure(error) from error
         try:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            os.ftruncate(self._file, 0)
-            self._put(MAGIC)
-            self._size = len(MAGIC)
+            self._size = 0 if resumed is None else resumed.whole()
+            os.ftruncate(self._file, self._size)
+            if not self._size:
+                self._put(MAGIC)
+                self._size = len(MAGIC)
         except OSError as error:
             self.close()
             raise self._failure(error) from error
@@ -70,6 +76,10 @@ class JournalWriter:
     def write_row(self, numbers: Array) -> None:
         """Write a row, shape (n,): the numbers of all columns of the last heading."""
         self._frame(_ROW, numbers.astype("<f8", copy=False).tobytes())
+
+    def write_note(self, note: Mapping[str, Any]) -> None:
+        """Write a note, JSON data."""
+        self._frame(_NOTE, _json(note))
 
     def write_end(self, status: str, message: str, **meta: Any) -> None:
         """Write how the run ended, and meta data that replaces the heading's."""
@@ -102,7 +112,7 @@ class JournalWriter:
     def _failure(self, error: OSError) -> LogError:
         reason = error.strerror or str(error)
         if isinstance(error, BlockingIOError):
-            reason = "another run is writing it; wait for it, or give another --out"
+            reason = "another process writes it; wait for it, or give another --out"
         return LogError(f"{self.path}: cannot write the journal: {reason}")
 
 
@@ -116,6 +126,7 @@ class JournalReader:
         self.meta: dict[str, Any] = {}
         self.count = 0  # the rows that were read
         self.ended = False  # whether the writer has written its end
+        self.notes: list[Any] = []  # all of them
         self._most, self._at = most, len(MAGIC)
         self._parts: list[tuple[Shapes, list[Array]]] = []
 
@@ -137,9 +148,17 @@ class JournalReader:
                 self.count += 1
                 if self._most is not None:
                     del self._parts[:-1], self._parts[-1][1][: -self._most]
+            elif kind == _NOTE:
+                self.notes.append(json.loads(payload))
             elif kind == _END:
                 self.meta, self.ended = {**self.meta, **json.loads(payload)}, True
         return self.count - before
+
+    def whole(self) -> int:
+        """Read what has come, and return how many bytes of all are whole frames."""
+        self.read()
+        begun = self.path.is_file() and self.path.stat().st_size >= len(MAGIC)
+        return self._at if begun else 0
 
     def rows(self, first: int) -> dict[str, Array]:
         """Return the columns from a row on, as far as they are kept."""

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from hsp_control.common.exceptions import SweepError
-from hsp_control.companions.sweeps.journal import Journal, journal_of
+from hsp_control.companions.sweeps.journal import SweepJournal, journal_of
 from hsp_control.companions.sweeps.parquet import require_parquet
 from hsp_control.companions.sweeps.plan import SweepPlan
 from hsp_control.companions.sweeps.results import Sweep
@@ -33,11 +33,11 @@ class Store:
         self.rows: dict[int, SweepRow] = {}
         self._described: dict[str, Measure] = {}
         self._plan, self._identity, self._out = plan, identity, out
-        self._journal: Journal | None = None
+        self._journal: SweepJournal | None = None
         if out is None:
             return
         require_parquet()
-        self._journal = Journal(journal_of(out))
+        self._journal = SweepJournal(journal_of(out), fresh=fresh)
         try:
             if not fresh:
                 self._resume(out, self._journal)
@@ -46,7 +46,7 @@ class Store:
             if self._journal.identity is None:
                 self._journal.path.unlink()
             raise
-        if self._journal.identity is None or fresh:
+        if self._journal.identity is None:
             self._journal.begin(identity)
 
     @property
@@ -75,7 +75,7 @@ class Store:
             self._journal.remove()
         return sweep
 
-    def _resume(self, out: Path, journal: Journal) -> None:
+    def _resume(self, out: Path, journal: SweepJournal) -> None:
         if journal.identity is not None:
             self._compare(journal.path, journal.identity)
         earlier: list[SweepRow] = []

@@ -18,9 +18,15 @@ from sweep_runs import MOVING, OVER, QUICK
 
 import hsp_control as hsp
 from hsp_control.cli import main
-from hsp_control.common.exceptions import ConfigError, HspControlError, SweepError
+from hsp_control.common.exceptions import (
+    ConfigError,
+    HspControlError,
+    LogError,
+    SweepError,
+)
 from hsp_control.companions.sweeps import Choices, Sweep, local_workers
-from hsp_control.companions.sweeps.journal import Journal, journal_of
+from hsp_control.companions.sweeps.journal import SweepJournal, journal_of
+from hsp_control.simulation.journal import JournalReader, JournalWriter
 
 pytestmark = [pytest.mark.process, pytest.mark.slow]
 
@@ -177,10 +183,11 @@ def test_a_killed_sweep_goes_on_where_it_was(
     assert main(["plot", str(out)]) == 2
     assert "the same command resumes it" in capsys.readouterr().err
     journal = journal_of(out)
-    lines = journal.read_text().splitlines()
-    rows = [json.loads(line)["row"] for line in lines if '"row"' in line]
-    with journal.open("a") as file:  # killed in the middle of a write
-        file.write('{"row": {"run": 19, "status": "compl')
+    read = JournalReader(journal)
+    read.read()
+    rows = [note["row"] for note in read.notes if "row" in note]
+    with journal.open("ab") as file:  # killed in the middle of a write
+        file.write(b'N\x90\x00\x00\x00....{"row": {"run": 19, "status": "compl')
     resumed = finish(out)
     same(resumed, whole)
     assert len(rows) >= 3
@@ -306,9 +313,9 @@ def test_a_urdf_that_changed_is_another_sweep(tmp_path: Path) -> None:
 
 def test_one_process_at_a_time(tmp_path: Path) -> None:
     out = tmp_path / "one.parquet"
-    journal = Journal(journal_of(out))
+    journal = SweepJournal(journal_of(out), fresh=False)
     try:
-        with pytest.raises(SweepError, match="another process is writing this sweep"):
+        with pytest.raises(LogError, match="another process writes it"):
             hsp.sweeps.sweep(MOVING, OVER, overrides=QUICK, out=out)
     finally:
         journal.remove()
@@ -323,9 +330,16 @@ def test_files_that_are_no_sweep_are_refused(tmp_path: Path, content: bytes) -> 
     assert out.read_bytes() == content
     assert not journal_of(out).exists()
     journal_of(out).write_bytes(b"mine\n")
-    with pytest.raises(SweepError, match="not the journal of a sweep"):
-        hsp.sweeps.sweep(MOVING, OVER, overrides=QUICK, out=out)
-    assert journal_of(out).read_bytes() == b"mine\n"
+    JournalWriter(tmp_path / "run").write_heading({"t": ()}, {"format": "hsp"})
+    for there, error, message in (
+        (b"mine\n", LogError, "is no journal"),
+        ((tmp_path / "run").read_bytes(), SweepError, "the journal of a run"),
+    ):
+        journal_of(out).write_bytes(there)
+        for fresh in (False, True):
+            with pytest.raises(error, match=message):
+                hsp.sweeps.sweep(MOVING, OVER, overrides=QUICK, out=out, fresh=fresh)
+        assert journal_of(out).read_bytes() == there
 
 
 def test_another_program_s_parquet_is_refused(tmp_path: Path) -> None:
