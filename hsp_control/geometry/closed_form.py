@@ -20,7 +20,6 @@ import coal
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.identity_cache import IdentityCache
 from hsp_control.compiled.kernels import KernelCall, KernelCalls, kernel
 from hsp_control.compiled.rotations import cross, rotate, rotate_back
 from hsp_control.geometry.links import LinkShape
@@ -102,16 +101,18 @@ class ClosedFormDistances:
         self._of_segments, self._of_solids = self._pairs[~solid], self._pairs[solid]
         # number of calls of `measure`, at any state, shape (1,)
         self.measurements: Indices = np.zeros(1, dtype=np.int64)
-        self._plans = IdentityCache(
-            lambda state, *arrays: state.plan(self.calls(state, *arrays))
-        )
-        self._derivatives = IdentityCache(
-            lambda state, *arrays: state.plan(self.derivatives(state, *arrays)).call()
-        )
 
     def measure(self, state: RobotState, distances: Array) -> None:
         """Write the distances [m] at the indices ``places`` of ``distances``."""
-        self._plans.get(state, distances).run(state.t)
+
+        def make() -> tuple[Array, KernelCalls]:
+            found = np.zeros(len(distances))
+            return found, self.calls(state, found)
+
+        found, run = state.prepared(self, "distances", make)
+        run()
+        places = self._pairs[:, 2]
+        distances[places] = found[places]
 
     def calls(self, state: RobotState, distances: Array) -> KernelCalls:
         """Return the calls of `measure` for this state and this array."""
@@ -134,12 +135,28 @@ class ClosedFormDistances:
         first, second = self._sizes[self._pairs[k, :2], 6]
         return x - first * n, y + second * n, -n
 
-    def differentiate(self, state: RobotState, *sums: Array) -> None:
-        """Write Σ b'(d_k) ∇d_k and its rate, after `measure` at this state.
+    def differentiate(
+        self,
+        state: RobotState,
+        slopes: Array,
+        curvatures: Array,
+        gradient: Array,
+        rate: Array,
+    ) -> None:
+        """Write Σ b'(d_k) ∇d_k and its rate, (nv,) each, after `measure` at this state.
 
-        ``sums`` are b' and b'' of all distances, and what is written, (nv,) each.
+        ``slopes`` and ``curvatures`` are b' and b'' of all distances.
         """
-        self._derivatives.get(state, *sums)()
+
+        def make() -> tuple[_Sums, KernelCalls]:
+            written = np.zeros((2, state.robot.nv))
+            sums = _Sums(*np.zeros((2, len(slopes))), *written)
+            return sums, self.derivatives(state, *sums)
+
+        sums, run = state.prepared(self, "derivatives", make)
+        sums.slopes[:], sums.curvatures[:] = slopes, curvatures
+        run()
+        gradient[:], rate[:] = sums.gradient, sums.rate
 
     def derivatives(self, state: RobotState, *sums: Array) -> KernelCalls:
         """Return the calls of `differentiate` for these arguments."""

@@ -171,9 +171,6 @@ class Proximity:
         ]
         self._measured: RobotState | None = None
         self._stamp = -1, -1
-        # For `gradient`, always the same arrays: a kernel is bound to them once.
-        self._slopes, self._curvatures = np.zeros((2, len(pairs)))
-        self._gradient, self._rate = np.zeros((2, robot.nv))
 
     def measure(self, state: RobotState) -> Array:
         """Return all distances at a state, shape (k,) [m]; computed once per state."""
@@ -200,14 +197,13 @@ class Proximity:
     def gradient(self, state: RobotState, slopes: Array) -> Array:
         """Return Σ slopes_k ∇d_k, shape (nv,); pairs with slope 0 are skipped."""
         self.measure(state)
-        self._slopes[:], self._gradient[:], self._rate[:] = slopes, 0.0, 0.0
+        gradient, rate = np.zeros((2, state.robot.nv))
         if self.closed_form is not None:
-            self.closed_form.differentiate(
-                state, self._slopes, self._curvatures, self._gradient, self._rate
-            )
+            flat = np.zeros(len(slopes))
+            self.closed_form.differentiate(state, slopes, flat, gradient, rate)
         if self.coal is not None:
-            self.coal.add_gradient(state, slopes, self._gradient)
-        return self._gradient.copy()
+            self.coal.add_gradient(state, slopes, gradient)
+        return gradient
 
     def nearest(self, state: RobotState) -> tuple[float, str]:
         """Return the minimum distance [m] and the names of its pair, ``a to b``."""

@@ -12,7 +12,6 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ConfigError
-from hsp_control.common.identity_cache import IdentityCache
 from hsp_control.common.version import __version__
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.controller import Controller
@@ -79,7 +78,8 @@ class LogWriter:
         self._columns = columns = LogColumns(rows)
         self._settled: object = None
         self._law: Record | None = None  # of the present row
-        self._sources = IdentityCache(self._find_sources)
+        self._active: ActiveStack | None = None  # what `_sources` are of
+        self._sources: list[tuple[str, Array]] = []  # what the law writes for columns
         robot, column = controller.robot, columns.add
         nv, units = robot.nv, dict.fromkeys(robot.units)
         joint_unit = " or ".join(units)
@@ -150,7 +150,7 @@ class LogWriter:
             self._tasks.update()
             self._terms.update()
             columns.lay_out()
-            self._sources = IdentityCache(self._find_sources)
+            self._active = None
         row = columns.row
         row["t"][...] = state.t
         row["q"][:], row["v"][:], row["tau"][:] = state.q, state.v, tau
@@ -188,13 +188,16 @@ class LogWriter:
     def _fill_law(self, state: RobotState, output: ControlOutput) -> None:
         controller, columns = self._controller, self._columns
         active = controller.active_stack
-        self._law = law = output.explanation(self._law)
+        before = self._law
+        self._law = law = output.explanation(before)
+        if active is not self._active or law is not before:
+            self._active, self._sources = active, self._find_sources(active, law)
         diagnostics = controller.diagnose()
         values = diagnostics.singular_values
         columns.widen("singular_values", len(values))
         columns.lay_out()
         row = columns.row
-        for name, source in self._sources.get(active, law):
+        for name, source in self._sources:
             row[name][:] = source
         self._tasks.write_law(active, output)
         row["field.value"][...] = diagnostics.field_value

@@ -2,13 +2,13 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache, partial
 from itertools import permutations
 
 import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.identity_cache import IdentityCache
 from hsp_control.companions.plots.palette import FIELD, TASK, WARNING
 from hsp_control.companions.viewer import threejs
 from hsp_control.companions.viewer.analysis import (
@@ -164,8 +164,8 @@ def self_motion(
     """
     size, model = motion.size, controller.robot.model
     radius, controls = _RADIUS * size, controller.field.controls
-    rates = IdentityCache(lambda motion: _joint_rates(controller, motion))
-    positions, *both = rates.get(motion)
+    rates = lru_cache(maxsize=1)(partial(_joint_rates, controller))
+    positions, *both = rates(motion)
     speeds = np.maximum(*(np.linalg.norm(each, axis=2) for each in both))
     joints = _select_joints(positions, speeds.mean(axis=0), _MIN_SPACING * size)
     fast = float(np.quantile(speeds.max(axis=1), 0.9))
@@ -184,7 +184,7 @@ def self_motion(
                 yield set_object(node("field", joint), wide)
 
     def tracks(motion: RunMotion) -> Iterator[Track]:
-        positions, velocities, fields = rates.get(motion)
+        positions, velocities, fields = rates(motion)
         kinds = [("velocity", velocities, radius)]
         if controls:
             kinds.append(("field", fields, _WIDENING * radius))

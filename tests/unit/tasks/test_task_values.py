@@ -307,3 +307,18 @@ def test_one_task_serves_many_states_of_many_robots_in_many_threads(cls: Any) ->
     for task, *_ in work:  # functions of the fields alone
         assert set(vars(task)) - fields <= {"_desired", "_axis", "_normals"}
         assert pickle.loads(pickle.dumps(task)) == task
+
+
+def test_a_changed_copy_of_a_part_computes_for_itself() -> None:
+    """At the same state: a task whose gains are replaced."""
+    robot = Robot.load("planar3r")
+    q = robot.integrate(robot.home(), np.array([0.3, 0.2, 0.1]))
+    state = robot.state(0.0, q, np.ones(3))
+    gains, path = Gains(25.0, 10.0), Hold([1.0, 1.0])
+    task = FramePosition("tip", path, gains=gains, axes="xy")
+    first = task.evaluate(state)
+    other = replace(task, gains=Gains(100.0, 10.0))
+    theirs, mine = other.evaluate(state), task.evaluate(state)
+    np.testing.assert_array_equal(mine.acceleration, first.acceleration)
+    extra = 75.0 * mine.error
+    np.testing.assert_allclose(theirs.acceleration, mine.acceleration + extra)
