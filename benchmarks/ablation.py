@@ -39,7 +39,7 @@ ROLLOUTS, WAYS, POINTS = 24, 6, 1000  # of a robot; of a way
 _LIMITS = "constraints/limits/acceleration_bounds.py"
 _COST = "control/actuation/deviation_cost.py"
 _EDGE = "law/threshold.py"
-_SENT = "control/actuation/limits_in_force.py"
+_SENT = "control/actuation/sent_effort.py"
 _MODEL = "robot/model.py"
 
 Edit = tuple[str, str, str]

@@ -14,9 +14,10 @@ from hsp_control.common.exceptions import ControllerError, ImmutableError
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits, RobotLimits
 from hsp_control.control.actuation.limits_in_force import LimitsInForce
+from hsp_control.control.bound_step import BoundStep
 from hsp_control.control.changes import Change, Changes, TimeLine
 from hsp_control.control.gains_in_force import GainsInForce, check_held
-from hsp_control.control.mixture import BoundStep, Mixture
+from hsp_control.control.mixture import Mixture
 from hsp_control.control.setup import Base, DeclaredController
 from hsp_control.control.targets import RAMP, followed_stream, new_stream, target_of
 from hsp_control.geometry.scene import Obstacle, Scene, Start

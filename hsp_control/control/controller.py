@@ -12,10 +12,11 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ControllerError, NonFiniteError
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation.limited_step import RELAXED
+from hsp_control.control.bound_step import FreeStep
 from hsp_control.control.changes import Change
 from hsp_control.control.composition import Composition, PresentRun
 from hsp_control.control.first_state import check_angles, warn_of_jump
-from hsp_control.control.mixture import AccelerationModifier, FreeStep
+from hsp_control.control.mixture import AccelerationModifier
 from hsp_control.control.output import ControlOutput, Diagnostics
 from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState

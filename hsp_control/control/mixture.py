@@ -1,24 +1,20 @@
 """Steps while tasks and limits fade in and out: mixtures of what each set delivers."""
 
 from collections.abc import Callable, Collection, Sequence, Set
-from functools import cached_property
 from itertools import pairwise
-from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
-from hsp_control.compiled.kernels import kernel
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation import Actuation, Delivered
-from hsp_control.control.actuation.actuation import LOOK
 from hsp_control.control.actuation.limits_in_force import LimitSet, LimitsInForce
 from hsp_control.control.actuation.support import Support
+from hsp_control.control.bound_step import BoundStep
 from hsp_control.control.evolution import PlannedContact
 from hsp_control.control.gains_in_force import GainsInForce
 from hsp_control.control.setup import PlannedTask, Setup, levels_of
-from hsp_control.law.resolution import BEYOND_ANY_LEVEL, DAMPED, NOT_FINITE
+from hsp_control.law.resolution import DAMPED, NOT_FINITE
 from hsp_control.robot import RobotState
 
 AccelerationModifier = Callable[
@@ -159,7 +155,7 @@ class Mixture:
         )
         return Delivered(effort, a, force, max(statuses), max(relaxations))
 
-    def bound_step(self) -> "BoundStep | None":
+    def bound_step(self) -> BoundStep | None:
         """Return the step that was made last as one call; None if it may change."""
         if not self.steady or self.active is None:
             return None
@@ -212,66 +208,6 @@ class Mixture:
                 self.actuation(stack, limits)
             self._stacks[key] = stack
         return self._stacks[key]
-
-
-class BoundStep:
-    """A step while nothing changes: state, references, law and limits as one call."""
-
-    def __init__(
-        self,
-        state: RobotState,
-        active: ActiveStack,
-        actuation: Actuation,
-        limits: LimitsInForce,
-    ) -> None:
-        self.active = active
-        self.damped = ""  # tasks of the first level with a bounded inverse, by name
-        # whether the effort is M a + N wherever no limit is violated
-        self.direct = actuation.direct
-        self.move = state.bind_move([*active.calls, *actuation.calls()])
-        self._state, self._actuation, self._limits = state, actuation, limits
-        self._code = active.resolution.code
-
-    def make(self, t: float, q: ArrayLike, v: ArrayLike) -> Delivered:
-        """Move to a state; return what is delivered there."""
-        value = self._state.advance(self.move, t, q, v)
-        self.damped = ""
-        if value == 0.0 and self.direct:
-            return self._actuation.own
-        active, level = self.active, self._code.item(0)
-        if level == BEYOND_ANY_LEVEL:
-            active.raise_not_finite()
-        if level:
-            self.damped = active.damped
-        if self.direct and value < LOOK:
-            return self._actuation.own
-        return self._actuation.delivered(active.acceleration)
-
-    @cached_property
-    def free(self) -> "FreeStep | None":
-        """What a compiled loop calls instead; None if more is needed than that."""
-        if self.active.streamed or not self.direct:
-            return None
-        sending = self._limits.applying(self.active.acceleration)
-        return FreeStep(self.move, self._state.effort, sending)
-
-
-class FreeStep(NamedTuple):
-    """What `compute` and `applied` of a controller do where no limit is violated."""
-
-    # (t, q, v) ↦ a number that `is_free` understands; the effort and the acceleration
-    # are written
-    move: Callable[[float, Array, Array], float]
-    effort: Array  # M a + N, shape (nv,) [N·m or N]
-    # calls of the time that record that this effort is held from now on, for the period
-    # of the last `Controller.applied`
-    sending: Sequence[Callable[[float], Any]]
-
-
-@kernel
-def is_free(value: float) -> bool:
-    """Return whether what a move returned means: valid, finite, no limit violated."""
-    return 0.0 <= value < LOOK
 
 
 def _mean(shares: Sequence[float], parts: Sequence[Array]) -> Array:

@@ -19,7 +19,7 @@ from hsp_control.control.actuation.support import Support
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.inverse_kinematics import Target, reach
 from hsp_control.tasks import CenterOfMass, FramePose, FramePosition, Task
-from hsp_control.tasks.axes import axis_indices
+from hsp_control.tasks.frame_position import axis_indices
 
 _TIMES = 40
 """At how many times of a run a target is looked at."""

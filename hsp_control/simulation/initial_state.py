@@ -26,7 +26,7 @@ from hsp_control.geometry.scene import Scene
 from hsp_control.robot import Robot
 from hsp_control.robot.inverse_kinematics import Target
 from hsp_control.tasks import FrameOrientation, FramePose, FramePosition, Task
-from hsp_control.tasks.axes import axis_indices
+from hsp_control.tasks.frame_position import axis_indices
 from hsp_control.tasks.frame_task import frame_of
 
 

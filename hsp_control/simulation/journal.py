@@ -60,11 +60,11 @@ class JournalWriter:
             raise self._failure(error) from error
         try:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            self._size = 0 if resumed is None else resumed.whole()
-            os.ftruncate(self._file, self._size)
-            if not self._size:
+            kept = 0 if resumed is None else resumed.whole()
+            os.ftruncate(self._file, kept)
+            if not kept:
                 self._put(MAGIC)
-                self._size = len(MAGIC)
+            self._size = kept or len(MAGIC)
         except OSError as error:
             self.close()
             raise self._failure(error) from error

@@ -15,8 +15,8 @@ from hsp_control.compiled.adapters import run
 from hsp_control.compiled.kernels import kernel
 from hsp_control.compiled.native import NativeCall, are_native, rows_of
 from hsp_control.compiled.native_move import NativeMove, make_move
+from hsp_control.control.bound_step import FreeStep, is_free
 from hsp_control.control.controller import Controller
-from hsp_control.control.mixture import FreeStep, is_free
 from hsp_control.robot.integrators import Steps
 from hsp_control.simulation.limit_excess import LimitExcess
 from hsp_control.simulation.plants import IntegratedPlant

@@ -11,8 +11,8 @@ from hsp_control.declaration.quantities import Axes, Positive
 from hsp_control.geometry.scene import Start
 from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
-from hsp_control.tasks.axes import axis_indices, track_axes
 from hsp_control.tasks.feedback import ErrorPart, Feedback
+from hsp_control.tasks.frame_position import axis_indices, track_axes
 from hsp_control.tasks.frame_task import TrackingTask, place_point
 from hsp_control.tasks.task import Task
 from hsp_control.trajectories import Hold, Trajectory

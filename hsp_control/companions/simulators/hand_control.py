@@ -15,7 +15,7 @@ from hsp_control.control.compensation import Command
 from hsp_control.control.controller import Controller
 from hsp_control.robot import Robot
 from hsp_control.tasks import FramePose, FramePosition, Gains, Task
-from hsp_control.tasks.axes import axis_indices
+from hsp_control.tasks.frame_position import axis_indices
 from hsp_control.trajectories import ComposedPose, Stream, StreamPose
 
 _JUMP = 1.5

@@ -38,7 +38,8 @@ from hsp_control.control.actuation.limited_step import (
     Status,
     Wanted,
 )
-from hsp_control.control.actuation.limits_in_force import Held, LimitSet, observe
+from hsp_control.control.actuation.limits_in_force import LimitSet
+from hsp_control.control.actuation.sent_effort import Held, observe
 from hsp_control.control.actuation.support import Support
 from hsp_control.law import Resolution
 from hsp_control.law.resolution import BEYOND_ANY_LEVEL

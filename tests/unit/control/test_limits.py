@@ -14,7 +14,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.constraints.limits import ObstacleDistance, RobotLimits
 from hsp_control.constraints.limits.acceleration_bounds import acceleration_bounds
 from hsp_control.control.actuation import Status
-from hsp_control.control.actuation.limits_in_force import SentEffort, observe
+from hsp_control.control.actuation.sent_effort import SentEffort, observe
 from hsp_control.geometry import Scene
 from hsp_control.geometry.scene import Start
 from hsp_control.simulation.plants import Push, RigidBodyPlant

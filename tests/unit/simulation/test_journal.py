@@ -344,3 +344,15 @@ def test_what_a_killed_hsp_run_leaves_is_a_log_for_all_commands(
     with np.load(tmp_path / "2_rest,simulation.duration=0.02.npz") as log:
         assert len(log["t"]) == 3
     capsys.readouterr()
+
+
+@pytest.mark.parametrize("torn", [b"", b"N", b"N\x09\x00\x00\x00....{}"])
+def test_it_goes_on_after_a_torn_frame(torn: bytes, tmp_path: Path) -> None:
+    for begun in range(3):  # the first time there is none
+        reader = JournalReader(tmp_path / "a.journal")
+        writer = JournalWriter(reader.path, reader)
+        assert reader.notes == [{"k": k} for k in range(begun)]
+        writer.write_note({"k": begun})
+        writer.close()
+        with reader.path.open("ab") as file:
+            file.write(torn)

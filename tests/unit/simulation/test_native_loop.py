@@ -23,9 +23,9 @@ from hsp_control.config import Experiment
 from hsp_control.constraints.limits import RobotLimits
 from hsp_control.control.actuation import Status
 from hsp_control.control.actuation.actuation import LOOK
+from hsp_control.control.bound_step import BoundStep, FreeStep, is_free
 from hsp_control.control.changes import Changes
 from hsp_control.control.controller import Controller
-from hsp_control.control.mixture import BoundStep, FreeStep, is_free
 from hsp_control.robot.integrators import SemiImplicitEuler
 from hsp_control.simulation import loops
 from hsp_control.simulation.limit_excess import LimitExcess
