@@ -257,7 +257,7 @@ class _RobotLog:
     def row(self, t: float, q: Array, v: Array, last: bool) -> None:
         """Write the row of a period, if one is due."""
         robot = self._robot
-        self._excess.see(self._controller.limits, q, v)
+        self._excess.record(self._controller.limits, q, v)
         if self._due.is_due(t, robot.phase, last=last):
             self.log.record(*self._row(t, q, v))
             self._due.written(t, robot.phase)
@@ -273,7 +273,7 @@ class _RobotLog:
         log_channels = {
             **live_channels(phase=float(robot.phase)),
             **robot.plant.log_channels(t, q, v, robot.tau),
-            **self._excess.take(self._controller.limits),
+            **self._excess.collect(self._controller.limits),
         }
         return state, output, robot.tau, log_channels
 

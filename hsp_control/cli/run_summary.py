@@ -73,9 +73,9 @@ def summary(rollout: Rollout) -> Table:
 
 def force_rows(rollout: Rollout) -> Iterator[tuple[str, str]]:
     """Yield what became of commanded forces, as rows of the table."""
-    for contact, wanted, planned, felt, lost in forces_kept(rollout):
-        missed = np.sqrt(np.mean((felt - wanted) ** 2))
-        text = f"{felt[-1]:.3g} of {wanted[-1]:.3g} N at the end, "
+    for contact, wanted, planned, actual, lost in forces_kept(rollout):
+        missed = np.sqrt(np.mean((actual - wanted) ** 2))
+        text = f"{actual[-1]:.3g} of {wanted[-1]:.3g} N at the end, "
         yield f"force {contact}", f"{text}missed by {missed:.3g} N rms"
         off = np.abs(wanted - planned)
         if rows := int((off > GIVEN_UP * (1.0 + wanted)).sum()):

@@ -79,13 +79,13 @@ class ChangeContact(Change, type="contact"):
 
     contact: str
     """Name of the contact."""
-    bears: Flag
-    """Whether it bears from then on."""
+    active: Flag
+    """Whether it is active from then on."""
 
     def apply(self, setup: Setup) -> Setup:
         """Return the setup with the contact; see `Change.apply`."""
         planned = setup.contact(self.contact)
-        presence = planned.presence.then(self.at, self.ramp, float(self.bears))
+        presence = planned.presence.then(self.at, self.ramp, float(self.active))
         return setup.with_contact(planned, presence=presence)
 
 

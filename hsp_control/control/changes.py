@@ -116,9 +116,9 @@ class Changes:
         """Change the limits; see `ChangeLimits`."""
         return self._do(ChangeLimits(limits, at=self._at, ramp=self._ramp))
 
-    def contact(self, contact: str, *, bears: bool) -> Self:
+    def contact(self, contact: str, *, active: bool) -> Self:
         """Lift a contact, or set it down; see `ChangeContact`."""
-        return self._do(ChangeContact(contact, bears, at=self._at, ramp=self._ramp))
+        return self._do(ChangeContact(contact, active, at=self._at, ramp=self._ramp))
 
     def force(self, contact: str, force: CommandedForce) -> Self:
         """Change the commanded force of a contact; see `ChangeForce`."""

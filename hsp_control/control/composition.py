@@ -311,8 +311,8 @@ class Composition:
         """
         return self._setup.task(task).weight(t)
 
-    def bearing_of(self, contact: str, t: float) -> float:
-        """Return how much a contact bears at time t [s], in [0, 1].
+    def contact_weight(self, contact: str, t: float) -> float:
+        """Return how active a contact is at time t [s], in [0, 1].
 
         Raises:
             ControllerError: If there is no such contact.
@@ -386,7 +386,7 @@ _INSTEAD = {
     "field": "use at(t).field(...)",
     "null_space_gain": "use at(t).null_space_gain(...)",
     "limits": "use at(t).limits(...)",
-    "contacts": "use at(t).contact(name, bears=...)",
+    "contacts": "use at(t).contact(name, active=...)",
     "scene": "use at(t).obstacle(name, center)",
     "changes": "use at(t)",
     "state": "call compute",

@@ -186,7 +186,7 @@ class Controller(Composition):
             warn_of_jump(self._declared.robot, self._state.q, self._state.v, tau)
         self._limits.applied(tau, self._run.acceleration, period)
         if self._gains.stiffening:
-            self._gains.wait(self.active_stack, self._state.t, period)
+            self._gains.delay(self.active_stack, self._state.t, period)
 
     def _while_free(self, advance: Callable[[FreeStep], int]) -> int:
         """Let a compiled loop make steps that are free; return how many it made."""
@@ -246,8 +246,8 @@ class Controller(Composition):
         A plan that switches contacts asks for each combination that it will use.
 
         Args:
-            state: A state in which these contacts bear.
-            lifted: The names of the contacts that do not bear.
+            state: A state in which the others are active.
+            lifted: The names of the contacts that are not active.
             without: The names of the tasks that do not count.
         """
         with self._lock:

@@ -35,7 +35,7 @@ class Estimator(Part, ABC, family="estimators", error=EstimationError):
         """Return what estimates, for one run.
 
         Args:
-            controller: The controller, whose contacts bear the robot.
+            controller: The controller, whose contacts carry the robot.
             inertial: A reading of the robot's inertial measurement unit, which says
                 where that is; None: there is no unit.
 

@@ -125,7 +125,7 @@ ABSENT: Evolution[float] = Evolution(0.0)
 
 HELD = 0.1
 """A contact whose weight is this or more is kept at rest. With 1, a foot would move
-while it bears; with 0, its motion would be set free, or stopped, with a jump."""
+while it is active; with 0, its motion would be set free, or stopped, with a jump."""
 
 
 @dataclass(frozen=True)
@@ -133,14 +133,14 @@ class PlannedContact:
     """A contact, and when it is part of the controller."""
 
     contact: Contact
-    presence: Evolution[float]  # 1 while it bears, 0 while it is lifted
+    presence: Evolution[float]  # 1 while it is active, 0 while it is lifted
     # what a compensator adds to the commanded normal force, shape (1,) [N]; every step
     # reads this array
     force_offset: Array = field(default_factory=lambda: np.zeros(1), compare=False)
 
     @property
     def always(self) -> bool:
-        """Whether the contact bears at all times."""
+        """Whether the contact is active at all times."""
         return self.contact.always and self.presence == PRESENT
 
     def active(self, t: float) -> bool:
@@ -150,7 +150,7 @@ class PlannedContact:
         )
 
     def weight(self, t: float) -> float:
-        """Return how much it bears at time t [s], in [0, 1]."""
+        """Return how active it is at time t [s], in [0, 1]."""
         return self.contact.weight(t) * self.presence.at(t)
 
     def share(self, t: float) -> float:

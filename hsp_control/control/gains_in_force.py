@@ -89,10 +89,10 @@ class GainsInForce:
 
     @property
     def stiffening(self) -> bool:
-        """Whether impedances change, or wait; then `wait` belongs to each step."""
+        """Whether impedances change, or wait; then `delay` belongs to each step."""
         return self._changing or bool(self._waiting)
 
-    def wait(self, active: ActiveStack, t: float, period: float) -> None:
+    def delay(self, active: ActiveStack, t: float, period: float) -> None:
         """Let changes of impedances wait where they would add energy."""
         for each in self._setup.tasks:
             changes = each.key in self._waiting or changes_impedance(

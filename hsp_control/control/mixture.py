@@ -109,14 +109,14 @@ class Mixture:
             if share == following:
                 continue
             on = {id(each) for _, each in coming[:k]}
-            bearing = [each for w, each in contacts if w >= 1.0 or id(each) in on]
+            standing = [each for w, each in contacts if w >= 1.0 or id(each) in on]
             lifted = [edge for key, edge in edges.items() if key not in on]
             off = {
                 each.key
                 for _, each in tasks
                 if each.weight_beyond(t, lifted) < 1.0 and id(each) not in on
             }
-            self.active = active = self._stack(bearing, off)
+            self.active = active = self._stack(standing, off)
             active.share = share - following
             self._parts.append(active)
             outcome = active.resolve(t)
@@ -178,29 +178,29 @@ class Mixture:
         return found
 
     def stack_at(self, t: float, off: Set[int] = frozenset()) -> ActiveStack:
-        """Return the stack of the contacts that bear at a time, without some tasks."""
-        bearing = [each for each in self._setup.contacts if each.active(t)]
-        return self._stack(bearing, off)
+        """Return the stack of the contacts active at a time, without some tasks."""
+        standing = [each for each in self._setup.contacts if each.active(t)]
+        return self._stack(standing, off)
 
     def stack_without(
         self, lifted: Collection[str], without: Collection[str]
     ) -> ActiveStack:
         """Return the stack without the contacts and tasks of some names."""
         contacts = self._setup.contacts
-        bearing = [each for each in contacts if each.contact.name not in lifted]
+        standing = [each for each in contacts if each.contact.name not in lifted]
         tasks = (each for level in self.levels for each in level)
         off = {each.key for each in tasks if each.task.name in without}
-        return self._stack(bearing, off)
+        return self._stack(standing, off)
 
-    def _stack(self, bearing: Sequence[PlannedContact], off: Set[int]) -> ActiveStack:
+    def _stack(self, standing: Sequence[PlannedContact], off: Set[int]) -> ActiveStack:
         on = frozenset(each.key for each in self._setup.tasks if each.key not in off)
         # By identity: to compare values would cost more than the step.
-        key = frozenset(map(id, bearing)), on
+        key = frozenset(map(id, standing)), on
         if key not in self._stacks:
             levels = [
                 [each for each in level if each.key in on] for level in self.levels
             ]
-            support = Support(bearing, self._state, self._base)
+            support = Support(standing, self._state, self._base)
             gains, metric = self._gains, self._setup.metric
             law = gains.feedback, metric, self.field, gains.null_space, self._threshold
             stack = ActiveStack(self._state, support, levels, *law)

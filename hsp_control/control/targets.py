@@ -29,8 +29,8 @@ RAMP = 0.2
 DELAY = 0.03
 """Time to a target, if the bounds permit [s]: about two of a page's pictures."""
 MOVING: dict[str, Any] = {"speed": 0.5, "acceleration": 3.0, "jerk": 60.0}
-"""Bounds on the way to a target [m/s, m/s², m/s³]: those that arms bear, whose limits
-then rarely bind."""
+"""Bounds on the way to a target [m/s, m/s², m/s³]: those that arms can follow, so
+that limits rarely bind."""
 TURNING: dict[str, Any] = {
     "angular_speed": 1.5,
     "angular_acceleration": 8.0,

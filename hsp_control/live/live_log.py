@@ -94,7 +94,7 @@ class LoopLog:
             return
         if measurement is not None:
             limits = self._chain.command.controller.limits
-            self._excess.see(limits, measurement.q, measurement.v)
+            self._excess.record(limits, measurement.q, measurement.v)
         if measurement is None and phase == Phase.RUNNING:
             return  # no measurement, so no effort was computed
         if not self._due.is_due(state.t, phase, last=last):
@@ -154,7 +154,7 @@ class LoopLog:
             own = self._chain.log_channels(state.q, state.v)
             log_channels = {**own, **log_channels}
         limits = self._chain.command.controller.limits
-        log_channels |= self._excess.take(limits)
+        log_channels |= self._excess.collect(limits)
         return state, self._output(phase, state), limiter.applied, log_channels
 
     def _output(self, phase: Phase, state: RobotState) -> ControlOutput | None:

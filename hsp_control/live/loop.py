@@ -28,7 +28,7 @@ from hsp_control.live.live_log import LoopLog
 from hsp_control.live.operator_requests import OperatorRequests, stop_signals
 from hsp_control.live.real_time import no_garbage_collection, real_time_priority
 from hsp_control.live.report import Ended, LoopReport
-from hsp_control.live.safe_stop import BearingFeet, Phase, SafeStop
+from hsp_control.live.safe_stop import Phase, SafeStop, StandingFeet
 from hsp_control.live.settings import LiveSettings, check_held
 from hsp_control.live.state_reader import StateReader
 from hsp_control.robot import RobotState
@@ -113,7 +113,7 @@ def run_loop(
             check_held(robot, controller.contacts, settings)
             limits = controller.limits
             limiter = EffortLimiter(robot, settings, period, limits)
-            feet = BearingFeet(robot, controller.contacts)
+            feet = StandingFeet(robot, controller.contacts)
             safe_stop = SafeStop(
                 robot, settings.stop, limiter.effort_limits, period, feet
             )
@@ -294,7 +294,7 @@ class LiveRun:
             self.rest_of_period(on_period)
 
     def feel_ground(self) -> None:
-        """Find which feet bear, and stop if the robot falls."""
+        """Find which feet stand, and stop if the robot falls."""
         measurement, state = self.reader.measurement, self.reader.state
         if self.detector is None or measurement is None:
             return

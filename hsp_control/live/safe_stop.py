@@ -1,4 +1,4 @@
-"""The safe stop: first damping, then hold, on the feet that bear."""
+"""The safe stop: first damping, then hold, on the feet that stand."""
 
 from collections.abc import Sequence
 from enum import IntEnum
@@ -29,35 +29,35 @@ _SMALLEST = 1e-6
 in, such as the turning about the line between two points."""
 
 
-class BearingFeet:
-    """The contacts that bear, and the efforts that they let the joints deliver.
+class StandingFeet:
+    """The active contacts, and the efforts that they let the joints deliver.
 
     A generalized force x, shape (nv,), is the sum of what joints and feet exert,
     x = Sᵀ tau + Jᵀ f. Its rows without motors determine the forces f at the feet's
     points, of minimum norm; then tau = S (x - Jᵀ f). While the feet stand still,
     J v = 0, these efforts do the work of x: vᵀ Sᵀ tau = vᵀ x.
 
-    Without motors in six rows, and without a foot that bears, nothing holds the robot.
+    Without motors in six rows, and without a foot that stands, nothing holds the robot.
     """
 
     def __init__(self, robot: Robot, contacts: Sequence[Contact]) -> None:
         self._robot = robot
         self._all = tuple(c for c in contacts if c.axes[2, 2] >= _STEEPEST)
         self._base = list(robot.unactuated)
-        self.contacts = self._all  # the contacts that bear now
+        self.contacts = self._all  # the contacts that are active now
 
     @property
     def hold(self) -> bool:
-        """Whether the robot can be held: by its base, or by a foot that bears."""
+        """Whether the robot can be held: by its base, or by a foot that stands."""
         return not self._base or bool(self.contacts)
 
     def feel(self, measured: Measurement) -> None:
-        """Find which contacts bear: those that are pressed."""
+        """Find which contacts are active: those that are pressed."""
         if self._base:
-            self.contacts = tuple(c for c in self._all if _bears(c, measured))
+            self.contacts = tuple(c for c in self._all if _stands(c, measured))
 
     def lose(self) -> None:
-        """Let no contact bear any more."""
+        """Let no contact be active any more."""
         self.contacts = ()
 
     def joint_effort(self, state: RobotState, force: Array) -> Array:
@@ -73,7 +73,7 @@ class BearingFeet:
         return effort
 
 
-def _bears(contact: Contact, measured: Measurement) -> bool:
+def _stands(contact: Contact, measured: Measurement) -> bool:
     force = measured.normal_force(contact.frame, contact.axes[:, 2])
     return contact.active(measured.t) if force is None else force > 0.0
 
@@ -101,9 +101,9 @@ class SafeStop:
     Arimoto (1981), stable for any inertia.
 
     A robot with a floating base stands on its feet meanwhile: what these two exert on
-    its base goes through the feet that bear (`BearingFeet`). If none bears, or after a
-    fall, nothing can hold it. Then its joints are damped only, tau_j = -k M_jj v_j: the
-    robot sinks, and does not thrash.
+    its base goes through the feet that stand (`StandingFeet`). If none stands, or after
+    a fall, nothing can hold it. Then its joints are damped only, tau_j = -k M_jj v_j:
+    the robot sinks, and does not thrash.
 
     Attributes:
         feet: What the robot stands on.
@@ -118,7 +118,7 @@ class SafeStop:
         settings: StopSettings,
         effort_limits: Array,
         period: float,
-        feet: BearingFeet | None = None,
+        feet: StandingFeet | None = None,
     ) -> None:
         """Check the gains for this period.
 
@@ -135,7 +135,7 @@ class SafeStop:
         settings.check_period(period)
         self._robot, self._settings, self._period = robot, settings, period
         self._effort_limits = effort_limits
-        self.feet = BearingFeet(robot, ()) if feet is None else feet
+        self.feet = StandingFeet(robot, ()) if feet is None else feet
         self._base = list(robot.unactuated)
         self._rest = np.zeros(robot.nv)
         self.begin()

@@ -133,6 +133,6 @@ def check_held(
     if settings.compensates_gravity:
         with within("compensates_gravity"):
             raise LiveError(
-                f"{robot.name} has a floating base: how its joints bear its weight "
+                f"{robot.name} has a floating base: how its joints carry its weight "
                 "depends on its contacts, which it does not know; must be false"
             )

@@ -10,7 +10,7 @@ from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import RobotLimits, own_limits
 from hsp_control.live.effort_limiter import EffortLimiter
 from hsp_control.live.hardware import Measurement
-from hsp_control.live.safe_stop import BearingFeet, Phase, SafeStop
+from hsp_control.live.safe_stop import Phase, SafeStop, StandingFeet
 from hsp_control.live.settings import LiveSettings
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.integrators import Integrator, Rk4
@@ -139,7 +139,7 @@ class SimulatedRobot:
         robot, settings = plant.robot, settings or LiveSettings()
         self._limiter = EffortLimiter(robot, settings, period, limits)
         upper = self._limiter.effort_limits
-        self._feet = BearingFeet(robot, contacts)
+        self._feet = StandingFeet(robot, contacts)
         self._stop = SafeStop(robot, settings.stop, upper, period, self._feet)
         self._check = EffortCheck(robot, settings, period, upper)
         self._state = RobotState(robot)

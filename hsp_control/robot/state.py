@@ -219,7 +219,7 @@ class RobotState:
             )
         return self._world
 
-    def made(self, part: object, what: str, make: Callable[[], Made]) -> Made:
+    def cached(self, part: object, what: str, make: Callable[[], Made]) -> Made:
         """Return what ``make`` returned for a part and this state; it is called once.
 
         ``what`` tells apart what a class and its subclasses keep.
@@ -248,13 +248,13 @@ class RobotState:
     def prepared(
         self, part: object, what: str, make: Callable[[], tuple[Made, KernelCalls]]
     ) -> tuple[Made, Callable[[], Any]]:
-        """Return what `made` does, and a call that makes the calls of ``make`` now."""
+        """Return what `cached` does, and a call that makes ``make``'s calls now."""
 
         def plan() -> tuple[Made, StepPlan]:
             memory, calls = make()
             return memory, self.plan(calls)
 
-        memory, calls = self.made(part, what, plan)
+        memory, calls = self.cached(part, what, plan)
         return memory, lambda: calls.run(self.t)
 
     def __getstate__(self) -> dict[str, Any]:

@@ -102,8 +102,8 @@ class ControlChain(Generic[Source_co]):
         if self.plan is not None:
             self.plan.update(measured)
         given = measured.t, measured.q, measured.v, period
-        felt = (measured.wrenches,) if self._feels else ()
-        tau = self.command.effort(*given, *felt)
+        wrenches = (measured.wrenches,) if self._feels else ()
+        tau = self.command.effort(*given, *wrenches)
         if self._estimating:
             self._status = float(self.command.output.status)
         return tau

@@ -33,25 +33,25 @@ class LimitExcess:
         # beyond the limits, shape (nv,) [rad or m, rad/s or m/s]
         self.position, self.velocity = np.zeros(robot.nv), np.zeros(robot.nv)
 
-    def see(self, limits: RobotLimits | None, q: Array, v: Array) -> None:
-        """See a true state."""
+    def record(self, limits: RobotLimits | None, q: Array, v: Array) -> None:
+        """Record a true state."""
         if limits is not None:
-            _see(*self._arguments(limits, q, v))
+            _record(*self._arguments(limits, q, v))
 
-    def seeing(
+    def recording(
         self, limits: RobotLimits | None, q: Array, v: Array
     ) -> list[KernelCall]:
-        """Return `see` of what these arrays then hold, as calls."""
+        """Return `record` of what these arrays then hold, as calls."""
         if limits is None:
             return []
-        return [(_see, self._arguments(limits, q, v))]
+        return [(_record, self._arguments(limits, q, v))]
 
     def _arguments(self, limits: RobotLimits, q: Array, v: Array) -> tuple[Any, ...]:
         bounds = limits.lower, limits.upper, limits.velocity
         most = self.position, self.velocity
         return self._coordinates, self._dofs, q, v, *bounds, *most
 
-    def take(self, limits: RobotLimits | None) -> dict[str, LogChannel]:
+    def collect(self, limits: RobotLimits | None) -> dict[str, LogChannel]:
         """Return what to log, and begin anew; nothing without limits."""
         if limits is None:
             return {}
@@ -65,7 +65,7 @@ class LimitExcess:
 
 
 @kernel
-def _see(
+def _record(
     coordinates: Indices,
     dofs: Indices,
     q: Array,

@@ -307,7 +307,7 @@ class ContactColumns:
                 more = {"frame": contact.frame, "normal": contact.axes[:, 2].tolist()}
                 column(f"{prefix}.commanded", (3,), "N", meaning, **more)
             column(f"{prefix}.position", (3,), "m", "centre of pressure")
-            column(f"{prefix}.weight", (), "-", "how much it bears, 0 to 1")
+            column(f"{prefix}.weight", (), "-", "how active it is, 0 to 1")
             column(
                 f"{prefix}.friction_used", (), "-", "largest ‖f_t‖/(μ f_n) of a point"
             )
@@ -323,7 +323,7 @@ class ContactColumns:
         for contact in controller.contacts:
             prefix = f"contact.{contact.name}"
             row[f"{prefix}.force"][:] = 0.0
-            row[f"{prefix}.weight"][...] = controller.bearing_of(contact.name, t)
+            row[f"{prefix}.weight"][...] = controller.contact_weight(contact.name, t)
             if contact not in support.contacts:
                 continue
             points = support.points[support.contacts.index(contact)]

@@ -171,8 +171,8 @@ class LogWriter:
         if output is not None:
             self._fill_law(state, output)
         if VELOCITY not in log_channels:  # the state was seen in this row alone
-            self._excess.see(controller.limits, state.q, state.v)
-            log_channels = {**self._excess.take(controller.limits), **log_channels}
+            self._excess.record(controller.limits, state.q, state.v)
+            log_channels = {**self._excess.collect(controller.limits), **log_channels}
         write_channels(columns, log_channels)
         self._write_heading()
         if not keep:

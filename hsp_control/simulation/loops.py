@@ -81,7 +81,7 @@ def sampled_loop(
         while k < periods:
             t = start + k * (end - start) / periods
             measured = Measurement(count, t, *plant.measure(t, q, v))
-            excess.see(controller.limits, q, v)
+            excess.record(controller.limits, q, v)
             if chain.needs_sensors:
                 measured = measured._replace(
                     applied=tau,
@@ -95,7 +95,7 @@ def sampled_loop(
                     output = command.evaluate(t, q, v)
                 channels = {
                     **chain.log_channels(q, v),
-                    **excess.take(controller.limits),
+                    **excess.collect(controller.limits),
                 }
                 yield Instant(state, output, tau, channels)
             if end == start:  # the last row

@@ -180,7 +180,7 @@ class ForceKept(NamedTuple):
     contact: str  # its name
     wanted: Array  # the commanded normal force, without feedback, shape (n,) [N]
     planned: Array  # the planned one, likewise
-    felt: Array  # what the plant says of it, or else the planned one, shape (n,) [N]
+    actual: Array  # what the plant says of it, or else the planned one, shape (n,) [N]
     lost: int  # in how many rows nothing is touched any more
 
 
@@ -191,20 +191,20 @@ def forces_kept(rollout: Rollout) -> Iterator[ForceKept]:
         if "normal" not in about:
             continue
         prefix, normal = column.removesuffix(".commanded"), np.array(about["normal"])
-        wanted = columns[column] @ normal  # NaN while the contact does not bear
+        wanted = columns[column] @ normal  # NaN while the contact is not active
         rows = wanted > REACHED
         if not rows.any():
             continue
         planned = columns[f"{prefix}.force"] @ normal
-        felt = columns.get(f"plant.contact.{about['frame']}.force")
-        felt = planned if felt is None else felt @ normal
+        actual = columns.get(f"plant.contact.{about['frame']}.force")
+        actual = planned if actual is None else actual @ normal
         added = columns.get(f"{prefix}.integral", np.zeros(len(rows)))
-        wanted, planned, felt = (
-            x[rows] for x in (wanted - added, planned - added, felt)
+        wanted, planned, actual = (
+            x[rows] for x in (wanted - added, planned - added, actual)
         )
-        touched = felt > 0.0
+        touched = actual > 0.0
         lost = int((~touched[touched.argmax() :]).sum())
-        yield ForceKept(prefix.removeprefix("contact."), wanted, planned, felt, lost)
+        yield ForceKept(prefix.removeprefix("contact."), wanted, planned, actual, lost)
 
 
 # --- the numbers that sum a run up ---------------------------------------------------

@@ -83,7 +83,7 @@ class NativeLoop:
             return None
         assert isinstance(steps.take, NativeCall)
         # Rows are addresses: what they lead to is kept, here and in the steps.
-        seeing = self._excess.seeing(self._controller.limits, steps.q, steps.v)
+        seeing = self._excess.recording(self._controller.limits, steps.q, steps.v)
         self._seeing = [NativeCall.of(*call, timed=False) for call in seeing]
         moving = rows_of([steps.take, *self._seeing])
         own = steps.q, steps.v, self._plant.effort, step.effort, steps.interval

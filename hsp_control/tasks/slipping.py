@@ -1,6 +1,6 @@
 """A spring whose force is bounded, as if it slipped where it pulls with the most.
 
-Let each group of rows g, such as the position, bear no more than F_g. The spring slips
+Let each group of rows g, such as the position, carry no more than F_g. The spring slips
 by x, as it does at a friction that is F_g in every direction, and K (e - x) pulls:
 
     U(e) = min_x ½ (e - x)ᵀ K (e - x) + Σ F_g |x_g|

@@ -260,7 +260,7 @@ def test_what_feet_feel_comes_over_the_wire(tmp_path: Path) -> None:
     assert len(pairs) > 50
     mine, theirs = np.array(pairs).T
     np.testing.assert_array_equal(loop.q[mine], true.q[theirs])
-    felt = loop["plan.front_left.felt"][mine]
+    felt = loop["plan.front_left.force"][mine]
     pressed = true["plant.contact.FL_FOOT.force"][theirs, 2]
     weight = 9.81 * sum(each.mass for each in experiment.robot.model.inertias)
     assert felt[-1] == pytest.approx(pressed[-1], rel=0.05)

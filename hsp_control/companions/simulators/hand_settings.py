@@ -31,7 +31,7 @@ _UNHURRIED = StreamPose(
     angular_acceleration=5.0,
     angular_jerk=100.0,
 )
-"""Bounds that efforts bear, also where the motors are weak for the wrist's rotors."""
+"""Bounds that efforts can follow, also where motors are weak for a wrist's rotors."""
 
 Source = str | PathLike[str] | Mapping[str, Any] | None
 """Where settings come from: a YAML file, its data, or nothing: the defaults."""

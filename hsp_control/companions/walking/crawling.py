@@ -25,12 +25,12 @@ FADE = 0.3
 
 
 class Crawl(QuadrupedPlan, type="crawl"):
-    """A quadruped crawls: one foot swings while three bear, and it could stop any time.
+    """A quadruped crawls: one foot swings while three stand, and it can stop any time.
 
     On four feet the centre of mass moves above the triangle of the three that will
-    bear; there it rests while the fourth swings. The feet follow each other on each
+    stand; there it rests while the fourth swings. The feet follow each other on each
     side, the hind one first (McGhee and Frank 1968). A foot lands half a stride ahead
-    of its place; it is a contact when it is felt, early or late, higher or lower.
+    of its place; it is a contact when it touches, early or late, higher or lower.
     """
 
     gait: ClassVar[str] = "crawl"
@@ -128,7 +128,7 @@ class RunningCrawl(RunningQuadruped):
                 self._move_over(t)
 
     def _move_over(self, t: float) -> None:
-        """Move the centre of mass above the feet that will bear."""
+        """Move the centre of mass above the feet that will stand."""
         stance, swing = self.gait.stance, self.gait.swing
         self._mode, self._since = "four", t
         self._foot.unload(t + (1.0 - FADE) * stance, FADE * stance)

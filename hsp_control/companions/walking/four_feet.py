@@ -43,7 +43,7 @@ class PointFoot(Switched):
         frame: Its frame.
         normal: The normal of the ground, shape (3,) [-].
         position: The reference of its frame's origin.
-        swing: Its motion while it swings; None while it bears.
+        swing: Its motion while it swings; None while it stands.
         followed: What its reference follows until it rests; None: where it is.
         height: The height of its frame where it stands, or stood last [m].
         offset: Where it stands beside the middle of the feet at the start, in axes of
@@ -154,7 +154,7 @@ class RunningQuadruped(RunningPlan):
         self._last = self._since = state.t
         self._mode = "standing"
         self._swings, self._idle = 0, 0
-        self._felt = {foot.name: False for foot in self._feet}
+        self._sensed = {foot.name: False for foot in self._feet}
         self._controller.prepare(state, without=[foot.name for foot in self._feet])
         self._start_gait(state)
         for lifted in self._combinations():
@@ -263,18 +263,18 @@ class RunningQuadruped(RunningPlan):
         self._last = t
 
     def _feel(self, measured: Measurement) -> None:
-        """Keep what has been felt since the start."""
+        """Keep what has been sensed since the start."""
         for foot in self._feet:
             force = measured.normal_force(foot.frame, foot.normal)
-            self._felt[foot.name] |= force is not None and force > self._touch
+            self._sensed[foot.name] |= force is not None and force > self._touch
 
     def _groundless(self) -> str:
         """Return what a message says of feet that never stood on anything."""
-        never = [name for name, felt in self._felt.items() if not felt]
+        never = [name for name, touched in self._sensed.items() if not touched]
         if not never:
             return ""
         return (
-            f"; no ground was ever felt at {listing(never)}: do they have shapes in "
+            f"; no ground was ever sensed at {listing(never)}: do they have shapes in "
             "plant.contacts, and is the ground at the height of start.ground?"
         )
 
@@ -315,7 +315,7 @@ class RunningQuadruped(RunningPlan):
     # -- a foot -----------------------------------------------------------------------
 
     def _lift_off(self, foot: PointFoot, t: float) -> None:
-        """Let a foot swing that bears no more, for the time being upwards."""
+        """Let a foot swing that stands no more, for the time being upwards."""
         foot.lift(t)
         here = self._state.position(foot.frame)
         foot.swing = foot.followed = Swing(
@@ -331,7 +331,7 @@ class RunningQuadruped(RunningPlan):
         )
 
     def _has_landed(self, foot: PointFoot, measured: Measurement) -> bool:
-        """Return whether a foot bears, perhaps since now."""
+        """Return whether a foot stands, perhaps since now."""
         t, swing = measured.t, foot.swing
         if swing is None:
             return True
@@ -339,10 +339,10 @@ class RunningQuadruped(RunningPlan):
         if force is None:
             lands = t >= swing.end
         else:
-            felt = swing.share(t) > EARLY and force > self._touch
-            lands = felt or t > swing.end + LATE
+            touched = swing.share(t) > EARLY and force > self._touch
+            lands = touched or t > swing.end + LATE
         if lands:
-            foot.bear(t, 0.5 * self.gait.stance)
+            foot.set_down(t, 0.5 * self.gait.stance)
             foot.swing = None
             foot.height = float(self._state.position(foot.frame)[2])
             # The trunk follows the ground.

@@ -67,7 +67,7 @@ class QuadrupedPlan(MovingPlan):
         if self.contact_force >= 0.25:
             raise PlanError(
                 f"contact_force is {self.contact_force:g} robot weights; must be below "
-                "0.25, which each of four feet bears"
+                "0.25, which each of four feet carries"
             )
 
     def velocity_at(self, t: float) -> Velocity:

@@ -1,4 +1,4 @@
-"""Contacts that begin and end when that is felt."""
+"""Contacts that begin and end when a force or a height says so."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, replace
@@ -31,7 +31,7 @@ from hsp_control.trajectories.schedule import Intervals, Schedule
 
 
 class SensedContact(Part, error=PlanError):
-    """When a contact begins to bear, and when it ends.
+    """When a contact begins, and when it ends.
 
     It begins when it is pressed with ``force``, or is at ``height``, or both if both
     are given; then its force rises. It ends when it is pressed with less than
@@ -42,10 +42,10 @@ class SensedContact(Part, error=PlanError):
     yaml_key: ClassVar[str | None] = "name"
 
     force: Positive | None = None
-    """Normal force from which it bears [N]."""
+    """Normal force from which it is active [N]."""
     _: KW_ONLY
     height: Number | None = None
-    """Height of its frame, along its normal, at or below which it bears [m]."""
+    """Height of its frame, along its normal, at or below which it is active [m]."""
     release: NonNegative | None = None
     """Normal force below which it has lost the ground [N]; a quarter of ``force`` by
     default."""
@@ -54,19 +54,19 @@ class SensedContact(Part, error=PlanError):
     ramp: Positive = 0.2
     """How long its force takes to rise, and to fade [s]."""
     wanted: Intervals | None = None
-    """Intervals in which it may bear: [start, end] [s], None for no start or no end;
-    always by default."""
+    """Intervals in which it may be active: [start, end] [s], None for no start or no
+    end; always by default."""
     starts: Flag = False
-    """Whether it bears at the start, before anything is felt [-]."""
+    """Whether it is active at the start, before anything is measured [-]."""
     task: str | None = None
-    """Name of a task that counts while it does not bear [-]: what moves its link."""
+    """Name of a task that counts while it is not active [-]: what moves its link."""
     name: str = ""
     """Name of the contact [-]. In YAML, its key."""
 
     def __post_init__(self) -> None:
         """Check that something is sensed, and that the intervals follow one another."""
         if self.force is None and self.height is None:
-            raise PlanError("give force or height: what tells that it bears")
+            raise PlanError("give force or height: what shows that it is active")
         if self.release is not None and self.force is None:
             raise PlanError("release is a force; give force, too")
         if self.release is not None and self.release >= (self.force or 0.0):
@@ -84,14 +84,14 @@ class SensedContact(Part, error=PlanError):
         return None if self.force is None else 0.25 * self.force
 
     def schedule(self) -> Schedule:
-        """Return when it may bear."""
+        """Return when it may be active."""
         if self.wanted is None:
             return Schedule.always()
         return Schedule(self.wanted, ramp=0.0)
 
 
 class Sensed(Plan, type="sensed"):
-    """Contacts are switched by what is felt: measured or estimated forces, or height.
+    """Contacts are switched by what is sensed: measured or estimated forces, or height.
 
     Everything else, tasks and their references, is as it is declared. A contact rises
     and fades over its ramp, so that efforts stay continuous.
@@ -133,7 +133,7 @@ class Sensed(Plan, type="sensed"):
                     if known[rule.task].schedule is not None or rule.task in moves:
                         raise PlanError(
                             f"{rule.task!r} has a schedule, or moves two contacts; it "
-                            "counts while the contact does not bear"
+                            "counts while the contact is not active"
                         )
                 moves[rule.task] = rule
         return PlanParts(
@@ -157,12 +157,12 @@ class Sensed(Plan, type="sensed"):
 
 
 class FeltContact(Switched):
-    """A contact in one run: whether it bears, and what is felt.
+    """A contact in one run: whether it is active, and what is measured.
 
     Attributes:
         name: Its name.
         frame: Its frame.
-        force: The normal force that is felt [N]; NaN without one.
+        force: The normal force that is measured [N]; NaN without one.
         height: The height of its frame along the normal [m].
         estimated: Whether the force is estimated.
         events: How often it has begun or ended.
@@ -197,19 +197,19 @@ class FeltContact(Switched):
         self.events = 0
 
     def start(self) -> None:
-        """Return to the start, before anything is felt."""
+        """Return to the start, before anything is measured."""
         self.reset()
-        self._pressed = -np.inf  # nothing was felt yet
+        self._pressed = -np.inf  # nothing was sensed yet
         self._leaving = False
         self.events = 0
 
     @property
-    def bears(self) -> bool:
+    def active(self) -> bool:
         """Whether it is switched on."""
         return self.contact.is_on
 
     def update(self, t: float, state: RobotState, measured: Measurement) -> None:
-        """Feel, and switch.
+        """Measure, and switch.
 
         Raises:
             PlanError: If a force is needed, and there is none.
@@ -225,18 +225,18 @@ class FeltContact(Switched):
         self.estimated = self.frame in measured.estimated
         self.height = float(self._normal @ state.position(self.frame))
         wanted = self._wanted.active(t)
-        if not self.bears:
+        if not self.active:
             if not self.contact.active(t) and self._leaving:
                 self._leaving = False  # its force has faded
                 self.events += 1
-            if wanted and self._is_felt():
-                self._bear(t)
+            if wanted and self._is_sensed():
+                self._begin(t)
         elif not wanted:
             self._leave(t, rule.ramp)
         elif self._is_lost(t):
             self._leave(t, rule.patience)
 
-    def _is_felt(self) -> bool:
+    def _is_sensed(self) -> bool:
         rule = self._rule
         pressed = rule.force is None or self.force >= rule.force
         return pressed and (rule.height is None or self.height <= rule.height)
@@ -247,9 +247,9 @@ class FeltContact(Switched):
             self._pressed = t
         return t - self._pressed > self._rule.patience
 
-    def _bear(self, t: float) -> None:
+    def _begin(self, t: float) -> None:
         self._pressed, self._leaving = t, False
-        self.bear(t, self._rule.ramp)
+        self.set_down(t, self._rule.ramp)
         self.events += 1
 
     def _leave(self, t: float, ramp: float) -> None:
@@ -269,15 +269,15 @@ class RunningSensed(RunningPlan):
         super().__init__(sensed)
         self._controller = controller
         self._state = RobotState(controller.robot)
-        self._felt = [
+        self._sensed = [
             FeltContact(name, rule, controller)
             for name, rule in sensed.contacts.items()
         ]
         self._begun = False
 
     def start(self, state: RobotState) -> None:
-        """Begin before anything is felt; see `RunningPlan.start`."""
-        for each in self._felt:
+        """Begin before anything is measured; see `RunningPlan.start`."""
+        for each in self._sensed:
             each.start()
         self._begun = True
 
@@ -286,22 +286,22 @@ class RunningSensed(RunningPlan):
         state = self._state.update(measured.t, measured.q, measured.v)
         if not self._begun:
             self.start(state)
-        for each in self._felt:
+        for each in self._sensed:
             each.update(measured.t, state, measured)
 
     def log_channels(self) -> Mapping[str, LogChannel]:
-        """Return what is felt of each contact, and whether it bears."""
+        """Return what is measured of each contact, and whether it is active."""
         channels: dict[str, LogChannel] = {}
-        for each in self._felt:
+        for each in self._sensed:
             prefix = f"plan.{each.name}"
             channels |= {
-                f"{prefix}.bears": LogChannel(
-                    float(each.bears), "-", "whether it is switched on"
+                f"{prefix}.active": LogChannel(
+                    float(each.active), "-", "whether it is switched on"
                 ),
                 f"{prefix}.events": LogChannel(
                     float(each.events), "-", "how often it has begun or ended"
                 ),
-                f"{prefix}.felt": LogChannel(
+                f"{prefix}.force": LogChannel(
                     each.force, "N", "normal force as measured or estimated"
                 ),
                 f"{prefix}.estimated": LogChannel(

@@ -94,7 +94,7 @@ class Switched:
         """Let the task move the link now [s]."""
         self.unload(t, 0.0)
 
-    def bear(self, t: float, ramp: float) -> None:
+    def set_down(self, t: float, ramp: float) -> None:
         """Let the force rise from now on [s], while the task ends."""
         if self.task is not None:
             self.task.throw(True, t)  # it may wait for the end of a ramp

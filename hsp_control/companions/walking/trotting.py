@@ -30,12 +30,12 @@ _COMMITTED = 0.05
 
 
 class Trot(QuadrupedPlan, type="trot"):
-    """A quadruped trots: two diagonal feet swing while two bear.
+    """A quadruped trots: two diagonal feet swing while two stand.
 
     It stands, trots with the given velocity, and stands again when that is zero. A
     foot lands where the body will be, farther by what the body is too fast (the capture
     point; Raibert 1986, Pratt et al. 2006). It starts from where it is and becomes a
-    contact when it is felt on the ground, early or late, higher or lower.
+    contact when it touches the ground, early or late, higher or lower.
     """
 
     gait: ClassVar[str] = "trot"
@@ -128,7 +128,7 @@ class RunningTrot(RunningQuadruped):
                 self._mode = "two"
                 for foot in self._pair:
                     self._lift_off(foot, t)
-        else:  # one foot may bear while the other is still in the air
+        else:  # one foot may stand while the other is still in the air
             landed = [self._has_landed(foot, measured) for foot in self._pair]
             if not all(landed):
                 return
@@ -146,7 +146,7 @@ class RunningTrot(RunningQuadruped):
         return self._pairs[self._swings % 2]
 
     def _unload(self, t: float) -> None:
-        """Let the force of the next pair fade while all feet bear."""
+        """Let the force of the next pair fade while all feet stand."""
         for foot in self._pair:
             foot.unload(t, self.gait.stance)
 

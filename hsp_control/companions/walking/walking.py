@@ -64,7 +64,7 @@ class Walk(BipedPlan, type="walk"):
     steps are done. The centre of mass follows the pendulum with feedback within the
     sole (`pendulum.py`); a push that the sole cannot hold moves the next step,
     in place and in time (`step_adjustment.py`). A swing foot starts from where it
-    is and becomes a contact when it is felt on the ground, early or late.
+    is and becomes a contact when it touches the ground, early or late.
 
     It has the tasks ``center_of_mass`` and ``trunk``, and one for each foot with the
     name of its contact.
@@ -280,7 +280,7 @@ class RunningWalk(RunningPlan):
     def _hold(self, t: float) -> None:
         """Keep both feet on the ground, and bring the mass back between them."""
         foot = self._feet[self._side]
-        foot.bear(t, LANDING * self.walk.double_support)
+        foot.set_down(t, LANDING * self.walk.double_support)
         self._now, self._held = Velocity(0.0, 0.0, 0.0), True
         self._stand(t)
         self._hull = self._soles(_HELD)
@@ -301,7 +301,7 @@ class RunningWalk(RunningPlan):
         self._hull = standing.corners(_HELD)
 
     def _lift_off(self, t: float) -> None:
-        """Let the foot swing that bears no more."""
+        """Let the foot swing that stands no more."""
         foot, walk = self._feet[self._side], self.walk
         foot.lift(t)
         self._mode = "single"
@@ -338,9 +338,9 @@ class RunningWalk(RunningPlan):
         return self._swing.share(t) > EARLY and force > self._touch
 
     def _land(self, t: float) -> None:
-        """Let the foot bear, and plan what follows from where it stands."""
+        """Set the foot down, and plan what follows from where it stands."""
         foot, walk = self._feet[self._side], self.walk
-        foot.bear(t, LANDING * walk.double_support)
+        foot.set_down(t, LANDING * walk.double_support)
         foot.stand(self._state)
         self._legs.lands(self._state, self._side, self._feet[-self._side].place.yaw)
         self._legs.lifts(self._state, -self._side, foot.place.yaw)

@@ -247,7 +247,7 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
         return self.schedule is None or self.schedule.active(t)
 
     def weight(self, t: float) -> float:
-        """Return how much it bears at time t [s], in [0, 1]; see `Schedule`."""
+        """Return how active it is at time t [s], in [0, 1]; see `Schedule`."""
         return 1.0 if self.schedule is None else self.schedule.weight(t)
 
     @cached_property

@@ -258,7 +258,7 @@ class StaticEffort:
         Efforts of ``excluded`` dofs, from root to contact, depend on contact forces.
         """
         robot, model = state.robot, state.robot.model
-        data = state.made(self, "data", model.createData)
+        data = state.cached(self, "data", model.createData)
         slope = pin.computeGeneralizedGravityDerivatives(model, data, state.q)
 
         def gravity(dt: float) -> Array:

@@ -113,7 +113,7 @@ class Command:
         tau[:] = self.output.tau
         self.controller.applied(tau, period)
         for stage in self.stages:
-            stage.sent(run)
+            stage.finish(run)
         if self._remembers:
             self._pressing = self._expected(self.output)
             sent = tau - run.friction_sent + self._pressing

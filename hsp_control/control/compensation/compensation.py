@@ -54,7 +54,7 @@ class Compensation(Part, error=CompensationError):
     integral_action: IntegralAction | None = None
     """Removes constant task errors by integral feedback."""
     force_feedback: ForceFeedback | None = None
-    """Lets the commanded forces of contacts be those that are felt."""
+    """Lets the commanded forces of contacts be those that are measured."""
     start_up_ramp: StartUpRamp | None = None
     """Changes the effort smoothly from holding still to the law."""
 

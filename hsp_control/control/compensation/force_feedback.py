@@ -1,4 +1,4 @@
-"""Integral feedback of contact forces: what is commanded is what is felt."""
+"""Integral feedback of contact forces: what is commanded is what is measured."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY
@@ -29,12 +29,12 @@ immobile."""
 class ForceFeedback(Part, error=CompensationError):
     """The normal force of contacts follows its command in spite of model errors.
 
-    With λ_d the commanded and λ_m the felt normal force, the controller commands
+    With λ_d the commanded and λ_m the measured normal force, the controller commands
 
         λ = λ_d + K_i ∫ (λ_d - λ_m) dt
 
     A rigid contact answers with λ_m = λ - (what the model lacks), so the error decays
-    like exp(-K_i t). The integral rests while the contact does not fully bear, and
+    like exp(-K_i t). The integral rests while the contact is not fully active, and
     while limits leave no room for what it would add.
     """
 
@@ -45,7 +45,7 @@ class ForceFeedback(Part, error=CompensationError):
     bound: Positive = 50.0
     """Largest magnitude of the integral's share of the command [N]."""
     force: Literal["measured", "estimated"] = "measured"
-    """What is felt [-]: what sensors in the contacts measure, or what the momentum
+    """What is fed back [-]: what sensors in the contacts measure, or what the momentum
     observer estimates (for robots with a fixed base)."""
     contacts: Names | None = None
     """Names of the contacts; all with a commanded force by default."""
@@ -83,12 +83,14 @@ class RunningForceFeedback(Stage):
             and (declared.contacts is None or contact.name in declared.contacts)
         ]
         self.integrals = dict.fromkeys(names, 0.0)  # what is added to each command [N]
-        self.felt = dict.fromkeys(names, np.nan)  # λ_m by contact, at the last step [N]
+        self.actual = dict.fromkeys(
+            names, np.nan
+        )  # λ_m by contact, at the last step [N]
         for name in names:
             controller._force_offset(name)[0] = 0.0
 
     def measure(self, run: Run) -> None:
-        """Feel the forces; see `Stage.measure`."""
+        """Measure the forces; see `Stage.measure`."""
         if self._declared.force == "measured":
             self._read(run.wrenches, pressed=run.last_period > 0.0)
         elif run.under_way:
@@ -105,8 +107,8 @@ class RunningForceFeedback(Stage):
                         "'estimated' needs none"
                     )
             wrench = wrenches[contact.frame]
-            felt = float(contact.axes[:, 2] @ wrench[:3])
-            self.felt[contact.name] = felt if pressed else np.nan
+            actual = float(contact.axes[:, 2] @ wrench[:3])
+            self.actual[contact.name] = actual if pressed else np.nan
 
     def _estimate(self, state: RobotState, disturbance: Array, forces: Array) -> None:
         """Estimate forces from r, what acts besides those that were expected."""
@@ -114,7 +116,7 @@ class RunningForceFeedback(Stage):
         support = self._controller.active_stack.support
         for contact in self._fed:
             if contact not in support.contacts:
-                self.felt[contact.name] = 0.0
+                self.actual[contact.name] = 0.0
                 continue
             points = support.points[support.contacts.index(contact)]
             columns = slice(3 * points.start, 3 * points.stop)
@@ -124,17 +126,22 @@ class RunningForceFeedback(Stage):
             mobility = F.T @ np.linalg.solve(state.mass_matrix, F)
             inverse = np.linalg.pinv(mobility, rcond=_SMALLEST, hermitian=True)
             expected = forces[columns].reshape(-1, 3)[:, 2].sum()
-            self.felt[contact.name] = float(expected + (inverse @ F.T @ unexpected)[2])
+            self.actual[contact.name] = float(
+                expected + (inverse @ F.T @ unexpected)[2]
+            )
 
-    def sent(self, run: Run) -> None:
+    def finish(self, run: Run) -> None:
         """Integrate the errors over one period, for the next effort."""
         t, period, forces = self._controller.state.t, run.period, run.output.forces
         hindered = run.output.status >= Status.LIMITED
         support = self._controller.active_stack.support
         gain, bound = self._declared.gain, self._declared.bound
         for contact in self._fed:
-            felt, name = self.felt[contact.name], contact.name
-            if not np.isfinite(felt) or self._controller.bearing_of(name, t) < 1.0:
+            actual, name = self.actual[contact.name], contact.name
+            if (
+                not np.isfinite(actual)
+                or self._controller.contact_weight(name, t) < 1.0
+            ):
                 continue
             assert contact.force is not None
             command = contact.force.followed.sample(t).position
@@ -144,9 +151,9 @@ class RunningForceFeedback(Stage):
                 float(each.reshape(-1, 3)[points, 2].sum())
                 for each in (forces, support.reference)
             )
-            change = gain * period * (float(wanted) - felt)
+            change = gain * period * (float(wanted) - actual)
             integral = self.integrals[name]
-            missing = commanded - planned  # the programme has given way
+            missing = commanded - planned  # the QP gave less
             if change * missing > 0.0 and abs(missing) > _MISSED * (1.0 + commanded):
                 continue
             if hindered and change * integral >= 0.0:
@@ -155,12 +162,12 @@ class RunningForceFeedback(Stage):
             self.integrals[name] = self._controller._force_offset(name)[0] = integral
 
     def log_channels(self, run: Run) -> Mapping[str, LogChannel]:
-        """Return what is felt, and what it adds; see `Stage.log_channels`."""
+        """Return what is measured, and what it adds; see `Stage.log_channels`."""
         found, how = dict[str, LogChannel](), self._declared.force
         added = "what force feedback adds to the commanded normal force"
-        for name, felt in self.felt.items():
+        for name, actual in self.actual.items():
             meaning = f"normal force, {how}"
-            found[f"contact.{name}.{how}"] = LogChannel(felt, "N", meaning)
+            found[f"contact.{name}.{how}"] = LogChannel(actual, "N", meaning)
             integral = LogChannel(self.integrals[name], "N", added)
             found[f"contact.{name}.integral"] = integral
         return found

@@ -52,7 +52,7 @@ class FrictionFeedForward(Part, error=CompensationError):
     def effort(self, state: RobotState, active: ActiveStack) -> Array:
         """Return the friction effort, shape (nv,) [N·m or N]."""
         v = desired_velocity(state, active)
-        friction = state.made(self, "friction", lambda: self._friction(state.robot))
+        friction = state.cached(self, "friction", lambda: self._friction(state.robot))
         coulomb = friction.coulomb * np.tanh(v / self.smoothing)
         return np.asarray(coulomb + friction.viscous * v)
 

@@ -105,8 +105,8 @@ class RunningIntegral(Stage):
             name: np.zeros(len(Ki)) for name, Ki in self._gains.items()
         }
 
-    def sent(self, run: Run) -> None:
-        """Integrate the errors of the fully active tasks; see `Stage.sent`."""
+    def finish(self, run: Run) -> None:
+        """Integrate the errors of the fully active tasks; see `Stage.finish`."""
         output, controller = run.output, self._controller
         limited = output.status >= Status.LIMITED
         errors: dict[str, Array | None] = {}

@@ -54,7 +54,7 @@ class Stage:
     def act(self, run: Run, state: RobotState, active: ActiveStack) -> None:
         """Change the acceleration or the effort; while tasks fade, for each set."""
 
-    def sent(self, run: Run) -> None:
+    def finish(self, run: Run) -> None:
         """Go on for the period for which the effort of `Run.output` is held."""
 
     def log_channels(self, run: Run) -> Mapping[str, LogChannel]:

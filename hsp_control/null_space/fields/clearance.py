@@ -151,7 +151,7 @@ class Clearance(Cost):
             add_barriers = state.plan([call]).call()
             return _Work(proximity, slopes, curvatures, call, add_barriers)
 
-        return state.made(self, "proximity", make)
+        return state.cached(self, "proximity", make)
 
 
 class _Work(NamedTuple):

@@ -29,7 +29,7 @@ from hsp_control.live import (
     Phase,
     run_loop,
 )
-from hsp_control.live.safe_stop import BearingFeet
+from hsp_control.live.safe_stop import StandingFeet
 from hsp_control.live.state_reader import valid_measurement
 from hsp_control.live.udp import SensorLayout
 
@@ -213,7 +213,7 @@ def test_joints_and_feet_exert_the_force_of_a_safe_stop() -> None:
     experiment = trotting()
     robot, contacts = experiment.robot, experiment.controller.contacts
     state = robot.state(0.0, experiment.q0, experiment.v0)
-    feet, random = BearingFeet(robot, contacts), np.random.default_rng(3)
+    feet, random = StandingFeet(robot, contacts), np.random.default_rng(3)
     J = np.vstack([state.frame(each.frame).jacobian[:3] for each in contacts])
     arms = [each.arms(state.frame(each.frame))[0] for each in contacts]
     angular = [state.frame(each.frame).jacobian[3:] for each in contacts]
@@ -236,7 +236,7 @@ def test_joints_and_feet_exert_the_force_of_a_safe_stop() -> None:
 @pytest.mark.system
 def test_feet_that_are_not_pressed_do_not_bear() -> None:
     experiment = trotting()
-    feet = BearingFeet(experiment.robot, experiment.controller.contacts)
+    feet = StandingFeet(experiment.robot, experiment.controller.contacts)
     q, v = experiment.q0, experiment.v0
     pressed = {name: np.zeros(6) for name in FEET}
     pressed["HL_FOOT"][2], pressed["HR_FOOT"][2] = 2.0, -2.0  # noise may pull
@@ -248,8 +248,8 @@ def test_feet_that_are_not_pressed_do_not_bear() -> None:
     feet.lose()
     assert not feet.hold
     wall = replace(experiment.controller.contacts[0], normal=[1.0, 0.0, 0.5])
-    assert not BearingFeet(experiment.robot, [wall]).hold, "a wall may only be pushed"
-    assert BearingFeet(panda(), ()).hold
+    assert not StandingFeet(experiment.robot, [wall]).hold, "a wall may only be pushed"
+    assert StandingFeet(panda(), ()).hold
 
 
 @pytest.mark.system

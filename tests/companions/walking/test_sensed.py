@@ -48,8 +48,8 @@ def test_it_bears_when_it_is_pressed_and_its_force_rises():
     assert contact.weight(0.2) == 0.0
     assert 0.0 < contact.weight(0.3) < contact.weight(0.4) == 1.0
     channels = running.log_channels()
-    assert channels["plan.front_left.bears"].value == 1.0
-    assert channels["plan.front_left.felt"].value == 3.0
+    assert channels["plan.front_left.active"].value == 1.0
+    assert channels["plan.front_left.force"].value == 3.0
     assert channels["plan.front_left.events"].value == 1.0
 
 
@@ -83,7 +83,7 @@ def test_with_height_and_force_both_must_be_felt(height, force, bears):
 
 
 @pytest.mark.parametrize(("rule", "message"), [
-    ("{}", "give force or height: what tells that it bears"),
+    ("{}", "give force or height: what shows that it is active"),
     ("{height: 0.1, release: 2}", "release is a force; give force, too"),
     ("{force: 2, release: 2}", "release is 2 N; must be below force = 2 N"),
     ("{force: 2, wanted: [[2, 1]]}", "the interval from 2 to 1 s is empty"),
@@ -127,7 +127,7 @@ def test_on_rigid_contacts_it_follows_what_the_plant_does():
         ]
     )
     run = stood(plant, duration=0.3)
-    bears, t = run["plan.front_left.bears"], run.t
+    bears, t = run["plan.front_left.active"], run.t
     assert bears[t < 0.1].all()
     gone = t[np.flatnonzero(np.diff(bears) < 0)[0] + 1]
     assert 0.1 + 0.015 < gone < 0.1 + 0.03  # its patience
@@ -137,4 +137,4 @@ def test_on_rigid_contacts_it_follows_what_the_plant_does():
     assert weight[np.flatnonzero(t >= back + 0.05)] == pytest.approx(1.0)
     faded = gone + 0.02  # its patience again
     assert weight[(t > faded) & (t < back)] == pytest.approx(0.0)
-    assert run["plan.front_left.felt"][-1] > 2.0
+    assert run["plan.front_left.force"][-1] > 2.0

@@ -32,7 +32,7 @@ def test_a_foot_is_put_down_where_the_ground_is_felt(estimated):
         "whole_body/solo12_swing", *PUT_DOWN, f"estimators={estimators}"
     ).run()
     assert run.status == "completed"
-    t, bears = run.t, run["plan.front_left.bears"]
+    t, bears = run.t, run["plan.front_left.active"]
     measured = run[f"plant.contact.{FOOT}.force"][:, 2]
     lands = np.flatnonzero(np.diff(bears) > 0)[0] + 1
     touches = np.flatnonzero((measured > 0.0) & (t > 1.0))[0]

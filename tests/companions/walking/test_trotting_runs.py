@@ -83,7 +83,7 @@ def test_feet_that_find_no_ground_are_named_where_it_falls():
     assert run.status == "stopped"
     message = str(run.meta["message"])
     assert message.startswith("the robot falls: at t = ")
-    assert "; no ground was ever felt at front_left, front_right, hind_" in message
+    assert "; no ground was ever sensed at front_left, front_right, hind_" in message
 
 
 @pytest.mark.system

@@ -123,7 +123,7 @@ MISTAKES: list[tuple[dict[str, Any], str, str]] = [
     (change(type="null_space_gain", gain=[1, 2]), "GainError",
      "changes.0.gain: null_space_gain has shape (2,); needs a number, 7 numbers or a "
      "7 × 7 matrix"),
-    (change(type="contact", contact="a", bears=True), "ControllerError",
+    (change(type="contact", contact="a", active=True), "ControllerError",
      "changes.0: there is no contact 'a' (there are none)"),
     ({"changes": [
         {"type": "remove_task", "task": "hand", "at": 2},

@@ -67,7 +67,7 @@ EVERYTHING: dict[str, Any] = {
      {"type": "weight", "at": 4, "field": "manipulability", "weight": 2},
      {"type": "null_space_gain", "at": 5, "gain": 3},
      {"type": "remove_task", "at": 6, "task": "hand"},
-     {"type": "contact", "at": 7, "contact": "sole", "bears": False}],
+     {"type": "contact", "at": 7, "contact": "sole", "active": False}],
     "plant": {"type": "rigid_contacts", "contacts": {
         "panda_hand": {"kind": "point", "on": [[1, 2]]}}},
     "compensation": {"predictor": {}, "momentum_observer": {"clip": [1, None]},

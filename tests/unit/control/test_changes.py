@@ -236,7 +236,7 @@ def gains(frequency: float) -> hsp.Gains:
             r"by\.displacement: point has 2 coordinates",
         ),
         (lambda c: c.at(1).ramp(-1).remove("hand"), "ramp: -1 is negative"),
-        (lambda c: c.at(1).contact("foot", bears=True), "no contact 'foot'"),
+        (lambda c: c.at(1).contact("foot", active=True), "no contact 'foot'"),
         (lambda c: c.at(1).null_space_gain(-1), "gain: "),
         (lambda c: c.at(np.inf).field(hsp.Rest()), "ChangeField: at: inf is not a f"),
         (lambda c: c.at(1).field(hsp.TargetPosture([0.0, 1.0])), "^fields.0.target: "),

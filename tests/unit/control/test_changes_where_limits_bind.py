@@ -219,8 +219,8 @@ def test_efforts_and_forces_of_legs_are_continuous(seed: int) -> None:
 
 
 def lifted(controller: hsp.Controller, contact: str) -> None:
-    controller.at(START).ramp(0.1).contact(contact, bears=False)
-    controller.at(START + RAMP - 0.1).ramp(0.1).contact(contact, bears=True)
+    controller.at(START).ramp(0.1).contact(contact, active=False)
+    controller.at(START + RAMP - 0.1).ramp(0.1).contact(contact, active=True)
 
 
 ABOUT = np.append(np.linspace(-1e-6, 1e-6, 20), -0.5 * FINEST)
@@ -297,7 +297,7 @@ def test_a_foot_that_a_plan_switches(seed: int) -> None:
     t = START + 0.2
     for begins in (t, t + 0.01, t + 0.02):  # the last two: while it bears already
         before = effort(begins - 1e-9)
-        foot.bear(begins, 0.1)
+        foot.set_down(begins, 0.1)
         np.testing.assert_allclose(effort(begins), before, rtol=0, atol=OF_LEGS)
         end = begins + 0.1
         np.testing.assert_allclose(
@@ -306,7 +306,7 @@ def test_a_foot_that_a_plan_switches(seed: int) -> None:
     early = t + 0.2
     foot.unload(t + 0.15, 0.1)
     before = effort(early + 0.04)  # a part of its motion is free
-    foot.bear(early + 0.04, 0.1)
+    foot.set_down(early + 0.04, 0.1)
     np.testing.assert_allclose(effort(early + 0.04), before, rtol=0, atol=OF_LEGS)
 
 

@@ -41,7 +41,7 @@ class BaseEstimator(Estimator, type="base"):
 
     By the contact-aided invariant extended Kalman filter
     (`estimation/invariant_filter.py`). A contact counts while the world presses on it;
-    one without a force counts while the controller lets it bear all.
+    one without a force counts while it is fully active.
 
     It begins where the robot is measured first. Heading and place drift from there:
     nothing on board observes them. The noise is that of a small industrial unit, the
@@ -105,7 +105,7 @@ class RunningBaseEstimator(RunningEstimator):
 
         Args:
             estimator: The estimator.
-            controller: The controller, whose contacts bear the robot.
+            controller: The controller, whose contacts carry the robot.
             frame: The frame of the inertial measurement unit.
 
         Raises:
@@ -248,9 +248,9 @@ class RunningBaseEstimator(RunningEstimator):
         measured: Measurement,
         inertial: Inertial,
     ) -> None:
-        """Let the filter see the contacts that bear."""
-        bearing = [each for each in legs.contacts if self._bears(each, measured)]
-        names = {each.name for each in bearing}
+        """Give the filter the contacts that stand."""
+        standing = [each for each in legs.contacts if self._stands(each, measured)]
+        names = {each.name for each in standing}
         gone = [key for key in estimate.names if key[0] not in names]
         if gone:
             estimate.drop(gone)
@@ -271,13 +271,13 @@ class RunningBaseEstimator(RunningEstimator):
             estimate.correct(
                 np.vstack([each.points for each in seen]), self._noise(seen)
             )
-        for contact in bearing:
+        for contact in standing:
             if contact.name not in known:
                 new = legs.seen(contact)
                 keys = [(contact.name, k) for k in range(len(new.points))]
                 estimate.add(keys, new.points, self._noise([new]))
 
-    def _bears(self, contact: Contact, measured: Measurement) -> bool:
+    def _stands(self, contact: Contact, measured: Measurement) -> bool:
         force = measured.normal_force(contact.frame, contact.axes[:, 2])
         if force is None:
             return bool(contact.weight(measured.t) >= 1.0)
