@@ -64,8 +64,9 @@ class ClosedFormDistances:
         obstacles: Sequence[Obstacle],
         pairs: Indices,
         places: Indices,
+        distances: Array,
     ) -> None:
-        """Allocate; ``places`` are the pairs' indices among all of the `Proximity`."""
+        """Allocate; `measure` writes ``distances`` of all pairs at ``places``."""
         used = np.unique(pairs)
         self._motion = np.zeros((len(obstacles), MOTION_SIZE))
         self._moving: KernelCalls = [
@@ -95,6 +96,9 @@ class ClosedFormDistances:
         self._cores = np.zeros((len(pairs), 3, 3))
         zeros = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((4, 3)), np.zeros((5, 3))
         self._nearest = _Nearest(*zeros)
+        self._distances = distances
+        sums = np.zeros((2, len(distances))), np.zeros((2, robot.nv))
+        self._sums = _Sums(*sums[0], *sums[1])
         # bodies, place and core of each pair; then those of segments, and with solids
         self._pairs = np.column_stack([pairs, places, np.arange(len(pairs))])
         solid = self._kinds[pairs[:, 1], 0] != SEGMENT
@@ -102,23 +106,16 @@ class ClosedFormDistances:
         # number of calls of `measure`, at any state, shape (1,)
         self.measurements: Indices = np.zeros(1, dtype=np.int64)
 
-    def measure(self, state: RobotState, distances: Array) -> None:
-        """Write the distances [m] at the indices ``places`` of ``distances``."""
+    def measure(self, state: RobotState) -> None:
+        """Write the distances [m]."""
+        calls = state.cached(self, "distances", lambda: state.plan(self.calls(state)))
+        calls.run(state.t)
 
-        def make() -> tuple[Array, KernelCalls]:
-            found = np.zeros(len(distances))
-            return found, self.calls(state, found)
-
-        found, run = state.prepared(self, "distances", make)
-        run()
-        places = self._pairs[:, 2]
-        distances[places] = found[places]
-
-    def calls(self, state: RobotState, distances: Array) -> KernelCalls:
-        """Return the calls of `measure` for this state and this array."""
+    def calls(self, state: RobotState) -> KernelCalls:
+        """Return the calls of `measure` for this state."""
         placements, bodies = state.world.placements, self  # see `supplied`
         given = self.measurements, placements, bodies, self._used, self._of_segments
-        work = self._segments, self._cores, distances
+        work = self._segments, self._cores, self._distances
         calls: list[KernelCall] = [(_measure, (*given, *work))]
         if len(self._of_solids):  # who has none does not compile it
             solids = self._bodies, self._of_solids, self._nearest.work
@@ -136,27 +133,22 @@ class ClosedFormDistances:
         return x - first * n, y + second * n, -n
 
     def differentiate(
-        self,
-        state: RobotState,
-        slopes: Array,
-        curvatures: Array,
-        gradient: Array,
-        rate: Array,
-    ) -> None:
-        """Write Σ b'(d_k) ∇d_k and its rate, (nv,) each, after `measure` at this state.
+        self, state: RobotState, slopes: Array, curvatures: Array | float
+    ) -> tuple[Array, Array]:
+        """Return Σ b'(d_k) ∇d_k and its rate, (nv,), after `measure` at this state.
 
-        ``slopes`` and ``curvatures`` are b' and b'' of all distances.
+        ``slopes`` and ``curvatures`` are b' and b'' of all distances. The next call
+        overwrites what is returned.
         """
-
-        def make() -> tuple[_Sums, KernelCalls]:
-            written = np.zeros((2, state.robot.nv))
-            sums = _Sums(*np.zeros((2, len(slopes))), *written)
-            return sums, self.derivatives(state, *sums)
-
-        sums, run = state.prepared(self, "derivatives", make)
+        sums = self._sums
+        run = state.cached(
+            self,
+            "derivatives",
+            lambda: state.plan(self.derivatives(state, *sums)).call(),
+        )
         sums.slopes[:], sums.curvatures[:] = slopes, curvatures
         run()
-        gradient[:], rate[:] = sums.gradient, sums.rate
+        return sums.gradient, sums.rate
 
     def derivatives(self, state: RobotState, *sums: Array) -> KernelCalls:
         """Return the calls of `differentiate` for these arguments."""

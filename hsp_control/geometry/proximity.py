@@ -160,7 +160,7 @@ class Proximity:
         if closed.any():
             places = np.flatnonzero(closed)
             self.closed_form = ClosedFormDistances(
-                robot, links, obstacles, index[closed], places
+                robot, links, obstacles, index[closed], places, self.distances
             )
         if not closed.all():
             places = np.flatnonzero(~closed)
@@ -177,7 +177,7 @@ class Proximity:
         if self._measured is state and self._stamp == self._stamp_of(state):
             return self.distances  # compare the object: ids are reused
         if self.closed_form is not None:
-            self.closed_form.measure(state, self.distances)
+            self.closed_form.measure(state)
         if self.coal is not None:
             self.coal.measure(state, self.distances)
         self._measured, self._stamp = state, self._stamp_of(state)
@@ -197,10 +197,20 @@ class Proximity:
     def gradient(self, state: RobotState, slopes: Array) -> Array:
         """Return Σ slopes_k ∇d_k, shape (nv,); pairs with slope 0 are skipped."""
         self.measure(state)
-        gradient, rate = np.zeros((2, state.robot.nv))
+        return self._gradient(state, slopes)
+
+    def gradients(self, state: RobotState, pairs: Sequence[int] | Indices) -> Array:
+        """Return ∇d of some pairs, shape (number of pairs, nv)."""
+        self.measure(state)
+        slopes = np.zeros((len(pairs), len(self.pairs)))
+        slopes[np.arange(len(pairs)), pairs] = 1.0
+        rows = [self._gradient(state, each) for each in slopes]
+        return np.array(rows).reshape(-1, state.robot.nv)
+
+    def _gradient(self, state: RobotState, slopes: Array) -> Array:
+        gradient = np.zeros(state.robot.nv)
         if self.closed_form is not None:
-            flat = np.zeros(len(slopes))
-            self.closed_form.differentiate(state, slopes, flat, gradient, rate)
+            gradient[:] = self.closed_form.differentiate(state, slopes, 0.0)[0]
         if self.coal is not None:
             self.coal.add_gradient(state, slopes, gradient)
         return gradient

@@ -175,14 +175,8 @@ class MinimumDistance(Barrier):
             step = _TURN / max(most, 1.0)
             turned = self._numbers(state.displaced(0.0, step * wanted))
             near |= (turned - d) / step < 0.5 * b
-        proximity = self.clearance.proximity(state)
         chosen = np.flatnonzero(near)
-        A = np.zeros((len(chosen), state.robot.nv))
-        for row, k in enumerate(chosen):
-            slopes = np.zeros(len(d))
-            slopes[k] = 1.0
-            A[row] = proximity.gradient(state, slopes)
-        return A, b[chosen]
+        return self.clearance.proximity(state).gradients(state, chosen), b[chosen]
 
     def check_start(self, state: RobotState) -> None:
         """Check that no pair starts closer than the minimum distance."""

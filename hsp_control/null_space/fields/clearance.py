@@ -89,7 +89,7 @@ class Clearance(Cost):
         if closed_form is None or coal is not None or says(self, *ways) != "kernels":
             return super().kernels(state, metric, form, out)
         return [
-            *closed_form.calls(state, work.proximity.distances),
+            *closed_form.calls(state),
             work.barrier,
             *closed_form.derivatives(state, work.slopes, work.curvatures, *out),
             (descend, (metric.L, metric.W_dot, form, *out)),
@@ -118,11 +118,10 @@ class Clearance(Cost):
         self.value(state)
         proximity, slopes, curvatures, *_ = self._work(state)
         closed_form, coal = proximity.closed_form, proximity.coal
+        gradient[:] = rate[:] = 0.0
         if closed_form is not None:
-            closed_form.differentiate(state, slopes, curvatures, gradient, rate)
-        else:
-            gradient.fill(0.0)
-            rate.fill(0.0)
+            found = closed_form.differentiate(state, slopes, curvatures)
+            gradient[:], rate[:] = found
         # Beyond the influence the gradient is zero in a whole neighbourhood.
         if coal is not None and slopes[coal.places].any():
             coal.add_gradient(state, slopes, gradient)
