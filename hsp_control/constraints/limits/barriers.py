@@ -77,9 +77,14 @@ class Barrier(Part, ABC, family="barriers", error=LimitError):
         """Return the barrier with values for what is relative to the start, checked.
 
         Raises:
-            LimitError: If h is not one or more finite numbers.
+            LimitError: If h is not one or more finite numbers, or ∇h has another shape.
         """
-        self._numbers(start.state)
+        state = start.state
+        needed = len(self._numbers(state)), state.robot.nv
+        if (shape := np.shape(self.gradients(state))) != needed:
+            raise LimitError(
+                f"{type(self).__name__} has gradients of shape {shape}; needs {needed}"
+            )
         return self
 
     def rows(

@@ -52,6 +52,13 @@ class Given(hsp.Barrier):
         return self.function(state)
 
 
+class Flat(FrameHeight):
+    """With one row too few dimensions."""
+
+    def gradients(self, state: hsp.RobotState) -> Any:
+        return np.ones(7)
+
+
 def at_home() -> Start:
     robot = panda()
     return Start(robot.state(0.0, robot.home(), np.zeros(7)), Scene())
@@ -114,6 +121,7 @@ def test_a_hand_that_is_drawn_below_stays_above() -> None:
             LimitError,
             r"FrameHeight is 0\.\d+, must be at least 2",
         ),
+        (Flat(), LimitError, r"Flat has gradients of shape \(7,\); needs \(1, 7\)"),
         (Given(lambda _: np.nan), LimitError, "Given has the values nan at t = 0 s"),
         (Given(lambda _: []), LimitError, "needs finite numbers, one or shape"),
         (Given(lambda _: None), LimitError, "has the values None"),
