@@ -1,3 +1,3 @@
 """Targets and states as JSON datagrams, ``udp://HOST:PORT``, for any language."""
 
-from .telling import publish as publish
+from .state_sender import publish as publish

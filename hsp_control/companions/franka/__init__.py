@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from hsp_control.companions.shared import at_first_use
 
 if TYPE_CHECKING:  # for type checkers; a help text must not import what is slow
-    from .connecting import connect as connect
+    from .connection import connect as connect
     from .hardware import FrankaHardware as FrankaHardware
     from .settings import FrankaSettings as FrankaSettings
     from .settings import Load as Load
@@ -13,7 +13,7 @@ if TYPE_CHECKING:  # for type checkers; a help text must not import what is slow
 __getattr__, __dir__ = at_first_use(
     __name__,
     {
-        "connecting": "connect",
+        "connection": "connect",
         "hardware": "FrankaHardware",
         "settings": "FrankaSettings Load",
     },

@@ -24,7 +24,7 @@ def _add_options(model: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from hsp_control.companions.franka.saving_model import franka_model
+    from hsp_control.companions.franka.model_command import franka_model
 
     return franka_model(options)
 

@@ -55,7 +55,7 @@ def _add_options(box: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from hsp_control.companions.franka_box.serving import franka_box
+    from hsp_control.companions.franka_box.box_command import franka_box
 
     return franka_box(options)
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:  # for type checkers; a help text must not import what is slow
     from .results import Sweep as Sweep
     from .sensitivities import Sensitivity as Sensitivity
     from .sensitivities import sensitivity as sensitivity
-    from .sweeping import sweep as sweep
+    from .sweep_runs import sweep as sweep
 
 __getattr__, __dir__ = at_first_use(
     __name__,
@@ -25,6 +25,6 @@ __getattr__, __dir__ = at_first_use(
         "figure": "save_sweep_figure sweep_figure",
         "results": "Sweep",
         "sensitivities": "Sensitivity sensitivity",
-        "sweeping": "sweep",
+        "sweep_runs": "sweep",
     },
 )

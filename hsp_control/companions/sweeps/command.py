@@ -52,7 +52,7 @@ def _add_options(sweep: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from hsp_control.companions.sweeps.running_command import sweep
+    from hsp_control.companions.sweeps.sweep_command import sweep
 
     return sweep(options)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from hsp_control.common.exceptions import SweepError
 from hsp_control.companions.sweeps.distributions import Choices, Distribution
-from hsp_control.companions.sweeps.spelling import values
+from hsp_control.companions.sweeps.value_syntax import values
 from hsp_control.declaration.located import split_assignment, written
 
 

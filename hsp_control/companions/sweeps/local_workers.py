@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Self, TypeAlias
 
 from hsp_control.common.exceptions import SweepError
-from hsp_control.companions.sweeps.running import crashed
+from hsp_control.companions.sweeps.run_task import crashed
 from hsp_control.companions.sweeps.worker import READY, main
 
 _ATTEMPTS = 2

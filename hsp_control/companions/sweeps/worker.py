@@ -7,7 +7,7 @@ import sys
 import threading
 import warnings
 
-from hsp_control.companions.sweeps.running import run_task
+from hsp_control.companions.sweeps.run_task import run_task
 from hsp_control.control.first_state import StartWarning
 
 READY = "ready"

@@ -3,7 +3,7 @@
 from .crawling import Crawl as Crawl
 from .estimation.base_estimator import BaseEstimator as BaseEstimator
 from .estimation.contact_forces import ContactForces as ContactForces
-from .sensing import Sensed as Sensed
-from .sensing import SensedContact as SensedContact
+from .sensed_contacts import Sensed as Sensed
+from .sensed_contacts import SensedContact as SensedContact
 from .trotting import Trot as Trot
 from .walking import Walk as Walk

@@ -6,9 +6,9 @@ from typing import Literal
 
 from hsp_control.common.exceptions import PlanError
 from hsp_control.common.suggestions import did_you_mean, listing
-from hsp_control.companions.walking.composing import composed
 from hsp_control.companions.walking.legs import leg_freedoms, root_frame
-from hsp_control.companions.walking.moving import MovingPlan
+from hsp_control.companions.walking.locomotion import MovingPlan
+from hsp_control.companions.walking.plan_composition import composed
 from hsp_control.constraints.contacts import Contact, SurfaceContact
 from hsp_control.control.plan import PlanParts
 from hsp_control.declaration import within

@@ -5,11 +5,11 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import PlanError
-from hsp_control.companions.walking.fed import Fed, FedOrientation
+from hsp_control.companions.walking.contact_switch import Switch, Switched
 from hsp_control.companions.walking.footsteps import Footstep, near
+from hsp_control.companions.walking.planned_references import Fed, FedOrientation
 from hsp_control.companions.walking.polygon import convex_hull
 from hsp_control.companions.walking.swing import Swing, turned
-from hsp_control.companions.walking.switch import Switch, Switched
 from hsp_control.constraints.contacts import SurfaceContact
 from hsp_control.control.controller import Controller
 from hsp_control.robot import RobotState

@@ -8,14 +8,14 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FallError, PlanError
 from hsp_control.common.suggestions import listing
-from hsp_control.companions.walking.fed import Fed, FedOrientation
+from hsp_control.companions.walking.contact_switch import Switch, Switched
 from hsp_control.companions.walking.footsteps import Footstep, Velocity
 from hsp_control.companions.walking.legs import hip_height, leg_length
 from hsp_control.companions.walking.pendulum import GRAVITY
+from hsp_control.companions.walking.planned_references import Fed, FedOrientation
 from hsp_control.companions.walking.quadruped import QuadrupedPlan
 from hsp_control.companions.walking.quintic import at_rest, to_rest
 from hsp_control.companions.walking.swing import Swing, turned
-from hsp_control.companions.walking.switch import Switch, Switched
 from hsp_control.control.controller import Controller
 from hsp_control.control.falling import FallDetector
 from hsp_control.control.measurement import LogChannel, Measurement

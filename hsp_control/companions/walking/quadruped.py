@@ -6,10 +6,10 @@ from typing import ClassVar
 
 from hsp_control.common.exceptions import PlanError
 from hsp_control.common.suggestions import did_you_mean, listing
-from hsp_control.companions.walking.composing import composed
 from hsp_control.companions.walking.footsteps import Velocity
 from hsp_control.companions.walking.legs import leg_freedoms, root_frame
-from hsp_control.companions.walking.moving import MovingPlan
+from hsp_control.companions.walking.locomotion import MovingPlan
+from hsp_control.companions.walking.plan_composition import composed
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits
 from hsp_control.control.plan import PlanParts

@@ -8,7 +8,6 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import PlanError
 from hsp_control.companions.walking.biped import BODY, TRUNK, BipedPlan
-from hsp_control.companions.walking.fed import Fed, FedOrientation
 from hsp_control.companions.walking.foot import Foot
 from hsp_control.companions.walking.footsteps import Footstep, Velocity, between
 from hsp_control.companions.walking.given_steps import GivenSteps
@@ -20,6 +19,7 @@ from hsp_control.companions.walking.pendulum import (
     in_step,
     plan_dcm,
 )
+from hsp_control.companions.walking.planned_references import Fed, FedOrientation
 from hsp_control.companions.walking.polygon import (
     convex_hull,
     last_inside,

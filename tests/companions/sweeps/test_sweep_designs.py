@@ -15,7 +15,7 @@ from hsp_control.companions.sweeps.design import chosen_design, points
 from hsp_control.companions.sweeps.factor import factors
 from hsp_control.companions.sweeps.plan import SweepPlan
 from hsp_control.companions.sweeps.row import SweepRow
-from hsp_control.companions.sweeps.spelling import values
+from hsp_control.companions.sweeps.value_syntax import values
 from hsp_control.simulation.measures import Measure
 
 pytestmark = pytest.mark.process

@@ -6,7 +6,7 @@ import pytest
 from hsp_control import load_experiment
 from hsp_control.common.exceptions import HspControlError, PlanError
 from hsp_control.companions.walking import Sensed, SensedContact
-from hsp_control.companions.walking.switch import Switch
+from hsp_control.companions.walking.contact_switch import Switch
 from hsp_control.control.measurement import Measurement
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation import simulate

@@ -8,9 +8,9 @@ import pytest
 from hsp_control import Limits, Robot, load_experiment
 from hsp_control.common.exceptions import HspControlError, PlanError
 from hsp_control.companions.walking import Crawl, Trot
-from hsp_control.companions.walking.composing import FRICTION
+from hsp_control.companions.walking.contact_switch import Switch
+from hsp_control.companions.walking.plan_composition import FRICTION
 from hsp_control.companions.walking.quadruped import BANDWIDTH
-from hsp_control.companions.walking.switch import Switch
 from hsp_control.constraints.contacts import BallContact, SurfaceContact
 from hsp_control.tasks import CenterOfMass
 from hsp_control.trajectories import Hold, Stops

@@ -9,8 +9,8 @@ import pytest
 from hsp_control import Controller, FramePose, Gains, Robot, load_experiment
 from hsp_control.common.exceptions import FallError, HspControlError, PlanError
 from hsp_control.companions.walking import Walk
+from hsp_control.companions.walking.contact_switch import Switch
 from hsp_control.companions.walking.foot import Foot
-from hsp_control.companions.walking.switch import Switch
 from hsp_control.constraints.contacts import BallContact, SurfaceContact
 from hsp_control.control.falling import FallDetector
 from hsp_control.tasks import CenterOfMass

@@ -283,7 +283,7 @@ def standing(seed: int, **schedules: Schedule) -> tuple[hsp.Controller, Array, A
 @many
 def test_a_foot_that_a_plan_switches(seed: int) -> None:
     """Whenever it lets it go, and puts it down, also before it has let it go."""
-    walking = pytest.importorskip("hsp_control.companions.walking.switch")
+    walking = pytest.importorskip("hsp_control.companions.walking.contact_switch")
     foot = walking.Switched()
     foot.contact, foot.task = walking.Switch(), walking.Switch(on=False)
     controller, q, v = standing(seed, contact=foot.contact, task=foot.task)

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TrajectoryError
-from hsp_control.companions.walking.written import Written
+from hsp_control.companions.walking.written_part import Written
 from hsp_control.compiled.kernels import KernelCall, kernel
 from hsp_control.compiled.rotations import turn
 from hsp_control.declaration.quantities import PositiveCount

@@ -15,7 +15,7 @@ from hsp_control.companions.sweeps.factor import factors
 from hsp_control.companions.sweeps.local_workers import LocalWorkers
 from hsp_control.companions.sweeps.plan import SweepPlan, document, insert
 from hsp_control.companions.sweeps.results import Sweep
-from hsp_control.companions.sweeps.running import read_result
+from hsp_control.companions.sweeps.run_task import read_result
 from hsp_control.companions.sweeps.store import Store
 from hsp_control.config.document import read_document
 from hsp_control.config.experiment import build

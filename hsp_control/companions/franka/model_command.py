@@ -6,7 +6,7 @@ import numpy as np
 
 from hsp_control.cli.consoles import out
 from hsp_control.common.exceptions import ModelError
-from hsp_control.companions.franka.connecting import reached
+from hsp_control.companions.franka.connection import reached
 from hsp_control.companions.franka.model_request import robot_urdf
 from hsp_control.companions.franka.robot_model import calibrated, own_model
 from hsp_control.companions.franka.settings import FrankaSettings

@@ -5,8 +5,8 @@ from dataclasses import replace
 from typing import Any
 
 from hsp_control.common.exceptions import PlanError
-from hsp_control.companions.walking.fed import Fed, FedOrientation
-from hsp_control.companions.walking.switch import Switch
+from hsp_control.companions.walking.contact_switch import Switch
+from hsp_control.companions.walking.planned_references import Fed, FedOrientation
 from hsp_control.constraints.contacts import Contact
 from hsp_control.control.plan import PlanParts
 from hsp_control.declaration import within
