@@ -44,7 +44,7 @@ def sweep(
         source: A configuration; see `hsp_control.load_experiment`.
         over: The varied parameters: key paths of the configuration and their values, as
             a mapping ``{"null_space.gain": "1:20:5"}`` or as texts ``key=values``.
-            Values are a text (see `spelling.values`), a sequence or
+            Values are a text (see `value_syntax.values`), a sequence or
             a `Distribution`.
         samples: The number of runs; None: all combinations.
         design: ``grid``, ``random``, ``latin_hypercube`` or ``sobol``; None: the grid

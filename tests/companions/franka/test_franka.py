@@ -34,7 +34,7 @@ from hsp_control.companions.franka import (
     FrankaSettings,
     Load,
     connect,
-    connecting,
+    connection,
 )
 from hsp_control.companions.franka_box.gripper import Gripper
 from hsp_control.live import (
@@ -176,7 +176,7 @@ def test_a_client_that_dies_is_told() -> None:
 
 def test_a_client_that_hangs_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
     """libfranka waits without end where a box closes the line without an answer."""
-    monkeypatch.setattr(connecting, "_TIMEOUT", 1.0)
+    monkeypatch.setattr(connection, "_TIMEOUT", 1.0)
     address = host(2)
     with socket.create_server((address, 1337)) as server:
 

@@ -13,7 +13,7 @@ from hsp_control.companions.franka import (
     FrankaSettings,
     Load,
     client,
-    connecting,
+    connection,
 )
 from hsp_control.companions.franka.client_process import ClientProcess
 from hsp_control.live import Hardware, Measurement
@@ -150,10 +150,10 @@ def test_a_load_that_the_robot_did_not_take_is_refused() -> None:
     load = Load(0.5, center=[0.0, 0.0, 0.1])
     settings = FrankaSettings("a", load=load)
     taken = {"mass": 0.5, "center": [0.0, 0.0, 0.1], "inertia": [0.0] * 9}
-    connecting._check_load(settings, taken)
+    connection._check_load(settings, taken)
     for name, other in (("mass", 0.0), ("center", [0.0] * 3), ("inertia", [0.1] * 9)):
         with pytest.raises(HardwareError, match=f"{name} .* after set_load"):
-            connecting._check_load(settings, taken | {name: other})
+            connection._check_load(settings, taken | {name: other})
 
 
 def test_without_pylibfranka_the_extra_is_named(
