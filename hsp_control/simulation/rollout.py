@@ -185,7 +185,8 @@ def _read_journal(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
     reader = JournalReader(path)
     reader.read()
     if not reader.meta:
-        raise LogError(f"{path}: the journal ends before its first heading")
+        why = "is a sweep's" if reader.notes else "ends before its first heading"
+        raise LogError(f"{path}: the journal {why}")
     columns, meta = reader.rows(0), reader.meta
     complete_columns(columns, meta["robot"]["continuous"])
     if not reader.ended:

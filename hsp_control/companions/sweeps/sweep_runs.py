@@ -67,6 +67,7 @@ def sweep(
     Raises:
         SweepError: If the sweep is not well defined, its file belongs to another sweep
             or cannot be written, or no worker can be started.
+        LogError: If its journal cannot be written, or is no journal.
         HspControlError: If the configuration cannot be built with any of the first
             values. Single runs that cannot be built, diverge or crash are rows.
     """

@@ -48,7 +48,6 @@ class Given(hsp.Barrier):
     """h of a state [-]."""
 
     def values(self, state: hsp.RobotState) -> Any:
-        """Return them."""
         return self.function(state)
 
 

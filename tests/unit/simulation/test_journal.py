@@ -354,5 +354,6 @@ def test_it_goes_on_after_a_torn_frame(torn: bytes, tmp_path: Path) -> None:
         assert reader.notes == [{"k": k} for k in range(begun)]
         writer.write_note({"k": begun})
         writer.close()
-        with reader.path.open("ab") as file:
-            file.write(torn)
+        reader.path.write_bytes(reader.path.read_bytes() + torn)
+    with pytest.raises(LogError, match="the journal is a sweep's"):
+        Rollout.load(reader.path)
