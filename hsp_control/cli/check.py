@@ -145,10 +145,10 @@ def warn_of_reach(experiment: Experiment) -> None:
         return  # it moves contacts and references
     duration = experiment.scenario.simulation.duration
     asked = experiment.q0, duration, law.contacts, law.limits
-    told = [each.message for each in out_of_reach(robot, law.tasks, *asked)]
+    messages = [each.message for each in out_of_reach(robot, law.tasks, *asked)]
     push_off = experiment.scenario.plant.push_off
-    told += missed_forces(law, experiment.q0, duration, push_off)
-    for message in told:
+    messages += missed_forces(law, experiment.q0, duration, push_off)
+    for message in messages:
         print(f"hsp: {message}", file=sys.stderr)
 
 

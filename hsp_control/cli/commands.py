@@ -149,8 +149,8 @@ def _tell_json(rollout: Rollout, log: Path, stopwatch: Stopwatch) -> None:
     """Print what a run did, by the names of its measures; null where undefined."""
     found = {name: each.value for name, each in measures(rollout).items()}
     numbers = {name: x if np.isfinite(x) else None for name, x in found.items()}
-    told = {"log": str(log), "status": rollout.status, "rows": len(rollout)} | numbers
-    print(json.dumps(told, indent=2, ensure_ascii=False))
+    facts = {"log": str(log), "status": rollout.status, "rows": len(rollout)} | numbers
+    print(json.dumps(facts, indent=2, ensure_ascii=False))
 
 
 def _saved_elsewhere(rollout: Rollout, log: Path, error: LogError) -> Path:

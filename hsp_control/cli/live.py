@@ -133,8 +133,8 @@ def live(options: argparse.Namespace) -> int:
             ends = {"completed", "operator"}
             if fault is None and report.ended in ends and not requests.fault:
                 return 0
-            told = fault is None or fault in report.reason
-            print(f"hsp: {report.reason if told else fault}", file=sys.stderr)
+            named = fault is None or fault in report.reason
+            print(f"hsp: {report.reason if named else fault}", file=sys.stderr)
             return 2
         # Or a simulated one, in a process of its own
         with RobotProcess(

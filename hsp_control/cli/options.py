@@ -305,5 +305,5 @@ def loaded(group: str) -> Iterator[tuple[str, Any]]:
         try:
             yield name, entry.load()
         except (ImportError, AttributeError) as error:
-            told = f"hsp: {name!r} cannot be imported from {entry.value}: {error}"
-            print(told, file=sys.stderr)
+            message = f"hsp: {name!r} cannot be imported from {entry.value}: {error}"
+            print(message, file=sys.stderr)

@@ -116,10 +116,10 @@ class RobotProcess:
             answer = self.process.stdout.readline() if ready else b""
         except OSError:
             pass
-        if (told := answer.decode().strip()) != READY:
+        if (reply := answer.decode().strip()) != READY:
             self.close()
             late = "" if ready else f" in {timeout:g} s"
-            raise HardwareError(told or f"the simulated robot did not start{late}")
+            raise HardwareError(reply or f"the simulated robot did not start{late}")
 
     def wait(self, timeout: float = 15.0) -> dict[str, Any] | None:
         """Wait until the robot has stopped and its process has ended."""

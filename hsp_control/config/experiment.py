@@ -272,7 +272,7 @@ class Experiment:
         return text
 
     @property
-    def hears(self) -> tuple[str, ...]:
+    def live_sources(self) -> tuple[str, ...]:
         """The addresses at which its streams hear other processes, in real time."""
         streams = parts_within(self.scenario, Streamed)
         return tuple(str(each.source) for each in streams if each.live)
@@ -288,7 +288,7 @@ class Experiment:
         If another process feeds a stream, the run keeps pace with real time.
         """
         settings = self.scenario.simulation
-        if self.hears:
+        if self.live_sources:
             on_row = _in_real_time(settings.log_period, on_row)
         return simulate(
             self.controller,

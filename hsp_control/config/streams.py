@@ -56,14 +56,14 @@ def _check_listening(stream: Streamed, access: Access) -> None:
 
 def with_recordings(
     config: Mapping[str, Any],
-    heard: Mapping[str, Sequence[Any]],
+    received: Mapping[str, Sequence[Any]],
     planned: Sequence[Any] = (),
 ) -> dict[str, Any]:
     """Return a log's configuration in which its streams repeat what they heard."""
     repeated = deepcopy(dict(config))
     tasks = repeated.get("tasks", {})
-    told = [(tasks.get(name, {}), recordings) for name, recordings in heard.items()]
-    for part, recordings in (*told, (repeated.get("plan"), planned)):
+    of_tasks = [(tasks.get(name, {}), each) for name, each in received.items()]
+    for part, recordings in (*of_tasks, (repeated.get("plan"), planned)):
         for stream, messages in zip(_streams(part), recordings, strict=False):
             stream.pop("source", None)
             stream["messages"] = messages

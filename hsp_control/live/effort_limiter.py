@@ -42,7 +42,7 @@ class EffortLimiter:
         self._least: Array = np.zeros(robot.nv)
         self._most: Array = np.zeros(robot.nv)
         self._before = self._least, self._most
-        self._unheard, self._says = 0, False
+        self._unanswered, self._says = 0, False
 
     @property
     def effort_limits(self) -> Array:
@@ -65,13 +65,13 @@ class EffortLimiter:
         self.applied = self.sent + self._added_by_robot
         self._least = self._most = self.sent.copy()
         self._before = self._least, self._most
-        self._unheard, self._says = 0, False
+        self._unanswered, self._says = 0, False
 
     @property
     def _added_by_robot(self) -> Array | float:
         return self.gravity if self._compensates else 0.0
 
-    def believes(self, effort: Array) -> bool:
+    def can_have(self, effort: Array) -> bool:
         """Return whether the motors can have an effort, shape (nv,), as it is sent."""
         tau = np.abs(effort + self._added_by_robot)
         return bool((tau <= self._largest * (1.0 + _TOLERANCE)).all())
@@ -82,7 +82,7 @@ class EffortLimiter:
         What was sent last may be lost, or still under way: the robot may have both,
         unless they are too far apart for one step from both. None: it does not say.
         """
-        self._unheard, self._says = 0, effort is not None
+        self._unanswered, self._says = 0, effort is not None
         if effort is None or np.array_equal(effort, self.sent):
             self._least = self._most = self.sent.copy()
             return False
@@ -94,10 +94,10 @@ class EffortLimiter:
         self.applied = has + borne
         return True
 
-    def nothing_heard(self) -> None:
+    def no_measurement(self) -> None:
         """Count a period without a measurement; a dead line got what was sent."""
-        self._unheard += 1
-        if self._says and self._unheard <= _SURE:
+        self._unanswered += 1
+        if self._says and self._unanswered <= _SURE:
             least, most = self._before
             self._least = np.minimum(least, self.sent)
             self._most = np.maximum(most, self.sent)

@@ -278,7 +278,7 @@ class LiveRun:
         elif self.ending is not None:
             self.end_regularly(*self.ending)
         self.feel_ground()
-        self.hear_applied()
+        self.check_applied_effort()
         tau = self.controller_effort() if self.phase == Phase.RUNNING else None
         if self.phase != Phase.RUNNING:
             tau = self.stop_effort()
@@ -288,7 +288,7 @@ class LiveRun:
             self.stop("fault", f"the effort is not finite: {tau.tolist()}")
         self.send(before)
         response = reader.effort_sent()
-        self.tell_applied()
+        self.report_applied_effort()
         self.log_row(response)
         if self.phase == Phase.RUNNING:
             self.rest_of_period(on_period)
@@ -298,7 +298,7 @@ class LiveRun:
         measurement, state = self.reader.measurement, self.reader.state
         if self.detector is None or measurement is None:
             return
-        self.safe_stop.feet.feel(measurement._replace(t=state.t))
+        self.safe_stop.feet.update(measurement._replace(t=state.t))
         try:
             self.detector.check(state)
         except FallError as error:
@@ -307,7 +307,7 @@ class LiveRun:
     def fall(self, reason: str, error: Exception | None = None) -> None:
         """Stop a robot that falls: its feet hold it no more."""
         self.detector = None
-        self.safe_stop.feet.lose()
+        self.safe_stop.feet.lift()
         self.stop("fault", reason, error)
 
     def controller_effort(self) -> Array | None:
@@ -373,22 +373,22 @@ class LiveRun:
         """Stop because of what a user's code or the law raised."""
         name = type(error).__name__
         text = described(error)
-        told = text if text.startswith(name) else f"{name}: {text}"
-        self.stop("fault", told, error)
+        message = text if text.startswith(name) else f"{name}: {text}"
+        self.stop("fault", message, error)
 
-    def hear_applied(self) -> None:
+    def check_applied_effort(self) -> None:
         """Tell the controller which effort the robot has: one may be lost."""
         if (measurement := self.reader.measurement) is None:
-            self.limiter.nothing_heard()
+            self.limiter.no_measurement()
             return
         has = measurement.applied
-        if has is not None and not self.limiter.believes(has):
+        if has is not None and not self.limiter.can_have(has):
             self.stop("fault", f"the robot says it has an effort of {has.tolist()}")
             has = None
         if self.limiter.robot_has(has):
-            self.tell_applied()
+            self.report_applied_effort()
 
-    def tell_applied(self) -> None:
+    def report_applied_effort(self) -> None:
         """Tell the controller which effort the motors apply."""
         if self.log.controller_failed:
             return

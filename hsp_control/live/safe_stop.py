@@ -51,12 +51,12 @@ class StandingFeet:
         """Whether the robot can be held: by its base, or by a foot that stands."""
         return not self._base or bool(self.contacts)
 
-    def feel(self, measured: Measurement) -> None:
+    def update(self, measured: Measurement) -> None:
         """Find which contacts are active: those that are pressed."""
         if self._base:
             self.contacts = tuple(c for c in self._all if _stands(c, measured))
 
-    def lose(self) -> None:
+    def lift(self) -> None:
         """Let no contact be active any more."""
         self.contacts = ()
 

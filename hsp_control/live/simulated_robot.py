@@ -218,7 +218,7 @@ class SimulatedRobot:
         if self.phase > Phase.RUNNING:
             state = self._state.update(self.t, self.q, self.v)
             if self.plant.robot.unactuated:
-                self._feet.feel(self._pressed())
+                self._feet.update(self._pressed())
             self._limiter.apply(self._stop.effort(state), self.q)
             self.phase = self._stop.phase
         self.tau = self._limiter.applied

@@ -210,7 +210,7 @@ def missed_forces(
         share = _share(controller, support, t) if pressed else 1.0
         for contact in support.contacts:
             force, kept = pressed.get(contact.name, 0.0), share
-            told = (
+            problem = (
                 f"at most {kept * force:.3g} of {force:.3g} N can be had at rest, "
                 "within efforts, friction and balance"
             )
@@ -219,12 +219,12 @@ def missed_forces(
                 needed = speed * push_off * _mass(contact, controller.state)
                 if force < kept * needed:
                     kept = force / needed
-                    told = (
+                    problem = (
                         f"it slides at {speed:.2g} m/s, and the plant's surface pushes "
                         f"it off below {needed:.3g} N; {force:.3g} N are commanded"
                     )
             if force > 0.0 and kept < least.get(contact.name, (_KEPT, ""))[0]:
-                least[contact.name] = kept, f"at t = {t:.3g} s {told}"
+                least[contact.name] = kept, f"at t = {t:.3g} s {problem}"
     for name, (_, message) in least.items():
         yield f"contact {name!r}: {message}"
 

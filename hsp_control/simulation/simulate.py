@@ -166,8 +166,8 @@ def simulate(
                 plant=plant.robot,
             )
             for each in high:
-                told = f"{'.'.join(each.path)}: {each.message}"
-                warnings.warn(told, StartWarning, stacklevel=2)
+                warning = f"{'.'.join(each.path)}: {each.message}"
+                warnings.warn(warning, StartWarning, stacklevel=2)
         chain = ControlChain(Command(controller, compensation), plan, estimators)
         chain.begin(plant.inertial())
         running = chain.plan

@@ -118,8 +118,8 @@ class Teller:
         streams: dict[str, Any] = {}
         for task in controller.tasks:
             for stream in parts_within(task, Streamed) if task.remembers else ():
-                told = {**stream.counts(), "reason": stream.last_rejection}
-                streams.setdefault(task.name, told)
+                counts = {**stream.counts(), "reason": stream.last_rejection}
+                streams.setdefault(task.name, counts)
         logged = source.log_channels().items()
         return {
             "t": state.t,

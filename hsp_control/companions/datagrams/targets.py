@@ -102,7 +102,7 @@ class _Port:
             ) from None
         self._socket.settimeout(_POLL)
 
-    def hear(self) -> None:
+    def poll(self) -> None:
         """Wait for a datagram; give each stream its part, or none if one is refused."""
         text: bytes | None = None
         with suppress(OSError):  # nothing came
@@ -117,16 +117,16 @@ class _Port:
             return
         sender = f"{host}:{port}"
         try:
-            heard = _parts_of(text, there)
-            for name in heard:
+            messages = _parts_of(text, there)
+            for name in messages:
                 with _naming(name):
                     there[name].check_sender(sender, now)
         except StreamError as error:
             for k, inbox in enumerate(there.values()):
                 inbox.reject(str(error), aloud=k == 0)
             return
-        for name, message in heard.items():
-            there[name].hear(sender, now, message)
+        for name, message in messages.items():
+            there[name].receive(sender, now, message)
 
     def close(self) -> None:
         """Close the port."""
@@ -179,7 +179,7 @@ def _listen(port: _Port, part: str, inbox: "ref[Inbox]") -> None:
     while inbox() is not None:
         if port.reading.acquire(timeout=_POLL):
             try:
-                port.hear()
+                port.poll()
             finally:
                 port.reading.release()
     with _lock:

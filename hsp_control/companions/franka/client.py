@@ -63,8 +63,8 @@ class Client:
                 return ANSWER + b"{}"
             return ANSWER + json.dumps(self.connect(json.loads(message[1:]))).encode()
         except Exception as error:
-            told = {"kind": type(error).__name__, "text": str(error)}
-            return ERROR + json.dumps(told).encode()
+            answer = {"kind": type(error).__name__, "text": str(error)}
+            return ERROR + json.dumps(answer).encode()
 
     def connect(self, wanted: dict[str, Any]) -> dict[str, Any]:
         """Connect, set what is wanted, and return the robot's state and model."""
@@ -149,7 +149,7 @@ class GripperClient:
         self.opening: float = 0.5 * self.gripper.read_once().width
         self.inbox = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.inbox.bind((host, port))
-        self.sender, self.heard, self.said = ("", 0), -_SILENCE, ""
+        self.sender, self.last_time, self.last_line = ("", 0), -_SILENCE, ""
 
     def serve(self, link: socket.socket) -> None:
         """Do what comes until the loop ends; the fingers stay as they are then."""
@@ -171,19 +171,19 @@ class GripperClient:
             except Exception as error:
                 self.say(str(error))
                 continue
-            told = {"value": [0.5 * state.width], "grasped": state.is_grasped}
+            answer = {"value": [0.5 * state.width], "grasped": state.is_grasped}
             for listener in listeners:
-                self.inbox.sendto(json.dumps(told).encode(), listener)
+                self.inbox.sendto(json.dumps(answer).encode(), listener)
 
     def read(self, message: Any, sender: tuple[str, int], wanted: float) -> float:
         """Return the opening that a message asks for, if it does."""
         value = message["values"][-1] if "values" in message else message.get("value")
         if value is None:
             return wanted
-        if sender != self.sender and monotonic() - self.heard < _SILENCE:
+        if sender != self.sender and monotonic() - self.last_time < _SILENCE:
             known, other = (":".join(map(str, who)) for who in (self.sender, sender))
             raise ValueError(f"{other} sends while {known} does")
-        self.sender, self.heard = sender, monotonic()
+        self.sender, self.last_time = sender, monotonic()
         if not 0.0 <= (opening := float(value[0])) <= 1.0:
             raise ValueError(f"the opening is {opening} m")
         return opening
@@ -200,8 +200,8 @@ class GripperClient:
 
     def say(self, line: str) -> None:
         """Print a line once."""
-        if line != self.said:
-            self.said = line
+        if line != self.last_line:
+            self.last_line = line
             print(f"The gripper: {line}", flush=True)
 
 

@@ -155,11 +155,11 @@ def explained(kind: str, text: str) -> str:
 
 def about(names: list[str]) -> str:
     """Return errors by name, each with its meaning and advice."""
-    told = []
+    found = []
     for name in names:
         what, advice = REFLEXES.get(name, ("an error without explanation here", ""))
-        told.append(f"{name}: {what}" + (f" ({advice})" if advice else ""))
-    return listing(told, 3) if told else "no error is named"
+        found.append(f"{name}: {what}" + (f" ({advice})" if advice else ""))
+    return listing(found, 3) if found else "no error is named"
 
 
 def table() -> str:

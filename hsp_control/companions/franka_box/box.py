@@ -241,7 +241,7 @@ class ControlBox:
     def _receive(self, motion: Motion, command: np.void | None) -> None:
         """Follow a client's command, or do without."""
         if command is None:
-            motion.lose()
+            motion.miss()
             lost = list(reflexes.communication(motion.lost))
             if lost:
                 self._reflex(lost)
@@ -252,7 +252,7 @@ class ControlBox:
         if finished(command):
             self.end(MoveStatus.SUCCESS, "the client has finished it")
             return
-        violations = list(motion.obey(command))
+        violations = list(motion.execute(command))
         if violations:
             self._reflex(violations)
 

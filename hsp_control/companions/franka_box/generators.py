@@ -80,15 +80,15 @@ class JointPositions(Generator):
 
     def _follow(self, command: np.void, *, first: bool) -> Iterator[Violation]:
         """Follow ``q_c``; see `Generator.follow`."""
-        before, told = self.reference, reference.as_told(self.reference)
+        before, commanded = self.reference, reference.as_commanded(self.reference)
         q = np.array(command["q_c"])
         if first:
             self.reference = reference.at_rest(q)
-            yield from reflexes.start_position(q, told.q, self.limits)
+            yield from reflexes.start_position(q, commanded.q, self.limits)
             return
         self.reference = reference.to_position(q, before)
-        new = reference.to_position(q, told)
-        yield from reflexes.commanded_motion(new, told, self.limits)
+        new = reference.to_position(q, commanded)
+        yield from reflexes.commanded_motion(new, commanded, self.limits)
 
     def _extrapolate(self) -> None:
         """Keep the acceleration; see `Generator.extrapolate`."""
@@ -100,11 +100,11 @@ class JointVelocities(JointPositions):
 
     def _follow(self, command: np.void, *, first: bool) -> Iterator[Violation]:
         """Follow ``dq_c``; see `Generator.follow`."""
-        before, told = self.reference, reference.as_told(self.reference)
+        before, commanded = self.reference, reference.as_commanded(self.reference)
         dq = np.array(command["dq_c"])
         self.reference = reference.to_velocity(dq, before)
-        new = reference.to_velocity(dq, told)
-        yield from reflexes.commanded_motion(new, told, self.limits)
+        new = reference.to_velocity(dq, commanded)
+        yield from reflexes.commanded_motion(new, commanded, self.limits)
 
 
 class HandPoses(Generator):
@@ -129,13 +129,13 @@ class HandPoses(Generator):
                 "the commanded pose is not a homogeneous transform",
             )
             return
-        told = hand.as_told(self.hand)
+        commanded = hand.as_commanded(self.hand)
         if first:
             self.hand = hand.at_rest(pose)
-            yield from reflexes.start_pose(hand.to_pose(pose, told))
+            yield from reflexes.start_pose(hand.to_pose(pose, commanded))
         else:
             self.hand = hand.to_pose(pose, self.hand)
-            yield from reflexes.commanded_hand(hand.to_pose(pose, told), told)
+            yield from reflexes.commanded_hand(hand.to_pose(pose, commanded), commanded)
         yield from self._move_joints(command, first=first)
 
     def _extrapolate(self) -> None:
@@ -146,7 +146,7 @@ class HandPoses(Generator):
 
     def _move_joints(self, command: np.void, *, first: bool) -> Iterator[Violation]:
         """Follow the hand with the joints, and yield what these violate."""
-        elbow, before = None, reference.as_told(self.reference)
+        elbow, before = None, reference.as_commanded(self.reference)
         if command["valid_elbow"]:
             elbow, side = (float(x) for x in command["elbow_c"])
             q_elbow, q_flip = before.q[_ELBOW], before.q[_ELBOW + 1]
@@ -180,9 +180,9 @@ class HandTwists(HandPoses):
     def _follow(self, command: np.void, *, first: bool) -> Iterator[Violation]:
         """Follow ``O_dP_EE_c``; see `Generator.follow`."""
         twist = np.array(command["O_dP_EE_c"])
-        told = hand.as_told(self.hand)
+        commanded = hand.as_commanded(self.hand)
         self.hand = hand.to_twist(twist, self.hand)
-        yield from reflexes.commanded_hand(hand.to_twist(twist, told), told)
+        yield from reflexes.commanded_hand(hand.to_twist(twist, commanded), commanded)
         yield from self._move_joints(command, first=False)
 
 

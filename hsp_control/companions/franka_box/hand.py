@@ -31,8 +31,8 @@ def at_rest(pose: pin.SE3) -> HandMotion:
     return HandMotion(pose, np.zeros(6), np.zeros(6))
 
 
-def as_told(motion: HandMotion) -> HandMotion:
-    """Return a motion as its client is told it, see `reference.as_told`."""
+def as_commanded(motion: HandMotion) -> HandMotion:
+    """Return a motion as its client is told it, see `reference.as_commanded`."""
     pose = motion.pose
     rotation, position, twist, acceleration = (
         x.astype(np.float32).astype(float)

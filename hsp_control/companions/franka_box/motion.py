@@ -84,7 +84,7 @@ class Motion:
         """Share of the last 100 commands that arrived."""
         return sum(self._window) / len(self._window) if self._window else 1.0
 
-    def lose(self) -> None:
+    def miss(self) -> None:
         """Go on without a command: the effort is held, the acceleration too."""
         if not self.commands:
             return
@@ -94,7 +94,7 @@ class Motion:
         if self.generator is not None:
             self.generator.extrapolate()
 
-    def obey(self, command: np.void) -> Iterator[Violation]:
+    def execute(self, command: np.void) -> Iterator[Violation]:
         """Follow a command, and yield what it violates."""
         self._window.append(True)
         self.lost = 0

@@ -60,10 +60,10 @@ class Readings:
         desired = HandMotion(pose, jacobian @ reference.dq, np.zeros(6))
         fields["O_T_EE_d"][:] = _columns(pose)
         fields["O_dP_EE_d"][:] = desired.twist
-        told = hand or desired
-        fields["O_T_EE_c"][:] = _columns(told.pose)
-        fields["O_dP_EE_c"][:] = told.twist
-        fields["O_ddP_EE_c"][:] = told.acceleration
+        commanded = hand or desired
+        fields["O_T_EE_c"][:] = _columns(commanded.pose)
+        fields["O_dP_EE_c"][:] = commanded.twist
+        fields["O_ddP_EE_c"][:] = commanded.acceleration
         fields["elbow_d"][:] = fields["elbow_c"][:] = _elbow(reference.q)
         fields["delbow_c"][0], fields["ddelbow_c"][0] = (
             reference.dq[2],

@@ -16,7 +16,7 @@ def at_rest(q: Array) -> Reference:
     return Reference(q, _REST, _REST)
 
 
-def as_told(reference: Reference) -> Reference:
+def as_commanded(reference: Reference) -> Reference:
     """Return a motion as its client is told it: in single precision.
 
     From there the client continues, and so its command is differentiated from there;

@@ -142,13 +142,13 @@ def load_mjcf(
     description: RobotDescription, access: Access
 ) -> tuple[pin.Model, RobotSource]:
     """Return the Pinocchio model of a description with an MJCF, and its source."""
-    told = description
-    file = Path(told.mjcf or "")
+    robot = description
+    file = Path(robot.mjcf or "")
     with within("mjcf"):
         scene = compile_mjcf(file, access)
-    given = told.root, told.joints, None, told.keyframe, told.locked
+    given = robot.root, robot.joints, None, robot.keyframe, robot.locked
     selection = select(scene, *given)
-    return load_selection(selection, told.tool_frames, told.gravity, file, access)
+    return load_selection(selection, robot.tool_frames, robot.gravity, file, access)
 
 
 def load_selection(

@@ -267,9 +267,9 @@ def select(
             if not np.isfinite(value):
                 raise ModelError(f"{name!r} at {value}; needs a finite number")
             configuration[model.jnt_qposadr[inside[name]]] = value
-    told = qpos is not None or keyframe is not None
+    posed = qpos is not None or keyframe is not None
     everything = tuple(sorted(bodies))
-    return Selection(model, names, top, everything, moving, configuration, told)
+    return Selection(model, names, top, everything, moving, configuration, posed)
 
 
 def _subtree(model: Any, top: int) -> set[int]:

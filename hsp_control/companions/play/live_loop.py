@@ -80,7 +80,7 @@ class DeadMansKey:
         self._clock = clock
         self._until = -float("inf")
 
-    def hear(self, *, held: bool) -> None:
+    def update(self, *, held: bool) -> None:
         """Note what the page says of it."""
         self._until = self._clock() + TIMEOUT if held else -float("inf")
 
@@ -90,7 +90,7 @@ class DeadMansKey:
         return self._clock() < self._until
 
 
-TOLD = 1.0 / 30.0  # time between two words to the page [s]
+_SEND_PERIOD = 1.0 / 30.0  # time between two words to the page [s]
 _MESSAGES = 4  # messages that are taken in one period at most
 
 
@@ -121,8 +121,8 @@ class SteeredLoop:
         self.handles.turn_knobs()
         now = self._clock()
         if now >= self._next:
-            self._next = now + TOLD
-            self.tell()
+            self._next = now + _SEND_PERIOD
+            self.send_state()
 
     def listen(self) -> None:
         """Take the messages of the page that have arrived."""
@@ -139,7 +139,7 @@ class SteeredLoop:
         if self._channel.lost:  # nobody can steer it any more
             self._requests.stop("the process of the page has ended", fault=True)
 
-    def tell(self) -> None:
+    def send_state(self) -> None:
         """Say where everything is, and what the knobs are set to."""
         targets, obstacles = self.handles.places()
         word: dict[str, Any] = {
@@ -154,10 +154,10 @@ class SteeredLoop:
 
     def _hold(self, *, held: bool) -> None:
         if self.key is not None:
-            self.key.hear(held=held)
+            self.key.update(held=held)
 
 
-class ToldHandles(Handles):
+class RemoteHandles(Handles):
     """What can be touched in another process: where it is, that process tells."""
 
     def __init__(self, controller: Controller, period: float) -> None:
@@ -170,7 +170,7 @@ class ToldHandles(Handles):
         """Return where the targets and the obstacles are, by name."""
         return self._places
 
-    def hear(self, word: Mapping[str, Any]) -> None:
+    def update(self, word: Mapping[str, Any]) -> None:
         """Note what the loop says; its changes are made here, too."""
         self._places = word["targets"], word["obstacles"]
         self.message, self.warning = word["message"], word["warning"]
@@ -210,7 +210,7 @@ class Mirror:
         start = LogWriter(self.controller, experiment.scene, 1)
         start.record(self.controller.state, output, output.tau, {})
         self.recorder: LogWriter | JournalReader = start
-        self.handles = ToldHandles(self.controller, period)
+        self.handles = RemoteHandles(self.controller, period)
         self.over = ""
         self._journal = JournalReader(journal, most=_KEPT)
         self._channel = channel
@@ -240,7 +240,7 @@ class Mirror:
     def read(self) -> None:
         """Read what has come from the loop."""
         for word in self._channel.receive():
-            self.handles.hear(word)
+            self.handles.update(word)
         if self._journal.read():
             self.recorder = self._journal
             row = self._journal.rows(self._journal.count - 1)

@@ -149,7 +149,7 @@ class SteeringPage(NamedTuple):
             )
             while not key.held and requests.reason is None:
                 loop.listen()
-                loop.tell()
+                loop.send_state()
                 sleep(_POLL)
             if page.channel.lost:
                 raise ViewerError(

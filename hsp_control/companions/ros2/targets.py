@@ -90,6 +90,6 @@ def _put(
     stamp = header.stamp.nanoseconds
     try:  # without a stamp: now
         t = stamp / 1e9 if stamp else None
-        inbox.hear(publisher, now, {"value": value, "t": t})
+        inbox.receive(publisher, now, {"value": value, "t": t})
     except StreamError as error:
         inbox.reject(str(error))

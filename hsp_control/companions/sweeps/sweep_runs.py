@@ -95,10 +95,10 @@ def sweep(
         build(base)  # raises the same error, with the line of the file
         raise
     experiment = plan.experiment(first)
-    if experiment.hears:
+    if experiment.live_sources:
         raise SweepError(
-            f"a stream hears {experiment.hears[0]}, which only one run can; sweep the "
-            "log of a run, or give the stream a recording as its source"
+            f"a stream hears {experiment.live_sources[0]}, which only one run can; "
+            "sweep the log of a run, or give the stream a recording as its source"
         )
     identity = plan.identity(experiment)
     path = None if out is None else Path(out)

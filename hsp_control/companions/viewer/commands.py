@@ -39,17 +39,17 @@ class LatestCommands:
         """Start without commands."""
         self._packed = packed or {}
 
-    def keep(self, commands: Iterable[PageCommand], *, told: bool = False) -> None:
+    def keep(self, commands: Iterable[PageCommand], *, deletions: bool = False) -> None:
         """Store commands in place of the last ones with their keys.
 
-        Those of a node that one deletes are dropped; ``told``: it is stored itself, for
-        a page that may show the node.
+        Those of a node that one deletes are dropped. With ``deletions`` it is stored
+        itself, for a page that may show the node.
         """
         for command in commands:
             if command.deletes:
                 self._drop(command.path)
             self._packed.pop(command.key, None)  # the new one comes last
-            if told or not command.deletes:
+            if deletions or not command.deletes:
                 self._packed[command.key] = command.packed
 
     def _drop(self, path: str) -> None:

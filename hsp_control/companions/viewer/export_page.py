@@ -134,7 +134,7 @@ _HELP = (
 
 def _about(runs: Sequence[ComparedRun]) -> list[str]:
     """Return the paragraphs at the foot of the page: descriptions and facts."""
-    told = [_HELP]
+    lines = [_HELP]
     for run in runs:
         meta, config = run.rollout.meta, run.rollout.config or {}
         text = " ".join(str(config.get("description") or "").split())
@@ -148,6 +148,6 @@ def _about(runs: Sequence[ComparedRun]) -> list[str]:
         if run.rollout.status == "completed":
             del facts[0]
         words = [f"{name} {value}" for name, value in facts if value]
-        told += [text] if text and text not in told else []
-        told.append("  ·  ".join([run.name, *words] if len(runs) > 1 else words))
-    return told
+        lines += [text] if text and text not in lines else []
+        lines.append("  ·  ".join([run.name, *words] if len(runs) > 1 else words))
+    return lines

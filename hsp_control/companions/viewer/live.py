@@ -130,8 +130,8 @@ class LiveView:
             if first
             else [extend_clip(clip, self._pieces)]
         )
-        told = [] if first else [set_status(f"computing at {_shown(rate)} × real time")]
-        return [*self._extend(motion), *shown, *told]
+        pace = [] if first else [set_status(f"computing at {_shown(rate)} × real time")]
+        return [*self._extend(motion), *shown, *pace]
 
 
 def _preview(experiment: Experiment) -> Rollout:

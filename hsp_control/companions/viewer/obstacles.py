@@ -32,7 +32,7 @@ from hsp_control.simulation import Rollout
 ROOT = "/obstacles"
 _OPACITY, _PALE = 0.75, 0.05
 _EXTENT = 4.0  # edge of the square that stands for a half-space, over the scene's size
-_TOLD = 3  # number of obstacles that the legend names
+_NAMED = 3  # number of obstacles that the legend names
 
 # -- shapes ---------------------------------------------------------------------------
 
@@ -189,10 +189,10 @@ def _obstacle_legend(names: Iterable[str], root: str) -> list[LegendEntry]:
     known = list(names)
     if not known:
         return []
-    told, more = known[:_TOLD], len(known) - _TOLD
+    named, more = known[:_NAMED], len(known) - _NAMED
     word = "obstacle" if len(known) == 1 else "obstacles"
     rest = f" and {more} more" if more > 0 else ""
-    return [LegendEntry(f"{word} {', '.join(told)}{rest}", OBSTACLE, (root,))]
+    return [LegendEntry(f"{word} {', '.join(named)}{rest}", OBSTACLE, (root,))]
 
 
 # -- a log ----------------------------------------------------------------------------

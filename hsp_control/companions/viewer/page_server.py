@@ -92,7 +92,7 @@ class Hub:
         self.lock = Lock()  # of all that is here, and of what is pending for pages
         self.pages: set[Page] = set()
         self.steering: Page | None = None  # the page that steers
-        self.said: dict[str, dict[str, Any]] = {}  # its newest words, by `say`
+        self.received: dict[str, dict[str, Any]] = {}  # its newest words, by `receive`
         self.asked = 0
 
     def keep(self, commands: Iterable[PageCommand]) -> None:
@@ -101,31 +101,31 @@ class Hub:
         with self.lock:
             self.scene.keep(commands)
             for page in self.pages:
-                page.pending.keep(commands, told=True)
+                page.pending.keep(commands, deletions=True)
 
-    def say(self, message: dict[str, Any]) -> None:
+    def receive(self, message: dict[str, Any]) -> None:
         """Keep a page's word: of each kind and object the newest, the newest last."""
         about = [message.get(name, "") for name in ("do", "target", "name", "id")]
         key = json.dumps(about)
         with self.lock:
-            self.said.pop(key, None)
-            self.said[key] = message
+            self.received.pop(key, None)
+            self.received[key] = message
 
     def steer(self, page: "Page | None") -> None:
         """Let a page steer from now on; what the last one held is let go."""
         if self.steering is not None:
-            self.say({"do": "left"})
+            self.receive({"do": "left"})
         self.steering = page
-        self.tell_who_steers()
+        self.show_who_steers()
 
-    def tell_who_steers(self) -> None:
+    def show_who_steers(self) -> None:
         """Tell all pages whether they steer, and whether any page does."""
         taken = self.steering is not None
         for page in self.pages:
             mine = self.steering is page
-            page.tell(PLAY, "drive", type="play_drive", mine=mine, taken=taken)
+            page.command(PLAY, "drive", type="play_drive", mine=mine, taken=taken)
 
-    def wake(self) -> None:
+    def notify(self) -> None:
         """Let pages get what is pending."""
         for page in self.pages:
             page.has_pending.set()
@@ -171,7 +171,7 @@ class Page(WebSocketHandler):
         self._delivery = asyncio.create_task(self._deliver(stage))
         if hub.steerable:
             hub.steering = hub.steering or self
-            hub.tell_who_steers()
+            hub.show_who_steers()
 
     def on_message(self, message: str | bytes) -> None:
         """Process an answer, or what a page that steers says; hang up on others."""
@@ -196,7 +196,7 @@ class Page(WebSocketHandler):
             if not mine:
                 self.hub.steer(self)
         elif mine:
-            self.hub.say(message)
+            self.hub.receive(message)
 
     def on_close(self) -> None:
         """Remove the page."""
@@ -208,9 +208,9 @@ class Page(WebSocketHandler):
 
     def ask(self) -> None:
         """Request that the page returns a number once it shows all sent before."""
-        self.tell("", "ask", type="ask", number=self.hub.asked)
+        self.command("", "ask", type="ask", number=self.hub.asked)
 
-    def tell(self, path: str, name: str, **command: Any) -> None:
+    def command(self, path: str, name: str, **command: Any) -> None:
         """Tell this page something."""
         packed = umsgpack.packb({"path": path, **command})
         with self.hub.lock:

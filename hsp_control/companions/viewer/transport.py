@@ -112,7 +112,7 @@ class PageServer(SceneRecorder):
         """Send commands, to be shown together; never waits for a page."""
         self._check_open()
         self._hub.keep(commands)
-        self._thread.call(self._hub.wake)
+        self._thread.call(self._hub.notify)
 
     def messages(self) -> list[dict[str, Any]]:
         """Return the steering page's messages since the last call; never waits.
@@ -121,8 +121,8 @@ class PageServer(SceneRecorder):
         """
         self._check_open()
         with self._hub.lock:
-            found = list(self._hub.said.values())
-            self._hub.said.clear()
+            found = list(self._hub.received.values())
+            self._hub.received.clear()
         return found
 
     def wait_for_page(self, timeout: float) -> bool:

@@ -12,19 +12,19 @@ from hsp_control.trajectories.schedule import Intervals, Schedule, smooth_step
 
 
 class Switch(Written, Schedule):
-    """w(t) in [0, 1] that a plan throws: on, off, each with a ramp.
+    """w(t) in [0, 1] that a plan turns on and off, each with a ramp.
 
     Off, it is active until its ramp ends: the force of a contact fades before the
     contact goes. On, it is active at once: the force of a contact rises from zero. A
-    throw during a ramp continues from the weight of that time.
+    change during a ramp continues from the weight of that time.
     """
 
     intervals: Intervals = ((None, None),)
     """Not used: events say when it is active."""
     ramp: NonNegative = 0.0
-    """Not used: each throw has its own."""
+    """Not used: each change has its own."""
     on: Flag = True
-    """Whether it is on before the first throw [-]."""
+    """Whether it is on before the first `set` [-]."""
 
     @property
     def constant(self) -> bool:
@@ -35,17 +35,17 @@ class Switch(Written, Schedule):
         weight = float(self.on)
         return np.array([-np.inf, 0.0, weight, weight])
 
-    def throw(self, on: bool, t: float, ramp: float = 0.0) -> None:
+    def set(self, on: bool, t: float, ramp: float = 0.0) -> None:
         """Turn it on or off, from a time on."""
         self.memory[:] = t, ramp, self.weight(t), float(on)
 
     def reset(self) -> None:
-        """Return to the state before the first throw."""
+        """Return to the state before the first `set`."""
         self.memory[:] = self._unwritten()
 
     @property
     def is_on(self) -> bool:
-        """Whether it was last thrown on, or is on from the beginning."""
+        """Whether it was last turned on, or is on from the beginning."""
         return bool(self.memory[3] > 0.0)
 
     def active(self, t: float) -> bool:
@@ -54,7 +54,7 @@ class Switch(Written, Schedule):
         return target > 0.0 or t < start + ramp
 
     def edge(self, t: float) -> float:
-        """Return when it is not active, just before or after the last throw [s]."""
+        """Return when it is not active, just before or after the last `set` [s]."""
         start, ramp, _, target = map(float, self.memory)
         return nextafter(start, -inf) if target > 0.0 else start + ramp
 
@@ -86,9 +86,9 @@ class Switched:
 
     def unload(self, t: float, ramp: float) -> None:
         """Let the force fade from a time on [s]; then the task moves the link."""
-        self.contact.throw(False, t, ramp)
+        self.contact.set(False, t, ramp)
         if self.task is not None:
-            self.task.throw(True, t + ramp)
+            self.task.set(True, t + ramp)
 
     def lift(self, t: float) -> None:
         """Let the task move the link now [s]."""
@@ -97,9 +97,9 @@ class Switched:
     def set_down(self, t: float, ramp: float) -> None:
         """Let the force rise from now on [s], while the task ends."""
         if self.task is not None:
-            self.task.throw(True, t)  # it may wait for the end of a ramp
-            self.task.throw(False, t)
-        self.contact.throw(True, t, ramp)
+            self.task.set(True, t)  # it may wait for the end of a ramp
+            self.task.set(False, t)
+        self.contact.set(True, t, ramp)
 
     def rests(self, t: float) -> bool:
         """Return whether the contact alone counts at time t [s], and its task ends."""

@@ -75,7 +75,7 @@ class Inbox:
                 f"heard alone until it is silent for {_SILENCE:g} s"
             )
 
-    def hear(self, sender: str, now: float, data: Mapping[str, Any]) -> None:
+    def receive(self, sender: str, now: float, data: Mapping[str, Any]) -> None:
         """Add a message of somebody elsewhere; say once what is odd about its clock."""
         self.check_sender(sender, now)
         self.put(**data)

@@ -79,7 +79,7 @@ def test_a_second_sender_is_refused_until_the_first_is_silent(
         before = inbox.count
         inbox.note_silence(now)
         try:
-            inbox.hear(sender, now, {"value": [0.1], "t": now})
+            inbox.receive(sender, now, {"value": [0.1], "t": now})
         except StreamError as error:
             inbox.reject(str(error))
         return inbox.count > before
@@ -234,8 +234,8 @@ def test_a_clock_that_jumps_is_said_once(
 ) -> None:
     inbox = Inbox(Space(1, False), "ros2://goal")
     for k in range(12):
-        inbox.hear("one", 100.0 + 0.05 * k, {"value": [0.0], "t": clock(k)})
+        inbox.receive("one", 100.0 + 0.05 * k, {"value": [0.0], "t": clock(k)})
     for k in range(2):  # a policy that starts again has another clock
-        inbox.hear("two", 110.0 + 0.05 * k, {"value": [0.0], "t": 0.05 * k})
+        inbox.receive("two", 110.0 + 0.05 * k, {"value": [0.0], "t": 0.05 * k})
     assert [each.removeprefix("ros2://goal: the sender's clock ")
             for each in caplog.messages] == said  # fmt: skip

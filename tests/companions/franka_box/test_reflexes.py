@@ -118,13 +118,13 @@ def test_braking_comes_to_rest_as_fast_as_it_may(speeds: list[float]) -> None:
 def test_success_is_counted_over_a_hundred_commands() -> None:
     motion = Motion(1, ControllerMode.EXTERNAL, MotionGenerator.NONE)
     command = np.zeros(1, COMMAND)[0]
-    motion.lose()  # before the first command nothing is lost
+    motion.miss()  # before the first command nothing is lost
     assert (motion.success_rate, motion.lost) == (1.0, 0)
     for _ in range(150):
-        assert not list(motion.obey(command))
+        assert not list(motion.execute(command))
     for _ in range(7):
-        motion.lose()
+        motion.miss()
     assert motion.success_rate == pytest.approx(0.93)
     assert motion.lost == 7
-    list(motion.obey(command))
+    list(motion.execute(command))
     assert (motion.lost, motion.lost_in_all) == (0, 7)

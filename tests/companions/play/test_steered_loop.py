@@ -85,7 +85,7 @@ def keyed(tmp_path: Path) -> Iterator[Steered]:
     """Its key is held at the beginning."""
     key = DeadMansKey(lambda: steered.now)
     steered = Steered(tmp_path / "live.journal", key=key)
-    key.hear(held=True)
+    key.update(held=True)
     yield steered
     steered.close()
 

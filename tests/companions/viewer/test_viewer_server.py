@@ -367,7 +367,7 @@ def test_the_newest_word_counts_and_order_is_kept() -> None:
     assert kept.copy().pop_all() == [b"2", b"3", b"4"]
     kept.keep([gone])
     assert [item[0] for item in kept.items()] == ["/ab"]
-    told.keep([gone], told=True)
+    told.keep([gone], deletions=True)
     assert told.pop_all() == [b"3", b"5"]
 
 

@@ -72,12 +72,12 @@ def test_a_switch_fades_and_then_goes():
     switch = Switch()
     assert switch.active(0.0)
     assert switch.weight(0.0) == 1.0
-    switch.throw(False, 1.0, 0.4)
+    switch.set(False, 1.0, 0.4)
     assert switch.weight(1.2) == pytest.approx(0.5)
     assert switch.active(1.39)
     assert not switch.active(1.4)
     assert not switch.is_on
-    switch.throw(True, 2.0, 0.2)
+    switch.set(True, 2.0, 0.2)
     assert switch.active(2.0)  # at once, with no force
     assert switch.weight(2.0) == 0.0
     assert switch.weight(2.1) == pytest.approx(0.5)
@@ -88,9 +88,9 @@ def test_a_switch_fades_and_then_goes():
 
 def test_a_throw_during_a_ramp_continues_from_there():
     switch = Switch(on=False)
-    switch.throw(True, 0.0, 1.0)
+    switch.set(True, 0.0, 1.0)
     before = switch.weight(0.3)
-    switch.throw(False, 0.3, 0.5)
+    switch.set(False, 0.3, 0.5)
     assert switch.weight(0.3) == before
     weights = [switch.weight(t) for t in np.linspace(0.3, 0.8, 501)]
     assert np.abs(np.diff(weights)).max() < 1.9 * before / 500

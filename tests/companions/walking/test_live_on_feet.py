@@ -240,12 +240,12 @@ def test_feet_that_are_not_pressed_do_not_bear() -> None:
     q, v = experiment.q0, experiment.v0
     pressed = {name: np.zeros(6) for name in FEET}
     pressed["HL_FOOT"][2], pressed["HR_FOOT"][2] = 2.0, -2.0  # noise may pull
-    feet.feel(Measurement(1, 0.0, q, v, wrenches=pressed))
+    feet.update(Measurement(1, 0.0, q, v, wrenches=pressed))
     assert [each.frame for each in feet.contacts] == ["HL_FOOT"]
     assert feet.hold
-    feet.feel(Measurement(1, 0.0, q, v))  # no sensors: their schedules count
+    feet.update(Measurement(1, 0.0, q, v))  # no sensors: their schedules count
     assert len(feet.contacts) == 4
-    feet.lose()
+    feet.lift()
     assert not feet.hold
     wall = replace(experiment.controller.contacts[0], normal=[1.0, 0.0, 0.5])
     assert not StandingFeet(experiment.robot, [wall]).hold, "a wall may only be pushed"
