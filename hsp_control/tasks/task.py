@@ -52,7 +52,7 @@ class Task(Part, ABC, family="tasks", error=TaskError):
     (a rotation vector, for example).
 
     A task has no memory: the controller owns the feedback, and the state keeps what a
-    computation needs (see `RobotState.made`).
+    computation needs (see `RobotState.cached`).
 
     Most tasks derive from `SecondOrderTask`, which has gains.
 

@@ -235,7 +235,7 @@ def _check(
 ) -> float:
     """Observe the last period's effort, and return whether to look; see `LOOK`."""
     # Which limits the next effort violates is written to ``found``; and to
-    # ``solve_if``, as `only_if` reads it.
+    # ``solve_if``, as `OnlyIf` reads it.
     observe(v, held, time[0])
     flags = violated_limits(
         q, v, a, tau, where, limits, held.error, held.drift, held.steady,

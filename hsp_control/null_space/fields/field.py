@@ -37,7 +37,7 @@ class NullSpaceField(Part, ABC, family="fields", error=FieldError):
 
     It may override `placed` if it refers to the start, to obstacles or to frames, and
     `minimum_distance` if it measures distances. A field has no memory: what a
-    computation needs is kept by the state (see `RobotState.made`).
+    computation needs is kept by the state (see `RobotState.cached`).
 
     All methods are about the field without its weight. The sum applies the weight.
 

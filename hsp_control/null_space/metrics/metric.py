@@ -44,7 +44,7 @@ class Metric(Part, ABC, family="metrics", error=MetricError):
     or VARYING and implements `evaluate`, or `kernel`, which makes a step faster; if W
     is constant, derive from `FixedMetric` instead. It may override `placed`. A metric
     has no memory: what a computation needs is kept by the state (see
-    `RobotState.made`).
+    `RobotState.cached`).
 
     Attributes:
         form: IDENTITY, CONSTANT or VARYING, by which the law skips terms that are zero.
