@@ -86,7 +86,7 @@ def test_a_switch_fades_and_then_goes():
     assert switch.weight(0.0) == 1.0
 
 
-def test_a_throw_during_a_ramp_continues_from_there():
+def test_a_change_during_a_ramp_continues_from_there():
     switch = Switch(on=False)
     switch.set(True, 0.0, 1.0)
     before = switch.weight(0.3)
