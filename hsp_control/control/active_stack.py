@@ -121,7 +121,8 @@ class ActiveStack:
             draws = spring and below  # from those below it
             if (follows or draws) and not balances:
                 still = np.zeros_like(asked)  # what damps is not lost, at any speed
-                rest = in_force.feedback, sample.error, still, asked
+                stretched = self.resolution.problem.stretched[here]
+                rest = in_force.feedback, sample.error, still, asked, stretched
                 self._calls.append((write_asked, rest))
             row += each.task.rows
         # names of each level's tasks; ``contacts`` for those at the top

@@ -62,6 +62,8 @@ class Problem:
             below a held level; see `write_thresholds`.
         pulls: With how much of its largest force a spring pulls along a row, shape
             (m,); 0 for other rows.
+        stretched: How long the part of the error is to which a row belongs, relative to
+            its largest length, shape (m,); 0 for rows without one.
         springs: Whether a row is that of a spring, shape (m,). The law itself treats
             all rows alike; where limits bind, a spring yields as a body would.
     """
@@ -76,4 +78,5 @@ class Problem:
         self.asked = np.zeros(rows)
         self.yields = np.zeros(rows)
         self.pulls = np.zeros(rows)
+        self.stretched = np.zeros(rows)
         self.springs = np.zeros(rows, dtype=np.bool_)

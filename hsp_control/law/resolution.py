@@ -16,6 +16,7 @@ from hsp_control.compiled.linalg import (
     squared_norm,
     triangularise_rows,
 )
+from hsp_control.law.edge import EdgeMemory, far_share, near_share
 from hsp_control.law.hierarchy import LevelScratch, resolve_levels
 from hsp_control.law.law import acceleration, null_space_command
 from hsp_control.law.problem import Problem
@@ -87,6 +88,7 @@ class Scratch(NamedTuple):
     rows: Array  # (7, max(m, nv))
     tall: Array  # (nv, m); for levels in conflict
     inner: Array  # (nv, nv); for levels in conflict
+    edge: EdgeMemory
 
 
 class Resolution:
@@ -135,7 +137,12 @@ class Resolution:
             np.zeros((7, max(m, nv))),
             np.zeros((nv, m)),
             np.zeros((nv, nv)),
+            EdgeMemory.allocate(m, nv),
         )
+        self.edge = self._scratch.edge
+        # Only a fixed base has a law beside the damped one. Who stands keeps the
+        # balance by tasks that nothing damps.
+        self._exact_beside = following.size > 0.0 and m <= nv and not following.legs
         # A conflict takes two levels, or more rows than degrees of freedom. Its kernel
         # is the largest of all: only who needs it compiles it.
         self.alone = len(self.ends) == 1 and m <= nv
@@ -151,11 +158,12 @@ class Resolution:
         step = (
             *(problem.task, problem.field, problem.metric, self.form),
             *(v, problem.gain, self.threshold, self._following, controls),
+            self._exact_beside,
             *(self.ends, problem.asked, problem.yields, problem.pulls, problem.springs),
-            *(self._thresholds, self._scratch),
+            *(problem.stretched, self._thresholds, self._scratch),
             *(self.null_space_error, self.acceleration, self.code),
         )
-        resolve = _resolve_at_once if self.alone else _resolve_levels
+        resolve = _resolve_stack if self.alone else _resolve_priorities
         return resolve, (LawStep._make(step),)
 
     def diagnosis(self, first: int) -> tuple[KernelCall, Array, Array]:
@@ -201,16 +209,81 @@ class LawStep(NamedTuple):
     threshold: float
     following: Following
     controls: bool
+    exact_beside: bool
     ends: Indices
     asked: Array
     yields: Array
     pulls: Array
     springs: Flags
+    stretched: Array
     thresholds: Thresholds
     scratch: Scratch
     e_N: Array
     a: Array
     code: Indices
+
+
+@kernel
+def _resolve_stack(step: LawStep) -> int:
+    """Resolve the tasks of one level; see `_mixed`."""
+    return _mixed(step, _resolve_at_once(step))
+
+
+@kernel
+def _resolve_priorities(step: LawStep) -> int:
+    """Resolve the tasks of several levels; see `_mixed`."""
+    return _mixed(step, _resolve_levels(step))
+
+
+@kernel
+def _mixed(step: LawStep, damped: int) -> int:
+    """Overwrite a_damped by a, and e_N; write and return the code of `outcome_of`.
+
+    The first two shares of `edge.py` count here.
+    """
+    edge, rows, a, e_N = step.scratch.edge, step.scratch.rows, step.a, step.e_N
+    edge.code[0] = damped
+    n = a.shape[0]
+    for i in range(n):
+        edge.damped[i] = a[i]
+    if damped == 0 or damped >= BEYOND_ANY_LEVEL or not step.exact_beside:
+        return damped
+    share = far_share(step.stretched)
+    if share < 1.0:
+        near = near_share(
+            step.scratch.wide, step.metric.L, step.form, step.following.size,
+            step.threshold, edge.turned, rows[0, :n],
+        )  # fmt: skip
+        share = max(share, near)
+    if share == 1.0:
+        return damped
+    _resolve_exactly(step, edge.Q, edge.X, edge.exact_e_N)
+    for i in range(n):
+        a[i] += share * (edge.damped[i] - a[i])
+        e_N[i] = edge.exact_e_N[i] + share * (e_N[i] - edge.exact_e_N[i])
+    if share == 0.0:
+        step.code[0] = 0
+    return int(step.code[0])
+
+
+@kernel
+def _resolve_exactly(step: LawStep, Q: Array, X: Array, e_N: Array) -> None:
+    """Write e_N and a of all tasks at once, whatever they ask for."""
+    bounded_inverse(step.scratch.wide, 0.0, Q, X)
+    _write_law(step, Q, X, e_N)
+
+
+@kernel
+def _write_law(step: LawStep, Q: Array, X: Array, e_N: Array) -> None:
+    """Write e_N and a for an inverse Qᵀ X: equations (13) and (7)."""
+    task, metric, form, v = step.task, step.metric, step.form, step.v
+    rows = step.scratch.rows
+    u = rows[6, : v.shape[0]]
+    null_space_command(task, step.field, metric, form, Q, X, v, step.K_N, rows, e_N, u)
+    if not step.controls:
+        for i in range(u.shape[0]):
+            u[i] = 0.0
+    acceleration(task, metric.L, form, Q, X, v, u, rows, step.a)
 
 
 @kernel
@@ -220,17 +293,10 @@ def _resolve_at_once(step: LawStep) -> int:
     If the tasks of several levels are exact together, they are exact one after the
     other: this is the same then.
     """
-    task, field, metric, form, v = step.task, step.field, step.metric, step.form, step.v
-    (Q, X), rows, B = step.scratch.factors, step.scratch.rows, step.scratch.wide
-    J, L, e_N, a = task.jacobian, metric.L, step.e_N, step.a
-    u = rows[6, : J.shape[1]]
-    whiten(J, L, form, B)
+    (Q, X), B, a = step.scratch.factors, step.scratch.wide, step.a
+    whiten(step.task.jacobian, step.metric.L, step.form, B)
     damped = int(bounded_inverse(B, _write_thresholds(step), Q, X))
-    null_space_command(task, field, metric, form, Q, X, v, step.K_N, rows, e_N, u)
-    if not step.controls:
-        for i in range(u.shape[0]):
-            u[i] = 0.0
-    acceleration(task, L, form, Q, X, v, u, rows, a)
+    _write_law(step, Q, X, step.e_N)
     step.code[0] = damped if _all_finite(a) else BEYOND_ANY_LEVEL
     return int(step.code[0])
 

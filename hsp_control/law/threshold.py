@@ -75,6 +75,7 @@ class Following(NamedTuple):
     # L [rad/s² for each unit of a singular value]; inf: it does not follow
     steepest: float
     modest: float  # f_0 [m/s² or rad/s²]
+    legs: bool  # whether the base floats
 
     @classmethod
     def of(cls, size: float, *, on_legs: bool) -> Self:
@@ -82,10 +83,10 @@ class Following(NamedTuple):
         if size == 0.0:
             return cls(*NOT)
         modest = MODEST_ON_LEGS if on_legs else MODEST
-        return cls(size, STIFFNESS / size, size * modest)
+        return cls(size, STIFFNESS / size, size * modest, on_legs)
 
 
-NOT = Following(0.0, np.inf, 0.0)  # nothing follows
+NOT = Following(0.0, np.inf, 0.0, False)  # nothing follows
 
 
 class Thresholds(NamedTuple):

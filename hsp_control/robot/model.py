@@ -100,7 +100,7 @@ class RobotModel(Structure):
         At ω0 = 10 rad/s the hand of an arm of 1 m then approaches at 1.75 m/s, about as
         fast as its joints can.
         """
-        return 0.35 * self.size, 1.0
+        return 0.35 * self.size, 1.25
 
     @cached_property
     def spring_force(self) -> tuple[float, float]:

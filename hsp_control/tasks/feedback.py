@@ -9,6 +9,7 @@ from pydantic import AfterValidator, BeforeValidator
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HspControlError, TaskError
 from hsp_control.compiled.kernels import kernel
+from hsp_control.compiled.linalg import squared_norm
 from hsp_control.declaration.quantities import Positive, plain
 from hsp_control.law.threshold import TURNS, WHOLE
 from hsp_control.robot import Robot
@@ -79,8 +80,20 @@ def add_feedback(
 
 
 @kernel
-def write_asked(feedback: Feedback, e: Array, rest: Array, out: Array) -> None:
-    """Write Kp s(e), what the feedback asks for at rest, shape (m,); ``rest`` is 0."""
+def write_asked(
+    feedback: Feedback, e: Array, rest: Array, out: Array, stretched: Array
+) -> None:
+    """Write Kp s(e), what the feedback asks for at rest, shape (m,); ``rest`` is 0.
+
+    And of each row of a bounded part how long that part is, relative to its largest
+    length.
+    """
+    largest = feedback.largest
+    for part in range(largest.shape[0]):
+        first, end = int(largest[part, 0]), int(largest[part, 1])
+        length = np.sqrt(squared_norm(e[first:end])) / largest[part, 2]
+        for i in range(first, end):
+            stretched[i] = length
     for i in range(e.shape[0]):
         out[i] = -feedback.offset[i]
     add_feedback(out, feedback, e, rest, out)

@@ -29,6 +29,7 @@ from hsp_control.constraints.limits.acceleration_bounds import (
     violated_limits,
     within,
 )
+from hsp_control.control.actuation.damped_share import Permitted
 from hsp_control.control.actuation.limited_step import (
     EXACT,
     LIMITED,
@@ -205,8 +206,12 @@ class Actuation:
             some = np.isfinite(limits.effort) | np.isfinite(limits.effort_rate)
         motors = np.setdiff1d(np.arange(nv), self._support.base)
         capacity = 1 << (count - 1).bit_length() if count else 0
+        permitted = None
+        if limits is not None and not self._support.base.size:
+            permitted = Permitted.by(limits.effort, self._limits.motion)
         law = self._state, self._law, self._support, self._limits.bounds, self._wanted
-        return LimitedStep(*law, motors[some[motors]], self.found[1:], capacity)
+        status = self.found[1:]
+        return LimitedStep(*law, motors[some[motors]], status, capacity, permitted)
 
 
 @kernel

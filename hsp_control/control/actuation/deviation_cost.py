@@ -76,7 +76,7 @@ class Directions(NamedTuple):
     thresholds: Array
     factors: Factors  # law's pseudo-inverse of the stack
     projectors: Projectors  # what its levels left, where it went level by level
-    code: Indices  # law's outcome, see `Resolution.code`
+    code: Indices  # outcome of the damped law, see `Resolution.edge`
     wide: Array  # scratch, shape (m, nv)
     square: Array  # scratch, shape (m, m)
     inner: Array  # scratch, shape (3, nv, max(nv, m))
@@ -98,7 +98,7 @@ class Directions(NamedTuple):
         return cls(
             J, problem.metric.L, resolution.form, resolution.ends, problem.task.error,
             problem.springs, size, int(supported), least, resolution.thresholds,
-            resolution.factors, resolution.projectors, resolution.code,
+            resolution.factors, resolution.projectors, resolution.edge.code,
             np.empty((m, n)), np.empty((m, m)),
             np.empty((3, n, max(n, m))), np.empty((2, max(n, m))), np.empty((n, n)),
             np.zeros(1, dtype=np.int64), np.empty(n), np.zeros((2, every + 1)),

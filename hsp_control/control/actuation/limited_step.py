@@ -23,6 +23,7 @@ import numpy as np
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.compiled.kernels import KernelCall, KernelCalls, OnlyIf, kernel
 from hsp_control.constraints.limits.acceleration_bounds import Bounds
+from hsp_control.control.actuation.damped_share import Permitted, add_damped_share
 from hsp_control.control.actuation.deviation_cost import (
     Directions,
     write_directions,
@@ -230,6 +231,7 @@ class LimitedStep:
         limited: Indices,
         status: Indices,
         capacity: int,
+        permitted: Permitted | None,
     ) -> None:
         n, p, base = state.robot.nv, support.size, support.base
         held = sum(contact.rows for contact in support.contacts)
@@ -295,17 +297,23 @@ class LimitedStep:
             found = optimum(self._rows, moving, memories[0], LIMITED, warm=warm)
             return [(write_inverse_root, root), (_begin, begin), *found]
 
-        rows = *state.inertia.calls, (_write_rows, (*around, self._rows))
+        rows: KernelCalls = [*state.inertia.calls]
+        if permitted is not None:
+            kept = slice(barriers, contacts)
+            law = resolution.acceleration, resolution.edge.damped
+            given = *wanted, *law, bounds, permitted, A[kept], lower[kept], zeros(n)
+            rows.append((add_damped_share, given))
+        rows.append((_write_rows, (*around, self._rows)))
         write = write_directions_at_once if resolution.alone else write_directions
-        law = (write, (directions,)), *nearest(standing=p > 0, warm=True)
-        self._nearest = [*rows, *law]
+        closest = (write, (directions,)), *nearest(standing=p > 0, warm=True)
+        self._nearest = [*rows, *closest]
         self._find_nearest = self._find_forces = state.plan(self._nearest).call()
         if p > 0:
             begun = _begin, (forces, 1.0, redistributed.own, x)
             at_once = optimum(
                 redistributed, none, memories[1], Status.REDISTRIBUTED, warm=True
             )
-            calls = [*rows, begun, *at_once, OnlyIf(law, unsolved)]
+            calls = [*rows, begun, *at_once, OnlyIf(closest, unsolved)]
             self._find_forces = state.plan(calls).call()
         # It again, with the rows as they are, those of the contacts too
         self._again = state.plan(nearest(standing=False, warm=False)).call()

@@ -1,0 +1,120 @@
+"""The edge: the law is exact where tasks can be met, and damped where they cannot.
+
+    a = a_exact + μ (a_damped - a_exact),      0 ≤ μ ≤ 1
+
+Out of reach an error persists, and with it what the feedback asks for. Near a singular
+posture the exact inverse of that changes faster than a sampled loop bears, so the
+inverse of a_damped is bounded by thresholds that follow what is asked for
+(`threshold.py`). But a threshold cannot tell an error that persists from a step within
+reach. What can is where the arm is held, and how: singular, or far away, or at a limit.
+So μ is the largest of three shares, each of them 0 in the middle:
+
+    near    σ ≥ σ_x: 0;  σ ≤ σ_x/2: 1.    σ_x is a tenth of the robot's size
+    far     |e| ≤ 0.85 ℓ: 0;  |e| ≥ ℓ: 1.      ℓ is the largest error that is fed back
+    limits  a_exact is within all limits: 0;  a tenth beyond one: 1
+
+with σ the smallest singular value of the stack. The first two are here, the last is
+where limits are known, in `control/actuation/actuation.py`. All are continuous, so a is.
+
+The unit of σ is that of J, whatever the metric. A direction v_i of unit length in the
+metric moves the joints by ‖L⁻ᵀv_i‖. With the mean u of that, each direction weighted by
+1/σ_i², so that the weakest counts most,
+
+    σ = σ_min(J L⁻ᵀ)/u,      u = ‖J#‖_F / ‖(J L⁻ᵀ)#‖_F
+
+``docs/law.md``, The edge, has what follows from it.
+"""
+
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from hsp_control.common.arrays import Array, Indices
+from hsp_control.compiled.kernels import kernel
+from hsp_control.compiled.linalg import (
+    copy,
+    orthogonalise_rows,
+    solve_lower_transposed,
+    squared_norm,
+)
+from hsp_control.law.samples import IDENTITY
+
+NEAR = 0.1
+"""σ_x over the robot's size: the law is exact in every posture that is farther from a
+singular one. A smaller zone is crossed before the motors have braked an arm that comes
+in at full speed, and it swings from one side of it to the other."""
+
+FAR = 0.85
+"""Part of ℓ up to which errors are far from being those of a hand that is held."""
+
+
+class EdgeMemory(NamedTuple):
+    """What the two laws leave, between the steps of the law."""
+
+    Q: Array  # factors of the exact inverse, see `pseudo_inverse.py`: (m, nv)
+    X: Array  # (m, m)
+    turned: Array  # scratch, (m, nv)
+    damped: Array  # a_damped, shape (nv,); the law's own where nothing is damped
+    exact_e_N: Array  # shape (nv,)
+    code: Indices  # of a_damped, see `outcome_of`, shape (1,)
+
+    @classmethod
+    def allocate(cls, m: int, nv: int) -> Self:
+        """Return memory for m rows."""
+        wide, square = np.zeros((2, m, nv)), np.zeros((m, m))
+        vectors = np.zeros((2, nv))
+        return cls(wide[0], square, wide[1], *vectors, np.zeros(1, dtype=np.int64))
+
+
+@kernel
+def smooth_share(x: float) -> float:
+    """Return 0 for x ≤ 0 and 1 for x ≥ 1, and between them 3x² - 2x³."""
+    x = min(max(x, 0.0), 1.0)
+    return x * x * (3.0 - 2.0 * x)
+
+
+@kernel
+def near_share(
+    B: Array, L: Array, form: int, size: float, least: float, turned: Array, part: Array
+) -> float:
+    """Return how near a singular posture is, from 0 to 1.
+
+    Args:
+        B: J L⁻ᵀ of the stack, shape (m, nv).
+        L: Cholesky factor of the metric, shape (nv, nv).
+        form: The metric's form.
+        size: The robot's size [m].
+        least: ε_0, below which the exact law does not exist: there it is 1.
+        turned: Scratch, shape (m, nv).
+        part: Scratch, shape (nv,).
+    """
+    m = B.shape[0]
+    for k in range(m):
+        copy(B[k], turned[k])
+    orthogonalise_rows(turned, turned[:0, :0])
+    largest, smallest = 0.0, np.inf
+    for k in range(m):
+        square = squared_norm(turned[k])
+        largest, smallest = max(largest, square), min(smallest, square)
+    unit = 1.0
+    if form != IDENTITY:
+        whitened = joints = 0.0
+        for k in range(m):
+            copy(turned[k], part)
+            # Where rounding decides on a direction, any will do: the share is 1.
+            square = max(squared_norm(part), 1e-20 * largest, 1e-300)
+            solve_lower_transposed(L, part)
+            whitened += 1.0 / square
+            joints += squared_norm(part) / (square * square)
+        unit = np.sqrt(joints / whitened)
+    edge = max(NEAR * size, 2.0 * least / unit)
+    return float(smooth_share(2.0 - 2.0 * np.sqrt(smallest) / (unit * edge)))
+
+
+@kernel
+def far_share(stretched: Array) -> float:
+    """Return how far an error is, from 0 to 1; ``stretched`` is |e|/ℓ of each row."""
+    most = 0.0
+    for k in range(stretched.shape[0]):
+        most = max(most, stretched[k])
+    return float(smooth_share((most - FAR) / (1.0 - FAR)))
