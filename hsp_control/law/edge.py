@@ -54,16 +54,21 @@ class EdgeMemory(NamedTuple):
     Q: Array  # factors of the exact inverse, see `pseudo_inverse.py`: (m, nv)
     X: Array  # (m, m)
     turned: Array  # scratch, (m, nv)
-    damped: Array  # a_damped, shape (nv,); the law's own where nothing is damped
+    exact: Array  # a_exact, shape (nv,); where the law is wholly damped, it is not known
+    damped: Array  # a_damped, shape (nv,); a_exact where nothing is damped
     exact_e_N: Array  # shape (nv,)
+    self_motions: Array  # P a of a and of a_damped, if they were asked for, (2, nv)
+    share: Array  # μ, without the share of the limits, shape (1,)
     code: Indices  # of a_damped, see `outcome_of`, shape (1,)
 
     @classmethod
     def allocate(cls, m: int, nv: int) -> Self:
         """Return memory for m rows."""
         wide, square = np.zeros((2, m, nv)), np.zeros((m, m))
-        vectors = np.zeros((2, nv))
-        return cls(wide[0], square, wide[1], *vectors, np.zeros(1, dtype=np.int64))
+        vectors, code = np.zeros((5, nv)), np.zeros(1, dtype=np.int64)
+        return cls(
+            wide[0], square, wide[1], *vectors[:3], vectors[3:], np.zeros(1), code
+        )
 
 
 @kernel

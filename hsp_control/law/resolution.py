@@ -11,6 +11,8 @@ from hsp_control.common.arrays import Array, Flags, Indices
 from hsp_control.compiled.kernels import KernelCall, kernel
 from hsp_control.compiled.linalg import (
     bounded_inverse,
+    copy,
+    multiply,
     norm,
     orthogonalise_rows,
     squared_norm,
@@ -20,7 +22,7 @@ from hsp_control.law.edge import EdgeMemory, far_share, near_share
 from hsp_control.law.hierarchy import LevelScratch, resolve_levels
 from hsp_control.law.law import acceleration, null_space_command
 from hsp_control.law.problem import Problem
-from hsp_control.law.pseudo_inverse import whiten
+from hsp_control.law.pseudo_inverse import apply_pseudo_inverse, whiten
 from hsp_control.law.samples import FieldSample, MetricSample, TaskSample
 from hsp_control.law.threshold import (
     NOT,
@@ -154,17 +156,27 @@ class Resolution:
 
     def call(self, v: Array, *, controls: bool = True) -> KernelCall:
         """Return the call that writes a and e_N; it returns what `outcome_of` takes."""
+        resolve = _resolve_stack if self.alone else _resolve_priorities
+        return resolve, (self._step(v, controls),)
+
+    def self_motions(self, v: Array) -> KernelCall:
+        """Return the call that writes P a of a and of a_damped, after `call`.
+
+        It writes to `edge`.
+        """
+        return _write_self_motions, (self._step(v, controls=True),)
+
+    def _step(self, v: Array, controls: bool) -> "LawStep":
         problem = self.problem
         step = (
             *(problem.task, problem.field, problem.metric, self.form),
             *(v, problem.gain, self.threshold, self._following, controls),
-            self._exact_beside,
+            *(self._exact_beside, self.alone),
             *(self.ends, problem.asked, problem.yields, problem.pulls, problem.springs),
             *(problem.stretched, self._thresholds, self._scratch),
             *(self.null_space_error, self.acceleration, self.code),
         )
-        resolve = _resolve_stack if self.alone else _resolve_priorities
-        return resolve, (LawStep._make(step),)
+        return LawStep._make(step)
 
     def diagnosis(self, first: int) -> tuple[KernelCall, Array, Array]:
         """Return a call that finds how near the law is to singular and to rest.
@@ -210,6 +222,7 @@ class LawStep(NamedTuple):
     following: Following
     controls: bool
     exact_beside: bool
+    alone: bool
     ends: Indices
     asked: Array
     yields: Array
@@ -244,8 +257,9 @@ def _mixed(step: LawStep, damped: int) -> int:
     edge, rows, a, e_N = step.scratch.edge, step.scratch.rows, step.a, step.e_N
     edge.code[0] = damped
     n = a.shape[0]
-    for i in range(n):
-        edge.damped[i] = a[i]
+    copy(a, edge.damped)
+    copy(a, edge.exact)
+    edge.share[0] = 0.0 if damped == 0 else 1.0
     if damped == 0 or damped >= BEYOND_ANY_LEVEL or not step.exact_beside:
         return damped
     share = far_share(step.stretched)
@@ -257,7 +271,9 @@ def _mixed(step: LawStep, damped: int) -> int:
         share = max(share, near)
     if share == 1.0:
         return damped
+    edge.share[0] = share
     _resolve_exactly(step, edge.Q, edge.X, edge.exact_e_N)
+    copy(a, edge.exact)
     for i in range(n):
         a[i] += share * (edge.damped[i] - a[i])
         e_N[i] = edge.exact_e_N[i] + share * (e_N[i] - edge.exact_e_N[i])
@@ -326,6 +342,33 @@ def _resolve_levels(step: LawStep) -> int:
             damped = BEYOND_ANY_LEVEL
         step.code[0] = damped
     return damped
+
+
+@kernel
+def _write_self_motions(step: LawStep) -> None:
+    """Write P a of a and of a_damped."""
+    edge, rows, form = step.scratch.edge, step.scratch.rows, step.form
+    J, L = step.task.jacobian, step.metric.L
+    m, n = J.shape
+    Jx, part, moved = rows[0, :m], rows[1, :m], rows[2, :n]
+    ours, damped = edge.self_motions[0], edge.self_motions[1]
+    share = edge.share[0]
+    if edge.code[0] == 0 or step.alone:
+        Q, X = step.scratch.factors
+        multiply(J, edge.damped, Jx)
+        apply_pseudo_inverse(Q, X, L, form, Jx, part, moved)
+        for i in range(n):
+            damped[i] = edge.damped[i] - moved[i]
+    else:
+        multiply(step.metric.W, edge.damped, moved)
+        multiply(step.scratch.inner, moved, damped)
+    copy(damped, ours)
+    if edge.code[0] > 0 and share < 1.0:
+        multiply(J, edge.exact, Jx)
+        apply_pseudo_inverse(edge.Q, edge.X, L, form, Jx, part, moved)
+        for i in range(n):
+            exact = edge.exact[i] - moved[i]
+            ours[i] = exact + share * (damped[i] - exact)
 
 
 @kernel

@@ -29,7 +29,7 @@ from hsp_control.constraints.limits.acceleration_bounds import (
     violated_limits,
     within,
 )
-from hsp_control.control.actuation.damped_share import Permitted
+from hsp_control.control.actuation.limited_target import Permitted
 from hsp_control.control.actuation.limited_step import (
     EXACT,
     LIMITED,

@@ -23,7 +23,6 @@ import numpy as np
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.compiled.kernels import KernelCall, KernelCalls, OnlyIf, kernel
 from hsp_control.constraints.limits.acceleration_bounds import Bounds
-from hsp_control.control.actuation.damped_share import Permitted, add_damped_share
 from hsp_control.control.actuation.deviation_cost import (
     Directions,
     write_directions,
@@ -35,6 +34,12 @@ from hsp_control.control.actuation.dual_active_set import (
     SOLVED,
     Workspace,
     minimise,
+)
+from hsp_control.control.actuation.limited_target import (
+    Barred,
+    Parts,
+    Permitted,
+    write_limited_target,
 )
 from hsp_control.control.actuation.support import Support
 from hsp_control.law import Resolution
@@ -299,10 +304,13 @@ class LimitedStep:
 
         rows: KernelCalls = [*state.inertia.calls]
         if permitted is not None:
-            kept = slice(barriers, contacts)
-            law = resolution.acceleration, resolution.edge.damped
-            given = *wanted, *law, bounds, permitted, A[kept], lower[kept], zeros(n)
-            rows.append((add_damped_share, given))
+            kept, edge = slice(barriers, contacts), resolution.edge
+            parts = Parts(resolution.acceleration, edge.damped, *edge.self_motions)
+            barred = Barred(A[kept], lower[kept])
+            target = *wanted, parts, bounds, permitted, barred, zeros((4, n))
+            shares = edge.share, directions.held
+            rows.append(resolution.self_motions(state.v))
+            rows.append((write_limited_target, (*target, *shares)))
         rows.append((_write_rows, (*around, self._rows)))
         write = write_directions_at_once if resolution.alone else write_directions
         closest = (write, (directions,)), *nearest(standing=p > 0, warm=True)
