@@ -62,7 +62,6 @@ INGREDIENTS: dict[str, tuple[Edit, ...]] = {
     "how a null space turns": (
         (_EDGE, "following.size / above))", "0.0 / above))"),
     ),
-    "what springs lend": ((_EDGE, "SPRING = 0.4", "SPRING = 1e-9"),),
     "static effort": (
         ("constraints/limits/limits.py", "_HELD = 0.95", "_HELD = 100.0"),
     ),

@@ -13,14 +13,8 @@ So μ is the largest of three shares, each of them 0 in the middle:
     far     |e| ≤ 0.85 ℓ: 0;  |e| ≥ ℓ: 1.      ℓ is the largest error that is fed back
     limits  a_exact is within all limits: 0;  a tenth beyond one: 1
 
-with σ the smallest singular value of the stack. The first two are here, the last is
+with σ the smallest singular value of the stack J, whatever the metric. The first two are here, the last is
 where limits are known, in `control/actuation/actuation.py`. All are continuous, so a is.
-
-The unit of σ is that of J, whatever the metric. A direction v_i of unit length in the
-metric moves the joints by ‖L⁻ᵀv_i‖. With the mean u of that, each direction weighted by
-1/σ_i², so that the weakest counts most,
-
-    σ = σ_min(J L⁻ᵀ)/u,      u = ‖J#‖_F / ‖(J L⁻ᵀ)#‖_F
 
 ``docs/law.md``, The edge, has what follows from it.
 """
@@ -31,13 +25,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.compiled.kernels import kernel
-from hsp_control.compiled.linalg import (
-    copy,
-    orthogonalise_rows,
-    solve_lower_transposed,
-    squared_norm,
-)
-from hsp_control.law.samples import IDENTITY
+from hsp_control.compiled.linalg import copy, orthogonalise_rows, squared_norm
 
 NEAR = 0.1
 """σ_x over the robot's size: the law is exact in every posture that is farther from a
@@ -79,41 +67,23 @@ def smooth_share(x: float) -> float:
 
 
 @kernel
-def near_share(
-    B: Array, L: Array, form: int, size: float, least: float, turned: Array, part: Array
-) -> float:
+def near_share(J: Array, size: float, least: float, turned: Array) -> float:
     """Return how near a singular posture is, from 0 to 1.
 
     Args:
-        B: J L⁻ᵀ of the stack, shape (m, nv).
-        L: Cholesky factor of the metric, shape (nv, nv).
-        form: The metric's form.
+        J: The stack, shape (m, nv).
         size: The robot's size [m].
-        least: ε_0, below which the exact law does not exist: there it is 1.
+        least: ε_0: no exact law is asked for below twice of it.
         turned: Scratch, shape (m, nv).
-        part: Scratch, shape (nv,).
     """
-    m = B.shape[0]
-    for k in range(m):
-        copy(B[k], turned[k])
+    smallest = np.inf
+    for k in range(J.shape[0]):
+        copy(J[k], turned[k])
     orthogonalise_rows(turned, turned[:0, :0])
-    largest, smallest = 0.0, np.inf
-    for k in range(m):
-        square = squared_norm(turned[k])
-        largest, smallest = max(largest, square), min(smallest, square)
-    unit = 1.0
-    if form != IDENTITY:
-        whitened = joints = 0.0
-        for k in range(m):
-            copy(turned[k], part)
-            # Where rounding decides on a direction, any will do: the share is 1.
-            square = max(squared_norm(part), 1e-20 * largest, 1e-300)
-            solve_lower_transposed(L, part)
-            whitened += 1.0 / square
-            joints += squared_norm(part) / (square * square)
-        unit = np.sqrt(joints / whitened)
-    edge = max(NEAR * size, 2.0 * least / unit)
-    return float(smooth_share(2.0 - 2.0 * np.sqrt(smallest) / (unit * edge)))
+    for k in range(J.shape[0]):
+        smallest = min(smallest, squared_norm(turned[k]))
+    edge = max(NEAR * size, 2.0 * least)
+    return float(smooth_share(2.0 - 2.0 * np.sqrt(smallest) / edge))
 
 
 @kernel

@@ -83,7 +83,7 @@ def resolve_levels(
         springs: Whether a row is that of a spring, shape (m,).
         thresholds: From which singular values of each level's whitened Jacobian, in
             the null space of those above, its inverse is bounded; ``own`` is raised
-            here below levels that turn or are held, and to what springs lend.
+            here below levels that turn or are held.
         controls: False for φ_N = 0.
         ends: Where each level's rows end in the stack.
         scratch: Memory.
@@ -101,7 +101,7 @@ def resolve_levels(
     for i in range(n):
         a[i] = drawn[i] = 0.0
     start, held, above = 0, 0.0, np.inf
-    own, _, lends, scales = thresholds
+    own, _, scales = thresholds
     for level in range(ends.shape[0]):
         end = ends[level]
         block = slice(start, end)
@@ -126,9 +126,6 @@ def resolve_levels(
         _add_level(QJ[:, block], G_inv, rest, shares, a)
         _add_level(QJ[:, block], G_inv, opposed, shares, drawn)
         # What it leaves to those below, and how much it turns or is held
-        if lends[level] > threshold:
-            threshold = lends[level]
-            _inverted(V, x, threshold, shares, G_inv)
         own[level] = threshold
         if turns:
             above = min(above, max(np.sqrt(smallest), threshold) / scales[level])
@@ -143,8 +140,6 @@ def resolve_levels(
                 wanted += asked[k] * asked[k]
                 lacking += lack * lack
             held = max(held, how_held(lacking, wanted, following))
-            if lends[level] > 0.0:
-                held = max(held, 1.0 - smallest / (lends[level] * lends[level]))
             if damped == 0:
                 damped = level + 1
         _close_level(Q, QJ[:, block], G_inv, pushed)

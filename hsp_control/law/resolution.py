@@ -254,7 +254,7 @@ def _mixed(step: LawStep, damped: int) -> int:
 
     The first two shares of `edge.py` count here.
     """
-    edge, rows, a, e_N = step.scratch.edge, step.scratch.rows, step.a, step.e_N
+    edge, a, e_N = step.scratch.edge, step.a, step.e_N
     edge.code[0] = damped
     n = a.shape[0]
     copy(a, edge.damped)
@@ -264,10 +264,8 @@ def _mixed(step: LawStep, damped: int) -> int:
         return damped
     share = far_share(step.stretched)
     if share < 1.0:
-        near = near_share(
-            step.scratch.wide, step.metric.L, step.form, step.following.size,
-            step.threshold, edge.turned, rows[0, :n],
-        )  # fmt: skip
+        J, size = step.task.jacobian, step.following.size
+        near = near_share(J, size, step.threshold, edge.turned)
         share = max(share, near)
     if share == 1.0:
         return damped

@@ -26,10 +26,6 @@ f - J a_f, with a_f what those above draw at rest: a task that is met undoes it.
 level below follows that with an L that is a fortieth, as far as the one above lacks
 what it asks for.
 
-A level of springs asks for as little at its edge as it can have: that fades with its
-mobility, and the directions in which it pulls in vain turn as 1/s. So it lends them to
-what is below, as far as it pulls.
-
 All but ε_0 is meant for the identity as metric. Another one that makes J L⁻ᵀ longer
 than J makes the same arm as steep at an ε that is larger.
 """
@@ -47,10 +43,8 @@ STIFFNESS = 200.0
 posture by a spring of at most 2 L |∂s/∂q| ≤ 100 1/s² of its own inertia, 10 rad/s: slow
 beside periods of up to 10 ms and what motors can give, and damped by a null-space gain
 of 10 1/s."""
-WHOLE, TURNS = 3, 0.8
-"""Components of an error to which all of L belongs, one of m < 3 gets L/(4 - m); and by
-how much L is less for an orientation, whose error of 1 rad asks for thrice as much as
-the largest of a position."""
+WHOLE = 3
+"""Components of an error to which all of L belongs, one of m < 3 gets L/(4 - m)."""
 BELOW = 40.0
 """By how much L is less below a held level: its feedback then accelerates a joint by at
 most 1/40 of the spring of the level above."""
@@ -62,10 +56,6 @@ TURNING, QUARTER, QUICKEST = 50.0, 0.25, 7.0
 """How fast what a field asks for may change as its null space turns [1/s]: what is held
 for a period h is stable below 2/h, and periods are up to 10 ms. A velocity counts for a
 quarter, and nothing for more than 7 rad/s: no field costs the task all that it has."""
-
-SPRING = 0.5
-"""ε, over the robot's size, from which a level lends its directions whose springs pull
-with all their force: that of a feedback with its largest error."""
 
 
 class Following(NamedTuple):
@@ -94,13 +84,12 @@ class Thresholds(NamedTuple):
 
     own: Array  # ε of each level
     follows: Array  # the part of it that follows f
-    lends: Array  # ε from which springs lend their directions to those below; 0: never
     scales: Array  # by how much J L⁻ᵀ is longer than J, at least 1: the unit of ε
 
     @classmethod
     def allocate(cls, levels: int) -> Self:
         """Return those of a number of levels."""
-        return cls(*np.zeros((4, levels)))
+        return cls(*np.zeros((3, levels)))
 
 
 @kernel
@@ -149,11 +138,11 @@ def write_thresholds(
     Returns:
         A singular value of the stack from which on no level is bounded.
     """
-    largest, start, several = least, 0, ends.shape[0] > 1
+    largest, start = least, 0
     above = 0.0  # the largest scale of those above
     for level in range(ends.shape[0]):
         square = more = pull = whitened = plain = 0.0
-        sprung, tracks = several, False
+        sprung, tracks = True, False
         for k in range(start, ends[level]):
             sprung = sprung and springs[k]
             pull += pulls[k] * pulls[k]
@@ -172,15 +161,14 @@ def write_thresholds(
             beyond *= 1.0 + more / square
         part = min(share, 1.0)
         follows = scale * np.sqrt(beyond / following.steepest)
-        lends = scale * SPRING * following.size * np.sqrt(part) if sprung else 0.0
         own = max(least, follows, scale * part * turning)
-        largest = max(largest, own, lends)
+        largest = max(largest, own)
         if above > 0.0:
             # No s is below that of the stack: `threshold_below` is not above it then.
             turns = np.cbrt(follows * follows * following.size * above)
             largest = max(largest, turns)
         thresholds.own[level], thresholds.follows[level] = own, follows
-        thresholds.lends[level], thresholds.scales[level] = lends, scale
+        thresholds.scales[level] = scale
         above = max(above, scale) if sprung or tracks else above
         start = ends[level]
     return float(largest)

@@ -23,7 +23,6 @@ from hsp_control.law.threshold import (
     MODEST,
     NOT,
     QUICKEST,
-    SPRING,
     STIFFNESS,
     TURNING,
     Following,
@@ -69,7 +68,7 @@ def test_it_bounds_what_the_feedback_asks_for_over_its_square(
     In a metric that makes J L⁻ᵀ longer than J the same holds for ε in its scale.
     """
     asked = 10.0**size * np.random.default_rng(seed).standard_normal(9)
-    following = Following(0.8, 150.0, 1.3)
+    following = Following(0.8, 150.0, 1.3, False)
     ends = [3, 3, 5, 9]
     largest, (own, *_) = written(asked, ends, following)
     _, scaled = written(asked, ends, following, whitened=scale)
@@ -92,7 +91,7 @@ def test_a_level_below_a_held_one_asks_for_less_than_draws_that_one(
     seed: int, lacks: float
 ) -> None:
     """It gets 2 s ‖f‖/ε² at most along s; held for good, that is 2 L s/40."""
-    rng, following = np.random.default_rng(seed), Following(0.8, 150.0, 1.3)
+    rng, following = np.random.default_rng(seed), Following(0.8, 150.0, 1.3, False)
     asked, above = 10.0 ** rng.uniform(-1.0, 4.0, (2, 1)) * unit(rng, 3)
     square = above @ above
     held = how_held(lacks**2 * square, square, following)
@@ -109,7 +108,7 @@ def test_a_level_below_follows_as_slowly_as_those_above_turn(
     seed: int, size: float, log_s: float
 ) -> None:
     """ε² = f size/(L s_1); and it is below s where all are resolved at once."""
-    rng, following = np.random.default_rng(seed), Following(0.8, 150.0, 1.3)
+    rng, following = np.random.default_rng(seed), Following(0.8, 150.0, 1.3, False)
     asked = 10.0**size * rng.standard_normal(6)
     scales = 10.0 ** rng.uniform(-1.0, 1.0, (6, 1))
     largest, thresholds = written(asked, [3, 6], following, whitened=scales)
@@ -121,19 +120,17 @@ def test_a_level_below_follows_as_slowly_as_those_above_turn(
 
 
 @given(seeds, st.floats(0.01, 2.0))
-def test_springs_lend_as_far_as_they_pull(seed: int, pull: float) -> None:
-    """Alone they lend nothing."""
-    rng, following = np.random.default_rng(seed), Following(0.8, 150.0, 1.3)
+def test_springs_need_what_a_field_needs_as_far_as_they_pull(
+    seed: int, pull: float
+) -> None:
+    rng, following = np.random.default_rng(seed), Following(0.8, 150.0, 1.3, False)
     pulls = np.zeros(6)
     pulls[:3] = pull * unit(rng, 3)
     springs: dict[str, Any] = {"yields": 0.0, "pulls": pulls, "turning": 0.05}
-    f, share = rng.standard_normal(6), min(pull, 1.0)
-    largest, (own, _, lends, _) = written(f, [3, 6], following, **springs)
-    most = SPRING * 0.8 * np.sqrt(share)
-    np.testing.assert_allclose(lends, [most, 0.0], atol=1e-12)
-    assert largest == max(*own, *lends)
-    assert own[0] == pytest.approx(max(LEAST, 0.05 * share))
-    assert written(f, [6], following, **springs)[1].lends[0] == 0.0
+    f = rng.standard_normal(6)
+    largest, (own, *_) = written(f, [3, 6], following, **springs)
+    assert largest == max(own)
+    assert own[0] == pytest.approx(max(LEAST, 0.05 * min(pull, 1.0)))
 
 
 class Slopes(NamedTuple):

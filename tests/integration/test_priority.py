@@ -1,0 +1,96 @@
+"""No field takes a feasible task away, whatever it asks for and whatever limits bind."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+import hsp_control as hsp
+from hsp_control.common.arrays import Array
+from hsp_control.control.actuation.limited_step import Status
+
+ARMS = {
+    "panda": (0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8),
+    "iiwa14": (0.0, 0.6, 0.0, -1.4, 0.0, 1.1, 0.0),
+    "xarm7": (0.0, -0.5, 0.0, 1.2, 0.0, 1.5, 0.0),
+    "ur5": (0.0, -1.2, 1.8, -2.2, -1.57, 0.0),
+}
+KEPT, TURNED = 1e-3, np.deg2rad(0.1)  # [m, rad]
+
+
+def constant(g: Array, state: hsp.RobotState) -> Array:
+    """Return g."""
+    return g
+
+
+def growing(g: Array, state: hsp.RobotState) -> Array:
+    """Return a field that grows by g in each second."""
+    return state.t * g
+
+
+def jumping(g: Array, state: hsp.RobotState) -> Array:
+    """Return a field that jumps from g to -g and back."""
+    return g * np.sign(np.sin(7.0 * state.t))
+
+
+FIELDS = {
+    "64 rad/s": (constant, 64.0),
+    "1e4 rad/s": (constant, 1e4),
+    "growing": (growing, 300.0),
+    "jumping": (jumping, 300.0),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("field", FIELDS)
+@pytest.mark.parametrize("name", ARMS)
+def test_a_field_that_pushes_into_limits_leaves_the_task(name: str, field: str) -> None:
+    """The hand stays where it is, while joints are driven into their limits."""
+    robot, (kind, size) = hsp.Robot.load(name), FIELDS[field]
+    q0 = robot.integrate(robot.neutral(), np.array(ARMS[name]))
+    d = np.random.default_rng(sum(map(ord, name + field))).normal(size=robot.nv)
+    g = partial(kind, size * d / np.linalg.norm(d))
+    whole = robot.nv > 6
+    task = hsp.FramePose if whole else hsp.FramePosition
+    controller = hsp.Controller(
+        robot,
+        [task(robot.end_effector, name="hand")],
+        hsp.fields.FunctionField(g),
+        start=q0,
+    )
+    run = hsp.simulate(
+        controller, q0, duration=1.5, control_period=0.001, check_rate=False
+    )
+    e = run["task.hand.error"]
+    assert (run["status"] == Status.LIMITED).any()
+    assert np.linalg.norm(e[:, :3], axis=1).max() < KEPT
+    assert not whole or np.linalg.norm(e[:, 3:], axis=1).max() < TURNED
+    lower, upper = robot.position_limits()
+    x = np.array([robot.joint_positions(q) for q in run.q])
+    assert np.maximum(x - upper, lower - x).max() < 1e-3
+
+
+def test_efforts_are_continuous_where_a_field_begins_to_violate_limits() -> None:
+    """Bisected: the largest change of an effort fades as its interval is halved."""
+    robot, rng = hsp.Robot.load("panda"), np.random.default_rng(0)
+    q0 = np.array(ARMS["panda"])
+    d, v = rng.normal(size=7), 0.3 * rng.normal(size=7)
+    limits = hsp.Limits(effort_rate="none")
+
+    def effort(scale: float) -> Array:
+        field = hsp.fields.FunctionField(partial(constant, scale * d))
+        hand = hsp.FramePose(robot.end_effector)
+        made = hsp.Controller(robot, [hand], field, limits=limits, start=q0)
+        return made.compute(0.0, q0, v).tau.copy()
+
+    scales = np.linspace(0.0, 40.0, 60)
+    efforts = np.array([effort(each) for each in scales])
+    changes = np.abs(np.diff(efforts, axis=0)).max(axis=1)
+    worst = int(changes.argmax())
+    low, high = scales[worst : worst + 2]
+    for _ in range(20):
+        middle = 0.5 * (low + high)
+        parts = [effort(each) for each in (low, middle, high)]
+        first, second = np.abs(np.diff(parts, axis=0)).max(axis=1)
+        low, high = (low, middle) if first > second else (middle, high)
+    assert max(first, second) < 1e-4 * changes[worst]
