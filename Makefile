@@ -63,12 +63,11 @@ test-system: $(STAMP) ## run those of browsers, notebooks, processes and whole w
 thorough: $(STAMP) ## run the tests with more seeds, and every configuration's page
 	@HSP_THOROUGH=1 $(BIN)/python -m pytest $(SPREAD) $(ARGS)
 
-lint: $(STAMP) ## ruff, mypy --strict, the layers of the architecture, budgets of lines
+lint: $(STAMP) ## ruff, mypy --strict, the layers of the architecture
 	@$(BIN)/ruff check
 	@$(BIN)/ruff format --check
 	@$(BIN)/mypy --strict
 	@$(BIN)/lint-imports
-	@$(BIN)/python tools/budget.py
 
 coverage: $(STAMP) ## run the tests with the kernels uncompiled, report the lines not run
 	@NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -n $(WORKERS) --cov --cov-report=term $(ARGS)

@@ -13,8 +13,9 @@ So μ is the largest of three shares, each of them 0 in the middle:
     far     |e| ≤ 0.85 ℓ: 0;  |e| ≥ ℓ: 1.      ℓ is the largest error that is fed back
     limits  a_exact is within all limits: 0;  a tenth beyond one: 1
 
-with σ the smallest singular value of the stack J, whatever the metric. The first two are here, the last is
-where limits are known, in `control/actuation/actuation.py`. All are continuous, so a is.
+with σ the smallest singular value of the stack J, whatever the metric. The first two
+are here, the last is where limits are known, in `control/actuation/limited_target.py`.
+All are continuous, so a is.
 
 ``docs/law.md``, The edge, has what follows from it.
 """
@@ -42,7 +43,9 @@ class EdgeMemory(NamedTuple):
     Q: Array  # factors of the exact inverse, see `pseudo_inverse.py`: (m, nv)
     X: Array  # (m, m)
     turned: Array  # scratch, (m, nv)
-    exact: Array  # a_exact, shape (nv,); where the law is wholly damped, it is not known
+    exact: (
+        Array  # a_exact, shape (nv,); where the law is wholly damped, it is not known
+    )
     damped: Array  # a_damped, shape (nv,); a_exact where nothing is damped
     exact_e_N: Array  # shape (nv,)
     self_motions: Array  # P a of a and of a_damped, if they were asked for, (2, nv)
@@ -52,10 +55,16 @@ class EdgeMemory(NamedTuple):
     @classmethod
     def allocate(cls, m: int, nv: int) -> Self:
         """Return memory for m rows."""
-        wide, square = np.zeros((2, m, nv)), np.zeros((m, m))
-        vectors, code = np.zeros((5, nv)), np.zeros(1, dtype=np.int64)
         return cls(
-            wide[0], square, wide[1], *vectors[:3], vectors[3:], np.zeros(1), code
+            Q=np.zeros((m, nv)),
+            X=np.zeros((m, m)),
+            turned=np.zeros((m, nv)),
+            exact=np.zeros(nv),
+            damped=np.zeros(nv),
+            exact_e_N=np.zeros(nv),
+            self_motions=np.zeros((2, nv)),
+            share=np.zeros(1),
+            code=np.zeros(1, dtype=np.int64),
         )
 
 

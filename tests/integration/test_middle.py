@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from task_cases import FRAMES, load
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
@@ -40,6 +39,19 @@ def random_vector(rng: np.random.Generator, longest: float) -> Array:
     """Return a vector of up to a length."""
     d = rng.normal(size=3)
     return np.asarray(rng.uniform(0.05, 1.0) * longest * d / np.linalg.norm(d))
+
+
+def simulated(
+    robot: hsp.Robot, hand: hsp.Task, field: Any, metric: Any, q0: Array, period: float
+) -> hsp.Rollout:
+    """Return the rollout of a step, without limits."""
+    controller = hsp.Controller(
+        robot, [hand], field, limits=None, metric=metric, start=q0
+    )
+    return hsp.simulate(
+        controller, q0, duration=DURATION, control_period=period,
+        log_period=max(period, 0.005), integrator=Rk4(min(period, 1e-3)),
+    )  # fmt: skip
 
 
 def constant(g: Array, state: hsp.RobotState) -> Array:
@@ -83,20 +95,16 @@ def test_steps_within_reach_are_the_law(name: str) -> None:
         if rows == 6:
             hold = hsp.trajectories.HoldPose(goal, turned)
             hand = hsp.FramePose(frame, hold, gains=gains)
-        metric, g = metric_of(rng, robot.nv), 0.3 * rng.normal(size=robot.nv)
+        g = 0.3 * rng.normal(size=robot.nv)
         field = hsp.fields.FunctionField(partial(constant, g), rate_function=unmoved)
+        metric = metric_of(rng, robot.nv)
 
-        def run_of(bound: Any) -> hsp.Rollout:
-            controller = hsp.Controller(
-                robot, [replace(hand, largest_error=bound)], field,
-                limits=None, metric=metric, start=q0,
-            )  # fmt: skip
-            return hsp.simulate(
-                controller, q0, duration=DURATION, control_period=period,
-                log_period=max(period, 0.005), integrator=Rk4(min(period, 1e-3)),
-            )  # fmt: skip
-
-        run = run_of("robot")
+        run, alone = (
+            simulated(
+                robot, replace(hand, largest_error=bound), field, metric, q0, period
+            )
+            for bound in ("robot", "none")
+        )
         if min(smallest(robot, frame, q, rows) for q in run.q[::4]) < NEAR:
             continue
         done += 1
@@ -108,8 +116,8 @@ def test_steps_within_reach_are_the_law(name: str) -> None:
                 assert away <= SAMPLED * period * np.linalg.norm(part[0])
         assert not run["damped"].any()
         # The null space's own equation is that of the law without an edge.
-        e_N, alone = run["null_space_norm"], run_of("none")["null_space_norm"]
-        np.testing.assert_allclose(e_N, alone, rtol=0, atol=1e-6 * alone.max() + 1e-12)
+        e_N, exact = run["null_space_norm"], alone["null_space_norm"]
+        np.testing.assert_allclose(e_N, exact, rtol=0, atol=1e-6 * exact.max() + 1e-12)
 
 
 @pytest.mark.parametrize("metric", ["identity", "mass"])
@@ -157,7 +165,7 @@ def test_two_arms_and_rails_are_exact_too() -> None:
         q0 = np.full(robot.nv, 0.4)
         here = robot.state(0.0, q0, np.zeros(robot.nv))
         tasks = [
-            hsp.FramePosition(each, hsp.Hold(here.position(each) + [0.0, 0.12, 0.05]))
+            hsp.FramePosition(each, hsp.Hold([*here.position(each), 0.0, 0.12, 0.05]))
             for each in frames
         ]
         gains = hsp.Gains(natural_frequency=RATE)

@@ -1,4 +1,4 @@
-"""No field takes a feasible task away, whatever it asks for and whatever limits bind."""
+"""No field takes a feasible task away, whatever it asks for and whatever binds."""
 
 from functools import partial
 

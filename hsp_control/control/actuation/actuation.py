@@ -29,7 +29,6 @@ from hsp_control.constraints.limits.acceleration_bounds import (
     violated_limits,
     within,
 )
-from hsp_control.control.actuation.limited_target import Permitted
 from hsp_control.control.actuation.limited_step import (
     EXACT,
     LIMITED,
@@ -39,6 +38,7 @@ from hsp_control.control.actuation.limited_step import (
     Status,
     Wanted,
 )
+from hsp_control.control.actuation.limited_target import Permitted
 from hsp_control.control.actuation.limits_in_force import LimitSet
 from hsp_control.control.actuation.sent_effort import Held, observe
 from hsp_control.control.actuation.support import Support

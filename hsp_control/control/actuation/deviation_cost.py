@@ -98,8 +98,9 @@ class Directions(NamedTuple):
         problem, least = resolution.problem, _LEAST ** (1.0 / max(levels, 1))
         return cls(
             J, problem.metric.L, resolution.form, resolution.ends, problem.task.error,
-            problem.springs, size, int(supported), least, np.ones(1), resolution.thresholds,
-            resolution.factors, resolution.projectors, resolution.edge.code,
+            problem.springs, size, int(supported), least, np.ones(1),
+            resolution.thresholds, resolution.factors, resolution.projectors,
+            resolution.edge.code,
             np.empty((m, n)), np.empty((m, m)),
             np.empty((3, n, max(n, m))), np.empty((2, max(n, m))), np.empty((n, n)),
             np.zeros(1, dtype=np.int64), np.empty(n), np.zeros((2, every + 1)),

@@ -21,7 +21,13 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.compiled.kernels import KernelCall, KernelCalls, OnlyIf, kernel
+from hsp_control.compiled.kernels import (
+    AnyCall,
+    KernelCall,
+    KernelCalls,
+    OnlyIf,
+    kernel,
+)
 from hsp_control.constraints.limits.acceleration_bounds import Bounds
 from hsp_control.control.actuation.deviation_cost import (
     Directions,
@@ -302,7 +308,7 @@ class LimitedStep:
             found = optimum(self._rows, moving, memories[0], LIMITED, warm=warm)
             return [(write_inverse_root, root), (_begin, begin), *found]
 
-        rows: KernelCalls = [*state.inertia.calls]
+        rows: list[AnyCall] = [*state.inertia.calls]
         if permitted is not None:
             kept, edge = slice(barriers, contacts), resolution.edge
             parts = Parts(resolution.acceleration, edge.damped, *edge.self_motions)
