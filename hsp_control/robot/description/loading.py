@@ -28,11 +28,18 @@ from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.declaration.rotation import matrix_of
 from hsp_control.robot.description.inertias import impossible_inertias, project_inertias
 from hsp_control.robot.description.mesh_files import check_mesh_name
+from hsp_control.robot.description.mimics import (
+    name_coordinates,
+    name_frames,
+    write_for_pinocchio,
+)
+from hsp_control.robot.description.planar_axes import write_planar_axes
 from hsp_control.robot.description.robot_description import (
     OneRobot,
     RobotDescription,
     ToolFrame,
 )
+from hsp_control.robot.description.soft_limits import write_soft_limits
 from hsp_control.robot.description.sources import RobotSource, Root
 from hsp_control.robot.description.urdf import named_files, parser_text, read_urdf
 
@@ -55,6 +62,7 @@ def load_model(
     locks = source.locked if settings.locked is None else settings.locked
     if locks:
         model = _lock(model, locks)
+    name_frames(model)
     return completed(model, source, settings.tool_frames, gravity)
 
 
@@ -143,29 +151,41 @@ def _parse(source: RobotSource, settings: OneRobot) -> pin.Model:
         project_inertias(xml)
     else:
         _check_inertias(xml, source)
-    text = parser_text(xml, "visual", "collision")
     parser_errors: list[str] = []
     root = cast("Root", settings.root or source.root)  # text is for MJCF only
     try:
         with _collect_parser_errors(parser_errors):
+            _write_for_pinocchio(xml, source, mimic=mimic)
+            text = parser_text(xml, "visual", "collision")
             if root == "fixed":
                 model = pin.buildModelFromXML(text, mimic=mimic)
             else:
                 joint = _ROOT_JOINTS[root]()
                 model = pin.buildModelFromXML(text, joint, "root_joint", mimic=mimic)
+            name_coordinates(model)
+    except ModelError:
+        raise
     except (ValueError, RuntimeError) as error:
         reason = str(error).strip().splitlines()[-1].removeprefix("hint: ")
         reason = parser_errors[0] if parser_errors else reason
-        if mimic and "mimic" in reason:
-            reason = _explain_mimic(xml, text) or reason
-            reason += "; load its mimic joints as independent joints with mimic=False"
         raise ModelError(f"{urdf}: Pinocchio cannot build a model: {reason}") from error
     if parser_errors:
-        left_out = "; ".join(parser_errors)
+        left_out = "; ".join(dict.fromkeys(parser_errors))
         raise ModelError(
             f"{urdf}: Pinocchio leaves out a part of the model: {left_out}"
         )
     return model
+
+
+def _write_for_pinocchio(xml: Element, source: RobotSource, *, mimic: bool) -> None:
+    """Write what Pinocchio would skip or refuse in words that it reads, in place."""
+    try:
+        write_soft_limits(xml)
+        write_planar_axes(xml)
+        if mimic:
+            write_for_pinocchio(xml)
+    except ModelError as error:
+        raise ModelError(f"{source.urdf}: {error}") from None
 
 
 def _check_inertias(xml: Element, source: RobotSource) -> None:
@@ -198,24 +218,6 @@ def _collect_parser_errors(errors: list[str]) -> Iterator[None]:
             errors.extend(
                 line.split("Error:", 1)[1].strip() for line in lines if "Error:" in line
             )
-
-
-def _explain_mimic(xml: Element, text: str) -> str:
-    """Return which mimic joint Pinocchio cannot handle, and why; empty if unknown."""
-    order = list(pin.buildModelFromXML(text, mimic=False).names)
-    for joint in xml.iter("joint"):
-        mimic, follower = joint.find("mimic"), joint.get("name")
-        if mimic is None or follower not in order:
-            continue
-        leader = mimic.get("joint")
-        if leader not in order:
-            return f"joint {follower!r} mimics {leader!r}, which is not a moving joint"
-        if order.index(leader) > order.index(follower):
-            return (
-                f"joint {follower!r} mimics {leader!r}, which comes after it in the "
-                "tree, but Pinocchio needs the leader first"
-            )
-    return ""
 
 
 def _lock(model: pin.Model, locks: Mapping[str, float]) -> pin.Model:
