@@ -44,7 +44,9 @@ def _mass_matrix_calls(
     model: pin.Model, data: pin.Data, q: Array
 ) -> Sequence[KernelCall]:
     """Return the calls of `mass_matrix`."""
-    clearing: list[KernelCall] = [(_clear, (matrix,)) for matrix in _remembered(model, data)]
+    clearing: list[KernelCall] = [
+        (_clear, (matrix,)) for matrix in _remembered(model, data)
+    ]
     return [*clearing, (pin.crba, (model, data, q))]
 
 
