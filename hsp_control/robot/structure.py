@@ -17,7 +17,7 @@ from hsp_control.common.exceptions import (
     SimulationError,
 )
 from hsp_control.common.suggestions import did_you_mean, listing
-from hsp_control.robot.description.loading import moving_joints
+from hsp_control.robot.description.loading import frames_by_name, moving_joints
 
 _LIMB = 4
 """Fewest joints of an arm or a leg; heads and fingers have fewer."""
@@ -69,13 +69,7 @@ class Structure:
         self.joints = moving_joints(model)
         self.joint_names: tuple[str, ...] = tuple(self.joints)
         self.frame_names: tuple[str, ...] = tuple(f.name for f in model.frames)
-        # If a joint and a link have the same name, it means the link's frame.
-        links = {f.name for f in model.frames if f.type == pin.FrameType.BODY}
-        self._frame_ids = {
-            frame.name: i
-            for i, frame in enumerate(model.frames)
-            if frame.type == pin.FrameType.BODY or frame.name not in links
-        }
+        self._frame_ids = frames_by_name(model)
         joints = self.joints.values()
         dofs = [
             (joint, f"{name}.{label}" if label else name, label)

@@ -88,6 +88,16 @@ def moving_joints(model: pin.Model) -> dict[str, Any]:
     return {name: joint for name, joint in named[1:] if joint.nv > 0}  # no universe
 
 
+def frames_by_name(model: pin.Model) -> dict[str, int]:
+    """Return the index of each frame; of a link and a joint of one name the link's."""
+    links = {f.name for f in model.frames if f.type == pin.FrameType.BODY}
+    return {
+        frame.name: i
+        for i, frame in enumerate(model.frames)
+        if frame.type == pin.FrameType.BODY or frame.name not in links
+    }
+
+
 def reference_posture(
     model: pin.Model, source: RobotSource
 ) -> tuple[float, ...] | None:
@@ -289,12 +299,13 @@ def _add_frame(model: pin.Model, name: str, tool: ToolFrame) -> None:
             f"tool frame {name!r}: no parent frame {tool.parent!r}"
             f"{did_you_mean(tool.parent, names)} (the model has {listing(names)})"
         )
-    parent = model.frames[model.getFrameId(tool.parent)]
+    index = frames_by_name(model)[tool.parent]
+    parent = model.frames[index]
     model.addFrame(
         pin.Frame(
             name,
             parent.parentJoint,
-            model.getFrameId(tool.parent),
+            index,
             parent.placement * placement(tool.translation, tool.rotation),
             pin.FrameType.OP_FRAME,
         )
@@ -382,12 +393,20 @@ def combine(parts: Sequence[tuple[RobotPart, pin.Model]]) -> pin.Model:
         for index in range(1, own.njoints):
             own.names[index] = part.prefix + own.names[index]
         for index in range(1, own.nframes):
-            own.frames[index].name = part.prefix + own.frames[index].name
+            # Pinocchio finds frames by their names, and a link may have a joint's.
+            mark = _LINK if own.frames[index].type == pin.FrameType.BODY else ""
+            own.frames[index].name = part.prefix + own.frames[index].name + mark
         whole = pin.appendModel(whole, own, 0, part.placement)
+    for frame in whole.frames:
+        frame.name = frame.name.removesuffix(_LINK)
     if any(model.gravity != parts[0][1].gravity for _, model in parts):
         raise ModelError("robots to combine differ in gravity; load all with one value")
     whole.gravity = parts[0][1].gravity
     return whole
+
+
+_LINK = "\t"
+"""What the name of a link's frame ends in while robots are put together."""
 
 
 def placement(position: ArrayLike, rotation: ArrayLike) -> pin.SE3:
