@@ -111,6 +111,14 @@ def test_two_equal_arms_side_by_side_begin_well(apart: float) -> None:
     assert found.regularity > LEAST
     depth, _ = search.overlap(found.q)
     assert depth == 0.0
+
+
+def test_a_pose_of_one_of_two_equal_arms_is_reached_in_a_good_posture() -> None:
+    """The other one stays where it is good alone."""
+    robot = two_arms("ur10", 0.6)
+    frames = [f"{side}_tool0" for side in ("left", "right")]
+    search = PostureSearch(robot, [(frame, POSE) for frame in frames])
+    found = search.find(LEAST)
     near = robot.state(0.0, found.q, np.zeros(12)).position("left_tool0")
     there = near + np.array([0.05, 0.0, 0.05])
     target = Target("left_tool0", pin.SE3(np.eye(3), there), 3)
