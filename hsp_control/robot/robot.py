@@ -1,6 +1,7 @@
 """The robot: a model, loaded by name, from a file, MuJoCo or Pinocchio."""
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
@@ -14,10 +15,10 @@ from hsp_control.common.exceptions import ModelError
 from hsp_control.declaration import within
 from hsp_control.robot.description.access import ANYWHERE, Access
 from hsp_control.robot.description.from_pinocchio import take_model
+from hsp_control.robot.description.hand import Hand, find_hand
 from hsp_control.robot.description.loading import (
     RobotPart,
     combine,
-    end_effector_frame,
     load_model,
     placement,
     reference_posture,
@@ -273,11 +274,16 @@ class Robot(RobotModel):
 
     @property
     def end_effector(self) -> str:
-        """The frame of the hand: as the source says, or else `end_effector_frame`."""
+        """The frame of the hand: as the source says, or else the likeliest."""
+        return self.hand.frame
+
+    @cached_property
+    def hand(self) -> Hand:
+        """The frame of the hand, and why it is this one; see `find_hand`."""
         named = self.source.end_effector
         if named is not None and named in self._frame_ids:
-            return named
-        return end_effector_frame(self.model)
+            return Hand(named, "the robot's source names it")
+        return find_hand(self.model)
 
     def state(self, t: float, q: Any, v: Any) -> "RobotState":
         """Return a new `RobotState` at time t [s], q (nq,) and v (nv,).

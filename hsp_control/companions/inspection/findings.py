@@ -365,7 +365,7 @@ def _of_robot(robot: Robot) -> tuple[list[Finding], dict[str, str]]:
     far, turned = robot.largest_error
     return findings, {
         "robot": f"{robot.name}: nq = {robot.nq}, nv = {robot.nv}, {root}",
-        "end effector": f"{robot.end_effector} (by default)",
+        "end effector": f"{robot.end_effector} (by default): {robot.hand.why}",
         "reach": f"{robot.size:.3g} m from the first joint at most: the longest chain",
         "bounds": f"an error counts up to {far:.3g} m and {turned:.3g} rad by default",
         "effort rate": _rates(robot),

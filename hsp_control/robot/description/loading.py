@@ -6,7 +6,6 @@ the others, and its true velocity is known.
 """
 
 import os
-import re
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
@@ -44,10 +43,6 @@ from hsp_control.robot.description.sources import RobotSource, Root
 from hsp_control.robot.description.urdf import named_files, parser_text, read_urdf
 
 _ROOT_JOINTS = {"planar": pin.JointModelPlanar, "free_flyer": pin.JointModelFreeFlyer}
-_NO_HAND = re.compile(
-    "finger|thumb|camera|imu|sensor|range|accelerometer|laser|optical|force|(^|_)ft_frame"
-)
-"""Names of links on a last joint that are less likely the hand than others."""
 
 
 def load_model(
@@ -111,44 +106,6 @@ def reference_posture(
     if q is None or q.shape != (model.nq,) or not np.isfinite(q).all():
         return None
     return tuple(pin.difference(model, pin.neutral(model), pin.normalize(model, q)))
-
-
-def end_effector_frame(model: pin.Model) -> str:
-    """Return the frame that is most likely the hand, found from the kinematic tree.
-
-    It is the last link, no finger or sensor if possible, on the last joint of the
-    longest chain of joints. Where this chain branches in its second half into three or
-    more, or into two of similar lengths, these are fingers, and it ends there. One much
-    shorter branch is none: it is a part of the arm's own mechanism.
-    """
-    chains: list[list[int]] = [[]]
-    for joint in range(1, model.njoints):
-        chains.append([*chains[model.parents[joint]], joint])
-    longest = max(reversed(chains), key=len)
-    branching = [
-        joint
-        for depth, joint in enumerate(longest, start=1)
-        if 2 * depth >= len(longest) and _carries_fingers(chains, joint)
-    ]
-    end = branching[0] if branching else longest[-1]
-    links = [
-        frame.name
-        for frame in model.frames
-        if frame.parentJoint == end and frame.type == pin.FrameType.BODY
-    ]
-    hands = [link for link in links if not _NO_HAND.search(link.lower())]
-    return str((hands or links)[-1])
-
-
-def _carries_fingers(chains: list[list[int]], joint: int) -> bool:
-    """Return whether the chains beyond a joint are three, or two of similar lengths."""
-    beyond: dict[int, int] = {}  # the longest chain, by its first joint
-    for chain in chains:
-        if joint in chain[:-1]:
-            after = chain[chain.index(joint) + 1 :]
-            beyond[after[0]] = max(beyond.get(after[0], 0), len(after))
-    lengths = sorted(beyond.values())
-    return len(lengths) > 2 or (len(lengths) == 2 and 2 * lengths[0] > lengths[1])
 
 
 def _parse(source: RobotSource, settings: OneRobot) -> pin.Model:

@@ -29,16 +29,13 @@ Root = Literal["fixed", "planar", "free_flyer"]
 FILE_ENDINGS = (".urdf", ".xml", ".xacro")
 """A robot's name that ends so is a path."""
 
-# Robots of example-robot-data for which `end_effector_frame` would be wrong: a single
-# gripper jaw looks like one more joint of the arm, a sensor looks like a tool.
+# Robots of example-robot-data for which `find_hand` would be wrong: the last link is a
+# motor of the gripper.
 _END_EFFECTORS = {
-    "b1_z1": "gripperStator",
-    "baxter": "right_gripper",
     "talos": "gripper_right_base_link",
     "talos_arm": "gripper_left_base_link",
     "talos_box": "gripper_right_base_link",
     "talos_legs": "gripper_right_base_link",
-    "z1": "gripperStator",
 }
 
 
