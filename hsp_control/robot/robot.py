@@ -64,6 +64,7 @@ class Robot(RobotModel):
         mimic: bool = True,
         project_inertias: bool = False,
         xacro_args: Mapping[str, str | bool | float] | None = None,
+        srdf: str | Path | None = None,
         access: Access = ANYWHERE,
     ) -> Self:
         """Load a bundled robot, one of an installed package, or a URDF or xacro file.
@@ -84,6 +85,8 @@ class Robot(RobotModel):
             project_inertias: Whether inertias that no body can have are replaced by the
                 nearest that one can have; mass and centre of mass stay.
             xacro_args: Arguments of a xacro file, by name.
+            srdf: An SRDF whose disabled pairs of links never collide. None: the one
+                beside the URDF that is called like it, if there is one.
             access: Which files may be read: a URDF given by path, and the meshes that
                 it names. Use `access.only_within` for untrusted files.
 
@@ -105,6 +108,7 @@ class Robot(RobotModel):
             "mimic": None if mimic else False,
             "project_inertias": project_inertias or None,
             "xacro_args": xacro_args,
+            "srdf": srdf,
         }
         given = {key: value for key, value in given.items() if value is not None}
         if not isinstance(name, RobotDescription):

@@ -10,7 +10,7 @@ brakes its leader. All of this is the same motion.
 
 import logging
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
 from typing import NamedTuple
 from xml.etree.ElementTree import Element, SubElement
@@ -40,6 +40,10 @@ class Follower(NamedTuple):
     leader: str  # a joint that follows no other one
     multiplier: float
     offset: float  # [rad or m]
+
+    def leaders_range(self, joints: Mapping[str, Element]) -> tuple[float, float]:
+        """Return the leader's own position limits."""
+        return _range(joints[self.leader])
 
     def bounds(self, joint: Element) -> tuple[float, float]:
         """Return between what the follower's own limits allow the leader to be."""
