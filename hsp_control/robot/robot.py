@@ -192,7 +192,8 @@ class Robot(RobotModel):
 
         Raises:
             ModelError: If an argument is of another type, a geometry model is of
-                another model, or the mass matrix is singular.
+                another model, the axes of a joint turn with its own configuration, or
+                the mass matrix is singular.
             FrameNotFoundError: If the hand, or a tool frame's parent, does not exist.
         """
         given = collision, visual, home, end_effector, tool_frames or {}

@@ -340,6 +340,8 @@ def _dof_labels(joint: Any) -> tuple[str, ...]:
         return ("",)
     if _is_ball(joint):
         return "roll", "pitch", "yaw"
+    if joint.shortname() == "JointModelTranslation":
+        return "x", "y", "z"
     roots = {3: ("x", "y", "yaw"), 6: ("x", "y", "z", "roll", "pitch", "yaw")}
     return roots.get(joint.nv, tuple(map(str, range(joint.nv))))
 

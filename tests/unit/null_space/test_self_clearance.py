@@ -156,8 +156,9 @@ def test_an_srdf_may_be_named(tmp_path: Path) -> None:
     assert without - names(Robot.load(urdf, srdf=tmp_path / "pairs.srdf")) == pair
     described = RobotDescription("arm.urdf", srdf="pairs.srdf").located(tmp_path)
     assert without - names(Robot.load(described)) == pair
-    parts = {"left": PlacedRobot(urdf, mimic=False, srdf=tmp_path / "pairs.srdf"),
-             "right": PlacedRobot(urdf, mimic=False, position=(0.0, 5.0, 0.0))}  # fmt: skip
+    free = {"mimic": False}
+    parts = {"left": PlacedRobot(urdf, **free, srdf=tmp_path / "pairs.srdf"),
+             "right": PlacedRobot(urdf, **free, position=(0.0, 5.0, 0.0))}  # fmt: skip
     two = names(Robot.load(RobotDescription(parts=parts)))
     assert frozenset(("right_panda_link0", "right_panda_hand")) in two
     assert frozenset(("left_panda_link0", "left_panda_hand")) not in two
