@@ -1,12 +1,20 @@
 """A robot's mass matrix, its centre of mass and momentum, and their exact rates."""
 
 from collections.abc import Sequence
+from copy import copy
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
-from hsp_control.common.arrays import Array, Indices, kept_view, matrix_view
+from hsp_control.common.arrays import (
+    Array,
+    Indices,
+    kept_view,
+    matrix_view,
+    read_only_view,
+)
 from hsp_control.common.exceptions import ModelError
 from hsp_control.common.suggestions import listing
 from hsp_control.compiled.kernels import KernelCall, KernelCalls, Once, kernel
@@ -137,6 +145,15 @@ class CentroidalMotion:
         # nothing is to be in A'.
         rest = _clear, (kept_view(data.vcom[0].reshape(1, 3), data),)
         self.calls: KernelCalls = [Once.at(stamp, rest, momentum, extract)]
+
+    @cached_property
+    def shown(self) -> "CentroidalMotion":
+        """The same, with arrays that can be read, but not written."""
+        shown = copy(self)
+        for name, value in vars(self).items():
+            if isinstance(value, np.ndarray):
+                setattr(shown, name, read_only_view(value))
+        return shown
 
     def supplied(self) -> tuple[PointMotion, KernelCalls]:
         """Return the centre's motion as an argument of a kernel; see `planned`."""

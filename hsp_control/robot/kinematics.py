@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from hsp_control.common.arrays import Array, Indices, matrix_view
+from hsp_control.common.arrays import Array, Indices, matrix_view, read_only_view
 from hsp_control.common.exceptions import ModelError
 from hsp_control.compiled.kernels import KernelCalls, kernel
 
@@ -110,6 +110,23 @@ class FrameKinematics:
     def supplied(self) -> tuple[FrameMotion, KernelCalls]:
         """Return the motion as an argument of a kernel; see `planned`."""
         return self.motion, self.calls
+
+
+class ShownFrame(FrameKinematics):
+    """A frame whose arrays can be read, but not written."""
+
+    __slots__ = ("_own",)
+
+    def __init__(self, own: FrameKinematics) -> None:
+        self._own, self.calls = own, own.calls
+        self.motion = FrameMotion(*map(read_only_view, own.motion))
+        for name, view in zip(FrameMotion._fields, self.motion, strict=True):
+            setattr(self, name, view)
+        self.drift = read_only_view(own.drift)
+
+    def supplied(self) -> tuple[FrameMotion, KernelCalls]:
+        """Return the motion as an argument of a kernel; see `planned`."""
+        return self._own.supplied()
 
 
 @kernel

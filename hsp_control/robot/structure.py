@@ -17,7 +17,11 @@ from hsp_control.common.exceptions import (
     SimulationError,
 )
 from hsp_control.common.suggestions import did_you_mean, listing
-from hsp_control.robot.description.loading import frames_by_name, moving_joints
+from hsp_control.robot.description.loading import (
+    frames_by_name,
+    guarded,
+    moving_joints,
+)
 
 _LIMB = 4
 """Fewest joints of an arm or a leg; heads and fingers have fewer."""
@@ -62,7 +66,7 @@ class Structure:
         ``home`` is the displacement from neutral (nv,) of the home posture, ignored if
         it has another size.
         """
-        self.model = model
+        self.model = guarded(model)
         self.name = name
         self.nq: int = model.nq
         self.nv: int = model.nv

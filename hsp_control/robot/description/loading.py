@@ -93,6 +93,24 @@ def frames_by_name(model: pin.Model) -> dict[str, int]:
     }
 
 
+def guarded(model: pin.Model) -> pin.Model:
+    """Return a model that gets no more joints; a copy of it can get some.
+
+    Data that were made for it would not fit: Pinocchio would write beyond them and end
+    the process.
+    """
+    model.addJoint = _refuse_joint
+    return model
+
+
+def _refuse_joint(*_: object, **__: object) -> None:
+    raise ModelError(
+        "a robot's model gets no more joints, as all that was made for it would not "
+        "fit: model = robot.model.copy(), model.addJoint(...), "
+        "Robot.from_pinocchio(model)"
+    )
+
+
 def reference_posture(
     model: pin.Model, source: RobotSource
 ) -> tuple[float, ...] | None:
