@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array, Indices, matrix_view, read_only_view
-from hsp_control.common.exceptions import ModelError
+from hsp_control.common.exceptions import ImmutableError, ModelError
 from hsp_control.compiled.kernels import KernelCalls, kernel
 
 
@@ -106,6 +106,14 @@ class FrameKinematics:
         )
         given = stamp, np.array([-1]), carrier, v, motion, self.drift
         self.calls: KernelCalls = [(frame_kinematics, given)]
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if hasattr(self, name):
+            raise ImmutableError(
+                f"frame.{name} cannot be assigned: native calls go on with the array "
+                "that was there; copy it, and change the copy"
+            )
+        super().__setattr__(name, value)
 
     def supplied(self) -> tuple[FrameMotion, KernelCalls]:
         """Return the motion as an argument of a kernel; see `planned`."""

@@ -45,6 +45,9 @@ ATTACKS: dict[str, Callable[[RobotState], object]] = {
     "position": lambda s: s.position(FRAME).fill(0.0),
     "rotation": lambda s: s.frame(FRAME).rotation.fill(0.0),
     "velocity": lambda s: s.frame(FRAME).velocity.fill(0.0),
+    "another jacobian": lambda s: setattr(
+        s.frame(FRAME), "jacobian", np.zeros((6, NV))
+    ),
     "motion": lambda s: s.frame(FRAME).motion.jacobian.fill(0.0),
     "M": lambda s: s.mass_matrix.fill(0.0),
     "M'": lambda s: s.mass_matrix_rate.fill(0.0),
@@ -306,6 +309,14 @@ def test_arrays_of_a_state_cannot_be_replaced(name: str) -> None:
             ImmutableError, match=f"state.{name} cannot be assigned.*up"
         ):
             setattr(each, name, np.zeros(NV))
+
+
+def test_arrays_of_a_frame_cannot_be_replaced() -> None:
+    own = controller()
+    own.compute(0.0, own.robot.home(), np.zeros(NV))
+    for name in ("jacobian", "jacobian_dot", "position", "rotation", "motion"):
+        with pytest.raises(ImmutableError, match=f"frame.{name} cannot be assigned"):
+            setattr(own.state.frame(FRAME), name, np.zeros((6, NV)))
 
 
 # -- out= ------------------------------------------------------------------------------

@@ -72,14 +72,14 @@ def test_states_of_a_robot_have_the_age_of_the_newest_packet(
     def state(k: int) -> Packet:
         stamp = round(1e9 * (10.0 + 0.01 * k))
         head = PacketKind.STATE, Phase.RUNNING, hardware.session, k, 0
-        return Packet(*head, stamp, 0.01 * k, payload)
+        return Packet(*head, stamp, 3.0 * k, payload)
 
     def age(*numbers: int, delay: float) -> float:
         now[0] = 100.0 + 0.01 * numbers[-1] + delay
         arrived[:] = [state(k) for k in numbers]
         found = hardware.read(0.0)
         assert found is not None
-        assert (found.sequence, found.t) == (numbers[-1], 0.01 * numbers[-1])
+        assert (found.sequence, found.t) == (numbers[-1], 3.0 * numbers[-1])
         return found.age
 
     try:

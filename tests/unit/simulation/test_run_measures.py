@@ -23,7 +23,7 @@ def changed_run() -> hsp.Rollout:
     rng = np.random.default_rng(3)
     for name, column in run.columns.items():
         if column.dtype == float and name not in ("t", "q"):
-            column[...] = rng.uniform(-2.0, 3.0, column.shape)
+            column[...] = rng.uniform(-3.0, 2.0, column.shape)
     run["damped"][:] = [1, 0, 0, 1, 1, 0]
     run.t[:] = [0.0, 0.1, 0.2, 0.4, 0.5, 0.7]
     return run
