@@ -269,7 +269,7 @@ def test_a_state_is_as_old_as_it_waited_longer_than_the_quickest(
     hardware._ages = AgeEstimator()
     hardware._stamps = Stamps(0.002)
     joints = Joints(panda())
-    stamp, ages = 77_000_000_000, []
+    stamp, begun, last, ages = 77_000_000_000, 0.0, 0.0, []
     for k, delay in enumerate((0.003, 0.028, 0.001, 0.006)):
         sent = 0.002 * k + (0.0007 if k == 2 else 0.0)  # with jitter
         now[0] = 500.0 + sent + delay
@@ -278,7 +278,9 @@ def test_a_state_is_as_old_as_it_waited_longer_than_the_quickest(
         )
         found = hardware._measurement(ReceivedMessage(message, sender_of(hardware)))
         assert found is not None
-        assert found.t == pytest.approx(sent)
+        assert found.t == pytest.approx(begun + sent - last)
+        begun, last = 5.0 + 3.0 * k, sent  # time may begin anew at any state
+        hardware._stamps.begin(begun)
         assert found.sequence == k
         ages.append(found.age)
     np.testing.assert_allclose(ages, [0.0, 0.025, 0.0, 0.005], rtol=0, atol=1e-9)

@@ -1,6 +1,7 @@
 """What a user reaches is not what steps: a mistake is one exact error, or harmless."""
 
 import os
+import signal
 import threading
 from collections.abc import Callable
 from typing import Any
@@ -375,6 +376,7 @@ def test_a_fork_while_a_thread_computes_is_one_error() -> None:
     assert inside.wait(60.0)
     child = os.fork()
     if child == 0:  # without pytest's own handlers
+        signal.alarm(60)  # ends it if it waits for ever
         code = 1
         try:
             other.compute(0.0, q, v)  # nobody computed with it
