@@ -6,6 +6,7 @@ robot is compared with the first one of another, to the last bit: the same code 
 
 from collections.abc import Iterator
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
@@ -18,8 +19,6 @@ from hsp_control import Robot
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ModelError
 from hsp_control.null_space.metrics import MassMatrixMetric
-from hsp_control.robot.description.mimics import followers
-from hsp_control.robot.description.urdf import read_urdf
 from hsp_control.robot.friction import JointFriction
 from hsp_control.robot.inertia import mass_matrix
 from hsp_control.simulation.plants import Push
@@ -111,14 +110,21 @@ def reductions(folder: Path) -> Iterator[tuple[str, Robot, Robot, Array, Array]]
         file = folder / f"{kind}.urdf"
         file.write_text(text)
         robot, free = Robot.load(file), Robot.load(file, mimic=False)
-        G, o = np.zeros((free.nv, robot.nv)), np.zeros(free.nv)
+        # each as its URDF says: q_free = A q_free + B q + b, link by link of a chain
+        A, B, b = np.zeros((free.nv, free.nv)), np.zeros((free.nv, robot.nv)), []
         for name in robot.joint_names:
-            G[free.velocity_index(name), robot.velocity_index(name)] = 1.0
-        for each in followers(read_urdf(robot.source)):
-            row = free.velocity_index(each.name)
-            G[row, robot.velocity_index(each.leader)] = each.multiplier
-            o[row] = each.offset
-        yield kind, robot, free, G, o
+            B[free.velocity_index(name), robot.velocity_index(name)] = 1.0
+        joints = ElementTree.fromstring(text).findall("joint")
+        mimics = {j.get("name"): j.find("mimic") for j in joints}
+        for name in free.joint_names:
+            mimic = mimics[name]
+            b.append(0.0 if mimic is None else float(mimic.attrib["offset"]))
+            if mimic is not None:
+                leader = free.velocity_index(mimic.attrib["joint"])
+                ratio = float(mimic.attrib["multiplier"])
+                A[free.velocity_index(name), leader] = ratio
+        chains = np.linalg.inv(np.eye(free.nv) - A)
+        yield kind, robot, free, chains @ B, chains @ np.array(b)
 
 
 def test_mimic_joints_move_as_free_ones_that_are_moved_so(tmp_path: Path) -> None:
