@@ -110,6 +110,11 @@ class RobotState:
         return self.time.item()
 
     @property
+    def own_data(self) -> pin.Data:
+        """The data that this state steps with: to read placements, never to write."""
+        return self._data
+
+    @property
     def data(self) -> pin.Data:
         """Pinocchio's data at (q, v), for terms that this class does not offer.
 
