@@ -19,23 +19,13 @@ from hsp_control.robot.description.sources import (
 )
 
 _BRAVO = {"bravo_finger1_joint": 0.0, "bravo_finger2_joint": 0.0}
-_ROMEO = {
-    f"{side}{part}": 0.0
-    for side in "LR"
-    for part in (
-        *("Hand", "Finger12", "Finger13", "Finger21", "Finger22", "Finger23"),
-        *("Finger31", "Finger32", "Finger33", "Thumb1", "Thumb2", "Thumb3"),
-    )
-}
 LOAD_OPTIONS: dict[str, dict[str, Any]] = {
     "alex_psyonic_hands": {"mimic": False},
     "bluevolta_bravo7_gripper": {"locked": _BRAVO},
     "bravo7_gripper": {"locked": _BRAVO},
     "falcon_bravo7_gripper": {"locked": _BRAVO},
     "icub": {"locked": {"neck_yaw": 0.0}},
-    "romeo": {"mimic": False, "locked": _ROMEO},
-    "talos_full": {"mimic": False},
-    "talos_full_box": {"mimic": False},
+    "romeo": {"locked": {"LHand": 0.0, "RHand": 0.0}},
 }
 """Options of `Robot.load` for robots that do not load, or cannot move, without them."""
 

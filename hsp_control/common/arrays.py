@@ -21,6 +21,13 @@ def kept_view(view: Array, owner: object) -> Array:
     return np.asarray(_Owned(view, owner))
 
 
+def read_only_view(array: Array) -> Array:
+    """Return a view that cannot be written."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
 def matrix_view(matrix: Array) -> Array:
     """Return a matrix of Pinocchio's as a view of two dimensions, also if nv = 1."""
     return matrix.reshape(-1, 1) if matrix.ndim == 1 else matrix

@@ -19,6 +19,7 @@ from hsp_control.law.threshold import Following
 from hsp_control.null_space.fields import FieldSum, NullSpaceField
 from hsp_control.null_space.metrics import Metric
 from hsp_control.robot import Robot, RobotState
+from hsp_control.robot.state import as_given
 from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.feedback import InForce, beyond_largest, write_asked
@@ -184,7 +185,7 @@ class ActiveStack:
 
     def field_value(self) -> float:
         """Return the field's value at the state that logs have: bound only for it."""
-        return self._field.value(self._state.seen)
+        return self._field.value(self._state.read_only)
 
     def diagnose(self) -> tuple[float, float, bytes]:
         """Return ‖e_N‖_W, the tasks' manipulability, and what `singular_values` takes.
@@ -210,7 +211,7 @@ class ActiveStack:
         flow.problem.task.jacobian[:] = self.rows.jacobian
         for level in self.levels:
             for task in level:
-                rate = task.reference_rate(state)
+                rate = task.reference_rate(state.read_only)
                 flow.problem.task.acceleration[self.task_rows[task.name]] = rate
         flow.problem.field.g[:] = law.problem.field.g
         flow.problem.metric.W[:], flow.problem.metric.L[:] = law.problem.metric[:2]
@@ -228,11 +229,12 @@ class ActiveStack:
                     "does its trajectory return NaN or infinity there?"
                 )
         if not all(np.isfinite(array).all() for array in problem.field):
-            self._field.value(state)  # may say what is wrong
+            self._field.value(state.read_only)  # may say what is wrong
             raise NonFiniteError(
                 f"field {self._field.name!r} is not finite at t = {state.t:.6g} s"
             )
-        self._metric.evaluate(state, problem.metric)  # may say what is wrong
+        given = as_given(self._metric, state)
+        self._metric.evaluate(given, problem.metric)  # may say what is wrong
         raise NonFiniteError(
             f"the effort is not finite at t = {state.t:.6g} s, "
             f"q = {state.q.tolist()}, v = {state.v.tolist()}"

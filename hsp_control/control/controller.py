@@ -1,9 +1,12 @@
 """The controller: from tasks, a null-space field and a metric to one effort."""
 
+import os
 from collections.abc import Callable, Collection, Mapping, Sequence
 from copy import deepcopy
 from math import isfinite
 from threading import RLock
+from typing import Any
+from weakref import WeakSet
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -76,6 +79,8 @@ class Controller(Composition):
             ControllerError: If the state belongs to another robot, or what a step
                 calls, such as a field, calls its own controller.
         """
+        if out is not None:
+            _check_output(out, self._declared.robot.nv)
         with self._lock:
             run, bound = self._run, self._run.bound
             if (
@@ -321,25 +326,63 @@ class Controller(Composition):
         return other
 
 
+def _check_output(out: object, nv: int) -> None:
+    """Check that an output is one of a controller with as many efforts."""
+    if not isinstance(out, ControlOutput):
+        raise ControllerError(
+            f"out is of type {type(out).__name__}; needs a ControlOutput: that of an "
+            "earlier step, or ControlOutput()"
+        )
+    if (given := out.size) not in (0, nv):
+        raise ControllerError(
+            f"out is of a step with {given} efforts; this controller has {nv}"
+        )
+
+
 class _StepLock:
     """A lock: other threads wait for it, and the thread that has it is told."""
 
-    __slots__ = ("_held", "_lock")
+    __slots__ = ("__weakref__", "_lock", "_taken")
 
     def __init__(self) -> None:
-        self._lock, self._held = RLock(), False
+        self._lock, self._taken = RLock(), ""  # why it cannot be had, if so
+        _locks.add(self)
 
     def __enter__(self) -> None:
         self._lock.acquire()
-        if self._held:  # by this thread: others are still waiting
+        if self._taken:  # by this thread: others are still waiting
             self._lock.release()
-            raise ControllerError(
-                "a step of a controller calls the same controller, for example within "
-                "a field: it would wait for itself for ever; use the state that the "
-                "field is given, or a copy, controller.preview()"
-            )
-        self._held = True
+            raise ControllerError(self._taken)
+        self._taken = _BY_ITSELF
 
     def __exit__(self, *_: object) -> None:
-        self._held = False
+        self._taken = ""
         self._lock.release()
+
+    def forked(self) -> None:
+        """Go on in a child process: a thread that has the lock is not there."""
+        own: Any = self._lock
+        if self._taken and not own._is_owned():
+            self._lock, self._taken = RLock(), _FORKED
+
+
+_BY_ITSELF = (
+    "a step of a controller calls the same controller, for example within a field: it "
+    "would wait for itself for ever; use the state that the field is given, or a copy, "
+    "controller.preview()"
+)
+_FORKED = (
+    "this process was forked while another thread computed with this controller, whose "
+    "memory is half a step here: make the controller in each process, or start "
+    'processes by "spawn"'
+)
+_locks: WeakSet[_StepLock] = WeakSet()
+
+
+def _after_fork() -> None:
+    for each in [*_locks]:
+        each.forked()
+
+
+if hasattr(os, "register_at_fork"):  # where processes can fork
+    os.register_at_fork(after_in_child=_after_fork)

@@ -137,7 +137,7 @@ class Mixture:
         for active in self._parts:
             a, offset = active.acceleration, None
             if modifier is not None:
-                a, offset = modifier(self._state, active, a)
+                a, offset = modifier(self._state.read_only, active, a)
             for limits, share in sets:
                 one = self.actuation(active, limits).deliver(a, offset)
                 if single:

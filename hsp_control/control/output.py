@@ -70,6 +70,11 @@ class ControlOutput:
         """Allocate nothing yet: see `overwrite`."""
         self._memory = _NOTHING
 
+    @property
+    def size(self) -> int:
+        """Number of efforts; 0 before the first step."""
+        return 0 if self._memory is _NOTHING else len(self.tau)
+
     def overwrite(self, delivered: Delivered, stack: ActiveStack, damped: str) -> None:
         """Make this the output of a step."""
         tau, a, forces, self.status, self.relaxation = delivered

@@ -38,6 +38,7 @@ from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.fields.weight import product
 from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric, Metric
 from hsp_control.robot import Robot
+from hsp_control.robot.state import as_given
 from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.gains import as_gain, as_matrix
@@ -115,6 +116,7 @@ def checked_gain(gain: ArrayLike, robot: Robot, metric: Metric) -> Array:
             )
         return K_N
     state = robot.state(0.0, robot.neutral(), np.zeros(robot.nv))
+    state = as_given(metric, state)
     W = metric.evaluate(state, MetricSample.allocate(robot.nv)).W
     decay = W @ K_N
     smallest = float(np.linalg.eigvalsh(0.5 * (decay + decay.T))[0])

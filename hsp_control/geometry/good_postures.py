@@ -6,19 +6,21 @@ the robot and what is asked.
 """
 
 import logging
-from collections.abc import Iterator, Sequence
-from operator import attrgetter
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import product
+from operator import attrgetter, itemgetter
 from typing import NamedTuple
 
 import numpy as np
 
-from hsp_control.common.arrays import Array
+from hsp_control.common.arrays import Array, Flags, Indices
 from hsp_control.common.exceptions import ConfigurationError, ModelError
 from hsp_control.geometry.links import link_shapes, self_pairs
 from hsp_control.geometry.proximity import Proximity
 from hsp_control.geometry.scene import Obstacle
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.inverse_kinematics import Reached, Target, reach
+from hsp_control.robot.kinematics import joint_support
 
 _SAMPLES = 48
 _ALWAYS = 0.9
@@ -31,6 +33,10 @@ _GAP = 0.02
 """Least distance from an obstacle [m]; links only must not overlap."""
 _SHARE = 0.5
 """Least singular value, as a share of the best that was seen."""
+_ARM = 3
+"""Fewest joints of an arm; fingers have fewer."""
+_EACH, _TOGETHER = 12, 60
+"""Most postures of one arm, and of all together, where arms are looked at alone."""
 _PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 67, 71)
 
 _log = logging.getLogger(__name__)
@@ -134,6 +140,9 @@ class PostureSearch:
         seen = [self.judge(self._at(x)) for x in self._displacements()]
         good, needed = self._qualified(seen, least)
         if not good:
+            together = [self.judge(self._at(x)) for x in self._assembled(least)]
+            good, needed = self._qualified(together, least)
+        if not good:
             raise ConfigurationError(
                 f"no good posture is found: {_nearest(seen, least)}"
             )
@@ -155,21 +164,34 @@ class PostureSearch:
     def find_with(self, target: Target, least: float) -> Judgement:
         """Return a good posture at which a frame is at a target."""
         self.robot.frame_id(target.frame)
-        bounds = self._lower, self._upper
-        found = [
-            reach(self.robot, target, self._at(x), self.middle, *bounds)
-            for x in self._displacements()
-        ]
-        reached = [self.judge(each.q) for each in found if each.converged]
+        starts = [(x, self.middle) for x in self._displacements()]
+        found, reached = self._reached(target, starts)
         if not reached:
             raise ConfigurationError(_too_far(found, target))
         good, _ = self._qualified(reached, least)
+        if not good:  # then the others stay where they are good
+            starts = [(x, x) for x in self._assembled(least)]
+            good, _ = self._qualified(self._reached(target, starts)[1], least)
         if not good:
             raise ConfigurationError(
                 f"frame {target.frame!r} reaches its place, but in no good posture: "
                 + _nearest(reached, least)
             )
         return min(good, key=_eccentricity)
+
+    def _reached(
+        self, target: Target, starts: Iterable[tuple[Array, Array]]
+    ) -> tuple[list[Reached], list[Judgement]]:
+        """Return where inverse kinematics end, and those postures that are there.
+
+        ``starts``: where each begins, and what it goes towards, shape (nv,) each.
+        """
+        bounds = self._lower, self._upper
+        found = [
+            reach(self.robot, target, self._at(x), preferred, *bounds)
+            for x, preferred in starts
+        ]
+        return found, [self.judge(each.q) for each in found if each.converged]
 
     def _qualified(
         self, seen: Sequence[Judgement], least: float
@@ -198,8 +220,86 @@ class PostureSearch:
         )
         yield self.middle.copy()
         for number in range(1, _SAMPLES + 1):
-            share = np.array([_halton(number, k) for k in range(self.robot.nv)])
-            yield self._lower + share * (self._upper - self._lower)
+            yield self._drawn(number, np.arange(self.robot.nv))
+
+    def _drawn(self, number: int, dofs: Indices) -> Array:
+        """Return one of many postures of some joints all over their limits."""
+        share = np.array([_halton(number, k) for k in range(len(dofs))])
+        lower, upper = self._lower[dofs], self._upper[dofs]
+        return np.asarray(lower + share * (upper - lower))
+
+    def _assembled(self, least: float) -> Iterator[Array]:
+        """Yield displacements whose arms are each good alone, shape (nv,).
+
+        Where one posture in five is good for an arm, one in 25 is for two of them, but
+        they hardly depend on one another. All else is at home.
+        """
+        home = next(self._displacements())
+        arms = [(dofs, self._alone(dofs, home, least)) for dofs in self._arms()]
+        choices = product(*(range(min(len(good), _EACH)) for _, good in arms))
+        for choice in sorted(choices, key=sum)[:_TOGETHER]:
+            x = home.copy()
+            for (dofs, good), k in zip(arms, choice, strict=True):
+                x[dofs] = good[k]
+            yield x
+
+    def _alone(self, dofs: Indices, home: Array, least: float) -> list[Array]:
+        """Return an arm's displacements that are good whatever other arms do."""
+        pairs = self._pairs_of(dofs)
+        found = []
+        drawn = (self._drawn(k, dofs) for k in range(1, _SAMPLES + 1))
+        for own in (home[dofs], self.middle[dofs], *drawn):
+            x = home.copy()
+            x[dofs] = own
+            state = self._state_at(self._at(x))
+            if self._proximity is not None:
+                spare = self._proximity.measure(state) - self._gaps
+                if spare[pairs].min(initial=np.inf) <= 0.0:
+                    continue
+            rows = [state.frame(f).jacobian[list(r)][:, dofs] for f, r in self._rows]
+            rows = [J for J in rows if J.any()]
+            regularity = np.inf
+            if rows:
+                regularity = np.linalg.svd(np.vstack(rows), compute_uv=False)[-1]
+            away = float(np.linalg.norm((x - self.middle)[dofs]))
+            found.append((away, regularity, x[dofs]))
+        finite = [regular for _, regular, _ in found if np.isfinite(regular)]
+        needed = max(least, _SHARE * max(finite, default=0.0))
+        good = [each for each in found if each[1] > needed]
+        return [x for _, _, x in sorted(good, key=itemgetter(0))]
+
+    def _pairs_of(self, dofs: Indices) -> Flags:
+        """Return which pairs an arm moves, and no other one."""
+        if self._proximity is None:
+            return np.zeros(0, dtype=bool)
+        every = {int(each) for arm in self._arms() for each in arm}
+        own, model = {*dofs.tolist()}, self.robot.model
+        moved = [
+            every & {*joint_support(model, link.joint)[1].tolist()}
+            for link in self._proximity.links
+        ]
+        moved += [set() for _ in self._proximity.obstacles]
+        both = [moved[i] | moved[j] for i, j in self._proximity.pairs]
+        return np.array([bool(each) and each <= own for each in both], dtype=bool)
+
+    def _arms(self) -> list[Indices]:
+        """Return the degrees of freedom of each arm, where there are several."""
+        model, arms = self.robot.model, [0]
+        while len(arms) == 1:
+            (base,) = arms
+            arms = [
+                joint
+                for joint in range(1, model.njoints)
+                if model.parents[joint] == base and len(self._beyond(joint)) >= _ARM
+            ]
+        return [self._beyond(joint) for joint in arms]
+
+    def _beyond(self, joint: int) -> Indices:
+        """Return the degrees of freedom of a joint and of all that it carries."""
+        model = self.robot.model
+        carried = [model.joints[each] for each in model.subtrees[joint]]
+        dofs = [k for each in carried for k in range(each.idx_v, each.idx_v + each.nv)]
+        return np.array(sorted(dofs), dtype=np.int64)
 
     def _state_at(self, q: Array) -> RobotState:
         """Return the state at rest in a configuration; the next call moves it."""

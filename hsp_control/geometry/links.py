@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 from weakref import WeakKeyDictionary
-from xml.etree.ElementTree import Element
+from xml.etree.ElementTree import Element, SubElement
 
 import coal
 import numpy as np
@@ -20,10 +20,12 @@ from hsp_control.geometry.enclosing import (
     enclosing_ellipsoid_capsule,
     hull_corners,
 )
+from hsp_control.geometry.mesh_loading import mesh_of
 from hsp_control.robot import Robot
 from hsp_control.robot.description import mesh_files
 from hsp_control.robot.description.access import XmlError, read_xml
 from hsp_control.robot.description.loading import RobotPart
+from hsp_control.robot.description.mesh_units import MeshUnits, mesh_units
 from hsp_control.robot.description.sources import PINOCCHIO, BodyShape, RobotSource
 from hsp_control.robot.description.urdf import parser_text, read_urdf
 
@@ -133,12 +135,7 @@ def _body_geometry(shape: BodyShape, *, as_is: bool) -> Any:
         case "ellipsoid":
             return coal.Ellipsoid(*shape.size)
     assert shape.mesh is not None
-    vertices, triangles = shape.mesh
-    mesh = coal.BVHModelOBBRSS()
-    mesh.beginModel(len(triangles), len(vertices))
-    for triangle in vertices[triangles]:
-        mesh.addTriangle(*triangle)
-    mesh.endModel()
+    mesh = mesh_of(*shape.mesh)
     return mesh if as_is else convex_hull(mesh) or mesh
 
 
@@ -182,7 +179,10 @@ def _shapes_of_urdf(robot: Robot, part: RobotPart) -> list[LinkShape]:
 
 
 def _locate_meshes(xml: Element, source: RobotSource) -> dict[str, str]:
-    """Put meshes' paths into a URDF, without missing ones; return these by link."""
+    """Put meshes' paths and units into a URDF, without missing ones.
+
+    Return the missing ones by link.
+    """
     missing: dict[str, str] = {}
     for link in xml.iter("link"):
         for element in link.findall("collision"):
@@ -198,7 +198,24 @@ def _locate_meshes(xml: Element, source: RobotSource) -> dict[str, str]:
                         f"{source.urdf}: a collision mesh: {file}: {reason}"
                     )
                 mesh.set("filename", str(file.resolve()))
+                _write_units(element, mesh, mesh_units(file))
     return missing
+
+
+def _write_units(collision: Element, mesh: Element, units: MeshUnits) -> None:
+    """Write a mesh's unit and up axis into its scale and its place."""
+    scale = _numbers(mesh.get("scale", "1 1 1"))
+    mesh.set("scale", " ".join(map(repr, units.scale(scale).tolist())))
+    if units.up == MeshUnits().up:
+        return
+    if (origin := collision.find("origin")) is None:
+        origin = SubElement(collision, "origin")
+    turn = pin.rpy.rpyToMatrix(_numbers(origin.get("rpy", "0 0 0"))) @ units.turn
+    origin.set("rpy", " ".join(map(repr, pin.rpy.matrixToRpy(turn).tolist())))
+
+
+def _numbers(text: str) -> Array:
+    return np.array([float(word) for word in text.split()])
 
 
 def _report_missing(part: RobotPart, missing: Mapping[str, str], left: int) -> None:

@@ -68,7 +68,7 @@ class CoalDistances:
         for index, obstacle in enumerate(self._obstacles, start=self._first_obstacle):
             items[index].placement = obstacle.placement(state.t)
         pin.updateGeometryPlacements(
-            self._robot.model, state.data, self._geometry, self._data
+            self._robot.model, state.own_data, self._geometry, self._data
         )
         pin.computeDistances(self._geometry, self._data)
         distances[self.places] = [result.min_distance for result in self._results]
@@ -169,18 +169,21 @@ class Proximity:
             (self.closed_form if has else self.coal, int((closed == has)[:k].sum()))
             for k, has in enumerate(closed)
         ]
-        self._measured: RobotState | None = None
+        self._measured: Indices | None = None
         self._stamp = -1, -1
 
     def measure(self, state: RobotState) -> Array:
         """Return all distances at a state, shape (k,) [m]; computed once per state."""
-        if self._measured is state and self._stamp == self._stamp_of(state):
-            return self.distances  # compare the object: ids are reused
+        # The array is the state's, and of all that show it: ids are reused.
+        if self._measured is state.stamp_array and (
+            self._stamp == self._stamp_of(state)
+        ):
+            return self.distances
         if self.closed_form is not None:
             self.closed_form.measure(state)
         if self.coal is not None:
             self.coal.measure(state, self.distances)
-        self._measured, self._stamp = state, self._stamp_of(state)
+        self._measured, self._stamp = state.stamp_array, self._stamp_of(state)
         return self.distances
 
     def _stamp_of(self, state: RobotState) -> tuple[int, int]:

@@ -32,6 +32,7 @@ from hsp_control.declaration.quantities import (
     plain,
 )
 from hsp_control.geometry.enclosing import convex_hull
+from hsp_control.geometry.mesh_loading import load_mesh
 from hsp_control.robot.description import mesh_files
 
 
@@ -184,10 +185,10 @@ class Mesh(Shape, type="mesh"):
     """
 
     file: FileName
-    """An STL, OBJ or DAE file [-]; in YAML a relative path begins at the
-    configuration's folder, see `located`."""
+    """An STL, OBJ, DAE, glTF, PLY or OFF file [-]; in YAML a relative path begins at
+    the configuration's folder, see `located`."""
     scale: Positive = 1.0
-    """Length of the file's unit [m]."""
+    """Length of the file's unit [m]; of a DAE, which says its own, a factor [-]."""
     convex: Flag = False
     """Whether its convex hull is used instead [-]."""
 
@@ -216,7 +217,7 @@ class Mesh(Shape, type="mesh"):
         if reason := mesh_files.find_problem(file):
             raise SceneError(f"mesh: {file}: {reason}")
         try:
-            mesh = coal.MeshLoader().load(str(file), np.full(3, self.scale))
+            mesh = load_mesh(file, np.full(3, self.scale))
         except (RuntimeError, ValueError) as error:
             reason = str(error).strip().splitlines()[-1]
             raise SceneError(f"mesh: cannot read {file}: {reason}") from error

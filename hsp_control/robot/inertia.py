@@ -1,12 +1,23 @@
 """A robot's mass matrix, its centre of mass and momentum, and their exact rates."""
 
+from collections.abc import Sequence
+from copy import copy
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
-from hsp_control.common.arrays import Array, Indices, kept_view, matrix_view
-from hsp_control.compiled.kernels import KernelCalls, Once, kernel
+from hsp_control.common.arrays import (
+    Array,
+    Indices,
+    kept_view,
+    matrix_view,
+    read_only_view,
+)
+from hsp_control.common.exceptions import ModelError
+from hsp_control.common.suggestions import listing
+from hsp_control.compiled.kernels import KernelCall, KernelCalls, Once, kernel
 from hsp_control.robot.kinematics import Term
 
 
@@ -14,8 +25,8 @@ def inertia_terms(
     model: pin.Model, data: pin.Data, q: Array, v: Array, stamp: Indices
 ) -> tuple[Term, Term]:
     """Return M (CRBA) and M' = C + Cᵀ along v, shape (nv, nv) each."""
-    mass_matrix = kept_view(matrix_view(data.M), data)
-    M = Term(mass_matrix, [Once.at(stamp, (pin.crba, (model, data, q)))])
+    value = kept_view(matrix_view(data.M), data)
+    M = Term(value, [Once.at(stamp, *_mass_matrix_calls(model, data, q))])
     M_dot = np.zeros((model.nv, model.nv))
     if model.mimicking_joints:  # Pinocchio has no C of such a model
         given = model, model.createData(), q, v, M_dot
@@ -23,6 +34,43 @@ def inertia_terms(
     coriolis = pin.computeCoriolisMatrix, (model, data, q, v)
     add = _write_sum, (matrix_view(data.C), M_dot)
     return M, Term(M_dot, [Once.at(stamp, coriolis, add)])
+
+
+def mass_matrix(model: pin.Model, data: pin.Data, q: Array) -> Array:
+    """Return M(q), shape (nv, nv), whatever the data were used for before.
+
+    Of models with mimic joints Pinocchio's CRBA (seen with 4.1) adds to `data.Fcrb` and
+    `data.M`, which it does not clear: a second M would contain a part of the first one.
+    So nobody else calls ``pin.crba`` with data that are used again.
+    """
+    for matrix in _remembered(model, data):
+        _clear(matrix)
+    return np.asarray(pin.crba(model, data, q))
+
+
+def _mass_matrix_calls(
+    model: pin.Model, data: pin.Data, q: Array
+) -> Sequence[KernelCall]:
+    """Return the calls of `mass_matrix`."""
+    clearing: list[KernelCall] = [
+        (_clear, (matrix,)) for matrix in _remembered(model, data)
+    ]
+    return [*clearing, (pin.crba, (model, data, q))]
+
+
+def _remembered(model: pin.Model, data: pin.Data) -> list[Array]:
+    """Return what CRBA does not clear itself, views of the data."""
+    if not model.mimicking_joints:
+        return []
+    return [kept_view(matrix_view(each), data) for each in (*data.Fcrb, data.M)]
+
+
+@kernel
+def _clear(matrix: Array) -> None:
+    """Write zeros."""
+    for i in range(matrix.shape[0]):
+        for j in range(matrix.shape[1]):
+            matrix[i, j] = 0.0
 
 
 @kernel
@@ -40,7 +88,7 @@ def _write_difference(
     h = 1e-3 / max(1.0, float(np.abs(v).max()))
 
     def M(s: float) -> Array:
-        return np.array(pin.crba(model, data, pin.integrate(model, q, s * v)))
+        return mass_matrix(model, data, pin.integrate(model, q, s * v)).copy()
 
     M_dot[:] = (8.0 * (M(h) - M(-h)) - (M(2.0 * h) - M(-2.0 * h))) / (12.0 * h)
 
@@ -73,6 +121,12 @@ class CentroidalMotion:
         self, model: pin.Model, data: pin.Data, q: Array, v: Array, stamp: Indices
     ) -> None:
         """Allocate the arrays; `calls` take the values that q and v have then."""
+        if mimics := [model.names[index] for index in model.mimicking_joints]:
+            raise ModelError(
+                f"{model.name}: the centre of mass and the momentum do not support "
+                f"mimic joints, and {listing(map(repr, mimics))} are some; load the "
+                "robot with mimic=False"
+            )
         # Pinocchio allocates these results at the first call; take views after it.
         pin.computeCentroidalMapTimeVariation(model, data, q, v)
         self.mass: float = pin.computeTotalMass(model)
@@ -87,7 +141,19 @@ class CentroidalMotion:
         angular = self.momentum_matrix, self.momentum_matrix_dot
         sums = matrix_view(data.Ag), matrix_view(data.dAg), self.mass, v
         extract = _extract, (*sums, *found, *angular)
-        self.calls: KernelCalls = [Once.at(stamp, momentum, extract)]
+        # It reads the velocity of the centre, which it does not write: of others' calls
+        # nothing is to be in A'.
+        rest = _clear, (kept_view(data.vcom[0].reshape(1, 3), data),)
+        self.calls: KernelCalls = [Once.at(stamp, rest, momentum, extract)]
+
+    @cached_property
+    def shown(self) -> "CentroidalMotion":
+        """The same, with arrays that can be read, but not written."""
+        shown = copy(self)
+        for name, value in vars(self).items():
+            if isinstance(value, np.ndarray):
+                setattr(shown, name, read_only_view(value))
+        return shown
 
     def supplied(self) -> tuple[PointMotion, KernelCalls]:
         """Return the centre's motion as an argument of a kernel; see `planned`."""

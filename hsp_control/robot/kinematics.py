@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from hsp_control.common.arrays import Array, Indices, matrix_view
-from hsp_control.common.exceptions import ModelError
+from hsp_control.common.arrays import Array, Indices, matrix_view, read_only_view
+from hsp_control.common.exceptions import ImmutableError, ModelError
 from hsp_control.compiled.kernels import KernelCalls, kernel
 
 
@@ -107,9 +107,34 @@ class FrameKinematics:
         given = stamp, np.array([-1]), carrier, v, motion, self.drift
         self.calls: KernelCalls = [(frame_kinematics, given)]
 
+    def __setattr__(self, name: str, value: object) -> None:
+        if hasattr(self, name):
+            raise ImmutableError(
+                f"frame.{name} cannot be assigned: native calls go on with the array "
+                "that was there; copy it, and change the copy"
+            )
+        super().__setattr__(name, value)
+
     def supplied(self) -> tuple[FrameMotion, KernelCalls]:
         """Return the motion as an argument of a kernel; see `planned`."""
         return self.motion, self.calls
+
+
+class ShownFrame(FrameKinematics):
+    """A frame whose arrays can be read, but not written."""
+
+    __slots__ = ("_own",)
+
+    def __init__(self, own: FrameKinematics) -> None:
+        self._own, self.calls = own, own.calls
+        self.motion = FrameMotion(*map(read_only_view, own.motion))
+        for name, view in zip(FrameMotion._fields, self.motion, strict=True):
+            setattr(self, name, view)
+        self.drift = read_only_view(own.drift)
+
+    def supplied(self) -> tuple[FrameMotion, KernelCalls]:
+        """Return the motion as an argument of a kernel; see `planned`."""
+        return self._own.supplied()
 
 
 @kernel

@@ -8,6 +8,7 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ModelError
+from hsp_control.robot.inertia import mass_matrix
 from hsp_control.robot.kinematics import Term
 from hsp_control.robot.structure import Structure
 
@@ -138,8 +139,8 @@ class RobotModel(Structure):
         rng, largest = np.random.default_rng(0), np.zeros(self.nv)
         q = self.home()
         for _ in range(65):
-            self._data.M[:] = 0.0
-            largest = np.maximum(largest, np.diag(pin.crba(self.model, self._data, q)))
+            M = mass_matrix(self.model, self._data, q)
+            largest = np.maximum(largest, np.diag(M))
             turned = rng.uniform(-np.pi, np.pi, self.nv)
             q = pin.integrate(self.model, self.neutral(), turned)
         return largest
@@ -184,10 +185,10 @@ class RobotModel(Structure):
         return Term(value, [(compute, (q, v, tau))])
 
     def _forward_dynamics_of_mimics(self, q: Array, v: Array, tau: Array) -> Array:
-        mass_matrix = pin.crba(self.model, self._data, q)
+        M = mass_matrix(self.model, self._data, q)
         effects = pin.nonLinearEffects(self.model, self._data, q, v)
         try:
-            return np.asarray(np.linalg.solve(mass_matrix, tau - effects))
+            return np.asarray(np.linalg.solve(M, tau - effects))
         except np.linalg.LinAlgError:
             raise ModelError(
                 f"{self.name}: the mass matrix is singular at this configuration"

@@ -1,6 +1,7 @@
 """The robot: a model, loaded by name, from a file, MuJoCo or Pinocchio."""
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
@@ -14,10 +15,10 @@ from hsp_control.common.exceptions import ModelError
 from hsp_control.declaration import within
 from hsp_control.robot.description.access import ANYWHERE, Access
 from hsp_control.robot.description.from_pinocchio import take_model
+from hsp_control.robot.description.hand import Hand, find_hand
 from hsp_control.robot.description.loading import (
     RobotPart,
     combine,
-    end_effector_frame,
     load_model,
     placement,
     reference_posture,
@@ -63,6 +64,7 @@ class Robot(RobotModel):
         mimic: bool = True,
         project_inertias: bool = False,
         xacro_args: Mapping[str, str | bool | float] | None = None,
+        srdf: str | Path | None = None,
         access: Access = ANYWHERE,
     ) -> Self:
         """Load a bundled robot, one of an installed package, or a URDF or xacro file.
@@ -83,6 +85,8 @@ class Robot(RobotModel):
             project_inertias: Whether inertias that no body can have are replaced by the
                 nearest that one can have; mass and centre of mass stay.
             xacro_args: Arguments of a xacro file, by name.
+            srdf: An SRDF whose disabled pairs of links never collide. None: the one
+                beside the URDF that is called like it, if there is one.
             access: Which files may be read: a URDF given by path, and the meshes that
                 it names. Use `access.only_within` for untrusted files.
 
@@ -104,6 +108,7 @@ class Robot(RobotModel):
             "mimic": None if mimic else False,
             "project_inertias": project_inertias or None,
             "xacro_args": xacro_args,
+            "srdf": srdf,
         }
         given = {key: value for key, value in given.items() if value is not None}
         if not isinstance(name, RobotDescription):
@@ -187,7 +192,8 @@ class Robot(RobotModel):
 
         Raises:
             ModelError: If an argument is of another type, a geometry model is of
-                another model, or the mass matrix is singular.
+                another model, the axes of a joint turn with its own configuration, or
+                the mass matrix is singular.
             FrameNotFoundError: If the hand, or a tool frame's parent, does not exist.
         """
         given = collision, visual, home, end_effector, tool_frames or {}
@@ -273,11 +279,16 @@ class Robot(RobotModel):
 
     @property
     def end_effector(self) -> str:
-        """The frame of the hand: as the source says, or else `end_effector_frame`."""
+        """The frame of the hand: as the source says, or else the likeliest."""
+        return self.hand.frame
+
+    @cached_property
+    def hand(self) -> Hand:
+        """The frame of the hand, and why it is this one; see `find_hand`."""
         named = self.source.end_effector
         if named is not None and named in self._frame_ids:
-            return named
-        return end_effector_frame(self.model)
+            return Hand(named, "the robot's source names it")
+        return find_hand(self.model)
 
     def state(self, t: float, q: Any, v: Any) -> "RobotState":
         """Return a new `RobotState` at time t [s], q (nq,) and v (nv,).

@@ -13,15 +13,22 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from hsp_control.common.arrays import Array, Indices, kept_view, matrix_view
+from hsp_control.common.arrays import (
+    Array,
+    Indices,
+    kept_view,
+    matrix_view,
+    read_only_view,
+)
 from hsp_control.common.exceptions import ImmutableError, NonFiniteError, ShapeError
-from hsp_control.compiled.kernels import AnyCall, KernelCall, KernelCalls, Once
+from hsp_control.compiled.kernels import AnyCall, KernelCall, KernelCalls, Once, says
 from hsp_control.compiled.moves import REFUSED, Memory, Move
 from hsp_control.compiled.step_plan import StepPlan, moving, planned
 from hsp_control.declaration.quantities import Vector
 from hsp_control.robot.inertia import CentroidalMotion, inertia_terms
 from hsp_control.robot.kinematics import (
     FrameKinematics,
+    ShownFrame,
     WorldKinematics,
     joint_placements,
 )
@@ -53,7 +60,6 @@ class RobotState:
         inertia: M(q) as an argument of kernels; see `mass_matrix`.
         inertia_rate: M' as an argument of kernels; see `mass_matrix_rate`.
         effort: What `inverse_dynamics` wrote last, shape (nv,) [N·m or N].
-        data: Pinocchio's data at (q, v), for terms that this class does not offer.
     """
 
     def __init__(self, robot: "Robot") -> None:
@@ -67,9 +73,11 @@ class RobotState:
         # writable, also where `seen` binds calls
         self._memory: Memory = self.time, self.q, self.v, blocks, self.stamp_array
         self._seen: RobotState | None = None
-        self.data: pin.Data = robot.model.createData()
-        self.effort: Array = kept_view(self.data.tau, self.data)
-        self._at = robot.model, self.data, self.q, self.v  # what Pinocchio is given
+        self._read_only: RobotState | None = None
+        self._data: pin.Data = robot.model.createData()
+        self._shown_data: tuple[pin.Data, int] | None = None
+        self.effort: Array = kept_view(self._data.tau, self._data)
+        self._at = robot.model, self._data, self.q, self.v  # what Pinocchio is given
         self._acceleration: Array = np.zeros(robot.nv)
         self._inverse_dynamics = self._bound(self.rnea(self._acceleration))
         self._world: WorldKinematics | None = None
@@ -88,10 +96,39 @@ class RobotState:
     def _bound(self, *calls: AnyCall) -> Callable[[], object]:
         return self.plan(calls).call()
 
+    def __setattr__(self, name: str, value: object) -> None:
+        if name == "t" or (name in _FIXED and name in self.__dict__):
+            raise ImmutableError(
+                f"state.{name} cannot be assigned, as all terms belong to one t, q and "
+                "v: call state.update(t, q, v)"
+            )
+        super().__setattr__(name, value)
+
     @property
     def t(self) -> float:
         """Time [s]."""
         return self.time.item()
+
+    @property
+    def own_data(self) -> pin.Data:
+        """The data that this state steps with: to read placements, never to write."""
+        return self._data
+
+    @property
+    def data(self) -> pin.Data:
+        """Pinocchio's data at (q, v), for terms that this class does not offer.
+
+        They have the placements of the joints, and their Jacobians J with the rate, and
+        are nobody else's: nothing here is computed with them.
+        """
+        stamp, model = self.stamp, self.robot.model
+        if self._shown_data is None or not _fits(self._shown_data[0], self._data):
+            self._shown_data = model.createData(), stamp - 1
+        data, computed = self._shown_data
+        if computed != stamp:
+            pin.computeJointJacobiansTimeVariation(model, data, self.q, self.v)
+            self._shown_data = data, stamp
+        return data
 
     def update(self, t: float, q: ArrayLike, v: ArrayLike) -> Self:
         """Move to time t [s], configuration q (nq,) and velocity v (nv,), in place.
@@ -145,6 +182,13 @@ class RobotState:
             self._seen = SeenState(self)
         return self._seen
 
+    @property
+    def read_only(self) -> "RobotState":
+        """This state, as the plain Python of a part gets it: nothing in it changes."""
+        if self._read_only is None:
+            self._read_only = ReadOnlyState(getattr(self, "_own", self))
+        return self._read_only
+
     def frame(self, name: str) -> FrameKinematics:
         """Return the placement, the Jacobian and the motion of a frame.
 
@@ -190,7 +234,7 @@ class RobotState:
     def nonlinear_effects(self) -> Array:
         """N(q, v): Coriolis, centrifugal and gravity efforts, shape (nv,) (RNEA)."""
         self._compute_effects()
-        return kept_view(self.data.nle, self.data)
+        return kept_view(self._data.nle, self._data)
 
     def inverse_dynamics(self, acceleration: Array) -> Array:
         """Return the effort M a + N, shape (nv,), for an acceleration (nv,) (RNEA)."""
@@ -212,9 +256,9 @@ class RobotState:
         """Placements and Jacobians of all joints at the world's origin, as views."""
         if self._world is None:
             self._world = WorldKinematics(
-                joint_placements(self.data),
-                matrix_view(self.data.J),
-                matrix_view(self.data.dJ),
+                joint_placements(self._data),
+                matrix_view(self._data.J),
+                matrix_view(self._data.dJ),
                 self._at[3],
             )
         return self._world
@@ -297,20 +341,10 @@ class SeenState(RobotState):
 
     def __init__(self, own: RobotState) -> None:
         self.__dict__ = own.__dict__
-        self._own, self._shown = own, (own.q.view(), own.v.view())
-        for view in self._shown:
-            view.flags.writeable = False
+        self._own, self._shown = own, (read_only_view(own.q), read_only_view(own.v))
 
     q = property(lambda self: self._shown[0])
     v = property(lambda self: self._shown[1])
-
-    def __setattr__(self, name: str, value: object) -> None:
-        if name in ("t", "q", "v"):
-            raise ImmutableError(
-                f"state.{name} cannot be assigned, as all terms belong to one t, q and "
-                "v: call state.update(t, q, v)"
-            )
-        super().__setattr__(name, value)
 
     def update(self, t: float, q: ArrayLike, v: ArrayLike) -> Self:
         """Move the state that it shows; see `RobotState.update`."""
@@ -319,6 +353,72 @@ class SeenState(RobotState):
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _copy, (self.robot, self.t, np.array(self.q), np.array(self.v))
+
+
+def as_given(part: object, state: RobotState) -> RobotState:
+    """Return a state as a part's `evaluate` gets it: read-only for plain Python.
+
+    Kernels are bound to the state itself, whose arrays they know as writable.
+    """
+    is_plain = says(part, "kernel", "kernels", "evaluate") == "evaluate"
+    return state.read_only if is_plain else state
+
+
+class ReadOnlyState(SeenState):
+    """A state that cannot be moved, whose arrays cannot be written.
+
+    The plain Python of a part gets it: what it changed would be the robot of the
+    controller that called it, silently.
+    """
+
+    __slots__ = ("_frames_shown",)
+    _frames_shown: dict[str, FrameKinematics]
+
+    def __init__(self, own: RobotState) -> None:
+        super().__init__(own)
+        object.__setattr__(self, "_frames_shown", {})
+
+    def update(self, t: float, q: ArrayLike, v: ArrayLike) -> Self:
+        """Refuse to move; see `RobotState.displaced`."""
+        raise ImmutableError(
+            "the state that a part is given cannot be moved: it is its controller's; "
+            "take state.displaced(dt, displacement), or state.robot.state(t, q, v)"
+        )
+
+    def frame(self, name: str) -> FrameKinematics:
+        """Return a frame whose arrays cannot be written; see `RobotState.frame`."""
+        own = self._own.frame(name)
+        shown = self._frames_shown.get(name)
+        if shown is None:
+            shown = self._frames_shown[name] = ShownFrame(own)
+        return shown
+
+    def displaced(self, dt: float, displacement: Array) -> RobotState:
+        """Return the companion, read-only as well; see `RobotState.displaced`."""
+        return self._own.displaced(dt, displacement).read_only
+
+    centroidal = property(lambda self: self._own.centroidal.shown)
+    mass_matrix = property(lambda self: read_only_view(self._own.mass_matrix))
+    mass_matrix_rate = property(lambda self: read_only_view(self._own.mass_matrix_rate))
+    nonlinear_effects = property(
+        lambda self: read_only_view(self._own.nonlinear_effects)
+    )
+
+    def inverse_dynamics(self, acceleration: Array) -> Array:
+        """Return the effort, a copy; see `RobotState.inverse_dynamics`."""
+        robot = self.robot
+        return robot.inverse_dynamics(self.q, self.v, np.array(acceleration))
+
+
+_FIXED = {"robot", "q", "v", "time", "stamp_array", "inertia", "inertia_rate", "effort"}
+"""What native calls read or write: assigning others would change nothing for them."""
+
+
+def _fits(data: pin.Data, other: pin.Data) -> bool:
+    """Return whether what is computed into data still has its size."""
+    return (data.J.shape, data.dJ.shape) == (other.J.shape, other.dJ.shape) and len(
+        data.oMi
+    ) == len(other.oMi)
 
 
 def _copy(robot: "Robot", t: float, q: Array, v: Array) -> RobotState:

@@ -17,7 +17,11 @@ from hsp_control.common.exceptions import (
     SimulationError,
 )
 from hsp_control.common.suggestions import did_you_mean, listing
-from hsp_control.robot.description.loading import moving_joints
+from hsp_control.robot.description.loading import (
+    frames_by_name,
+    guarded,
+    moving_joints,
+)
 
 _LIMB = 4
 """Fewest joints of an arm or a leg; heads and fingers have fewer."""
@@ -62,20 +66,14 @@ class Structure:
         ``home`` is the displacement from neutral (nv,) of the home posture, ignored if
         it has another size.
         """
-        self.model = model
+        self.model = guarded(model)
         self.name = name
         self.nq: int = model.nq
         self.nv: int = model.nv
         self.joints = moving_joints(model)
         self.joint_names: tuple[str, ...] = tuple(self.joints)
         self.frame_names: tuple[str, ...] = tuple(f.name for f in model.frames)
-        # If a joint and a link have the same name, it means the link's frame.
-        links = {f.name for f in model.frames if f.type == pin.FrameType.BODY}
-        self._frame_ids = {
-            frame.name: i
-            for i, frame in enumerate(model.frames)
-            if frame.type == pin.FrameType.BODY or frame.name not in links
-        }
+        self._frame_ids = frames_by_name(model)
         joints = self.joints.values()
         dofs = [
             (joint, f"{name}.{label}" if label else name, label)
@@ -346,6 +344,8 @@ def _dof_labels(joint: Any) -> tuple[str, ...]:
         return ("",)
     if _is_ball(joint):
         return "roll", "pitch", "yaw"
+    if joint.shortname() == "JointModelTranslation":
+        return "x", "y", "z"
     roots = {3: ("x", "y", "yaw"), 6: ("x", "y", "z", "roll", "pitch", "yaw")}
     return roots.get(joint.nv, tuple(map(str, range(joint.nv))))
 

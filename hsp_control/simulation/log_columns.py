@@ -146,7 +146,7 @@ class TaskColumns:
             for task in tasks:
                 name = self._names[task.name] = self._log_name(task)
                 self.logged[name], self._levels[name] = task, level
-                self._add(name, task, len(task.measure(probe)[0]))
+                self._add(name, task, len(task.measure(probe.read_only)[0]))
 
     def _log_name(self, task: Task) -> str:
         """Return the task's name in the log."""
@@ -181,7 +181,7 @@ class TaskColumns:
         """Write references, what follows them, and what streams have heard."""
         row = self._columns.row
         for name, task in self.logged.items():
-            reference, actual = task.measure(state)
+            reference, actual = task.measure(state.read_only)
             row[f"task.{name}.reference"][:] = reference
             row[f"task.{name}.actual"][:] = actual
             for prefix, stream in self._streams[name]:
@@ -267,9 +267,9 @@ class TermColumns:
         """Write the values of the terms, and distances."""
         row = self._columns.row
         for name, term in self._terms.items():
-            row[f"field.{name}.value"][...] = term.value(state)
+            row[f"field.{name}.value"][...] = term.value(state.read_only)
         for name, term in self._distances.items():
-            row[name][...] = term.minimum_distance(state)
+            row[name][...] = term.minimum_distance(state.read_only)
 
     def sources(self, active: ActiveStack) -> Sources:
         """Yield what the law writes of the terms."""

@@ -223,7 +223,7 @@ class Task(Part, ABC, family="tasks", error=TaskError):
         """Return the calls that write the sample of each step."""
         if says(self, "kernel", "evaluate") == "kernel":
             return [with_outputs(self.kernel(state), feedback, out)]
-        return [(self.evaluate, (state, out, feedback))]
+        return [(self.evaluate, (state.read_only, out, feedback))]
 
     def evaluate(
         self,
@@ -262,7 +262,21 @@ class Task(Part, ABC, family="tasks", error=TaskError):
     def given(
         self, state: RobotState, out: TaskSample | None, feedback: Feedback | None
     ) -> tuple[TaskSample, Feedback]:
-        """Return both, or new ones where they are None."""
+        """Return both, or new ones where they are None.
+
+        Raises:
+            TaskError: If ``out`` is no sample of so many rows.
+        """
+        shape = self.rows, state.robot.nv
+        if out is not None and (
+            not isinstance(out, TaskSample) or out.jacobian.shape != shape
+        ):
+            kind = type(out).__name__
+            if isinstance(out, TaskSample):
+                kind = f"a TaskSample of shape {out.jacobian.shape}"
+            raise TaskError(
+                f"task {self.name!r}: out is {kind}; needs TaskSample.allocate{shape}"
+            )
         return (
             TaskSample.allocate(self.rows, state.robot.nv) if out is None else out,
             self.feedback_at(state) if feedback is None else feedback,

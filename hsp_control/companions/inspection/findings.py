@@ -1,8 +1,8 @@
 """Look at a robot's description with all checks."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
-from typing import Any, Literal
+from dataclasses import dataclass, replace
+from typing import Any
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -11,6 +11,21 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ConfigurationError, ModelError
 from hsp_control.common.suggestions import listing
+from hsp_control.companions.inspection.finding import Finding as Finding
+from hsp_control.companions.inspection.finding import Severity
+from hsp_control.companions.inspection.plausibility import (
+    check_angles,
+    check_gyration,
+    check_size,
+)
+from hsp_control.companions.inspection.reading import (
+    check_followers,
+    check_mesh_axes,
+    check_planar_axes,
+    check_soft_limits,
+    check_srdf,
+    check_unread,
+)
 from hsp_control.geometry import Proximity, link_shapes, self_pairs
 from hsp_control.geometry.good_postures import PostureSearch, Rows
 from hsp_control.robot import Robot, RobotDescription
@@ -25,26 +40,6 @@ from hsp_control.robot.description.mesh_files import (
 from hsp_control.robot.description.sources import RobotSource
 from hsp_control.robot.description.urdf import parse_urdf, problems
 from hsp_control.simulation.demand_check import too_weak
-
-Severity = Literal["error", "warning", "note"]
-"""Of an error, the robot does not load; of a warning, something does not work well; a
-note is good to know."""
-
-
-@dataclass(frozen=True)
-class Finding:
-    """Something odd in a robot's description."""
-
-    severity: Severity  # how bad it is
-    check: str  # which check found it, such as ``inertia``
-    element: str  # the link, joint, file or pair of links that it is about
-    message: str  # what is odd, with the value
-    cure: str = ""  # what would be right, or what to do; empty if nothing is to be done
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return it as plain data."""
-        return asdict(self)
-
 
 _CURE = "project_inertias: true takes the nearest possible one, --fix writes it"
 
@@ -331,16 +326,21 @@ def inspect(description: RobotDescription, access: Access = ANYWHERE) -> Inspect
         # What is wrong with its elements: then the robot does not load.
         findings += [Finding("error", "element", *each) for each in problems(xml)]
         if not findings:
-            findings += [*check_inertias(xml), *check_limits(xml)]
-            findings += check_meshes(xml, source)
+            findings += [*check_inertias(xml), *check_limits(xml), *check_angles(xml)]
+            findings += [*check_soft_limits(xml), *check_followers(xml)]
+            findings += [*check_planar_axes(xml), *check_unread(xml)]
+            findings += [*check_meshes(xml, source), *check_mesh_axes(xml, source)]
+            findings += check_srdf(xml, source)
         errors = [f for f in findings if f.severity == "error"]
         if all(error.check == "inertia" for error in errors):
             if errors:
                 description = replace(description, project_inertias=True)
             try:
                 model = load_model(source, description, description.gravity)
-                found, facts = _of_robot(Robot(model, source, description=description))
+                robot = Robot(model, source, description=description)
+                found, facts = _of_robot(robot)
                 findings += found
+                findings += check_gyration(xml, robot, _points_of_shapes(robot))
             except ModelError as error:
                 reason = _reason(error, source)
                 findings.append(Finding("error", "robot", source.name, reason))
@@ -352,7 +352,7 @@ def inspect(description: RobotDescription, access: Access = ANYWHERE) -> Inspect
 def _of_robot(robot: Robot) -> tuple[list[Finding], dict[str, str]]:
     """Return what is odd about a robot that was loaded, and the facts about it."""
     condition, dof = worst_condition(robot)
-    findings = [*check_mass_matrix(condition, dof)]
+    findings = [*check_size(robot), *check_mass_matrix(condition, dof)]
     try:
         findings += check_self_collisions(robot)
     except ModelError as error:
@@ -365,7 +365,7 @@ def _of_robot(robot: Robot) -> tuple[list[Finding], dict[str, str]]:
     far, turned = robot.largest_error
     return findings, {
         "robot": f"{robot.name}: nq = {robot.nq}, nv = {robot.nv}, {root}",
-        "end effector": f"{robot.end_effector} (by default)",
+        "end effector": f"{robot.end_effector} (by default): {robot.hand.why}",
         "reach": f"{robot.size:.3g} m from the first joint at most: the longest chain",
         "bounds": f"an error counts up to {far:.3g} m and {turned:.3g} rad by default",
         "effort rate": _rates(robot),
@@ -374,6 +374,24 @@ def _of_robot(robot: Robot) -> tuple[list[Finding], dict[str, str]]:
         "mass matrix": f"condition number up to {condition:.2g}, by {dof}",
         "home": f"[{home}]",
     }
+
+
+def _points_of_shapes(robot: Robot) -> dict[str, Array]:
+    """Return points at the ends of the links' capsules, in their frames, by link."""
+    try:
+        shapes = link_shapes(robot)
+    except ModelError:  # reported where they are looked at
+        return {}
+    points: dict[str, list[Array]] = {}
+    for shape in shapes:
+        if shape.link not in robot.frame_names:
+            continue  # what stands for the shapes of a robot without any
+        frame = robot.model.frames[robot.frame_id(shape.link)]
+        place, capsule = frame.placement.actInv(shape.placement), shape.geometry
+        reach = capsule.radius + getattr(capsule, "halfLength", 0.0)
+        ends = reach * np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]])
+        points.setdefault(shape.link, []).extend(place.act(end) for end in ends)
+    return {link: np.array(found) for link, found in points.items()}
 
 
 def _rates(robot: Robot) -> str:

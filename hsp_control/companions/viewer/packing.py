@@ -182,7 +182,8 @@ class Piece(NamedTuple):
 def read_mesh(thing: Json, owner: str) -> list[Piece]:
     """Return a mesh file's pieces, one per colour; a texture becomes its mean colour.
 
-    A Collada file's unit and up axis are ignored, as in Meshcat's page and Pinocchio.
+    A Collada file's unit and up axis are in the object's matrix: vertices stay as they
+    are in the file, as in Meshcat's page.
     """
     try:
         import collada  # noqa: F401

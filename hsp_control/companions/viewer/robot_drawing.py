@@ -23,14 +23,16 @@ from hsp_control.companions.viewer.commands import (
 )
 from hsp_control.companions.viewer.motion import RunMotion, Track, pose_tracks
 from hsp_control.geometry.links import part_of
+from hsp_control.geometry.mesh_loading import facets, load_mesh
 from hsp_control.robot import Robot
 from hsp_control.robot.description.loading import RobotPart
 from hsp_control.robot.description.mesh_files import candidates, find_problem
+from hsp_control.robot.description.mesh_units import mesh_units
 from hsp_control.robot.description.sources import BodyShape, RobotSource
 from hsp_control.robot.description.urdf import read_urdf
 
 _GREY = (0.72, 0.74, 0.76, 1.0)
-_MESHES = {".dae", ".obj", ".stl"}  # formats that the page can read
+_MESHES = {".dae", ".obj", ".stl"}  # formats that the page reads itself
 _SIZES = {
     "box": ("size",),
     "cylinder": ("radius", "length"),
@@ -116,15 +118,36 @@ def _visual(
     if shape is None or shape.tag not in _SIZES:
         return None
     size = tuple(x for n in _SIZES[shape.tag] for x in _numbers(shape.get(n)))
-    return Visual(
+    visual = Visual(
         joint=frame.parentJoint,
         link=frame.name,
         pose=frame.placement.homogeneous @ _pose(element.find("origin")),
         kind=shape.tag,
         size=size or (1.0, 1.0, 1.0),
         color=_color(element.find("material"), materials) or _GREY,
-        file=_mesh_file(source, shape.get("filename", "")),
+        file=None,
     )
+    file = _mesh_file(source, shape.get("filename", ""))
+    return visual if file is None else _with_mesh(visual, file)
+
+
+def _with_mesh(visual: Visual, file: Path) -> Visual:
+    """Return a visual with the file that it is drawn from, in its unit and upright.
+
+    What the page cannot read itself is read here, as it is for distances.
+    """
+    units = mesh_units(file)
+    turn = np.eye(4)
+    turn[:3, :3] = units.turn
+    size = tuple(units.scale(np.array(visual.size)).tolist())
+    upright = visual._replace(pose=visual.pose @ turn, size=size)
+    if file.suffix.lower() in _MESHES:
+        return upright._replace(file=file)
+    try:
+        mesh = facets(load_mesh(file, np.array(visual.size)))
+    except (RuntimeError, ValueError):  # counted as missing
+        return visual
+    return visual._replace(mesh=mesh) if len(mesh[1]) else visual
 
 
 def _materials(tree: Element) -> Iterator[tuple[str, tuple[float, ...]]]:
@@ -156,17 +179,10 @@ def _pose(origin: Element | None) -> Array:
 
 
 def _mesh_file(source: RobotSource, name: str) -> Path | None:
-    """Return the file that a mesh's name refers to, if it exists and can be shown."""
-    return next(
-        (
-            file
-            for file in candidates(source, name)
-            if file.suffix.lower() in _MESHES
-            and not find_problem(file)
-            and source.access.allows(file)
-        ),
-        None,
-    )
+    """Return the file that a mesh's name refers to, if it exists and may be read."""
+    files = candidates(source, name)
+    good = (f for f in files if not find_problem(f) and source.access.allows(f))
+    return next(good, None)
 
 
 def _numbers(text: str | None) -> tuple[float, ...]:
@@ -278,8 +294,8 @@ class RobotDrawing:
             self._placeholders = set(range(robot.model.njoints))
         if missing:
             _log.warning(
-                "%s: %d of %d meshes are not found (the first belongs to link %r)%s; "
-                "capsules are drawn instead",
+                "%s: %d of %d meshes are not found or cannot be read (the first "
+                "belongs to link %r)%s; capsules are drawn instead",
                 robot.name,
                 len(missing),
                 sum(visual.kind == "mesh" for visual in self._visuals),

@@ -81,7 +81,7 @@ class Barrier(Part, ABC, family="barriers", error=LimitError):
         """
         state = start.state
         needed = len(self._numbers(state)), state.robot.nv
-        if (shape := np.shape(self.gradients(state))) != needed:
+        if (shape := np.shape(self.gradients(state.read_only))) != needed:
             raise LimitError(
                 f"{type(self).__name__} has gradients of shape {shape}; needs {needed}"
             )
@@ -98,7 +98,7 @@ class Barrier(Part, ABC, family="barriers", error=LimitError):
             wanted: The acceleration without them, shape (nv,): it may tell which count.
         """
         _, _, least = self._least_acceleration(state, bandwidth)
-        return self.gradients(state), least
+        return self.gradients(state.read_only), least
 
     def check_start(self, state: RobotState) -> None:
         """Check that none starts below the minimum."""
@@ -111,7 +111,7 @@ class Barrier(Part, ABC, family="barriers", error=LimitError):
 
     def _numbers(self, state: RobotState) -> Array:
         """Return the values as a new array, shape (k,), checked."""
-        h = self.values(state)
+        h = self.values(state.read_only)
         try:
             found = np.atleast_1d(np.array(h, dtype=float))
         except (TypeError, ValueError):

@@ -90,7 +90,7 @@ def desired_velocity(state: RobotState, active: ActiveStack) -> Array:
     """Return v_d = J# x_d' + P g = v + e_N + J#(x_d' - J v), shape (nv,)."""
     # J# is that of the law, bounded near singularities by the law's threshold. The rows
     # of unactuated base motions have no desired rate.
-    resolution, v = active.resolution, state.v
+    resolution, v, state = active.resolution, state.v, state.read_only
     task, metric = resolution.problem.task, resolution.problem.metric
     rate_error = -task.jacobian @ v
     contact_rows = sum(contact.rows for contact in active.contacts)

@@ -10,6 +10,7 @@ from hsp_control.control.compensation.compensation import Compensation
 from hsp_control.control.controller import Controller
 from hsp_control.law import FieldSample, MetricSample
 from hsp_control.robot import Robot, RobotState
+from hsp_control.robot.state import as_given
 
 
 @dataclass(frozen=True)
@@ -199,8 +200,9 @@ def field_slope(controller: Controller, state: RobotState) -> Array:
             moved = np.zeros(nv)
             moved[i] = sign * _STEP
             near = state.displaced(0.0, moved)
-            controller.metric.evaluate(near, metric)
-            controller.field.evaluate(near, metric, controller.metric.form, out)
+            own, field = controller.metric, controller.field
+            own.evaluate(as_given(own, near), metric)
+            field.evaluate(as_given(field, near), metric, own.form, out)
             slope[:, i] += sign * out.g / (2.0 * _STEP)
     return slope
 

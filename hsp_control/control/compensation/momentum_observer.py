@@ -29,6 +29,7 @@ from hsp_control.law.pseudo_inverse import (
     whiten,
 )
 from hsp_control.robot import Robot, RobotState
+from hsp_control.robot.state import as_given
 from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import CompliantTask
 
@@ -146,7 +147,8 @@ def task_wrench(
     r does. J̄ = M⁻¹JᵀΛ is bounded near singularities as the law's own pseudo-inverse is:
     a force along a lost direction, which the joints do not feel, is taken for zero.
     """
-    J = task.evaluate(state, feedback=task.feedback()).jacobian
+    given = as_given(task, state)
+    J = task.evaluate(given, feedback=task.feedback()).jacobian
     m, nv = J.shape
     L, B, Q = np.zeros((nv, nv)), np.zeros((m, nv)), np.zeros((m, nv))
     X, part, force = np.zeros((m, m)), np.zeros(m), np.zeros(m)

@@ -152,7 +152,7 @@ class Cost(NullSpaceField):
         descent = metric.L, metric.W_dot, form, *out
         if self._has_kernel("gradient", "gradient_rate", "differentiate"):
             return [*self.derivatives(state, *out), (descend, descent)]
-        return [(self._differentiated, (state, *out)), (descend, descent)]
+        return [(self._differentiated, (state.read_only, *out)), (descend, descent)]
 
     def evaluate(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
@@ -236,7 +236,7 @@ class FunctionCost(Cost, type="function_cost"):
 
     def value(self, state: RobotState) -> float:
         """Return f."""
-        value = self.function(state.seen)
+        value = self.function(state.read_only)
         try:
             number = float(value)
         except (TypeError, ValueError):
@@ -252,13 +252,13 @@ class FunctionCost(Cost, type="function_cost"):
         """Return ∇f from the given function, or by differences."""
         if self.gradient_function is None:
             return super().gradient(state)
-        return self.gradient_function(state.seen)
+        return self.gradient_function(state.read_only)
 
     def gradient_rate(self, state: RobotState) -> Array:
         """Return (∇f)' from the given function, or by differences along the flow."""
         if self.rate_function is None:
             return super().gradient_rate(state)
-        return self.rate_function(state.seen)
+        return self.rate_function(state.read_only)
 
 
 @kernel

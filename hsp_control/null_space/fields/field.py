@@ -102,9 +102,9 @@ class NullSpaceField(Part, ABC, family="fields", error=FieldError):
         if says(self, "kernels", "evaluate") == "kernels":
             return self.kernels(state, metric, form, out)
         if self.zero:
-            self.evaluate(state, metric, form, out)
+            self.evaluate(state.read_only, metric, form, out)
             return []
-        return [(self.evaluate, (state, metric, form, out))]
+        return [(self.evaluate, (state.read_only, metric, form, out))]
 
     def kernels(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
@@ -220,7 +220,7 @@ class FieldSum(NullSpaceField):
             calls += term.calls(state, metric, form, sample)
             weights = np.zeros(2)
             if isinstance(term.weight, Weight) and not term.weight.constant:
-                calls.append((_update, (term.weight, state, weights)))
+                calls.append((_update, (term.weight, state.read_only, weights)))
             else:
                 weights[:] = sample_weight(term.weight, state)
             calls.append((_add, (k == 0, weights, *sample, *out)))

@@ -79,13 +79,13 @@ class FunctionField(VectorField, type="function_field"):
 
     def vector(self, state: RobotState) -> Array:
         """Return g."""
-        return self.function(state.seen)
+        return self.function(state.read_only)
 
     def rate(self, state: RobotState) -> Array:
         """Return g' from the given function, or by differences along the flow."""
         if self.rate_function is None:
             return super().rate(state)
-        return self.rate_function(state.seen)
+        return self.rate_function(state.read_only)
 
 
 class Rest(NullSpaceField, type="rest"):

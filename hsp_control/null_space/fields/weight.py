@@ -81,6 +81,7 @@ class StateWeight(Weight):
 
     def sample(self, state: RobotState) -> tuple[float, float]:
         """Return w and w'; see `Weight.sample`."""
+        state = state.read_only
         value = float(self.function(state))
         if not 0.0 <= value < np.inf:
             raise FieldError(f"weight is {value}; must be at least 0")

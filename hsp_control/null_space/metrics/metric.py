@@ -73,11 +73,11 @@ class Metric(Part, ABC, family="metrics", error=MetricError):
     def calls(self, state: RobotState, out: MetricSample) -> KernelCalls:
         """Return the calls that write the sample of each step."""
         if self.form != VARYING:
-            self.evaluate(state, out)
+            self.evaluate(state.read_only, out)
             return []
         if says(self, "kernel", "evaluate") == "kernel":
             return [with_outputs(self.kernel(state), *out)]
-        return [(self.evaluate, (state, out))]
+        return [(self.evaluate, (state.read_only, out))]
 
     def evaluate(self, state: RobotState, out: MetricSample) -> MetricSample:
         """Write W = L Lᵀ and W' at a state into ``out`` and return ``out``.

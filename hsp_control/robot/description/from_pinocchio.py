@@ -44,6 +44,7 @@ def take_model(
         if geometry is not None:
             _check_type(geometry, role, pin.GeometryModel)
     model = model.copy()
+    _check_joints(model)
     displacement = None
     if home is not None:
         q = np.asarray(home, dtype=float)
@@ -71,6 +72,30 @@ def _check_type(given: Any, name: str, kind: type) -> None:
         hint = f"; give {parts}" if isinstance(given, pin.RobotWrapper) else ""
         needs = f"needs a pinocchio.{kind.__name__}{hint}"
         raise ModelError(f"{name} is of type {type(given).__name__}; {needs}")
+
+
+def _check_joints(model: pin.Model) -> None:
+    """Check that no joint's motion subspace depends on its configuration.
+
+    Pinocchio's rates of Jacobians and of the mass matrix leave out S' (seen with 4.1).
+    """
+    rng, first = np.random.default_rng(0), model.createData()
+    neutral = pin.neutral(model)
+    pin.computeJointJacobians(model, first, neutral)
+    for _ in range(3):
+        data = model.createData()
+        q = pin.integrate(model, neutral, rng.uniform(-1.0, 1.0, model.nv))
+        pin.computeJointJacobians(model, data, q)
+        for index in range(1, model.njoints):
+            before, after = (np.asarray(each.joints[index].S) for each in (first, data))
+            if np.abs(before - after).max(initial=0.0) > 1e-9:
+                kind = model.joints[index].shortname()
+                raise ModelError(
+                    f"joint {model.names[index]!r} is a {kind}, whose motion subspace "
+                    "depends on its configuration: its rates would be wrong; needs "
+                    "joints of one axis each, one after the other, or a ball "
+                    "(JointModelSpherical)"
+                )
 
 
 def _shapes(model: pin.Model, geometry: Any, role: str) -> Iterator[BodyShape]:

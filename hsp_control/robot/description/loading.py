@@ -6,7 +6,6 @@ the others, and its true velocity is known.
 """
 
 import os
-import re
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
@@ -28,19 +27,22 @@ from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.declaration.rotation import matrix_of
 from hsp_control.robot.description.inertias import impossible_inertias, project_inertias
 from hsp_control.robot.description.mesh_files import check_mesh_name
+from hsp_control.robot.description.mimics import (
+    name_coordinates,
+    name_frames,
+    write_for_pinocchio,
+)
+from hsp_control.robot.description.planar_axes import write_planar_axes
 from hsp_control.robot.description.robot_description import (
     OneRobot,
     RobotDescription,
     ToolFrame,
 )
+from hsp_control.robot.description.soft_limits import write_soft_limits
 from hsp_control.robot.description.sources import RobotSource, Root
 from hsp_control.robot.description.urdf import named_files, parser_text, read_urdf
 
 _ROOT_JOINTS = {"planar": pin.JointModelPlanar, "free_flyer": pin.JointModelFreeFlyer}
-_NO_HAND = re.compile(
-    "finger|thumb|camera|imu|sensor|range|accelerometer|laser|optical|force|(^|_)ft_frame"
-)
-"""Names of links on a last joint that are less likely the hand than others."""
 
 
 def load_model(
@@ -55,6 +57,7 @@ def load_model(
     locks = source.locked if settings.locked is None else settings.locked
     if locks:
         model = _lock(model, locks)
+    name_frames(model)
     return completed(model, source, settings.tool_frames, gravity)
 
 
@@ -80,6 +83,34 @@ def moving_joints(model: pin.Model) -> dict[str, Any]:
     return {name: joint for name, joint in named[1:] if joint.nv > 0}  # no universe
 
 
+def frames_by_name(model: pin.Model) -> dict[str, int]:
+    """Return the index of each frame; of a link and a joint of one name the link's."""
+    links = {f.name for f in model.frames if f.type == pin.FrameType.BODY}
+    return {
+        frame.name: i
+        for i, frame in enumerate(model.frames)
+        if frame.type == pin.FrameType.BODY or frame.name not in links
+    }
+
+
+def guarded(model: pin.Model) -> pin.Model:
+    """Return a model that gets no more joints; a copy of it can get some.
+
+    Data that were made for it would not fit: Pinocchio would write beyond them and end
+    the process.
+    """
+    model.addJoint = _refuse_joint
+    return model
+
+
+def _refuse_joint(*_: object, **__: object) -> None:
+    raise ModelError(
+        "a robot's model gets no more joints, as all that was made for it would not "
+        "fit: model = robot.model.copy(), model.addJoint(...), "
+        "Robot.from_pinocchio(model)"
+    )
+
+
 def reference_posture(
     model: pin.Model, source: RobotSource
 ) -> tuple[float, ...] | None:
@@ -95,44 +126,6 @@ def reference_posture(
     return tuple(pin.difference(model, pin.neutral(model), pin.normalize(model, q)))
 
 
-def end_effector_frame(model: pin.Model) -> str:
-    """Return the frame that is most likely the hand, found from the kinematic tree.
-
-    It is the last link, no finger or sensor if possible, on the last joint of the
-    longest chain of joints. Where this chain branches in its second half into three or
-    more, or into two of similar lengths, these are fingers, and it ends there. One much
-    shorter branch is none: it is a part of the arm's own mechanism.
-    """
-    chains: list[list[int]] = [[]]
-    for joint in range(1, model.njoints):
-        chains.append([*chains[model.parents[joint]], joint])
-    longest = max(reversed(chains), key=len)
-    branching = [
-        joint
-        for depth, joint in enumerate(longest, start=1)
-        if 2 * depth >= len(longest) and _carries_fingers(chains, joint)
-    ]
-    end = branching[0] if branching else longest[-1]
-    links = [
-        frame.name
-        for frame in model.frames
-        if frame.parentJoint == end and frame.type == pin.FrameType.BODY
-    ]
-    hands = [link for link in links if not _NO_HAND.search(link.lower())]
-    return str((hands or links)[-1])
-
-
-def _carries_fingers(chains: list[list[int]], joint: int) -> bool:
-    """Return whether the chains beyond a joint are three, or two of similar lengths."""
-    beyond: dict[int, int] = {}  # the longest chain, by its first joint
-    for chain in chains:
-        if joint in chain[:-1]:
-            after = chain[chain.index(joint) + 1 :]
-            beyond[after[0]] = max(beyond.get(after[0], 0), len(after))
-    lengths = sorted(beyond.values())
-    return len(lengths) > 2 or (len(lengths) == 2 and 2 * lengths[0] > lengths[1])
-
-
 def _parse(source: RobotSource, settings: OneRobot) -> pin.Model:
     urdf, mimic = source.urdf, settings.mimic
     xml = read_urdf(source)
@@ -143,29 +136,41 @@ def _parse(source: RobotSource, settings: OneRobot) -> pin.Model:
         project_inertias(xml)
     else:
         _check_inertias(xml, source)
-    text = parser_text(xml, "visual", "collision")
     parser_errors: list[str] = []
     root = cast("Root", settings.root or source.root)  # text is for MJCF only
     try:
         with _collect_parser_errors(parser_errors):
+            _write_for_pinocchio(xml, source, mimic=mimic)
+            text = parser_text(xml, "visual", "collision")
             if root == "fixed":
                 model = pin.buildModelFromXML(text, mimic=mimic)
             else:
                 joint = _ROOT_JOINTS[root]()
                 model = pin.buildModelFromXML(text, joint, "root_joint", mimic=mimic)
+            name_coordinates(model)
+    except ModelError:
+        raise
     except (ValueError, RuntimeError) as error:
         reason = str(error).strip().splitlines()[-1].removeprefix("hint: ")
         reason = parser_errors[0] if parser_errors else reason
-        if mimic and "mimic" in reason:
-            reason = _explain_mimic(xml, text) or reason
-            reason += "; load its mimic joints as independent joints with mimic=False"
         raise ModelError(f"{urdf}: Pinocchio cannot build a model: {reason}") from error
     if parser_errors:
-        left_out = "; ".join(parser_errors)
+        left_out = "; ".join(dict.fromkeys(parser_errors))
         raise ModelError(
             f"{urdf}: Pinocchio leaves out a part of the model: {left_out}"
         )
     return model
+
+
+def _write_for_pinocchio(xml: Element, source: RobotSource, *, mimic: bool) -> None:
+    """Write what Pinocchio would skip or refuse in words that it reads, in place."""
+    try:
+        write_soft_limits(xml)
+        write_planar_axes(xml)
+        if mimic:
+            write_for_pinocchio(xml)
+    except ModelError as error:
+        raise ModelError(f"{source.urdf}: {error}") from None
 
 
 def _check_inertias(xml: Element, source: RobotSource) -> None:
@@ -198,24 +203,6 @@ def _collect_parser_errors(errors: list[str]) -> Iterator[None]:
             errors.extend(
                 line.split("Error:", 1)[1].strip() for line in lines if "Error:" in line
             )
-
-
-def _explain_mimic(xml: Element, text: str) -> str:
-    """Return which mimic joint Pinocchio cannot handle, and why; empty if unknown."""
-    order = list(pin.buildModelFromXML(text, mimic=False).names)
-    for joint in xml.iter("joint"):
-        mimic, follower = joint.find("mimic"), joint.get("name")
-        if mimic is None or follower not in order:
-            continue
-        leader = mimic.get("joint")
-        if leader not in order:
-            return f"joint {follower!r} mimics {leader!r}, which is not a moving joint"
-        if order.index(leader) > order.index(follower):
-            return (
-                f"joint {follower!r} mimics {leader!r}, which comes after it in the "
-                "tree, but Pinocchio needs the leader first"
-            )
-    return ""
 
 
 def _lock(model: pin.Model, locks: Mapping[str, float]) -> pin.Model:
@@ -287,12 +274,13 @@ def _add_frame(model: pin.Model, name: str, tool: ToolFrame) -> None:
             f"tool frame {name!r}: no parent frame {tool.parent!r}"
             f"{did_you_mean(tool.parent, names)} (the model has {listing(names)})"
         )
-    parent = model.frames[model.getFrameId(tool.parent)]
+    index = frames_by_name(model)[tool.parent]
+    parent = model.frames[index]
     model.addFrame(
         pin.Frame(
             name,
             parent.parentJoint,
-            model.getFrameId(tool.parent),
+            index,
             parent.placement * placement(tool.translation, tool.rotation),
             pin.FrameType.OP_FRAME,
         )
@@ -380,12 +368,20 @@ def combine(parts: Sequence[tuple[RobotPart, pin.Model]]) -> pin.Model:
         for index in range(1, own.njoints):
             own.names[index] = part.prefix + own.names[index]
         for index in range(1, own.nframes):
-            own.frames[index].name = part.prefix + own.frames[index].name
+            # Pinocchio finds frames by their names, and a link may have a joint's.
+            mark = _LINK if own.frames[index].type == pin.FrameType.BODY else ""
+            own.frames[index].name = part.prefix + own.frames[index].name + mark
         whole = pin.appendModel(whole, own, 0, part.placement)
+    for frame in whole.frames:
+        frame.name = frame.name.removesuffix(_LINK)
     if any(model.gravity != parts[0][1].gravity for _, model in parts):
         raise ModelError("robots to combine differ in gravity; load all with one value")
     whole.gravity = parts[0][1].gravity
     return whole
+
+
+_LINK = "\t"
+"""What the name of a link's frame ends in while robots are put together."""
 
 
 def placement(position: ArrayLike, rotation: ArrayLike) -> pin.SE3:

@@ -16,6 +16,7 @@ from hsp_control.robot.description.access import (
     XmlError,
     check_no_document_type,
 )
+from hsp_control.robot.description.mesh_units import mesh_units
 from hsp_control.robot.description.sources import RobotSource
 from hsp_control.robot.description.xacro_files import package_folders
 
@@ -41,6 +42,9 @@ def find_problem(file: Path) -> str:
             return f"{size / 1e6:.0f} MB; at most {MAX_SIZE // 1_000_000} MB"
         if file.suffix.lower() == ".dae":
             check_no_document_type(file.read_bytes())
+            mesh_units(file)
+    except ValueError as error:
+        return str(error)
     except XmlError as error:
         return f"line {error.line}: {error.message}"
     except OSError as error:

@@ -31,7 +31,9 @@ from hsp_control.robot.description.sources import (
 from hsp_control.robot.description.xacro_files import xacro_text
 
 _ZERO = (0.0, 0.0, 0.0)
-_OF_ONE = {"root", "locked", "tool_frames", "mimic", "project_inertias", "xacro_args"}
+_OF_ONE = {
+    "root", "locked", "tool_frames", "mimic", "project_inertias", "xacro_args", "srdf",
+}  # fmt: skip
 
 
 class ToolFrame(Part, error=ModelError):
@@ -74,6 +76,9 @@ class OneRobot(Part, error=ModelError):
         default_factory=ReadOnlyDict
     )
     """Arguments of a xacro file, by name; others have their defaults [-]."""
+    srdf: FileName | None = None
+    """SRDF file whose disabled pairs of links never collide; by default the one beside
+    the URDF that is called like it, if there is one."""
 
     def find(self, access: Access = ANYWHERE) -> RobotSource:
         """Return where it comes from; see `find_robot` and `find_description`.
@@ -83,10 +88,19 @@ class OneRobot(Part, error=ModelError):
         """
         arguments = {name: xacro_text(text) for name, text in self.xacro_args.items()}
         if self.description is not None:
-            return find_description(self.description, access, arguments)
-        if self.name is None:
+            source = find_description(self.description, access, arguments)
+        elif self.name is None:
             raise ModelError("several robots come from several files")
-        return find_robot(self.name, access, arguments)
+        else:
+            source = find_robot(self.name, access, arguments)
+        if self.srdf is None:
+            return source
+        srdf = Path(self.srdf).expanduser()
+        access.check(srdf, "srdf")
+        if not is_file(srdf):
+            with within("srdf"):
+                raise ModelError(f"no such file {srdf}")
+        return replace(source, srdf=srdf)
 
     def located(self, folder: Path) -> Self:
         """Return it with the full path of each file that is in a folder.
@@ -94,9 +108,12 @@ class OneRobot(Part, error=ModelError):
         A relative path is first looked up there, so that a folder with a configuration
         and its robots can be moved.
         """
-        if self.name is None:
-            return self
-        return replace(self, name=_located(self.name, folder))
+        located = self
+        if self.name is not None:
+            located = replace(located, name=_located(self.name, folder))
+        if self.srdf is not None and is_file(folder / self.srdf):
+            located = replace(located, srdf=str(folder / self.srdf))
+        return located
 
     def _check_one_of(self, *names: str) -> None:
         if sum(getattr(self, name) is not None for name in names) != 1:
@@ -147,7 +164,7 @@ class RobotDescription(OneRobot):
                 raise ModelError(
                     "mimic is not for mjcf, which has equality constraints"
                 )
-            for key in ("project_inertias", "xacro_args"):
+            for key in ("project_inertias", "xacro_args", "srdf"):
                 if getattr(self, key):
                     raise ModelError(f"{key} is not for mjcf")
             return

@@ -18,7 +18,7 @@ import yaml
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import AccessError, ModelError, RobotNotFoundError
-from hsp_control.common.resources import bundled_robots, is_folder
+from hsp_control.common.resources import bundled_robots, is_file, is_folder
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.robot.description.access import ANYWHERE, Access
 from hsp_control.robot.description.xacro_files import expand, is_xacro
@@ -29,16 +29,13 @@ Root = Literal["fixed", "planar", "free_flyer"]
 FILE_ENDINGS = (".urdf", ".xml", ".xacro")
 """A robot's name that ends so is a path."""
 
-# Robots of example-robot-data for which `end_effector_frame` would be wrong: a single
-# gripper jaw looks like one more joint of the arm, a sensor looks like a tool.
+# Robots of example-robot-data for which `find_hand` would be wrong: the last link is a
+# motor of the gripper.
 _END_EFFECTORS = {
-    "b1_z1": "gripperStator",
-    "baxter": "right_gripper",
     "talos": "gripper_right_base_link",
     "talos_arm": "gripper_left_base_link",
     "talos_box": "gripper_right_base_link",
     "talos_legs": "gripper_right_base_link",
-    "z1": "gripperStator",
 }
 
 
@@ -293,9 +290,12 @@ def _from_path(
     # The folder of `package://<folder>/...` is usually one above the URDF.
     above = tuple(path.resolve().parents)[:5]
     allowed = tuple(folder for folder in above if access.allows(folder))
+    name = Path(path.name.removesuffix(".xacro")).stem
+    srdf = path.with_name(f"{name}.srdf")
     return RobotSource(
-        name=Path(path.name.removesuffix(".xacro")).stem,
+        name=name,
         urdf=path,
+        srdf=srdf if is_file(srdf) and access.allows(srdf) else None,
         package_dirs=allowed,
         access=access,
         expanded=_expanded(path, access, allowed, xacro_args),

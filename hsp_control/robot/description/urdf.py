@@ -39,6 +39,7 @@ _NUMBERS = {
     "mesh": {"scale": 3},
     "dynamics": {"damping": 1, "friction": 1},
     "color": {"rgba": 4},
+    "safety_controller": dict.fromkeys(("soft_lower_limit", "soft_upper_limit"), 1),
     "limit": dict.fromkeys(("lower", "upper", "effort", "velocity"), 1),
 }
 """How many numbers an element's attributes are."""
@@ -49,11 +50,20 @@ _SINGLE = {
     "visual": {"origin", "geometry"},
     "collision": {"origin", "geometry"},
     "geometry": {"box", "cylinder", "capsule", "sphere", "mesh"},
-    "joint": {"origin", "parent", "child", "axis", "limit", "mimic", "dynamics"},
+    "joint": {
+        "origin",
+        "parent",
+        "child",
+        "axis",
+        "limit",
+        "mimic",
+        "dynamics",
+        "safety_controller",
+    },
 }
 """Elements of which others may contain one; parsers use one of several, silently."""
 _OF_MJCF = "; an MJCF's robot is robot: {mjcf: FILE} in a configuration"
-_WITH_AXIS = {"revolute", "continuous", "prismatic"}
+_WITH_AXIS = {"revolute", "continuous", "prismatic", "planar"}
 
 
 def read_urdf(source: RobotSource) -> Element:

@@ -12,6 +12,7 @@ from hsp_control.compiled.kernels import kernel
 from hsp_control.compiled.moves import number_of_steps
 from hsp_control.robot import Robot
 from hsp_control.robot.friction import JointFriction
+from hsp_control.robot.inertia import mass_matrix
 from hsp_control.robot.integrators import Integrator
 from hsp_control.robot.kinematics import Term
 from hsp_control.simulation.plants.plant import (
@@ -119,8 +120,7 @@ class StickingPlant(SampledPlant):
     ) -> Array:
         """Return v⁺ after a time h from velocity ``start``, with M and N at (q, v)."""
         model, data = self.robot.model, self._data
-        M = np.triu(pin.crba(model, data, q))
-        M += np.triu(M, 1).T
+        M = mass_matrix(model, data, q)
         N = pin.nonLinearEffects(model, data, q, v)
         damping = np.diag(0.5 * h * self.friction.viscous)
         after = start.copy()

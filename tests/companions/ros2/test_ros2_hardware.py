@@ -11,11 +11,14 @@ from ros2_rigs import DOMAIN, MILLISECOND, Broadcaster, fresh, joint_state
 
 from hsp_control.common.exceptions import HardwareError
 from hsp_control.companions.ros2 import connect
+from hsp_control.companions.ros2 import hardware as ros2_hardware
 from hsp_control.companions.ros2.hardware import Ros2Hardware
 from hsp_control.companions.ros2.joints import Joints
 from hsp_control.companions.ros2.messages import Float64MultiArray
-from hsp_control.companions.ros2.node import Node, Subscription
+from hsp_control.companions.ros2.node import Node, ReceivedMessage, Subscription
+from hsp_control.companions.ros2.stamps import Stamps
 from hsp_control.live import LiveSettings, run_loop
+from hsp_control.live.link import AgeEstimator
 
 NAMES = panda().dof_names
 LONG = 30.0
@@ -251,3 +254,40 @@ def test_without_cyclone_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> 
         r"needs Cyclone DDS; install it with: pip install 'hsp_control\[ros2\]"
     ):
         connect("a", panda(), PERIOD)
+
+
+# --- ages ----------------------------------------------------------------------------
+
+
+def test_a_state_is_as_old_as_it_waited_longer_than_the_quickest(
+    rig: tuple[Rig, Ros2Hardware], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By its stamp, whatever the robot's clock says; its number plays no part."""
+    _, hardware = rig
+    now = [0.0]
+    monkeypatch.setattr(ros2_hardware, "monotonic", lambda: now[0])
+    hardware._ages = AgeEstimator()
+    hardware._stamps = Stamps(0.002)
+    joints = Joints(panda())
+    stamp, begun, last, ages = 77_000_000_000, 0.0, 0.0, []
+    for k, delay in enumerate((0.003, 0.028, 0.001, 0.006)):
+        sent = 0.002 * k + (0.0007 if k == 2 else 0.0)  # with jitter
+        now[0] = 500.0 + sent + delay
+        message = joints.message(
+            stamp + round(1e9 * sent), start(), np.zeros(7), np.zeros(7)
+        )
+        found = hardware._measurement(ReceivedMessage(message, sender_of(hardware)))
+        assert found is not None
+        assert found.t == pytest.approx(begun + sent - last)
+        begun, last = 5.0 + 3.0 * k, sent  # time may begin anew at any state
+        hardware._stamps.begin(begun)
+        assert found.sequence == k
+        ages.append(found.age)
+    np.testing.assert_allclose(ages, [0.0, 0.025, 0.0, 0.005], rtol=0, atol=1e-9)
+
+
+def sender_of(hardware: Ros2Hardware) -> int:
+    """Return the publisher that the hardware hears."""
+    sender = hardware._sender
+    assert sender is not None
+    return sender

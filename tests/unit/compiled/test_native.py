@@ -19,6 +19,8 @@ from hsp_control.compiled.linked_kernels import _LINEAR_ALGEBRA
 from hsp_control.compiled.native import NativeCall, sequence
 from hsp_control.compiled.step_plan import bind, planned
 
+EPS = float(np.finfo(float).eps)
+
 compiled = pytest.mark.skipif(
     not hasattr(kernel(lambda: None), "py_func"), reason="NUMBA_DISABLE_JIT is set"
 )
@@ -64,12 +66,17 @@ def called(log: Array) -> list[float]:
     flag=st.booleans(),
     count=st.integers(-5, 5),
     rows=st.integers(1, 5),
-    columns=st.integers(0, 4),
+    columns=st.integers(0, 40),
     seed=st.integers(0, 99),
 )
 def test_a_bound_call_is_the_kernel(
     layout: str, flag: bool, count: int, rows: int, columns: int, seed: int
 ) -> None:
+    """To the rounding of sums in another order: the two are compiled one by one.
+
+    How many products a processor adds at once depends on it, and on what is known of
+    the arrays, so that the last bits are anybody's.
+    """
     rng = np.random.default_rng(seed)
     A = rng.standard_normal((rows, columns))
     if layout == "F":
@@ -85,11 +92,14 @@ def test_a_bound_call_is_the_kernel(
     arguments = flag, count, 0.7, A, x, places
     call = bind(_combine, *arguments, bound)
     assert bool(call()) == _combine(*arguments, direct) == flag
-    np.testing.assert_array_equal(bound, direct)
-    x[:] = rng.standard_normal(columns)  # arrays are followed
-    call()
-    _combine(*arguments, direct)
-    np.testing.assert_array_equal(bound, direct)
+    for _ in range(2):
+        # Each of the two is at most n eps of the sum of sizes beside the exact sum.
+        rounding = np.zeros(rows)
+        rounding[places] = 2.0 * (columns + 2) * EPS * (np.abs(A) @ np.abs(x) + 5.0)
+        assert np.all(np.abs(bound - direct) <= rounding)
+        x[:] = rng.standard_normal(columns)  # arrays are followed
+        call()
+        _combine(*arguments, direct)
 
 
 @pytest.mark.slow

@@ -90,3 +90,41 @@ def test_what_cannot_be_found_is_said_with_numbers() -> None:
         blocked.find(LEAST)
     with pytest.raises(FrameNotFoundError, match="did you mean 'tip'"):
         search.find_with(far._replace(frame="tpi"), LEAST)
+
+
+def two_arms(name: str, apart: float) -> Robot:
+    """Return two equal robots side by side."""
+    pytest.importorskip("example_robot_data")
+    arm = Robot.load(name)
+    places = [pin.SE3(np.eye(3), np.array([0.0, y, 0.0])) for y in (apart, -apart)]
+    return Robot.combine({"left": (arm, places[0]), "right": (arm, places[1])})
+
+
+@pytest.mark.parametrize("apart", [0.2, 0.6])
+def test_two_equal_arms_side_by_side_begin_well(apart: float) -> None:
+    """One posture in six is clear of a UR10's own links: none of 50 for both."""
+    robot = two_arms("ur10", apart)
+    frames = [f"{side}_tool0" for side in ("left", "right")]
+    search = PostureSearch(robot, [(frame, POSE) for frame in frames])
+    found = search.find(LEAST)
+    assert found.clear
+    assert found.regularity > LEAST
+    depth, _ = search.overlap(found.q)
+    assert depth == 0.0
+
+
+def test_a_pose_of_one_of_two_equal_arms_is_reached_in_a_good_posture() -> None:
+    """The other one stays where it is good alone."""
+    robot = two_arms("ur10", 0.6)
+    frames = [f"{side}_tool0" for side in ("left", "right")]
+    search = PostureSearch(robot, [(frame, POSE) for frame in frames])
+    found = search.find(LEAST)
+    near = robot.state(0.0, found.q, np.zeros(12)).position("left_tool0")
+    there = near + np.array([0.05, 0.0, 0.05])
+    target = Target("left_tool0", pin.SE3(np.eye(3), there), 3)
+    reached = search.find_with(target, LEAST)
+    assert reached.clear
+    np.testing.assert_allclose(
+        robot.state(0.0, reached.q, np.zeros(12)).position("left_tool0"),
+        there, atol=1e-8,
+    )  # fmt: skip

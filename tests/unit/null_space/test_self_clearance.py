@@ -12,9 +12,12 @@ from oracles import gradient
 
 from hsp_control import Robot
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ModelError
+from hsp_control.common.exceptions import AccessError, ModelError
 from hsp_control.geometry import Proximity, link_shapes, self_pairs
 from hsp_control.null_space.fields import SelfClearance
+from hsp_control.robot import RobotDescription
+from hsp_control.robot.description.access import only_within
+from hsp_control.robot.description.robot_description import PlacedRobot
 
 
 def names(robot: Robot) -> set[frozenset[str]]:
@@ -121,3 +124,50 @@ def test_each_robot_is_the_others_moving_obstacle() -> None:
         np.testing.assert_allclose(g_dot, by_flow[1], rtol=0, atol=3e-8 * scale)
         assert np.abs(g[:7]).max() > 1e-2
         assert np.abs(g[7:]).max() > 1e-2
+
+
+# --- the SRDF of a robot from a file -------------------------------------------------
+
+
+def arm_with_srdf(folder: Path, name: str) -> tuple[Path, set[frozenset[str]]]:
+    """Write a Panda, and an SRDF that leaves out one pair; return its file and pair."""
+    robot = load("panda")
+    urdf = folder / "arm.urdf"
+    urdf.write_text(robot.source.urdf.read_text())
+    pair = "panda_link0", "panda_hand"
+    (folder / name).write_text(
+        f'<robot name="arm"><disable_collisions link1="{pair[0]}" link2="{pair[1]}" '
+        'reason="Never"/></robot>'
+    )
+    return urdf, {frozenset(pair)}
+
+
+def test_the_srdf_beside_a_urdf_leaves_pairs_out(tmp_path: Path) -> None:
+    urdf, pair = arm_with_srdf(tmp_path, "arm.srdf")
+    with_it = names(Robot.load(urdf))
+    (tmp_path / "arm.srdf").unlink()
+    assert names(Robot.load(urdf)) - with_it == pair
+
+
+def test_an_srdf_may_be_named(tmp_path: Path) -> None:
+    """In Python and in YAML, beside the configuration."""
+    urdf, pair = arm_with_srdf(tmp_path, "pairs.srdf")
+    without = names(Robot.load(urdf))
+    assert without - names(Robot.load(urdf, srdf=tmp_path / "pairs.srdf")) == pair
+    described = RobotDescription("arm.urdf", srdf="pairs.srdf").located(tmp_path)
+    assert without - names(Robot.load(described)) == pair
+    free = {"mimic": False}
+    parts = {"left": PlacedRobot(urdf, **free, srdf=tmp_path / "pairs.srdf"),
+             "right": PlacedRobot(urdf, **free, position=(0.0, 5.0, 0.0))}  # fmt: skip
+    two = names(Robot.load(RobotDescription(parts=parts)))
+    assert frozenset(("right_panda_link0", "right_panda_hand")) in two
+    assert frozenset(("left_panda_link0", "left_panda_hand")) not in two
+    with pytest.raises(ModelError, match=r"srdf: no such file .*none\.srdf"):
+        Robot.load(urdf, srdf=tmp_path / "none.srdf")
+    with pytest.raises(ModelError, match="srdf is not for mjcf"):
+        RobotDescription(mjcf="scene.xml", srdf="arm.srdf")
+    with pytest.raises(ModelError, match="srdf: give it for each of the parts"):
+        RobotDescription(parts=parts, srdf="arm.srdf")
+    closed = only_within([tmp_path / "elsewhere"])
+    with pytest.raises(AccessError, match=r"pairs\.srdf"):
+        Robot.load("panda", srdf=tmp_path / "pairs.srdf", access=closed)

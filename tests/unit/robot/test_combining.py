@@ -3,10 +3,12 @@
 import copy
 from collections.abc import Callable
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 import pytest
+from robot_texts import ARM
 
 from hsp_control import (
     Controller,
@@ -26,6 +28,7 @@ from hsp_control.common.exceptions import (
 )
 from hsp_control.common.resources import bundled_robots
 from hsp_control.robot.description.loading import RobotPart, combine, placement
+from hsp_control.robot.description.robot_description import ToolFrame
 from hsp_control.robot.description.sources import RobotSource
 from hsp_control.robot.integrators import Rk4
 
@@ -209,3 +212,21 @@ def test_every_mistake_is_named(
     with pytest.raises(error) as caught:
         make()
     assert message in str(caught.value)
+
+
+def test_a_link_may_have_a_joints_name(tmp_path: Path) -> None:
+    """Pinocchio finds frames by their names alone; Z1's and SO-100's hands are such."""
+    file = tmp_path / "arm.urdf"
+    file.write_text(ARM.replace('"lower"', '"elbow"'))
+    arm = Robot.load(file, tool_frames={"tip": ToolFrame("elbow", (0.0, 0.0, 0.5))})
+    assert arm.model.frames[arm.frame_id("elbow")].type == pin.FrameType.BODY
+    both = Robot.combine({"left": (arm, LEFT), "right": (arm, RIGHT)})
+    q, rest = np.array([0.3, -0.4]), np.zeros(2)
+    alone = arm.state(0.0, q, rest)
+    state = both.state(0.0, np.concatenate([q, q]), np.zeros(4))
+    assert not any("\t" in name for name in both.frame_names)
+    for prefix, place in (("left", LEFT), ("right", RIGHT)):
+        for frame in ("elbow", "tip"):
+            found = state.position(f"{prefix}_{frame}")
+            expected = place.act(alone.position(frame))
+            np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)

@@ -69,17 +69,21 @@ def test_unit_blocks() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("case", ROBOTS)
 def test_position_limits(case: str) -> None:
-    """The model's for joints with one number; none for continuous joints and roots."""
+    """The URDF's for joints with one number; none for continuous joints and roots."""
     robot = load(case)
     lower, upper = robot.position_limits()
+    urdf = ElementTree.parse(robot.source.urdf)
     for name, joint in robot.joints.items():
         where = slice(joint.idx_v, joint.idx_v + joint.nv)
         if joint.nq == 1:
-            urdf = ElementTree.parse(robot.source.urdf)
             limit = urdf.find(f"joint[@name='{name}']/limit")
+            soft = urdf.find(f"joint[@name='{name}']/safety_controller")
             assert limit is not None
-            assert lower[where] == float(limit.attrib["lower"])
-            assert upper[where] == float(limit.attrib["upper"])
+            low, high = float(limit.attrib["lower"]), float(limit.attrib["upper"])
+            if soft is not None:
+                low = max(low, float(soft.get("soft_lower_limit", -np.inf)))
+                high = min(high, float(soft.get("soft_upper_limit", np.inf)))
+            assert (lower[where], upper[where]) == (low, high)
         else:
             assert (lower[where] == -np.inf).all(), name
             assert (upper[where] == np.inf).all(), name

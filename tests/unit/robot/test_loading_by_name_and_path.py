@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from refused_robots import LATE_LEADER, NO_LEADER, REFUSED
+from refused_robots import NO_HAND_MASS, NO_LEADER, REFUSED
 from robot_texts import ARM, assert_same_placements, link, placements
 
 from hsp_control import Robot
@@ -19,6 +19,7 @@ from hsp_control.robot import RobotDescription
 from hsp_control.robot.description.loading import load_model
 from hsp_control.robot.description.mesh_files import candidates
 from hsp_control.robot.description.sources import example_robots, find_robot
+from hsp_control.robot.description.urdf import read_urdf
 
 # Robots of example-robot-data that are refused, and why. (cassie is not listed at all:
 # it is no URDF.)
@@ -39,7 +40,7 @@ def example(name: str) -> Robot:
 def test_every_example_robot_loads_or_says_why_not(name: str, mimic: bool) -> None:
     """Nothing but ModelError, and of exactly the robots that are known for it."""
     reason = REFUSED.get(name)
-    if not mimic and reason in {LATE_LEADER, NO_LEADER}:
+    if not mimic and reason in {NO_HAND_MASS, NO_LEADER}:
         reason = REFUSED_WITHOUT_MIMIC.get(name)
     source = find_robot(name)
     if source.origin == "bundled":
@@ -50,9 +51,12 @@ def test_every_example_robot_loads_or_says_why_not(name: str, mimic: bool) -> No
             load_model(source, settings)
         return
     robot = Robot(load_model(source, settings), source)
-    plain = pin.buildModelFromUrdf(str(source.urdf), mimic=mimic)
+    plain = pin.buildModelFromUrdf(str(source.urdf))
     extra = 6 if source.root == "free_flyer" else 0
-    assert robot.nv == plain.nv + extra
+    joints = read_urdf(source).findall("joint") if mimic else []
+    following = [j for j in joints if j.find("mimic") is not None]
+    following = [j for j in following if j.get("type") != "fixed"]
+    assert robot.nv == plain.nv + extra - len(following)
     # The root comes first, then the URDF's joints without those that only follow.
     assert len(robot.dof_names) == robot.nv
     assert len(robot.joint_names) == len(robot.joints)

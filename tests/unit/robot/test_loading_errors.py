@@ -71,6 +71,10 @@ def grown(*parts: str) -> str:
 
 BUILD = "Pinocchio cannot build a model"
 TWO_SHAPES = '<geometry><sphere radius="1"/><box size="1 1 1"/></geometry>'
+SOFT = (
+    '<safety_controller k_velocity="1" soft_lower_limit="4" soft_upper_limit="5"/>'
+    "</joint>"
+)
 NO_ROBOTS = [
     ('<robot name="r">\n  <link name="a">\n</robot>', r":3:3: malformed XML: mism"),
     ("", r"arm\.urdf:1:1: malformed XML: no element found"),
@@ -107,8 +111,19 @@ NO_ROBOTS = [
      'xyz="0.2 0.1 ３" must be 3 numbers in the digits 0 to 9'),
     (ARM.replace("</joint>", '<mimic joint="ghost"/></joint>', 1),
      "joint 'shoulder' mimics 'ghost', which is not a moving joint; load its"),
-    (gripper().replace('"follower" type="revolute"', '"follower" type="continuous"'),
-     "build a model: Mimicking and .* different sizes; load .*mimic=False"),
+    (gripper().replace('mimic joint="shoulder"', 'mimic joint="follower"'),
+     "joint 'follower' mimics 'follower', which follows itself; load .*mimic=False"),
+    (gripper().replace("</joint>", '<mimic joint="follower"/></joint>', 1),
+     "joint 'follower' mimics 'shoulder', which follows it; load .*mimic=False"),
+    (gripper().replace('"shoulder" type="revolute"', '"shoulder" type="floating"'),
+     "joint 'shoulder' is mimicked but is floating; must be one of revolute, cont"),
+    (gripper().replace('"follower" type="revolute"', '"follower" type="planar"'),
+     "joint 'follower' mimics but is planar; must be one of revolute, cont"),
+    (gripper().replace("</joint>", SOFT, 1),
+     "joint 'shoulder': <safety_controller>: the soft limits 4 to 5 leave nothing of "
+     "its limits -3 to 3"),
+    (gripper().replace("</joint>", SOFT.replace("4", "soft"), 1),
+     "joint 'shoulder': <safety_controller>: soft_lower_limit=\"soft\" must be a num"),
 ]  # fmt: skip
 
 

@@ -24,7 +24,7 @@ from hsp_control import Robot
 from hsp_control.common.exceptions import ModelError
 from hsp_control.geometry.links import link_shapes
 from hsp_control.robot import ToolFrame
-from hsp_control.robot.description.loading import end_effector_frame
+from hsp_control.robot.description.hand import find_hand
 from hsp_control.robot.description.urdf import read_urdf
 
 
@@ -171,6 +171,11 @@ def chain(*names: str) -> str:
     return "".join(link(b) + joint(f"{a}-{b}", a, b) for a, b in pairs)
 
 
+def welded(parent: str, name: str) -> list[str]:
+    """Return a link that is fixed to another one."""
+    return [link(name), joint(f"to {name}", parent, name, "fixed")]
+
+
 @pytest.mark.parametrize(
     ("parts", "expected"),
     [
@@ -193,13 +198,50 @@ def chain(*names: str) -> str:
           joint("weld", "b", "hand_camera", "fixed")], "b"),
         ([chain("base", "a", "b"), link("left_finger"),
           joint("weld", "b", "left_finger", "fixed")], "b"),
+        # What was welded on to be the hand comes before what was welded on later.
+        ([chain("base", "a", "b"), *welded("b", "my_tcp"), *welded("b", "cover")],
+         "my_tcp"),
+        ([chain("base", "a", "b"), *welded("b", "ee_link"), *welded("b", "tool0"),
+          *welded("b", "plate")], "tool0"),
+        ([chain("base", "a", "b"), *welded("b", "grasp"), *welded("b", "cover")],
+         "grasp"),
+        ([chain("base", "a", "b"), *welded("b", "gripper_frame_link"),
+          *welded("b", "cover")], "gripper_frame_link"),
+        # A jaw is none, also where it is one more joint of the chain.
+        ([chain("base", "a", "b"), link("c"), joint("gripper", "b", "c")], "b"),
+        ([chain("base", "a", "b"), link("c"), joint("moving_jaw", "b", "c")], "b"),
+        ([chain("base", "a", "b"), link("c"), joint("finger", "b", "c"), link("d"),
+          joint("finger_tip", "c", "d")], "b"),
+        ([chain("base", "a", "b"), link("c"), joint("gripper", "b", "c"),
+          *welded("b", "gripper_frame")], "gripper_frame"),
+        # But the wrist that turns a gripper is the arm's, and a finger alone is one.
+        ([chain("base", "a", "b"), link("c"), joint("gripper_roll", "b", "c")], "c"),
+        ([link("c"), joint("finger", "base", "c"), link("d"),
+          joint("finger_tip", "c", "d")], "d"),
     ],
 )  # fmt: skip
-def test_end_effector_frame(
-    parts: list[str], expected: str, write: Callable[..., Path]
-) -> None:
+def test_the_hand(parts: list[str], expected: str, write: Callable[..., Path]) -> None:
     path = write(robot_xml(link("base", ""), *parts))
-    assert end_effector_frame(Robot.load(path).model) == expected
+    assert find_hand(Robot.load(path).model).frame == expected
+
+
+@pytest.mark.parametrize(
+    ("parts", "why"),
+    [
+        ([], "the longest chain of joints ends with 'a-b'"),
+        (welded("b", "tcp"), "ends with 'a-b', and this link is called a TCP"),
+        (welded("b", "cover"), "ends with 'a-b', and this is its last link"),
+        ([link("c"), joint("jaw", "b", "c")], "'a-b': 'jaw' after it is a gripper's"),
+        ([chain("b", "c", "d"), chain("b", "e", "f"), chain("b", "g", "h")],
+         "ends with 'a-b', where fingers branch off"),
+    ],
+)  # fmt: skip
+def test_it_is_said_why_a_link_is_the_hand(
+    parts: list[str], why: str, write: Callable[..., Path]
+) -> None:
+    text = robot_xml(link("base", ""), chain("base", "z", "a", "b"), *parts)
+    assert why in Robot.load(write(text)).hand.why
+    assert Robot.load("panda").hand.why == "the robot's source names it"
 
 
 # --- Pinocchio's own models ----------------------------------------------------------

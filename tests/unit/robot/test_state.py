@@ -216,4 +216,4 @@ def test_a_type_error_of_a_call_is_its_own() -> None:
 def test_what_a_state_gave_keeps_its_memory() -> None:
     state = load("panda").state(0.0, load("panda").home(), np.zeros(7))
     given = state.mass_matrix, state.nonlinear_effects, state.centroidal.position
-    assert all(array.base.owner is state.data for array in given)
+    assert all(array.base.owner is state._data for array in given)

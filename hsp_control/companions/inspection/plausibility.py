@@ -1,0 +1,135 @@
+"""Numbers that no robot has: what units are taken for others looks like.
+
+A link's radius of gyration is k = √(½ tr(I)/m), the mean distance of its mass from its
+centre. It is no larger than the link, and no smaller than that of a ball of the densest
+metal.
+"""
+
+from collections.abc import Iterator, Mapping
+from xml.etree.ElementTree import Element
+
+import numpy as np
+import pinocchio as pin
+
+from hsp_control.common.arrays import Array
+from hsp_control.companions.inspection.finding import Finding
+from hsp_control.robot import Robot
+from hsp_control.robot.description.inertias import tensor_of
+
+_REACH = 0.01, 30.0
+"""What a robot's longest chain may be [m]."""
+_WIDE, _LEAST_WIDE = 3.0, 0.3
+"""Largest k, as a share of the distance from a link's centre to the farthest point that
+is known of it, and of the robot's size: of what has no shape little is known."""
+_DENSITY = 2.3e4
+"""Density of osmium and iridium [kg/m³]."""
+_DENSE = 10.0
+"""A link may be denser by this factor: small links have rough inertias."""
+_HEAVY = 2000.0
+"""Largest mass over the cube of the robot's size [kg/m³]; an arm has 10."""
+_TURNS = 30.0
+"""Largest limit of a turning joint that means one [rad]; 1e3 and more means none."""
+
+
+def check_size(robot: Robot) -> Iterator[Finding]:
+    """Yield that the robot is too long, too short, or too heavy for its length."""
+    low, high = _REACH
+    if not low <= robot.size <= high and robot.size > 0.0:
+        yield Finding(
+            "warning",
+            "units",
+            "all joints",
+            f"the longest chain of joints is {robot.size:.3g} m",
+            "lengths of a URDF are in m: are these in "
+            f"{'mm' if robot.size > high else 'another unit'}?",
+        )
+        return
+    mass = float(pin.computeTotalMass(robot.model))
+    if mass > _HEAVY * robot.size**3 > 0.0:
+        yield Finding(
+            "warning",
+            "units",
+            "all links",
+            f"{mass:.4g} kg move, on a chain of {robot.size:.3g} m",
+            "masses of a URDF are in kg: are these in g?",
+        )
+
+
+def check_gyration(
+    xml: Element, robot: Robot, shapes: Mapping[str, Array]
+) -> Iterator[Finding]:
+    """Yield the links whose mass is farther away, or nearer, than a body's can be.
+
+    Args:
+        xml: The URDF.
+        robot: The robot; of links that do not move no inertia counts.
+        shapes: Points of the links' shapes in their frames, (k, 3) each [m].
+    """
+    moving = {f.name for f in robot.model.frames if f.parentJoint > 0}
+    known = _known_points(xml)
+    total = sum(float(mass.get("value", 0.0)) for mass in xml.iter("mass"))
+    for link in xml.findall("link"):
+        name = link.get("name", "")
+        found = link.find("inertial/mass"), link.find("inertial/inertia")
+        mass = 0.0 if found[0] is None else float(found[0].get("value", 0.0))
+        if mass <= 1e-4 * total or found[1] is None or name not in moving:
+            continue
+        trace = float(np.trace(tensor_of(found[1])))
+        if trace <= 0.0:  # a point
+            continue
+        k = float(np.sqrt(0.5 * trace / mass))
+        center = _xyz(link.find("inertial/origin"))
+        points = np.vstack([known[name], shapes.get(name, np.zeros((0, 3)))])
+        away = float(np.linalg.norm(points - center, axis=1).max())
+        about = f"{mass:.3g} kg with a radius of gyration of {k:.3g} m"
+        # a ball of radius r has k² = 3/5 r²
+        volume = 4.0 / 3.0 * np.pi * (k / np.sqrt(0.6)) ** 3
+        if k > max(_WIDE * away, _LEAST_WIDE * robot.size):
+            yield Finding(
+                "warning",
+                "units",
+                f"link {name!r}",
+                f"{about}, but it ends {away:.3g} m from its centre of mass",
+                "inertias of a URDF are in kg·m²: are they in another unit or made up?",
+            )
+        elif mass > _DENSE * _DENSITY * volume:
+            yield Finding(
+                "warning",
+                "units",
+                f"link {name!r}",
+                f"{about} is {mass / volume:.2g} kg/m³, denser than any metal",
+                "masses of a URDF are in kg and inertias in kg·m²: is one in another "
+                "unit, or made up?",
+            )
+
+
+def check_angles(xml: Element) -> Iterator[Finding]:
+    """Yield the turning joints whose limits look like degrees."""
+    for joint in xml.findall("joint"):
+        limit = joint.find("limit")
+        if joint.get("type") != "revolute" or limit is None:
+            continue
+        ends = [float(limit.get(name, 0.0)) for name in ("lower", "upper")]
+        if _TURNS < max(map(abs, ends)) < 1e3:
+            yield Finding(
+                "note",
+                "units",
+                f"joint {joint.get('name', '')!r}",
+                f"it turns from {ends[0]:g} to {ends[1]:g} rad",
+                "angles of a URDF are in rad: are these in degrees?",
+            )
+
+
+def _known_points(xml: Element) -> dict[str, Array]:
+    """Return each link's origin and the origins of the joints on it, by link [m]."""
+    points = {each.get("name", ""): [np.zeros(3)] for each in xml.findall("link")}
+    for joint in xml.findall("joint"):
+        parent = joint.find("parent")
+        if parent is not None and parent.get("link") in points:
+            points[parent.get("link", "")].append(_xyz(joint.find("origin")))
+    return {name: np.array(found) for name, found in points.items()}
+
+
+def _xyz(origin: Element | None) -> Array:
+    text = "0 0 0" if origin is None else origin.get("xyz", "0 0 0")
+    return np.array([float(word) for word in text.split()])

@@ -1,0 +1,159 @@
+"""How a robot's files are read, where that is no matter of course, and what is not."""
+
+from collections.abc import Iterator
+from xml.etree.ElementTree import Element
+
+from hsp_control.common.exceptions import ModelError
+from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.companions.inspection.finding import Finding
+from hsp_control.robot.description.access import XmlError, read_xml
+from hsp_control.robot.description.mesh_files import find_file, find_problem
+from hsp_control.robot.description.mesh_units import MeshUnits, mesh_units
+from hsp_control.robot.description.mimics import followers
+from hsp_control.robot.description.sources import RobotSource
+
+_READ = {
+    "robot": {"link", "joint", "material"},
+    "link": {"inertial", "visual", "collision"},
+    "joint": {
+        "origin", "parent", "child", "axis", "limit", "mimic", "dynamics",
+        "safety_controller",
+    },
+}  # fmt: skip
+"""Elements that count, by what they are in."""
+_UNREAD = {
+    "transmission": "positions, speeds and efforts are those of the joints",
+    "calibration": "positions count from where the model has its zero",
+    "gazebo": "it is for Gazebo alone",
+}
+
+
+def check_unread(xml: Element) -> Iterator[Finding]:
+    """Yield the kinds of elements that nobody reads."""
+    found: dict[str, dict[str, None]] = {}
+    for owner in (xml, *xml.findall("link"), *xml.findall("joint")):
+        for element in owner:
+            if element.tag not in _READ[owner.tag]:
+                name = (element if owner is xml else owner).get("name")
+                name = name or element.get("reference") or ""
+                found.setdefault(element.tag, {})[name] = None
+    for tag, owners in found.items():
+        about = listing([repr(name) for name in owners if name]) or "the robot"
+        message = f"of {about} is not read"
+        if tag in _UNREAD:
+            message += f": {_UNREAD[tag]}"
+        yield Finding("note", "not read", f"<{tag}>", message)
+
+
+def check_followers(xml: Element) -> Iterator[Finding]:
+    """Yield the followers that bound their leaders, or cannot be within their own."""
+    joints = {each.get("name", ""): each for each in xml.findall("joint")}
+    try:
+        found = followers(xml)
+    except ModelError as error:
+        yield Finding("error", "mimic", "joints", str(error))
+        return
+    for each in found:
+        if each.multiplier == 0.0:
+            continue
+        try:
+            lower, upper = each.leaders_range(joints)
+            low, high = each.bounds(joints[each.name])
+        except ModelError:
+            continue  # said by `check_limits`
+        name = f"joint {each.name!r}"
+        if max(lower, low) >= min(upper, high):
+            message = (
+                f"its limits allow its leader {each.leader!r} to be from {low:.4g} to "
+                f"{high:.4g}, whose own are {lower:.4g} to {upper:.4g}: they do not "
+                "count"
+            )
+            yield Finding("warning", "mimic", name, message, "correct one of them")
+        elif low > lower + 1e-6 or high < upper - 1e-6:
+            message = (
+                f"its limits keep its leader {each.leader!r} within "
+                f"{max(low, lower):.4g} to {min(high, upper):.4g}"
+            )
+            yield Finding("note", "mimic", name, message)
+
+
+def check_soft_limits(xml: Element) -> Iterator[Finding]:
+    """Yield the joints that soft limits keep nearer than their limits."""
+    for joint in xml.findall("joint"):
+        limit, safety = joint.find("limit"), joint.find("safety_controller")
+        if limit is None or safety is None or joint.get("type") == "continuous":
+            continue
+        low, high = (float(safety.get(f"soft_{x}_limit", 0.0)) for x in _ENDS)
+        lower, upper = (float(limit.get(x, 0.0)) for x in _ENDS)
+        if low < high and (low > lower or high < upper):
+            message = (
+                f"its soft limits keep it within {max(low, lower):.4g} to "
+                f"{min(high, upper):.4g} of {lower:.4g} to {upper:.4g}"
+            )
+            name = f"joint {joint.get('name', '')!r}"
+            yield Finding("note", "soft limits", name, message)
+
+
+_ENDS = "lower", "upper"
+
+
+def check_planar_axes(xml: Element) -> Iterator[Finding]:
+    """Yield the planar joints whose plane is not said."""
+    for joint in xml.findall("joint"):
+        if joint.get("type") == "planar" and joint.find("axis") is None:
+            yield Finding(
+                "note",
+                "axis",
+                f"joint {joint.get('name', '')!r}",
+                "planar without <axis>: its plane is x-y, where URDF's own default "
+                "would be y-z",
+                'give <axis xyz="0 0 1"/>',
+            )
+
+
+def check_mesh_axes(xml: Element, source: RobotSource) -> Iterator[Finding]:
+    """Yield the mesh files in which another axis than z points up."""
+    turned: dict[str, dict[str, None]] = {}
+    for link in xml.findall("link"):
+        for mesh in link.iter("mesh"):
+            file = find_file(source, mesh.get("filename", ""))
+            if file is None or find_problem(file):
+                continue
+            if (up := mesh_units(file).up) != MeshUnits().up:
+                turned.setdefault(up, {})[link.get("name", "")] = None
+    for up, links in turned.items():
+        axis = up[0].lower()
+        yield Finding(
+            "note",
+            "mesh",
+            f"meshes of {listing(links)}",
+            f"their files say that {axis} points up: it is turned to the link's z, "
+            "which RViz does not do",
+            "if the robot looks wrong, write <up_axis>Z_UP",
+        )
+
+
+def check_srdf(xml: Element, source: RobotSource) -> Iterator[Finding]:
+    """Yield that an SRDF cannot be read, or leaves out pairs of links not there."""
+    if source.srdf is None:
+        return
+    try:
+        srdf = read_xml(source.srdf)
+    except XmlError as error:
+        yield Finding("error", "srdf", str(source.srdf), error.message)
+        return
+    except OSError as error:
+        yield Finding("error", "srdf", str(source.srdf), str(error.strerror))
+        return
+    links = [link.get("name", "") for link in xml.findall("link")]
+    unknown: dict[str, None] = {}
+    for pair in srdf.iter("disable_collisions"):
+        for end in ("link1", "link2"):
+            if (name := pair.get(end, "")) not in links:
+                unknown[name] = None
+    if unknown:
+        first, *others = unknown
+        named = f"{first!r}{did_you_mean(first, links)}"
+        named += f" and {len(others)} more" * bool(others)
+        message = f"it leaves out pairs of links that are not there: {named}"
+        yield Finding("note", "srdf", source.srdf.name, message)

@@ -1,0 +1,196 @@
+"""What no robot has is named, and so is how files are read and what is not read."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from mesh_texts import tetrahedron
+from robot_kinds import chain, follow
+from robot_texts import ARM, INERTIA, link
+
+from hsp_control.companions.inspection.findings import Finding, inspect
+from hsp_control.robot import RobotDescription
+
+Look = Callable[[str], dict[str, list[Finding]]]
+
+
+@pytest.fixture
+def look(tmp_path: Path) -> Look:
+    """Return what is found in a text, by check."""
+
+    def look_at(text: str) -> dict[str, list[Finding]]:
+        path = tmp_path / "arm.urdf"
+        path.write_text(text)
+        found: dict[str, list[Finding]] = {}
+        for finding in inspect(RobotDescription(path)).findings:
+            found.setdefault(finding.check, []).append(finding)
+        return found
+
+    return look_at
+
+
+def arm(mass: float = 2.0, moment: float = 0.02, away: float = 0.1) -> str:
+    """Return an arm of links of half a metre."""
+    inertia = (
+        f'<inertial><origin xyz="{away} 0 0"/><mass value="{mass}"/><inertia '
+        f'ixx="{moment}" iyy="{moment}" izz="{moment}" ixy="0" ixz="0" iyz="0"/>'
+        "</inertial>"
+    )
+    return ARM.replace(INERTIA, inertia)
+
+
+@pytest.mark.parametrize(("text", "message"), [
+    (arm(), ""),
+    (arm(moment=1e-3), ""),
+    (arm(mass=0.1, moment=1.0), "of 3.87 m, but it ends 0."),  # an identity
+    (arm(moment=2e4), "with a radius of gyration of 122 m, but it ends"),  # kg mm²
+    (arm(mass=2000.0), "denser than any metal"),  # g
+    (arm(moment=2e-8), "denser than any metal"),
+    (arm(moment=0.0), ""),  # points
+])  # fmt: skip
+def test_what_a_body_cannot_be_is_named(text: str, message: str, look: Look) -> None:
+    found = [f for f in look(text).get("units", []) if f.element.startswith("link")]
+    assert bool(found) == bool(message)
+    for each in found:
+        assert each.element in ("link 'upper'", "link 'lower'")
+        assert (each.severity, message in each.message) == ("warning", True)
+        assert "kg·m²" in each.cure
+
+
+def test_inertias_of_what_does_not_move_do_not_matter(look: Look) -> None:
+    identity = INERTIA.replace('"0.1"', '"9"')
+    assert "units" not in look(arm().replace(link("base", ""), link("base", identity)))
+
+
+def test_shapes_tell_how_large_a_link_is(look: Look) -> None:
+    """A long tool may have a wide inertia."""
+    wide = arm(mass=1.0, moment=6.0)
+    tool = (
+        '<collision><origin xyz="1 0 0" rpy="0 1.57 0"/><geometry>'
+        '<cylinder radius="0.02" length="2"/></geometry></collision>'
+    )
+    assert "units" in look(wide)
+    with_tool = wide.replace("</inertial>", f"</inertial>{tool}")
+    assert "units" not in look(with_tool)
+
+
+@pytest.mark.parametrize(("factor", "message", "cure"), [
+    (1000.0, "the longest chain of joints is 548 m", "are these in mm?"),
+    (0.01, "the longest chain of joints is 0.00548 m", "in another unit?"),
+])  # fmt: skip
+def test_lengths_in_another_unit(
+    factor: float, message: str, cure: str, look: Look
+) -> None:
+    lengths = " ".join(str(factor * x) for x in (0.5, 0.1, 0.2))
+    (found,) = [
+        f for f in look(arm().replace("0.5 0.1 0.2", lengths))["units"]
+        if f.element == "all joints"
+    ]  # fmt: skip
+    assert message in found.message
+    assert cure in found.cure
+
+
+def test_masses_in_grams(look: Look) -> None:
+    """With inertias in g·m²: each link is a body, but what an arm?"""
+    (found,) = look(arm(mass=2000.0, moment=20.0))["units"]
+    assert found.element == "all links"
+    assert "4000 kg move, on a chain of 0.548 m" in found.message
+    assert "are these in g?" in found.cure
+
+
+def test_limits_in_degrees(look: Look) -> None:
+    (found,) = look(ARM.replace('lower="-3" upper="3"', 'lower="-90" upper="90"', 1))[
+        "units"
+    ]
+    assert found.element == "joint 'shoulder'"
+    assert "it turns from -90 to 90 rad" in found.message
+    assert "degrees" in found.cure
+    assert "units" not in look(ARM.replace('"-3" upper="3"', '"-1e5" upper="1e5"', 1))
+
+
+def test_what_nobody_reads_is_named(look: Look) -> None:
+    extra = (
+        '<transmission name="gear"/><gazebo reference="upper"/>'
+        '<gazebo reference="lower"/><sensor name="eye"/></robot>'
+    )
+    text = ARM.replace("</robot>", extra)
+    text = text.replace("</joint>", '<calibration rising="0.1"/></joint>', 1)
+    found = {f.element: f.message for f in look(text)["not read"]}
+    assert found == {
+        "<transmission>": "of 'gear' is not read: positions, speeds and efforts are "
+        "those of the joints",
+        "<gazebo>": "of 'upper', 'lower' is not read: it is for Gazebo alone",
+        "<sensor>": "of 'eye' is not read",
+        "<calibration>": "of 'shoulder' is not read: positions count from where the "
+        "model has its zero",
+    }
+    assert "not read" not in look(ARM)
+
+
+def test_followers_that_bound_their_leaders_are_named(look: Look) -> None:
+    def found(multiplier: float) -> list[Finding]:
+        mimic = follow("leader", multiplier)
+        text = chain(("leader", "revolute", ""), ("follower", "revolute", mimic))
+        return look(text).get("mimic", [])
+
+    assert found(0.5) == []
+    (narrow,) = found(2.0)
+    assert narrow.severity == "note"
+    assert "its limits keep its leader 'leader' within -1.5 to 1.5" in narrow.message
+    mimic = follow("leader", 1.0, 9.0)
+    text = chain(("leader", "revolute", ""), ("follower", "revolute", mimic))
+    (never,) = look(text)["mimic"]
+    assert never.severity == "warning"
+    assert "from -12 to -6, whose own are -3 to 3: they do not count" in never.message
+    ghost = chain(("leader", "revolute", follow("ghost")))
+    (error,) = look(ghost)["mimic"]
+    assert (error.severity, "'ghost'" in error.message) == ("error", True)
+
+
+def test_soft_limits_and_planes_are_named(look: Look) -> None:
+    soft = (
+        '<safety_controller k_velocity="1" soft_lower_limit="-1" soft_upper_limit="9"/>'
+    )
+    (found,) = look(ARM.replace("</joint>", f"{soft}</joint>", 1))["soft limits"]
+    assert found.element == "joint 'shoulder'"
+    assert "keep it within -1 to 3 of -3 to 3" in found.message
+    cart = ARM.replace('"shoulder" type="revolute"', '"shoulder" type="planar"')
+    assert "axis" not in look(cart)
+    (found,) = look(cart.replace('<axis xyz="0 0 1"/>', "", 1))["axis"]
+    assert "planar without <axis>: its plane is x-y" in found.message
+
+
+def test_meshes_that_are_turned_are_named(look: Look, tmp_path: Path) -> None:
+    tetrahedron(tmp_path / "y.dae", "0.01", "Y_UP")
+    tetrahedron(tmp_path / "z.dae", "0.01", "Z_UP")
+    shape = "<visual><geometry><mesh filename='{}'/></geometry></visual>"
+    text = ARM.replace(INERTIA, INERTIA + shape.format("y.dae"), 1)
+    (found,) = look(text)["mesh"]
+    assert found.element == "meshes of upper"
+    assert "y points up: it is turned to the link's z" in found.message
+    assert "mesh" not in look(text.replace("y.dae", "z.dae"))
+
+
+def test_an_srdf_is_looked_at(look: Look, tmp_path: Path) -> None:
+    srdf = tmp_path / "arm.srdf"
+    pair = '<robot><disable_collisions link1="upper" link2="{}"/></robot>'
+    srdf.write_text(pair.format("lower"))
+    assert "srdf" not in look(ARM)
+    srdf.write_text(pair.format("lowr"))
+    (found,) = look(ARM)["srdf"]
+    assert found.message.startswith(
+        "it leaves out pairs of links that are not there: 'lowr'"
+    )
+    assert "lower" in found.message
+    srdf.write_text("<robot>")
+    (found,) = look(ARM)["srdf"]
+    assert (found.severity, "malformed XML" in found.message) == ("error", True)
+
+
+def test_it_is_said_why_a_link_is_the_hand(tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_text(ARM)
+    facts = inspect(RobotDescription(path)).facts
+    assert facts["end effector"] == (
+        "lower (by default): the longest chain of joints ends with 'elbow'"
+    )

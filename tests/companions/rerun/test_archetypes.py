@@ -1,0 +1,88 @@
+"""What Rerun draws stands where the shape is: each in its own way of saying so."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hsp_control as hsp
+from hsp_control.common.arrays import Array
+from hsp_control.companions.rerun.log import _archetypes, _shape
+from hsp_control.companions.viewer.robot_drawing import Visual
+
+
+@dataclass
+class Drawn:
+    """An archetype of Rerun's, as it was made."""
+
+    kind: str
+    given: dict[str, Any]
+
+
+class Rerun:
+    """Keeps what is drawn, without Rerun."""
+
+    def __getattr__(self, kind: str) -> Any:
+        return lambda **given: Drawn(kind, given)
+
+
+def extent(drawn: Drawn) -> Array:
+    """Return the least and the greatest point of an archetype, (2, 3) [m].
+
+    As Rerun's pages have it: a capsule begins at its origin and goes along z, without
+    its ends; all others are about their centres.
+    """
+    given = drawn.given
+    low, high = np.zeros((2, 3))
+    match drawn.kind:
+        case "Boxes3D":
+            high = 0.5 * np.array(given["sizes"][0], dtype=float)
+            low = -high
+        case "Ellipsoids3D":
+            high = np.ones(3) * given["radii"][0]
+            low = -high
+        case "Cylinders3D" | "Capsules3D":
+            radius, length = given["radii"][0], given["lengths"][0]
+            half = 0.5 * length
+            low, high = np.array([[-radius] * 3, [radius] * 3])
+            if drawn.kind == "Cylinders3D":
+                low[2], high[2] = -half, half
+            else:
+                high[2] += length
+        case _:
+            points = np.array(given["vertex_positions"])
+            low, high = points.min(axis=0), points.max(axis=0)
+    shift = np.array(given.get("translations", [[0.0, 0.0, 0.0]])[0])
+    return np.array([low + shift, high + shift])
+
+
+BOUNDS = {
+    "box": ((0.2, 0.4, 0.6), (0.1, 0.2, 0.3)),
+    "sphere": ((0.3,), (0.3, 0.3, 0.3)),
+    "cylinder": ((0.1, 0.8), (0.1, 0.1, 0.4)),
+    "capsule": ((0.1, 0.8), (0.1, 0.1, 0.5)),
+    "ellipsoid": ((0.1, 0.2, 0.3), (0.1, 0.2, 0.3)),
+}
+"""Sizes by kind, and half of what they take along each axis [m]."""
+
+
+@pytest.mark.parametrize("kind", BOUNDS)
+def test_a_links_shape_is_about_its_place(kind: str) -> None:
+    size, half = BOUNDS[kind]
+    color = (0.1, 0.2, 0.3, 1.0)
+    visual = Visual(1, "link", np.eye(4), kind, size, color, None)
+    (drawn,) = _archetypes(Rerun(), visual, "link")
+    np.testing.assert_allclose(extent(drawn), [np.negative(half), half])
+    assert drawn.given["colors"] == [[*color]]
+
+
+@pytest.mark.parametrize(("shape", "half"), [
+    (hsp.shapes.Box([0.2, 0.4, 0.6]), (0.1, 0.2, 0.3)),
+    (hsp.shapes.Sphere(0.3), (0.3, 0.3, 0.3)),
+    (hsp.shapes.Cylinder(0.1, 0.8), (0.1, 0.1, 0.4)),
+    (hsp.shapes.Capsule(0.1, 0.8), (0.1, 0.1, 0.5)),
+])  # fmt: skip
+def test_an_obstacle_is_about_its_centre(shape: Any, half: tuple[float, ...]) -> None:
+    (drawn,) = _shape(Rerun(), shape)
+    np.testing.assert_allclose(extent(drawn), [np.negative(half), half])

@@ -1,0 +1,392 @@
+"""What a user reaches is not what steps: a mistake is one exact error, or harmless."""
+
+import os
+import signal
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import hsp_control as hsp
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import (
+    ControllerError,
+    ImmutableError,
+    ModelError,
+    TaskError,
+)
+from hsp_control.constraints.limits.barriers import Barrier
+from hsp_control.law import FieldSample, MetricSample, TaskSample
+from hsp_control.null_space.fields import (
+    FunctionCost,
+    FunctionField,
+    NullSpaceField,
+    StateWeight,
+)
+from hsp_control.null_space.metrics import Metric
+from hsp_control.robot import RobotState
+from hsp_control.tasks import Task
+from hsp_control.tasks.feedback import ErrorPart, Feedback
+
+FRAME = "panda_tcp"
+NV = 7
+
+ATTACKS: dict[str, Callable[[RobotState], object]] = {
+    "q": lambda s: np.subtract(s.q, 0.1, out=s.q),
+    "v": lambda s: s.v.fill(1.0),
+    "another q": lambda s: setattr(s, "q", np.zeros(NV)),
+    "another v": lambda s: setattr(s, "v", np.zeros(NV)),
+    "another t": lambda s: setattr(s, "t", 3.0),
+    "update": lambda s: s.update(0.0, np.zeros(NV), np.zeros(NV)),
+    "jacobian": lambda s: s.frame(FRAME).jacobian.fill(0.0),
+    "its rate": lambda s: s.frame(FRAME).jacobian_dot.fill(0.0),
+    "position": lambda s: s.position(FRAME).fill(0.0),
+    "rotation": lambda s: s.frame(FRAME).rotation.fill(0.0),
+    "velocity": lambda s: s.frame(FRAME).velocity.fill(0.0),
+    "another jacobian": lambda s: setattr(
+        s.frame(FRAME), "jacobian", np.zeros((6, NV))
+    ),
+    "motion": lambda s: s.frame(FRAME).motion.jacobian.fill(0.0),
+    "M": lambda s: s.mass_matrix.fill(0.0),
+    "M'": lambda s: s.mass_matrix_rate.fill(0.0),
+    "N": lambda s: s.nonlinear_effects.fill(0.0),
+    "centre": lambda s: s.centroidal.jacobian.fill(0.0),
+    "companion": lambda s: s.ahead(0.01).q.fill(0.0),
+}
+"""What a part's own Python may do by mistake to the state that it is given."""
+
+
+class Attacked:
+    """Which attacks succeeded, and from where."""
+
+    def __init__(self) -> None:
+        self.places = set[str]()
+        self.done: list[str] = []
+
+    def by(self, place: str, state: RobotState) -> None:
+        self.places.add(place)
+        for name, attack in ATTACKS.items():
+            try:
+                attack(state)
+            except (ValueError, ImmutableError):
+                continue
+            self.done.append(f"{place}: {name}")
+        # what is its own: Pinocchio's data, and an effort
+        state.data.M[:] = state.data.J[:] = state.data.tau[:] = 0.0
+        state.inverse_dynamics(np.ones(NV)).fill(0.0)
+
+
+attacked = Attacked()
+
+
+class OwnCost(hsp.Cost):
+    """A cost by each of its methods."""
+
+    def value(self, state: RobotState) -> float:
+        attacked.by("Cost.value", state)
+        return 0.5 * float(state.q @ state.q)
+
+    def gradient(self, state: RobotState) -> Array:
+        attacked.by("Cost.gradient", state)
+        return state.q.copy()
+
+    def gradient_rate(self, state: RobotState) -> Array:
+        attacked.by("Cost.gradient_rate", state)
+        return state.v.copy()
+
+
+class OwnDerivatives(hsp.Cost):
+    """A cost that writes both derivatives."""
+
+    def value(self, state: RobotState) -> float:
+        return 0.5 * float(state.q @ state.q)
+
+    def differentiate(self, state: RobotState, gradient: Array, rate: Array) -> None:
+        attacked.by("Cost.differentiate", state)
+        gradient[:], rate[:] = state.q, state.v
+
+
+class OwnValue(hsp.Cost):
+    """A cost whose derivatives are differences."""
+
+    def value(self, state: RobotState) -> float:
+        attacked.by("value for differences", state)
+        return 0.5 * float(state.q @ state.q)
+
+
+class OwnField(NullSpaceField):
+    """A field in plain Python."""
+
+    def evaluate(
+        self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
+    ) -> FieldSample:
+        attacked.by("NullSpaceField.evaluate", state)
+        out.g[:], out.g_dot[:] = -state.q, -state.v
+        return out
+
+    def value(self, state: RobotState) -> float:
+        attacked.by("NullSpaceField.value", state)
+        return 0.0
+
+
+class OwnMetric(Metric):
+    """A metric in plain Python."""
+
+    form = 2
+
+    def evaluate(self, state: RobotState, out: MetricSample) -> MetricSample:
+        attacked.by("Metric.evaluate", state)
+        out.W[:] = (1.0 + state.q[1] ** 2) * np.eye(NV)
+        out.L[:] = np.sqrt(1.0 + state.q[1] ** 2) * np.eye(NV)
+        out.W_dot[:] = 2.0 * state.q[1] * state.v[1] * np.eye(NV)
+        return out
+
+
+class OwnTask(Task):
+    """The first joint goes to zero."""
+
+    @property
+    def error_parts(self) -> tuple[ErrorPart, ...]:
+        return (ErrorPart("angle", "rad", "rad/s", 1),)
+
+    def feedback(self) -> Feedback:
+        return Feedback(np.eye(1), 2.0 * np.eye(1), np.zeros(1), np.zeros((0, 3)))
+
+    def evaluate(
+        self,
+        state: RobotState,
+        out: TaskSample | None = None,
+        feedback: Feedback | None = None,
+    ) -> TaskSample:
+        out, feedback = self.given(state, out, feedback)
+        attacked.by("Task.evaluate", state)
+        out.jacobian[:] = 0.0
+        out.jacobian[0, 0] = 1.0
+        out.jacobian_dot[:] = 0.0
+        out.error[:], out.error_rate[:] = -state.q[:1], -state.v[:1]
+        out.acceleration[:] = -state.q[:1] - 2.0 * state.v[:1]
+        return out
+
+    def reference_rate(self, state: RobotState) -> Array:
+        attacked.by("Task.reference_rate", state)
+        return np.zeros(1)
+
+    def measure(self, state: RobotState) -> tuple[Array, Array]:
+        attacked.by("Task.measure", state)
+        return np.zeros(1), state.q[:1]
+
+
+class OwnBarrier(Barrier):
+    """The second joint stays above -1."""
+
+    def values(self, state: RobotState) -> float:
+        attacked.by("Barrier.values", state)
+        return float(state.q[1] + 1.0)
+
+    def gradients(self, state: RobotState) -> Array:
+        attacked.by("Barrier.gradients", state)
+        return np.eye(NV)[1:2]
+
+
+def of_function(place: str) -> Callable[[RobotState], Any]:
+    def function(state: RobotState) -> Any:
+        attacked.by(place, state)
+        vector = "field" in place or "gradient" in place or "rate" in place
+        return state.q.copy() if vector else 1.0
+
+    return function
+
+
+def controllers() -> list[hsp.Controller]:
+    """Return controllers that together have every hook in plain Python."""
+    panda = hsp.Robot.load("panda")
+    hand = hsp.FramePosition(FRAME, hsp.Hold([0.5, 0.1, 0.5]))
+    cost = FunctionCost(
+        of_function("FunctionCost.function"),
+        gradient_function=of_function("FunctionCost.gradient"),
+        rate_function=of_function("FunctionCost.rate"),
+    )
+    vector = FunctionField(
+        of_function("FunctionField.field"), rate_function=of_function("field rate")
+    )
+    weight = StateWeight(of_function("StateWeight"))
+    fields = [
+        OwnCost(), OwnDerivatives(), OwnValue(), OwnField(), cost, vector,
+        hsp.JointCentering(weight=weight),
+    ]  # fmt: skip
+    limits = hsp.Limits(barriers=[OwnBarrier()])
+    return [
+        hsp.Controller(panda, [OwnTask(), hand], fields[0], metric=OwnMetric()),
+        hsp.Controller(panda, [hand], fields[1], limits=limits),
+        *(hsp.Controller(panda, [hand], field, limits=None) for field in fields[2:]),
+    ]
+
+
+def test_no_hook_can_change_the_controllers_robot() -> None:
+    """Whatever it writes is refused, or its own; and the efforts are the same."""
+
+    def modifier(state: RobotState, active: Any, a: Array) -> tuple[Array, None]:
+        attacked.by("modifier", state)
+        return a, None
+
+    q, v = hsp.Robot.load("panda").home(), np.full(NV, 0.1)
+    for controller in controllers():
+        for k in range(2):
+            out = controller.compute(0.01 * k, q, v)
+            again = controller.compute(0.01 * k, q, v, modifier=modifier)
+            np.testing.assert_allclose(out.tau, again.tau, rtol=0, atol=1e-9)
+            np.testing.assert_array_equal(controller.state.q, q)
+        hsp.simulate(controller, q, duration=0.02, control_period=0.01)
+        controller.flow(0.0, q)
+    assert attacked.done == []
+    assert attacked.places >= {
+        "Cost.gradient", "Cost.gradient_rate", "Cost.value", "Cost.differentiate",
+        "value for differences", "NullSpaceField.evaluate", "NullSpaceField.value",
+        "Metric.evaluate", "Task.evaluate", "Task.reference_rate", "Task.measure",
+        "Barrier.values", "Barrier.gradients", "FunctionCost.function",
+        "FunctionCost.gradient", "FunctionCost.rate", "FunctionField.field",
+        "field rate", "StateWeight", "modifier",
+    }  # fmt: skip
+
+
+# -- the model and Pinocchio's data ----------------------------------------------------
+
+
+def controller() -> hsp.Controller:
+    panda = hsp.Robot.load("panda")
+    hand = hsp.FramePosition(FRAME, hsp.Hold([0.5, 0.1, 0.5]))
+    return hsp.Controller(panda, [hand], hsp.JointCentering())
+
+
+def test_a_robots_model_gets_no_more_joints() -> None:
+    """Pinocchio would write beyond the data that were made before."""
+    own = controller()
+    robot = own.robot
+    before = own.compute(0.0, robot.home(), np.zeros(NV)).tau.copy()
+    joint = pin.JointModelRX(), pin.SE3.Identity(), "more"
+    with pytest.raises(ModelError, match=r"no more joints.*model = robot.model.copy"):
+        robot.model.addJoint(0, *joint)
+    np.testing.assert_array_equal(
+        own.compute(0.0, robot.home(), np.zeros(NV)).tau, before
+    )
+    model = robot.model.copy()
+    index = model.addJoint(model.njoints - 1, *joint)
+    model.appendBodyToJoint(index, pin.Inertia.Random(), pin.SE3.Identity())
+    assert hsp.Robot.from_pinocchio(model).nv == NV + 1
+
+
+def test_data_that_are_written_or_replaced_change_nothing() -> None:
+    own = controller()
+    q, v = own.robot.home(), np.full(NV, 0.2)
+    before = own.compute(0.0, q, v).tau.copy()
+    state = own.robot.state(0.0, q, v)
+    for shown in (own.state, state):
+        data = shown.data
+        for name in ("J", "dJ", "Ag"):
+            setattr(data, name, np.zeros((6, 2)))
+        data.M, data.C = np.zeros((2, 2)), np.zeros((2, 2))
+        for name in ("tau", "nle", "ddq"):
+            setattr(data, name, np.zeros(2))
+        for place in data.oMi:
+            place.translation = np.ones(3)
+    np.testing.assert_array_equal(own.compute(0.0, q, v).tau, before)
+    fresh = own.robot.state(0.1, q + 0.1, v)
+    state.update(0.1, q + 0.1, v)
+    np.testing.assert_array_equal(state.mass_matrix, fresh.mass_matrix)
+    np.testing.assert_array_equal(state.data.J, fresh.data.J)
+    np.testing.assert_array_equal(state.data.oMi[7].homogeneous, fresh.data.oMi[7])
+
+
+@pytest.mark.parametrize("name", ["q", "v", "t", "time", "robot", "effort"])
+def test_arrays_of_a_state_cannot_be_replaced(name: str) -> None:
+    """Terms would go on as they were; values are copied by `update`."""
+    robot = hsp.Robot.load("panda")
+    state = robot.state(0.0, robot.home(), np.zeros(NV))
+    for each in (state, state.seen, state.read_only):
+        with pytest.raises(
+            ImmutableError, match=f"state.{name} cannot be assigned.*up"
+        ):
+            setattr(each, name, np.zeros(NV))
+
+
+def test_arrays_of_a_frame_cannot_be_replaced() -> None:
+    own = controller()
+    own.compute(0.0, own.robot.home(), np.zeros(NV))
+    for name in ("jacobian", "jacobian_dot", "position", "rotation", "motion"):
+        with pytest.raises(ImmutableError, match=f"frame.{name} cannot be assigned"):
+            setattr(own.state.frame(FRAME), name, np.zeros((6, NV)))
+
+
+# -- out= ------------------------------------------------------------------------------
+
+
+def test_an_output_of_another_kind_is_one_error() -> None:
+    own = controller()
+    q, v = own.robot.home(), np.zeros(NV)
+    for wrong in ("out", np.zeros(NV), TaskSample.allocate(3, NV)):
+        kind = type(wrong).__name__
+        with pytest.raises(
+            ControllerError, match=f"out is of type {kind}; needs a Con"
+        ):
+            own.compute(0.0, q, v, out=wrong)  # type: ignore[arg-type]
+    iiwa = hsp.Robot.load("planar3r")
+    other = hsp.Controller(iiwa, [hsp.FramePosition(axes="xy")], hsp.Rest())
+    of_other = other.compute(0.0, iiwa.home(), np.zeros(iiwa.nv))
+    with pytest.raises(ControllerError, match="with 3 efforts; this controller has 7"):
+        own.compute(0.0, q, v, out=of_other)
+    out = own.compute(0.0, q, v)
+    assert own.compute(0.0, q, v, out=out) is out
+    task = own.tasks[0]
+    for wrong in (np.zeros(3), TaskSample.allocate(2, NV), TaskSample.allocate(3, 3)):
+        with pytest.raises(
+            TaskError, match=r"out is .*needs TaskSample.allocate\(3, 7"
+        ):
+            task.evaluate(own.state, wrong)  # type: ignore[arg-type]
+
+
+# -- a fork beside a thread ------------------------------------------------------------
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no processes that fork")
+@pytest.mark.filterwarnings("ignore:.*multi-threaded.*:DeprecationWarning")
+def test_a_fork_while_a_thread_computes_is_one_error() -> None:
+    """The child's copy is half a step: it says so, and waits for nobody."""
+    inside, leave = threading.Event(), threading.Event()
+
+    def slow(state: RobotState) -> float:
+        inside.set()
+        leave.wait(60.0)
+        return float(state.q @ state.q)
+
+    panda = hsp.Robot.load("panda")
+    hand = hsp.FramePosition(FRAME, hsp.Hold([0.5, 0.1, 0.5]))
+    leave.set()
+    own = hsp.Controller(panda, [hand], FunctionCost(slow))
+    other = controller()
+    q, v = panda.home(), np.zeros(NV)
+    for each in (own, other):
+        each.compute(0.0, q, v)
+    inside.clear()
+    leave.clear()
+    thread = threading.Thread(target=own.compute, args=(0.0, q, v))
+    thread.start()
+    assert inside.wait(60.0)
+    child = os.fork()
+    if child == 0:  # without pytest's own handlers
+        signal.alarm(60)  # ends it if it waits for ever
+        code = 1
+        try:
+            other.compute(0.0, q, v)  # nobody computed with it
+            try:
+                own.compute(0.0, q, v)
+            except ControllerError as error:
+                code = 0 if "was forked while another thread" in str(error) else 2
+        finally:
+            os._exit(code)
+    leave.set()
+    thread.join()
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+    own.compute(0.0, q, v)  # here all is as it was

@@ -1,0 +1,95 @@
+"""How old a state is, by clocks that know nothing of one another."""
+
+import numpy as np
+import pytest
+from live_rigs import PERIOD, panda
+
+from hsp_control.common.arrays import Array
+from hsp_control.live import Phase, udp
+from hsp_control.live.link import AgeEstimator, Packet, PacketKind
+from hsp_control.live.udp import UdpHardware
+
+APART = 1234.5
+"""How far the two clocks are apart [s]."""
+
+
+def ages_of(delays: Array, every: float = 0.1, window: float = 1.0) -> Array:
+    """Return the ages of packets that are sent regularly, after these delays [s]."""
+    estimator = AgeEstimator(window)
+    sent = every * np.arange(len(delays))
+    return np.array(
+        [
+            estimator.age(t + delay, t + APART)
+            for t, delay in zip(sent, delays, strict=True)
+        ]
+    )
+
+
+def test_the_quickest_packet_has_no_age_and_others_are_older_than_it() -> None:
+    delays = np.array([0.004, 0.003, 0.009, 0.003, 0.005])
+    np.testing.assert_allclose(ages_of(delays), [0, 0, 0.006, 0, 0.002], atol=1e-9)
+
+
+def test_a_quick_packet_counts_through_the_next_window() -> None:
+    """At least for one window, whenever it came, and never for more than two."""
+    for quick in range(12):
+        delays = np.full(60, 0.008)
+        delays[quick] = 0.001
+        ages = ages_of(delays)
+        np.testing.assert_allclose(
+            ages[quick : quick + 10], [0, *[0.007] * 9], atol=1e-9
+        )
+        np.testing.assert_allclose(ages[quick + 24 :], 0.0, atol=1e-9)
+
+
+def test_ages_are_never_negative_and_know_no_offset() -> None:
+    delays = np.random.default_rng(0).uniform(0.001, 0.02, 300)
+    ages = ages_of(delays)
+    assert ages.min() >= 0.0
+    for k in range(10, 300):  # at most the quickest of all, at least of the last ten
+        least = delays[: k + 1].min(), delays[k - 9 : k + 1].min()
+        assert delays[k] - least[1] - 1e-9 <= ages[k] <= delays[k] - least[0] + 1e-9
+
+
+def test_a_clock_that_drifts_is_followed() -> None:
+    """By 1 ms/s, and the age stays below what it drifts by in two windows."""
+    estimator = AgeEstimator(1.0)
+    ages = [estimator.age(0.1 * k + 1e-4 * k, 0.1 * k) for k in range(500)]
+    assert max(ages) < 2.2e-3
+    assert ages[-1] > 0.0
+
+
+def test_states_of_a_robot_have_the_age_of_the_newest_packet(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of one that waited 30 ms longer than the quickest; all that came count."""
+    now, arrived = [100.0], list[Packet]()
+    monkeypatch.setattr(udp, "monotonic", lambda: now[0])
+    hardware = UdpHardware(panda(), PERIOD)
+    monkeypatch.setattr(hardware.link, "receive", lambda timeout: arrived)
+    payload = np.concatenate([panda().home(), np.zeros(7)])
+
+    def state(k: int) -> Packet:
+        stamp = round(1e9 * (10.0 + 0.01 * k))
+        head = PacketKind.STATE, Phase.RUNNING, hardware.session, k, 0
+        return Packet(*head, stamp, 3.0 * k, payload)
+
+    def age(*numbers: int, delay: float) -> float:
+        now[0] = 100.0 + 0.01 * numbers[-1] + delay
+        arrived[:] = [state(k) for k in numbers]
+        found = hardware.read(0.0)
+        assert found is not None
+        assert (found.sequence, found.t) == (numbers[-1], 3.0 * numbers[-1])
+        return found.age
+
+    try:
+        assert age(0, delay=0.002) == pytest.approx(0.0, abs=1e-6)
+        assert age(1, delay=0.032) == pytest.approx(0.03, abs=1e-6)
+        # two at once: the later one is 10 ms younger
+        assert age(2, 3, delay=0.012) == pytest.approx(0.01, abs=1e-6)
+        assert age(4, delay=0.001) == pytest.approx(0.0, abs=1e-6)
+        assert age(5, delay=0.002) == pytest.approx(0.001, abs=1e-6)
+    finally:
+        monkeypatch.undo()
+        hardware.close()
+        hardware.drain()

@@ -1,0 +1,92 @@
+"""Every joint of Pinocchio's has its exact rates here, or is refused by name."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from hsp_control import Robot
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import ModelError
+
+TILTED = np.array([0.6, 0.8, 0.0])
+
+
+def composite(*joints: Any) -> Any:
+    made = pin.JointModelComposite()
+    for each in joints:
+        made.addJoint(each)
+    return made
+
+
+KEPT: dict[str, Callable[[], Any]] = {
+    "revolute": pin.JointModelRX,
+    "revolute, tilted": lambda: pin.JointModelRevoluteUnaligned(TILTED),
+    "continuous": pin.JointModelRUBZ,
+    "prismatic": lambda: pin.JointModelPrismaticUnaligned(TILTED),
+    "helical": lambda: pin.JointModelHelicalUnaligned(TILTED, 0.3),
+    "planar": pin.JointModelPlanar,
+    "translation": pin.JointModelTranslation,
+    "ball": pin.JointModelSpherical,
+    "free-flyer": pin.JointModelFreeFlyer,
+}
+REFUSED: dict[str, Callable[[], Any]] = {
+    "JointModelSphericalZYX": pin.JointModelSphericalZYX,
+    "JointModelUniversal": lambda: pin.JointModelUniversal(
+        np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
+    ),
+    "JointModelComposite": lambda: composite(pin.JointModelRX(), pin.JointModelRY()),
+    "JointModelEllipsoid": lambda: pin.JointModelEllipsoid(0.1, 0.2, 0.3),
+}
+
+
+def model_with(joint: Any) -> pin.Model:
+    """Return an arm whose middle joint is the given one."""
+    model, parent, rng = pin.Model(), 0, np.random.default_rng(6)
+    for k, each in enumerate((pin.JointModelRY(), joint, pin.JointModelRZ())):
+        place = pin.SE3(
+            pin.rpy.rpyToMatrix(*rng.uniform(-1, 1, 3)), rng.uniform(size=3)
+        )
+        parent = model.addJoint(parent, each, place, f"joint{k}")
+        body = pin.SE3(np.eye(3), rng.uniform(size=3))
+        model.appendBodyToJoint(parent, pin.Inertia.FromBox(2.0, 0.3, 0.2, 0.1), body)
+        model.addBodyFrame(f"link{k}", parent, body, 0)
+    return model
+
+
+@pytest.mark.parametrize("kind", KEPT)
+def test_rates_are_those_of_differences(kind: str) -> None:
+    robot, rng = (
+        Robot.from_pinocchio(model_with(KEPT[kind]())),
+        np.random.default_rng(7),
+    )
+    q = robot.random_configuration(rng)
+    v = rng.standard_normal(robot.nv)
+    h = 1e-4
+
+    def terms(s: float) -> tuple[Array, Array]:
+        state = robot.state(0.0, robot.integrate(q, s * v), v)
+        return state.frame("link2").jacobian.copy(), state.mass_matrix.copy()
+
+    state = robot.state(0.0, q, v)
+    ahead, behind = terms(h), terms(-h)
+    for found, one, other in zip(
+        (state.frame("link2").jacobian_dot, state.mass_matrix_rate), ahead, behind,
+        strict=True,
+    ):  # fmt: skip
+        np.testing.assert_allclose(found, (one - other) / (2.0 * h), rtol=0, atol=1e-5)
+
+
+@pytest.mark.parametrize("kind", REFUSED)
+def test_joints_whose_axes_turn_with_them_are_refused_by_name(kind: str) -> None:
+    message = f"joint 'joint1' is a {kind}, whose motion subspace depends on"
+    with pytest.raises(ModelError, match=message):
+        Robot.from_pinocchio(model_with(REFUSED[kind]()))
+
+
+def test_a_translation_has_three_lengths() -> None:
+    robot = Robot.from_pinocchio(model_with(pin.JointModelTranslation()))
+    assert robot.dof_names[1:4] == ("joint1.x", "joint1.y", "joint1.z")
+    assert robot.units == ("rad", "m", "m", "m", "rad")

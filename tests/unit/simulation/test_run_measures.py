@@ -1,0 +1,84 @@
+"""Every measure of a run is what its meaning says, computed from the log by NumPy."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+import hsp_control as hsp
+from hsp_control.common.arrays import Array
+from hsp_control.simulation.measures import measures
+
+
+@cache
+def changed_run() -> hsp.Rollout:
+    """Return a log whose columns are random numbers, so that none is like another."""
+    panda = hsp.Robot.load("panda")
+    q = panda.home()
+    ball = hsp.Obstacle("ball", hsp.shapes.Sphere(0.1), hsp.Hold([0.6, 0.0, 0.6]))
+    field = hsp.JointCentering() + hsp.ObstacleClearance(["ball"])
+    hand = hsp.FramePose("panda_tcp", name="hand")
+    controller = hsp.Controller(panda, [hand], field, scene=[ball])
+    run = hsp.simulate(controller, q, duration=0.05, control_period=0.01)
+    rng = np.random.default_rng(3)
+    for name, column in run.columns.items():
+        if column.dtype == float and name not in ("t", "q"):
+            column[...] = rng.uniform(-3.0, 2.0, column.shape)
+    run["damped"][:] = [1, 0, 0, 1, 1, 0]
+    run.t[:] = [0.0, 0.1, 0.2, 0.4, 0.5, 0.7]
+    return run
+
+
+def rms(values: Array) -> float:
+    return float(np.sqrt((values**2).sum() / len(values)))
+
+
+def expected(run: hsp.Rollout) -> dict[str, float]:
+    e = run["task.hand.error"]
+    parts = {"position": e[:, :3], "orientation": e[:, 3:]}
+    found = {}
+    for name, part in parts.items():
+        norm = np.sqrt((part**2).sum(axis=1))
+        label = f"tracking.hand.{name}"
+        found |= {f"{label}.rms": rms(norm), f"{label}.max": norm.max()}
+        found[f"{label}.end"] = norm[-1]
+    e_N = run["null_space_norm"]
+    return found | {
+        "null_space_error.rms": rms(e_N),
+        "null_space_error.max": e_N.max(),
+        "null_space_error.end": e_N[-1],
+        "manipulability.min": run["manipulability"].min(),
+        "singular_value.min": run["singular_values"].min(),
+        "damped.fraction": 0.5,
+        "effort.max": np.abs(run.tau).max(),
+        # of all joints together: the norm's, not the mean of the joints' squares
+        "effort.rms": float(np.sqrt((run.tau**2).sum() / len(run))),
+        "speed.max": np.abs(run.v).max(),
+        "simulated_time": 0.7,
+    }
+
+
+def test_measures_are_what_they_mean() -> None:
+    run = changed_run()
+    found = measures(run)
+    for name, value in expected(run).items():
+        assert found[name].value == pytest.approx(value, rel=1e-12), name
+    others = found.keys() - expected(run).keys()
+    assert others, "a distance"
+    for name in others:
+        column, _, kind = name.rpartition(".")
+        numbers = np.nan_to_num(run[column]) if kind == "max" else run[column]
+        assert found[name].value == getattr(numbers, kind)(), name
+    assert any(name.startswith("distance.") for name in others)
+
+
+def test_a_robot_that_stands_needs_the_effort_of_gravity() -> None:
+    """The same in a run that is known: rms and largest effort are those at rest."""
+    panda = hsp.Robot.load("panda")
+    controller = hsp.Controller(panda, [hsp.JointPosture("start")], limits=None)
+    run = hsp.simulate(controller, panda.home(), duration=0.02, control_period=0.01)
+    gravity = panda.inverse_dynamics(panda.home(), np.zeros(7), np.zeros(7))
+    found = measures(run)
+    assert found["effort.rms"].value == pytest.approx(np.linalg.norm(gravity), rel=1e-6)
+    assert found["effort.max"].value == pytest.approx(np.abs(gravity).max(), rel=1e-6)
+    assert found["effort.rms"].unit == "N·m"
