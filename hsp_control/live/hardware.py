@@ -26,6 +26,9 @@ class Hardware(Protocol):
     `read` raises means that no state can arrive any more: the loop sends nothing more.
     After what `write` raises it goes on trying, with the safe stop.
 
+    One that runs in real time may have an attribute ``real_time`` that is true: its
+    clock is then compared with this computer's.
+
     Attributes:
         period: Time between two measurements [s].
     """

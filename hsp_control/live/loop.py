@@ -287,7 +287,7 @@ class LiveRun:
         if tau is not None and not limiter.apply(tau, reader.state.q):
             self.stop("fault", f"the effort is not finite: {tau.tolist()}")
         self.send(before)
-        response = reader.effort_sent()
+        response = reader.effort_sent(limiter.applied)
         self.report_applied_effort()
         self.log_row(response)
         if self.phase == Phase.RUNNING:
@@ -382,9 +382,11 @@ class LiveRun:
             self.limiter.no_measurement()
             return
         has = measurement.applied
-        if has is not None and not self.limiter.can_have(has):
-            self.stop("fault", f"the robot says it has an effort of {has.tolist()}")
-            has = None
+        if has is not None:
+            wrong = self.limiter.contradiction(has, halted=measurement.halted)
+            if wrong is not None:
+                self.stop("fault", wrong)
+                has = None
         if self.limiter.robot_has(has):
             self.report_applied_effort()
 
@@ -443,7 +445,7 @@ class LiveRun:
     def report(self) -> LoopReport:
         """Return how the run ended."""
         state = self.reader.state
-        speed = float(np.abs(state.v).max())
+        speed = self.reader.speed
         standing = speed <= self.settings.stop.standstill
         at_rest = standing and self.safe_stop.done and not self.silent
         ended, reason = self.ended, self.reason

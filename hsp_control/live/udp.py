@@ -96,6 +96,8 @@ class UdpHardware:
         closed: Whether `close` was called.
     """
 
+    real_time = True
+
     def __init__(
         self,
         robot: Robot,
