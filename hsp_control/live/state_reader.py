@@ -13,6 +13,7 @@ from hsp_control.common.exceptions import HardwareError, HspControlError
 from hsp_control.constraints.limits import RobotLimits, own_limits
 from hsp_control.control.measurement import Inertial
 from hsp_control.live.hardware import Hardware, Measurement, described
+from hsp_control.live.operator_requests import OPERATOR
 from hsp_control.live.report import Deadlines
 from hsp_control.live.settings import LiveSettings
 from hsp_control.live.trusted_motion import TrustedMotion
@@ -72,9 +73,9 @@ def valid_measurement(raw: object, robot: Robot, period: float) -> Measurement:
         )
     try:
         return _checked(raw, robot, period)
-    except HardwareError:
+    except (HardwareError, *OPERATOR):
         raise
-    except Exception as error:  # an array-like object may raise anything
+    except BaseException as error:  # an array-like object may raise anything
         raise HardwareError(
             f"the state cannot be read: {type(error).__name__}"
         ) from error
@@ -447,7 +448,7 @@ class StateReader:
         # the new, valid measurement of this period, or None
         self.measurement: Measurement | None = None
         self.fault: str | None = None  # why the robot must be stopped, or None
-        self.error: Exception | None = None  # what the hardware raised, or None
+        self.error: BaseException | None = None  # what the hardware raised, or None
         self.connection_lost = False  # whether no state can arrive any more
         # when this period's state arrived, by the loop's clock [s]
         self.arrival = self._last_arrival = self._due = clock()
@@ -526,7 +527,9 @@ class StateReader:
         """Return the new measurement if it is the robot's state; set the fault."""
         try:
             raw = self._hardware.read(max(self._due - self._clock(), 0.0))
-        except Exception as error:  # a driver may raise anything
+        except OPERATOR:
+            raise
+        except BaseException as error:  # a driver may raise anything
             self.fault, self.error = f"no state can be read: {described(error)}", error
             self.connection_lost = True
             raw = None

@@ -27,6 +27,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
+from weakref import WeakSet
 
 import numpy as np
 
@@ -43,8 +44,12 @@ Shapes = Mapping[str, tuple[int, ...]]
 """The shape of each column in one row."""
 
 
+_writers: "WeakSet[JournalWriter]" = WeakSet()
+"""The journals that this process writes."""
+
+
 class JournalWriter:
-    """Writes a journal."""
+    """Writes a journal; nobody else can meanwhile, until it is closed or forgotten."""
 
     def __init__(self, path: Path, resumed: "JournalReader | None" = None) -> None:
         """Begin a journal, or go on after what a reader of it has read.
@@ -52,6 +57,7 @@ class JournalWriter:
         Else an existing file is overwritten, unless another process writes it.
         """
         self.path = path  # the file
+        self._file = -1
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND
@@ -65,9 +71,12 @@ class JournalWriter:
             if not kept:
                 self._put(MAGIC)
             self._size = kept or len(MAGIC)
-        except OSError as error:
+        except BaseException as error:
             self.close()
-            raise self._failure(error) from error
+            if isinstance(error, OSError):
+                raise self._failure(error) from error
+            raise
+        _writers.add(self)
 
     def write_heading(self, shapes: Shapes, meta: Mapping[str, Any]) -> None:
         """Write a heading for the next rows."""
@@ -90,6 +99,11 @@ class JournalWriter:
         if self._file >= 0:
             os.close(self._file)
             self._file = -1
+            _writers.discard(self)
+
+    def __del__(self) -> None:
+        """Close the file of a writer that nobody has closed."""
+        self.close()
 
     def _frame(self, kind: bytes, payload: bytes) -> None:
         """Write a frame, whole or not at all: what cuts it short takes it back."""
@@ -113,6 +127,10 @@ class JournalWriter:
         reason = error.strerror or str(error)
         if isinstance(error, BlockingIOError):
             reason = "another process writes it; wait for it, or give another --out"
+            if any(
+                writer.path.absolute() == self.path.absolute() for writer in _writers
+            ):
+                reason = "this program writes it already: close that log first"
         return LogError(f"{self.path}: cannot write the journal: {reason}")
 
 

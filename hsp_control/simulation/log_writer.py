@@ -244,10 +244,17 @@ class LogWriter:
             return
         try:
             self._journal.write_end(status, message, **self._came_during_run(), **meta)
-        except Exception:  # not Ctrl-C, after which it may be called again
+        except KeyboardInterrupt:  # after which it may be called again
+            raise
+        except BaseException:
             self._journal.close()
             raise
         self._journal.close()
+
+    def close(self) -> None:
+        """Close the journal, if there is one, without an end."""
+        if self._journal is not None:
+            self._journal.close()
 
     def rollout(self, status: str, message: str, **meta: Any) -> Rollout:
         """Return the rows in memory as a rollout."""

@@ -180,7 +180,7 @@ def test_rows_come_as_they_are_written(tmp_path: Path) -> None:
     writer = JournalWriter(path)
     assert reader.read() == 0
     writer.write_heading(PAIR, {"status": "running", "name": "a"})
-    with pytest.raises(LogError, match="another process writes it"):
+    with pytest.raises(LogError, match="this program writes it already"):
         JournalWriter(path)
     for k in range(3):
         writer.write_row(np.array([0.1 * k, k, k]))
