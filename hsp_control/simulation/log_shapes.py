@@ -50,7 +50,7 @@ def check_columns(columns: Mapping[str, Array], meta: Mapping[str, Any]) -> None
                 f"the column {name!r} has shape {values.shape}; needs {(rows, *needed)}"
             )
         if name in _FINITE or name.startswith("obstacle."):
-            finite = np.isfinite(values).reshape(rows, -1).all(axis=1)
+            finite = np.isfinite(values).all(axis=tuple(range(1, values.ndim)))
             if not finite.all():
                 row = int(np.flatnonzero(~finite)[0])
                 raise WrongColumnError(

@@ -320,7 +320,12 @@ def _listen(host: str, port: int) -> socket.socket:
         try:
             listener = socket.create_server((host, candidate))
         except OSError as error:
-            reason = os.strerror(error.errno or 0)
+            reason = error.strerror or str(error)
+            if isinstance(error, socket.gaierror):  # its numbers are not the system's
+                raise OSError(
+                    f"cannot listen on {host}: no computer has this name: {reason}"
+                ) from None
+            reason = os.strerror(error.errno) if error.errno else reason
         else:
             listener.setblocking(False)
             return listener
