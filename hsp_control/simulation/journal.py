@@ -235,6 +235,8 @@ class JournalReader:
 
     def _frames(self) -> Iterator[tuple[bytes, bytes]]:
         """Yield kind and payload of every new frame before the first incomplete one."""
+        if self.path.exists() and not self.path.is_file():
+            raise LogError(f"{self.path} is no journal")
         try:
             with self.path.open("rb") as file:
                 if not MAGIC.startswith(file.read(len(MAGIC))):

@@ -159,6 +159,8 @@ class Rollout:
         if path.suffix in (".yaml", ".yml"):
             made = spoken(f"hsp run {path} writes", "load_experiment(...).run() makes")
             raise LogError(f"{path}: a configuration, not a log; {made} one")
+        if not (path.is_file() or path.is_dir()) and path.exists():
+            raise LogError(f"{path}: a device or a pipe, which may never end; no log")
         try:
             reading = _read_journal if is_journal(path) else _read_npz
             columns, meta = reading(path)
