@@ -72,7 +72,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # `hsp schema | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except OSError as error:
-        where = f"{error.filename}: " if error.filename is not None else ""
+        where = "" if error.filename is None else f"{error.filename!s:.200}: "
         print(f"hsp: {where}{error.strerror or error}", file=sys.stderr)
     except MemoryError:
         print("hsp: not enough memory for what was asked", file=sys.stderr)

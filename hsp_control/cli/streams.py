@@ -25,8 +25,8 @@ def make_usable() -> None:
     for name, number in (("stdin", 0), ("stdout", 1), ("stderr", 2)):
         stream = getattr(sys, name)
         if stream is None:
-            mode = "w" if number else "r"
-            file = os.fdopen(number, mode, encoding="utf-8", closefd=False)
+            kind = "w" if number else "r"
+            file = open(number, kind, encoding="utf-8", closefd=False)  # noqa: SIM115
             setattr(sys, name, file)
         elif number and hasattr(stream, "reconfigure"):
             try:

@@ -70,7 +70,7 @@ class JournalWriter:
             path.parent.mkdir(parents=True, exist_ok=True)
             flags = os.O_RDWR | os.O_CREAT | os.O_APPEND
             self._file = os.open(path, flags, 0o644)
-        except OSError as error:
+        except (OSError, ValueError) as error:
             raise self._failure(error) from error
         try:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -148,8 +148,8 @@ class JournalWriter:
         while data:  # a nearly full disk may take only a part
             data = data[os.write(self._file, data) :]
 
-    def _failure(self, error: OSError) -> LogError:
-        reason = error.strerror or str(error)
+    def _failure(self, error: OSError | ValueError) -> LogError:
+        reason = getattr(error, "strerror", None) or str(error)
         if isinstance(error, BlockingIOError):
             reason = "another process writes it; wait for it, or give another --out"
             if any(
@@ -235,9 +235,9 @@ class JournalReader:
 
     def _frames(self) -> Iterator[tuple[bytes, bytes]]:
         """Yield kind and payload of every new frame before the first incomplete one."""
-        if self.path.exists() and not self.path.is_file():
-            raise LogError(f"{self.path} is no journal")
         try:
+            if self.path.exists() and not self.path.is_file():
+                raise LogError(f"{self.path} is no journal")
             with self.path.open("rb") as file:
                 if not MAGIC.startswith(file.read(len(MAGIC))):
                     raise LogError(f"{self.path} is no journal")
@@ -245,8 +245,11 @@ class JournalReader:
                 data = file.read()
         except FileNotFoundError:  # its writer has not begun
             return
-        except OSError as error:
-            raise LogError(f"{self.path}: cannot be read: {error.strerror}") from error
+        except LogError:
+            raise
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "strerror", None) or str(error)
+            raise LogError(f"{self.path}: cannot be read: {reason}") from error
         at = 0
         while at < len(data):
             payload = _whole_frame(data, at)

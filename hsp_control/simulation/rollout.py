@@ -137,9 +137,9 @@ class Rollout:
             with part.open("wb") as file:
                 np.savez_compressed(file, allow_pickle=False, **arrays)
             part.replace(path)
-        except OSError as error:
+        except (OSError, ValueError) as error:  # a name may contain what none can
             _remove(part)
-            reason = error.strerror or str(error)
+            reason = getattr(error, "strerror", None) or str(error)
             raise LogError(f"{path}: cannot write the log: {reason}") from error
         except BaseException:  # also a second Ctrl-C: leave no temporary file
             _remove(part)
@@ -159,9 +159,11 @@ class Rollout:
         if path.suffix in (".yaml", ".yml"):
             made = spoken(f"hsp run {path} writes", "load_experiment(...).run() makes")
             raise LogError(f"{path}: a configuration, not a log; {made} one")
-        if not (path.is_file() or path.is_dir()) and path.exists():
-            raise LogError(f"{path}: a device or a pipe, which may never end; no log")
         try:
+            if not (path.is_file() or path.is_dir()) and path.exists():
+                raise LogError(
+                    f"{path}: a device or a pipe, which may never end; no log"
+                )
             reading = _read_journal if is_journal(path) else _read_npz
             columns, meta = reading(path)
             if meta.get("format") == FORMAT:
@@ -259,7 +261,7 @@ def _check_sizes(archive: zipfile.ZipFile) -> None:
 
 
 def _remove(part: Path) -> None:
-    with suppress(OSError):  # its folder may not exist
+    with suppress(OSError, ValueError):  # its folder may not exist
         part.unlink(missing_ok=True)
 
 
