@@ -49,7 +49,8 @@ class SentEfforts:
         Returns:
             Three arrays, shape (nv,).
         """
-        sent_least, sent_most = self._sent.min(axis=0), self._sent.max(axis=0)
+        sent_least = np.minimum.reduce(self._sent)
+        sent_most = np.maximum.reduce(self._sent)
         self._answers += 1
         if self._answers <= _START_PERIODS:
             least, most = np.minimum(sent_least, 0.0), np.maximum(sent_most, 0.0)
@@ -59,6 +60,8 @@ class SentEfforts:
             most = sent_most + _FADES * self._above
             spare = self._rounding
         # What is beyond by rounding alone does not add up.
-        self._above = np.clip(effort - sent_most, 0.0, most - sent_most)
-        self._below = np.clip(sent_least - effort, 0.0, sent_least - least)
+        beyond = np.maximum(effort, sent_most) - sent_most
+        self._above = np.minimum(beyond, most - sent_most)
+        beyond = sent_least - np.minimum(effort, sent_least)
+        self._below = np.minimum(beyond, sent_least - least)
         return least, most, spare

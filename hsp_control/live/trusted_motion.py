@@ -41,6 +41,8 @@ class ExpectedMotion:
     def __init__(self, robot: Robot, error: float, period: float) -> None:
         self._robot, self._error = robot, error
         self._rate = min(_BANDWIDTH, 0.3 / period)
+        self._rates = np.array([0.0, _ALONE, self._rate])
+        self._sources = np.zeros((3, robot.nv))
         self.begin(np.zeros(robot.nv))
 
     def begin(self, v: Array) -> None:
@@ -73,15 +75,17 @@ class ExpectedMotion:
         ``known`` is how many of them are trusted, shape (nv,). A joint of which none is
         goes on as it is expected.
         """
-        sources = np.stack([velocity, slope, 0.5 * (velocity + slope)])
+        sources = self._sources
+        sources[0], sources[1] = velocity, slope
+        sources[2] = 0.5 * (velocity + slope)
         difference = sources - self.v
-        self.surprise = exp(-passed / _MEMORY) * self.surprise
-        self.surprise = np.maximum(self.surprise, np.abs(difference))
-        step = np.clip(difference, -self._error, self._error)
-        rate = np.array([0.0, _ALONE, self._rate])[known]
+        faded = exp(-passed / _MEMORY) * self.surprise
+        self.surprise = np.maximum(faded, np.abs(difference))
+        step = np.minimum(np.maximum(difference, -self._error), self._error)
+        rate = self._rates[known]
         self.v = self.v + np.minimum(2.0 * rate * passed, 1.0) * step
         gain = min(self._rate**2 * passed, self._rate)
-        self._missed = np.where(known == 2, self._missed + gain * step, 0.0)
+        self._missed = (self._missed + gain * step) * (known == 2)
 
 
 class TrustedMotion:
@@ -96,6 +100,7 @@ class TrustedMotion:
         fault: What contradicts what, or None.
         doubtful: Whether the last measurement should not be used, though it is no fault
             yet.
+        complete: Whether all that is measured is trusted.
         unknown_for: Time since which some joint was only expected, not measured [s].
         last: The last measurement, as it came; None before the first.
     """
@@ -111,17 +116,13 @@ class TrustedMotion:
         self._check.restart()
         self.last: Measurement | None = None
         self._q: Array = np.zeros(0)  # the last trusted configuration
+        self.complete = True
         self._moving = False  # whether the robot's clock has begun
         self._positions = np.ones(self._robot.nv, dtype=bool)
         self._velocities = np.ones(self._robot.nv, dtype=bool)
         self.fault: str | None = None
         self.doubtful = False
         self.unknown_for = 0.0
-
-    @property
-    def complete(self) -> bool:
-        """Whether all that is measured is trusted."""
-        return bool(self._positions.all() and self._velocities.all())
 
     @property
     def mean_velocity(self) -> Array | None:
@@ -163,13 +164,14 @@ class TrustedMotion:
         known = self._velocities.astype(np.int64) + self._positions
         expected.follow(check.mean, check.slope, known, passed)
         self._judge(new.v, jumps)
+        if self.complete:
+            self.doubtful = bool(check.doubtful.any())
+            self._q = new.q
+            return new
         all_known = (self._velocities | self._positions).all()
         self.unknown_for = 0.0 if all_known else self.unknown_for + passed
         both = self._positions & self._velocities
         self.doubtful = self.fault is None and bool((check.doubtful & both).any())
-        if self.complete:
-            self._q = new.q
-            return new
         v = np.where(self._positions, check.slope, expected.v[2])
         v = np.where(self._velocities, new.v, v)
         way = self._robot.difference(self._q, new.q)
@@ -180,10 +182,13 @@ class TrustedMotion:
     def _judge(self, v: Array, jumps: Flags) -> None:
         """Find what is wrong now, and what is not trusted from now on."""
         check = self._check
+        wrong = check.contradicted | check.dead | jumps
+        if self.complete and not wrong.any():
+            return
+        both = self._positions & self._velocities
+        wrong &= both
         by_v, by_q, _ = self._expected.surprise
         greatest = np.maximum(by_v, by_q)
-        both = self._positions & self._velocities
-        wrong = both & (check.contradicted | check.dead | jumps)
         good_v = by_v < _CLEARLY * greatest
         small = check.difference < _SMALL * self._error
         good_q = (by_q < _CLEARLY * greatest) | (~good_v & small)
@@ -195,6 +200,7 @@ class TrustedMotion:
         lost |= self._left(v)
         self._positions &= ~lost
         self._velocities &= ~lost
+        self.complete = bool(self._positions.all() and self._velocities.all())
         if (wrong | lost).any():
             i = int(np.flatnonzero(wrong | lost)[0])
             self.fault = self._described(i, v, bool(check.dead[i]))

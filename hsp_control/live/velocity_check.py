@@ -65,6 +65,9 @@ class VelocityCheck:
         self._few = max(2, ceil(_SLOPE_TIME / period))
         self._slopes = np.zeros((max(ceil(_WINDOW / period), _FEWEST), robot.nv))
         self._velocities = np.zeros_like(self._slopes)
+        # Which of them are the last few, by the place of the next one.
+        size = len(self._slopes)
+        self._latest = (np.arange(size)[:, None] - 1 - np.arange(self._few)) % size
         # Noise of this size, six standard deviations, leaves a sum of this size.
         noise = self._error * np.sqrt(0.5 * period * _MEMORY)
         self._allowed = _CONSTANT + float(noise)
@@ -84,7 +87,8 @@ class VelocityCheck:
         self.difference: Array = np.zeros(nv)
         self.doubtful: Flags = np.zeros(nv, dtype=bool)
         self.contradicted: Flags = np.zeros(nv, dtype=bool)
-        self.dead: Flags = np.zeros(nv, dtype=bool)
+        self._none = np.zeros(nv, dtype=bool)
+        self.dead: Flags = self._none
 
     def update(self, way: Array, v: Array, passed: float, expected: Array) -> None:
         """Judge a new measurement.
@@ -101,11 +105,12 @@ class VelocityCheck:
         self._velocities[self._count % len(self._slopes)] = v
         self._count += 1
         known = self._slopes[: self._count]
-        latest = np.arange(self._count - min(self._count, self._few), self._count)
-        latest %= len(self._slopes)
-        self.slope = self._slopes[latest].mean(axis=0)
-        self.mean = self._velocities[latest].mean(axis=0)
-        beyond = v - np.clip(v, known.min(axis=0), known.max(axis=0))
+        few, end = min(self._count, self._few), self._count % len(self._slopes)
+        latest = self._latest[end] if few == self._few else slice(0, few)
+        self.slope = np.add.reduce(self._slopes[latest]) / few
+        self.mean = np.add.reduce(self._velocities[latest]) / few
+        least, most = np.minimum.reduce(known), np.maximum.reduce(known)
+        beyond = v - np.minimum(np.maximum(v, least), most)
         self.doubtful = (np.abs(beyond) > self._error) & self._judged
         self._beyond += min(passed / _MEAN_TIME, 1.0) * (beyond - self._beyond)
         self._doubts = _DOUBT_LEAK * self._doubts + self.doubtful
@@ -120,6 +125,10 @@ class VelocityCheck:
     def _find_dead(self, way: Array, v: Array, expected: Array) -> None:
         still = (np.abs(way) < 1e-12) & (v == self._last_v)
         self._last_v = v
+        if not still.any():
+            self._still[:], self.dead = 0, self._none
+            self._before = np.abs(expected)
+            return
         self._before = np.where(self._still == 0, np.abs(expected), self._before)
         self._still = np.where(still, self._still + 1, 0)
         moved = self._before * self._still * self._period
