@@ -160,7 +160,7 @@ class TrustedMotion:
             slope = way / passed
             expected.begin(np.where(np.abs(slope) < np.abs(new.v), slope, new.v))
         expected.advance(passed)
-        check.update(way, new.v, passed, expected.v[2])
+        check.update(way, new.v, passed)
         known = self._velocities.astype(np.int64) + self._positions
         expected.follow(check.mean, check.slope, known, passed)
         self._judge(new.v, jumps)

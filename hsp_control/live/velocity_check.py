@@ -81,7 +81,7 @@ class VelocityCheck:
         self._count = 0
         self._sum, self._fastest, self._doubts, self._beyond = np.zeros((4, nv))
         self._still = np.zeros(nv, dtype=np.int64)
-        self._before, self._last_v = np.zeros((2, nv))
+        self._before, self._last_v, self._speed = np.zeros((3, nv))
         self.slope: Array = np.zeros(nv)
         self.mean: Array = np.zeros(nv)
         self.difference: Array = np.zeros(nv)
@@ -90,14 +90,13 @@ class VelocityCheck:
         self._none = np.zeros(nv, dtype=bool)
         self.dead: Flags = self._none
 
-    def update(self, way: Array, v: Array, passed: float, expected: Array) -> None:
+    def update(self, way: Array, v: Array, passed: float) -> None:
         """Judge a new measurement.
 
         Args:
             way: Displacement since the last one, shape (nv,) [rad or m].
             v: Measured velocity, shape (nv,).
             passed: Time since the last one [s].
-            expected: Velocity that the model expects now, shape (nv,).
         """
         slope = way / passed
         self.difference = np.abs(v - slope)
@@ -120,17 +119,20 @@ class VelocityCheck:
         differs = np.abs(self._sum) > self._allowed + 2.0 * _LAG * self._fastest
         differs |= np.abs(self._beyond) > self._allowed_mean
         self.contradicted = (differs | (self._doubts >= _DOUBT)) & self._judged
-        self._find_dead(way, v, expected)
+        self._find_dead(way, v, slope)
 
-    def _find_dead(self, way: Array, v: Array, expected: Array) -> None:
+    def _find_dead(self, way: Array, v: Array, slope: Array) -> None:
         still = (np.abs(way) < 1e-12) & (v == self._last_v)
         self._last_v = v
+        # The speed before it stood, of two states: the last may show a part of the lie.
+        # It is measured: friction that the model misses must not count.
+        now = np.minimum(np.abs(v), np.abs(slope))
+        speed, self._speed = np.maximum(now, self._speed), now
         if not still.any():
-            self._still[:], self.dead = 0, self._none
-            self._before = np.abs(expected)
+            self._still[:], self._before, self.dead = 0, speed, self._none
             return
-        self._before = np.where(self._still == 0, np.abs(expected), self._before)
+        self._before = np.where(still, self._before, speed)
         self._still = np.where(still, self._still + 1, 0)
         moved = self._before * self._still * self._period
-        fast = (self._before > _STOPS * self._period) & (moved > _STEP)
+        fast = (self._before > 2.0 * _STOPS * self._period) & (moved > _STEP)
         self.dead = (self._still >= _STILL) & fast & self._judged

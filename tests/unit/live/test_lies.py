@@ -267,3 +267,21 @@ def test_a_collision_is_no_lie() -> None:
         motion.update(Measurement(k, k * PERIOD, q, v), PERIOD * (k > 0), none)
         assert motion.fault is None, k
     assert motion.complete
+
+
+def test_friction_that_the_model_misses_is_no_dead_sensor() -> None:
+    """A joint turns round, and sticks for 50 ms there, under an effort that grows."""
+    motion, none = TrustedMotion(panda(), LiveSettings(), PERIOD), np.zeros(7, bool)
+    q, at = start(), np.zeros(7)
+    at[3] = 1.0
+    for k in range(400):
+        t = k * PERIOD
+        speed = 0.4 * np.cos(10.0 * t)
+        sticks = abs(speed) < 0.04
+        v = at * (0.0 if sticks else speed)
+        q = q + PERIOD * v
+        held = panda().inverse_dynamics(q, v, -4.0 * np.sin(10.0 * t) * at)
+        motion.applied(q, v, held + 10.0 * np.sign(-np.sin(10.0 * t)) * at)
+        motion.update(Measurement(k, t, q, v), PERIOD * (k > 0), none)
+        assert motion.fault is None, k
+    assert motion.complete
