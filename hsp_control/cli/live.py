@@ -128,11 +128,11 @@ def live(options: argparse.Namespace) -> int:
             report = run(hardware)
             out.print(_times(report, experiment))
             out.print(f"The loop: {report.reason}")
-            _convert(loop_log)
+            kept = _convert(loop_log)
             fault = getattr(hardware, "fault", None)
             ends = {"completed", "operator"}
             if fault is None and report.ended in ends and not requests.fault:
-                return 0
+                return 0 if kept else 2
             named = fault is None or fault in report.reason
             print(f"hsp: {report.reason if named else fault}", file=sys.stderr)
             return 2
@@ -152,13 +152,13 @@ def live(options: argparse.Namespace) -> int:
     out.print(_times(report, experiment))
     out.print(_packets(counts, link.injected, robot_report))
     _print_ends(report, robot_report)
-    _convert(loop_log, link=counts, injected=link.injected)
-    _convert(robot_log)
+    kept = _convert(loop_log, link=counts, injected=link.injected)
+    kept &= _convert(robot_log)
     asked = report.ended == "operator" and not requests.fault
     regular = report.ended == "completed" or (asked and duration == inf)
     if not regular:
         print(f"hsp: {report.reason}", file=sys.stderr)
-    return 0 if regular and robot_report is not None else 2
+    return 0 if regular and robot_report is not None and kept else 2
 
 
 def _table(title: str, *headings: str) -> Table:
@@ -226,16 +226,17 @@ def _print_ends(report: LoopReport, robot_report: dict[str, Any] | None) -> None
         )
 
 
-def _convert(journal: Path, **meta: Any) -> None:
-    """Convert a journal to an ``.npz`` log; if it cannot be read, keep the journal."""
+def _convert(journal: Path, **meta: Any) -> bool:
+    """Convert a journal to an ``.npz`` log, else keep it; return whether it is one."""
     try:
         rollout = Rollout.load(journal)
         rollout.meta.update(meta)
         log = rollout.save(journal.with_suffix(".npz"))
     except LogError as error:
         print(f"hsp: {error}", file=sys.stderr)
-        return
-    journal.unlink()
+        return False
+    journal.unlink(missing_ok=True)
     for row in excess_rows(rollout):
         out.print(f"{log.stem}: {row}", highlight=False)
     out.print(f"Log: {log}")
+    return True

@@ -8,6 +8,7 @@ from typing import Any
 
 from hsp_control.cli.interrupts import INTERRUPTED, end_in_order, is_command
 from hsp_control.cli.options import AddedCommand, command_line
+from hsp_control.cli.streams import make_usable
 from hsp_control.common.exceptions import HspControlError
 
 _OWN_FILES = {"check", "doctor", "live"}
@@ -20,6 +21,7 @@ FAILURE = 2
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run ``hsp``: status 0, 2 after one clear message, 130 after Ctrl-C."""
+    make_usable()
     parser = command_line()
     if "_ARGCOMPLETE" in os.environ:  # a shell asks what may come next
         import argcomplete
@@ -70,7 +72,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # `hsp schema | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except OSError as error:
-        where = f"{error.filename}: " if error.filename is not None else ""
+        where = "" if error.filename is None else f"{error.filename!s:.200}: "
         print(f"hsp: {where}{error.strerror or error}", file=sys.stderr)
     except MemoryError:
         print("hsp: not enough memory for what was asked", file=sys.stderr)

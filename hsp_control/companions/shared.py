@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from importlib import import_module
+from math import inf
 from typing import Any
 from urllib.parse import unquote
 
@@ -41,6 +42,29 @@ def name_and_options(address: str) -> tuple[str, dict[str, str]]:
             raise ValueError(f"the option {key!r} is given twice")
         options[key] = unquote(value)
     return name, options
+
+
+class Rate:
+    """Says when something is due that is told at a rate, once a period of a loop.
+
+    The mean rate is right, also where a loop's period does not divide its own.
+    """
+
+    def __init__(self, rate: float) -> None:
+        """``rate`` is how often it is due [Hz]."""
+        self._every, self._next, self._last = 1.0 / rate, -inf, -inf
+
+    def due(self, t: float) -> bool:
+        """Return whether it is due at a time [s]; an earlier one is a new run's."""
+        if t < self._last:
+            self._next = -inf
+        self._last = t
+        if t < self._next - 1e-9:
+            return False
+        following = self._next + self._every
+        # What was missed is not made up for.
+        self._next = following if following > t else t + self._every
+        return True
 
 
 def rate_of(options: Mapping[str, str]) -> float:

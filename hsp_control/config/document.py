@@ -32,6 +32,7 @@ from hsp_control.declaration.located import (
 )
 from hsp_control.robot.description.access import ANYWHERE, only_within
 from hsp_control.robot.description.sources import is_robot, packaged_folders
+from hsp_control.robot.recorded import usable_record
 from hsp_control.simulation import Rollout
 
 
@@ -83,6 +84,8 @@ class Document:
         self.access = ANYWHERE  # which files the configuration may name
         # the packages whose types it may name, besides our own; None: all
         self.packages: frozenset[str] | None = None
+        # what a log says of its robot, unless another one is chosen; see `recorded`
+        self.recorded_robot: Any = None
         self._data = deepcopy(data)
         self._origins: dict[KeyPath, Mark | str] = dict(marks)
         self._written = bool(marks)  # as a text, not in Python
@@ -160,6 +163,8 @@ class Document:
             path = assign(self._data, keys, value)
         except ValueError as error:
             raise located(origin, str(error)) from None
+        if path[0] == "robot":
+            self.recorded_robot = None
         for inside in [key for key in self._origins if key[: len(path)] == path]:
             del self._origins[inside]
         for end in range(1, len(path)):  # what was created on the way
@@ -279,7 +284,9 @@ def _read(source: str | PathLike[str] | dict[str, Any]) -> Document:
             run.meta.get("streams") or {},
             run.meta.get("plan_streams") or [],
         )
-        return Document(config | {"changes": made}, {}, str(path))
+        document = Document(config | {"changes": made}, {}, str(path))
+        document.recorded_robot = usable_record(run.meta)
+        return document
     known = bundled_configs()
     if path.suffix in {".yaml", ".yml"} or is_file(path):
         return Document.read(path)

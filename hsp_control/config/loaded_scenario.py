@@ -23,6 +23,7 @@ from hsp_control.geometry.shapes import Mesh
 from hsp_control.robot import Robot
 from hsp_control.robot.description.access import Access
 from hsp_control.robot.description.mesh_files import check_references
+from hsp_control.robot.recorded import recorded_robot
 
 Value = TypeVar("Value", bound=Part)
 
@@ -68,7 +69,10 @@ def load_scenario(document: Document) -> LoadedScenario:
 
 
 def load_robot(document: Document, scenario: Scenario) -> Robot:
-    """Return the robot of a configuration."""
+    """Return the robot of a configuration; that of a log is in the log."""
+    if document.recorded_robot is not None:
+        with document.at("robot"):
+            return recorded_robot(document.recorded_robot, document.access)
     keys = [key for key in ("name", "description") if getattr(scenario.robot, key)]
     with document.at("robot", *keys):
         return Robot.load(scenario.robot, access=document.access)

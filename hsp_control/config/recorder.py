@@ -116,10 +116,11 @@ class Recorder:
             LogError: If the file cannot be written.
         """
         if self._rollout is None:
-            self._writer.end(status, message)
             try:
+                self._writer.end(status, message)
                 self._rollout = self._read()
             finally:
+                self._writer.close()
                 if self._folder is not None:
                     self._folder.cleanup()
             if self.path is not None:
@@ -167,6 +168,11 @@ class Recorder:
             interrupted = isinstance(error, KeyboardInterrupt)
             status = "interrupted" if interrupted else "stopped"
             self.close(status, f"{type(error).__name__}: {error}")
+        else:  # there is nothing to keep
+            self._writer.close()
+            self._journal.unlink(missing_ok=True)
+            if self._folder is not None:
+                self._folder.cleanup()
 
 
 def _config_of(controller: Controller) -> tuple[dict[str, Any] | None, str]:

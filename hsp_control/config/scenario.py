@@ -199,7 +199,8 @@ def json_schema() -> dict[str, Any]:
     schema = TypeAdapter(Scenario).json_schema(schema_generator=_SchemaOfScenario)
     for model in schema["$defs"].values():
         if "const" in (kind := model.get("properties", {}).get("type", {})):
-            kind.setdefault("description", f"{kind['const']}: {model['description']}")
+            about = model.get("description", "")  # python -OO leaves docstrings out
+            kind.setdefault("description", f"{kind['const']}: {about}")
     _name_added_tasks(schema["$defs"])
     schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
     schema["title"] = "hsp_control configuration"

@@ -4,12 +4,13 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.constraints.limits import RobotLimits
+from hsp_control.live.sent_efforts import SentEfforts
 from hsp_control.live.settings import LiveSettings
 from hsp_control.robot import Robot
 
 _TOLERANCE = 0.5
-"""By how much the effort that a robot says it has may exceed the limits, relative to
-them: the robot's own stop, or another load, may need more."""
+"""By how much the effort of a robot that has stopped may exceed the limits, relative to
+them: its own stop, or another load, may need more."""
 
 _SURE = 5
 """Periods in a row without a measurement that a bad line may have."""
@@ -38,6 +39,8 @@ class EffortLimiter:
         self.applied: Array = np.zeros(robot.nv)
         # g(q) at the last configuration, shape (nv,)
         self.gravity: Array = np.zeros(robot.nv)
+        kept = max(settings.missing, settings.watchdog) + _SURE
+        self._recent = SentEfforts(self._largest, kept)
         # What the robot may have, at least and at most; and before the last effort.
         self._least: Array = np.zeros(robot.nv)
         self._most: Array = np.zeros(robot.nv)
@@ -66,15 +69,31 @@ class EffortLimiter:
         self._least = self._most = self.sent.copy()
         self._before = self._least, self._most
         self._unanswered, self._says = 0, False
+        self._recent.restart(self.sent)
 
     @property
     def _added_by_robot(self) -> Array | float:
         return self.gravity if self._compensates else 0.0
 
-    def can_have(self, effort: Array) -> bool:
-        """Return whether the motors can have an effort, shape (nv,), as it is sent."""
-        tau = np.abs(effort + self._added_by_robot)
-        return bool((tau <= self._largest * (1.0 + _TOLERANCE)).all())
+    def contradiction(self, effort: Array, *, halted: bool) -> str | None:
+        """Return why the robot cannot have an effort, shape (nv,), or None.
+
+        It has one that was sent (`SentEfforts`), or its own where it has halted.
+        """
+        if halted:
+            most = self._largest * (1.0 + _TOLERANCE)
+            least, most = -most - self._added_by_robot, most - self._added_by_robot
+            spare = np.zeros(effort.size)
+        else:
+            least, most, spare = self._recent.bounds_of(effort)
+        beyond = np.maximum(effort - most, least - effort) - spare
+        i = int(beyond.argmax())
+        if beyond[i] <= 0.0:
+            return None
+        return (
+            f"the robot says it has an effort of {effort[i]:.6g} at "
+            f"{self._robot.dof_names[i]}; it can have {least[i]:.6g} to {most[i]:.6g}"
+        )
 
     def robot_has(self, effort: Array | None) -> bool:
         """Use the effort that the robot has, as it says; return whether it is another.
@@ -119,6 +138,7 @@ class EffortLimiter:
         self.applied = self.sent + self._added_by_robot
         self._before = self._least, self._most
         self._least = self._most = self.sent.copy()
+        self._recent.add(self.sent)
         return True
 
     def hold(self, q: Array) -> None:

@@ -9,6 +9,7 @@ from hsp_control.common.entry_points import entry_points
 from hsp_control.common.exceptions import HspControlError, LiveError
 from hsp_control.common.suggestions import listing, nearest
 from hsp_control.control.measurement import Measurement as Measurement
+from hsp_control.live.operator_requests import OPERATOR
 from hsp_control.live.settings import LiveSettings
 from hsp_control.robot import Robot
 from hsp_control.simulation.control_chain import EffortSource
@@ -22,9 +23,13 @@ class Hardware(Protocol):
     second `read` on, it calls `read` and `write` once a period, and `close` at the end.
     If it has no valid state any more, it calls `close` without further writes.
 
-    Once the first effort is out, whatever the methods raise ends in the report. What
+    Once the first effort is out, whatever the methods raise ends in the report, also
+    what is no `Exception`. What
     `read` raises means that no state can arrive any more: the loop sends nothing more.
     After what `write` raises it goes on trying, with the safe stop.
+
+    One that runs in real time may have an attribute ``real_time`` that is true: its
+    clock is then compared with this computer's.
 
     Attributes:
         period: Time between two measurements [s].
@@ -62,7 +67,9 @@ def described(error: BaseException) -> str:
     name = type(error).__name__
     try:
         message = str(error)
-    except Exception:
+    except OPERATOR:
+        raise
+    except BaseException:
         return name
     if isinstance(error, HspControlError | OSError) and message:
         return message

@@ -216,8 +216,9 @@ class Link:
     """One end of a UDP connection.
 
     Every received packet is one of: accepted; corrupted (incomplete or changed);
-    foreign (of another session); duplicated (the newest again); stale (older than the
-    newest). `receive` returns the accepted ones only.
+    foreign (of another session, or of a kind that the other end does not send: our own
+    that came back); duplicated (the newest again); stale (older than the newest).
+    `receive` returns the accepted ones only.
     """
 
     def __init__(
@@ -228,9 +229,20 @@ class Link:
         peer: Address | None = None,
         faults: Faults | None = None,
         stream: int = 0,
+        hears: PacketKind | None = None,
     ) -> None:
-        """Open the socket."""
+        """Open the socket.
+
+        Args:
+            session: Number of the session.
+            address: Where to listen.
+            peer: The other end's address; None: that of its first packet.
+            faults: Faults to inject into packets sent.
+            stream: Number of the stream of random numbers.
+            hears: What the other end sends besides BYE; None: anything.
+        """
         self.session, self.peer = session, peer
+        self._hears = hears
         self._faults = FaultInjector(faults or Faults(), stream)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
@@ -245,6 +257,7 @@ class Link:
             ) from error
         self.address: Address = self._socket.getsockname()
         self.newest = self._sent = 0
+        self._byes: set[int] = set()  # when ours were sent [ns]
         self.counts: Counter[str] = Counter(
             dict.fromkeys(
                 ("sent", "accepted", "corrupted", "foreign", "duplicated", "stale"), 0
@@ -275,16 +288,12 @@ class Link:
             raise HardwareError("no packet of the robot has arrived yet")
         self._sent += 1
         self.counts["sent"] += 1
+        stamp = monotonic_ns()
         packet = Packet(
-            kind,
-            phase,
-            self.session,
-            self._sent,
-            self.newest,
-            monotonic_ns(),
-            t,
-            payload,
+            kind, phase, self.session, self._sent, self.newest, stamp, t, payload
         )
+        if kind is PacketKind.BYE:
+            self._byes.add(stamp)
         # A BYE must arrive: faults are injected only into packets that repeat.
         if kind is PacketKind.BYE:
             sent = [*self._faults.flush(), encode(packet)]
@@ -332,7 +341,7 @@ class Link:
         kind = "accepted"
         if packet is None:
             kind = "corrupted"
-        elif packet.session != self.session:
+        elif packet.session != self.session or self._is_reflected(packet):
             kind = "foreign"
         elif packet.sequence == self.newest:
             kind = "duplicated"
@@ -343,6 +352,12 @@ class Link:
             return None
         self.newest, self.peer = packet.sequence, sender
         return packet
+
+    def _is_reflected(self, packet: Packet) -> bool:
+        """Return whether a packet is our own, or one of that kind."""
+        if self._hears is not None and packet.kind is not PacketKind.BYE:
+            return packet.kind is not self._hears
+        return packet.kind is PacketKind.BYE and packet.stamp in self._byes
 
 
 class AgeEstimator:

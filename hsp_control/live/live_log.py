@@ -101,7 +101,9 @@ class LoopLog:
             return
         try:
             self._log.record(*self._row(phase, reader, limiter, response))
-        except Exception:  # after Ctrl-C the row is written again
+        except KeyboardInterrupt:  # the row is written again
+            raise
+        except BaseException:
             self._failed = True
             raise
         self._due.written(state.t, phase)
@@ -135,6 +137,11 @@ class LoopLog:
         }
         self._log.end(report.status, report.reason, live=summary)
 
+    def abandon(self) -> None:
+        """Close the journal of a run that did not begin; another one may write it."""
+        if self._log is not None:
+            self._log.close()
+
     def _row(
         self, phase: Phase, reader: StateReader, limiter: EffortLimiter, response: float
     ) -> tuple[RobotState, ControlOutput | None, Array, Mapping[str, LogChannel]]:
@@ -165,6 +172,8 @@ class LoopLog:
             return self._chain.command.output
         try:
             return self._chain.command.controller.compute(state)
-        except Exception:  # its effort is not used any more: log without it
+        except KeyboardInterrupt:
+            raise
+        except BaseException:  # its effort is not used any more: log without it
             self.controller_failed = True
             return None

@@ -25,7 +25,11 @@ from hsp_control.geometry.scene import Scene
 from hsp_control.live.effort_limiter import EffortLimiter
 from hsp_control.live.hardware import Hardware, described
 from hsp_control.live.live_log import LoopLog
-from hsp_control.live.operator_requests import OperatorRequests, stop_signals
+from hsp_control.live.operator_requests import (
+    OPERATOR,
+    OperatorRequests,
+    stop_signals,
+)
 from hsp_control.live.real_time import no_garbage_collection, real_time_priority
 from hsp_control.live.report import Ended, LoopReport
 from hsp_control.live.safe_stop import Phase, SafeStop, StandingFeet
@@ -62,10 +66,11 @@ def run_loop(
     Every run ends with a safe stop, damping and then hold (`SafeStop`); then the
     hardware is closed. Faults are: a state that is malformed, not finite, missing,
     frozen, too old, outside the limits, or further from the last one than the robot can
-    be; a clock of the robot that jumps; a robot that stopped by itself or cannot be
-    reached; a fall; any exception of the hardware, the controller, the plan or a
-    change. Once real-time
-    operation has begun, nothing is raised; the report contains the fault.
+    be; a velocity that contradicts the positions, an effort that was not sent, a clock
+    that does not fit; a robot that stopped by itself or cannot be reached; a fall; all
+    that the hardware, the controller, the plan, a change or ``on_period`` raises, also
+    what is no `Exception`, such as `asyncio.CancelledError`. Once real-time operation
+    has begun, nothing is raised; the report contains the fault.
 
     Ctrl-C and SIGTERM are the operator's stop (`stop_signals`).
 
@@ -107,6 +112,7 @@ def run_loop(
     controller = source.controller
     robot, period = controller.robot, hardware.period
     requests = requests or OperatorRequests()
+    loop_log: LoopLog | None = None
     with stop_signals(requests):
         try:
             _check(period, duration, log_period)
@@ -150,8 +156,10 @@ def run_loop(
             with real_time_priority(priority), no_garbage_collection():
                 loop.run(on_period)
         except BaseException:
-            with suppress(Exception):  # the first error is what matters
+            with suppress(BaseException):  # the first error is what matters
                 hardware.close()
+            if loop_log is not None:
+                loop_log.abandon()
             raise
         return loop.finish()
 
@@ -236,7 +244,7 @@ class LiveRun:
     phase: Phase = Phase.RUNNING  # running, damping or holding
     ended: Ended = "completed"
     reason: str = ""
-    error: Exception | None = None
+    error: BaseException | None = None
     # how it will end, and why, once the plan has brought the robot to rest
     ending: tuple[Ended, str] | None = None
     asked_at: float = 0.0  # when that was asked for [s]
@@ -252,16 +260,19 @@ class LiveRun:
         while not self.done:
             try:
                 self.one_period(on_period)
-            except (KeyboardInterrupt, SystemExit) as request:
+            except OPERATOR as request:
                 if self.phase != Phase.RUNNING:  # the second: the robot must stop
                     self.silent = self.done = self.abandoned = True
                 name = "Ctrl-C" if isinstance(request, KeyboardInterrupt) else "exit"
                 reason = f"stopped by the operator ({name})"
+                # Who raises it in the law would raise it again in the stop.
+                self.log.controller_failed |= self.chain.plan is None
                 if self.ending is None:
                     self.end_regularly("operator", reason)
                 else:
+                    self.log.controller_failed = True
                     self.stop("operator", reason)
-            except Exception as error:  # nobody knows what to send now
+            except BaseException as error:  # nobody knows what to send now
                 self.silent = self.done = True
                 self.fail(error)
 
@@ -287,7 +298,7 @@ class LiveRun:
         if tau is not None and not limiter.apply(tau, reader.state.q):
             self.stop("fault", f"the effort is not finite: {tau.tolist()}")
         self.send(before)
-        response = reader.effort_sent()
+        response = reader.effort_sent(limiter.applied)
         self.report_applied_effort()
         self.log_row(response)
         if self.phase == Phase.RUNNING:
@@ -304,7 +315,7 @@ class LiveRun:
         except FallError as error:
             self.fall(str(error))
 
-    def fall(self, reason: str, error: Exception | None = None) -> None:
+    def fall(self, reason: str, error: BaseException | None = None) -> None:
         """Stop a robot that falls: its feet hold it no more."""
         self.detector = None
         self.safe_stop.feet.lift()
@@ -329,7 +340,9 @@ class LiveRun:
             self.log.controller_failed = True
             self.fall(str(error), error)
             return None
-        except Exception as error:  # a user's task or field may raise anything
+        except OPERATOR:
+            raise
+        except BaseException as error:  # a user's task or field may raise anything
             self.log.controller_failed = True
             self.fail(error)
             return None
@@ -359,7 +372,9 @@ class LiveRun:
         if waited or (plan.rests and still):
             self.stop(*self.ending)
 
-    def stop(self, ended: Ended, reason: str, error: Exception | None = None) -> None:
+    def stop(
+        self, ended: Ended, reason: str, error: BaseException | None = None
+    ) -> None:
         """Start the safe stop; later calls change neither it nor the reason."""
         if self.phase != Phase.RUNNING:
             if ended == "fault":
@@ -369,7 +384,7 @@ class LiveRun:
         self.ended, self.reason, self.error = ended, reason, error
         self.safe_stop.begin()
 
-    def fail(self, error: Exception) -> None:
+    def fail(self, error: BaseException) -> None:
         """Stop because of what a user's code or the law raised."""
         name = type(error).__name__
         text = described(error)
@@ -382,9 +397,11 @@ class LiveRun:
             self.limiter.no_measurement()
             return
         has = measurement.applied
-        if has is not None and not self.limiter.can_have(has):
-            self.stop("fault", f"the robot says it has an effort of {has.tolist()}")
-            has = None
+        if has is not None:
+            wrong = self.limiter.contradiction(has, halted=measurement.halted)
+            if wrong is not None:
+                self.stop("fault", wrong)
+                has = None
         if self.limiter.robot_has(has):
             self.report_applied_effort()
 
@@ -394,7 +411,9 @@ class LiveRun:
             return
         try:
             self.chain.command.applied(self.limiter.applied, self.hardware.period)
-        except Exception as error:
+        except OPERATOR:
+            raise
+        except BaseException as error:
             self.fail(error)
 
     def send(self, before: Array) -> None:
@@ -403,7 +422,9 @@ class LiveRun:
             return
         try:
             self.hardware.write(self.limiter.sent.copy())
-        except Exception as error:  # a driver may raise anything
+        except OPERATOR:
+            raise
+        except BaseException as error:  # a driver may raise anything
             self.limiter.replace_sent(before)
             reason = f"the effort cannot be sent: {described(error)}"
             self.stop("fault", reason, error)
@@ -422,7 +443,9 @@ class LiveRun:
             except KeyboardInterrupt:
                 write()
                 raise
-        except Exception as error:  # the disk is full, or a user's task raises
+        except OPERATOR:
+            raise
+        except BaseException as error:  # the disk is full, or a user's task raises
             self.fail(error)
 
     def rest_of_period(self, on_period: Callable[[float], object] | None) -> None:
@@ -431,7 +454,9 @@ class LiveRun:
             self.requests.run_pending()
             if on_period is not None:
                 on_period(self.reader.state.t)
-        except Exception as error:
+        except OPERATOR:
+            raise
+        except BaseException as error:
             self.fail(error)
 
     def finish(self) -> LoopReport:
@@ -443,7 +468,7 @@ class LiveRun:
     def report(self) -> LoopReport:
         """Return how the run ended."""
         state = self.reader.state
-        speed = float(np.abs(state.v).max())
+        speed = self.reader.speed
         standing = speed <= self.settings.stop.standstill
         at_rest = standing and self.safe_stop.done and not self.silent
         ended, reason = self.ended, self.reason
@@ -472,7 +497,7 @@ class LiveRun:
                 if last:
                     self._add(f"{what}: {described(interrupt)}")
                 continue
-            except Exception as error:
+            except BaseException as error:
                 self._add(f"{what}: {described(error)}")
                 self.error = self.error or error
             return

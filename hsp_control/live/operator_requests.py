@@ -41,6 +41,10 @@ class OperatorRequests:
             self._changes.popleft()()
 
 
+OPERATOR = (KeyboardInterrupt, SystemExit)
+"""What an operator raises, or a program that ends. All else that is no `Exception`,
+such as `asyncio.CancelledError` or a panic of an extension, is a fault."""
+
 _KINDS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _DEFAULTS = (signal.SIG_DFL, signal.default_int_handler)
 

@@ -109,7 +109,7 @@ class LoopReport:
     at_rest: bool
     t: float
     deadlines: Deadlines
-    error: Exception | None = None
+    error: BaseException | None = None
     log: Path | None = None
 
     @property

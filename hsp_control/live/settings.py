@@ -90,6 +90,9 @@ class LiveSettings(Part, error=LiveError):
     """How far a measured joint position may exceed its limits [rad or m]."""
     velocity_margin: NonNegative = 0.1
     """How far a measured joint speed may exceed its limit, as a fraction of it [-]."""
+    velocity_error: Positive = 0.3
+    """How far a measured joint velocity may be from the slopes of its positions in the
+    last 50 ms [rad/s or m/s]: six times its noise."""
     start_timeout: Positive = 10.0
     """Maximum time to wait for the first state [s]."""
     watchdog: PositiveCount = 20

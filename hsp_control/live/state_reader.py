@@ -2,19 +2,21 @@
 
 from collections.abc import Callable
 from contextlib import nullcontext
-from math import isfinite, ulp
+from math import exp, inf, isfinite, ulp
 from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
 
-from hsp_control.common.arrays import Array
+from hsp_control.common.arrays import Array, Flags
 from hsp_control.common.exceptions import HardwareError, HspControlError
 from hsp_control.constraints.limits import RobotLimits, own_limits
 from hsp_control.control.measurement import Inertial
 from hsp_control.live.hardware import Hardware, Measurement, described
+from hsp_control.live.operator_requests import OPERATOR
 from hsp_control.live.report import Deadlines
 from hsp_control.live.settings import LiveSettings
+from hsp_control.live.trusted_motion import TrustedMotion
 from hsp_control.robot import Robot, RobotState
 
 
@@ -71,9 +73,9 @@ def valid_measurement(raw: object, robot: Robot, period: float) -> Measurement:
         )
     try:
         return _checked(raw, robot, period)
-    except HardwareError:
+    except (HardwareError, *OPERATOR):
         raise
-    except Exception as error:  # an array-like object may raise anything
+    except BaseException as error:  # an array-like object may raise anything
         raise HardwareError(
             f"the state cannot be read: {type(error).__name__}"
         ) from error
@@ -243,16 +245,22 @@ class MeasurementMonitor:
         """Return whether the measurement is later than the last one."""
         return self.last is None or measurement.sequence > self.last.sequence
 
-    def jump(self, measurement: Measurement) -> str | None:
-        """Return why the robot cannot have come here from the last state, or None."""
+    def jumps(
+        self, measurement: Measurement, judged: Flags
+    ) -> tuple[Flags, str | None]:
+        """Return the joints that cannot have come here from the last state, and why.
+
+        Only those are judged that are true in ``judged``, shape (nv,).
+        """
         last = self.last
         if last is None:
-            return None
+            return np.zeros(self._robot.nv, dtype=bool), None
         passed = max(measurement.t - last.t, 0.0)
         passed = max(passed, (measurement.sequence - last.sequence) * self._period)
-        moved = self._robot.difference(last.q, measurement.q)
+        moved = self._robot.difference(last.q, measurement.q) * judged
         furthest = self._speed * passed + self._settings.position_margin
-        return self._outside(moved, -furthest, furthest, "jumps by")
+        why = self._outside(moved, -furthest, furthest, "jumps by")
+        return np.abs(moved) > furthest, why
 
     def violation(self, measurement: Measurement) -> str | None:
         """Return why the loop must stop at a valid state, or None."""
@@ -296,34 +304,80 @@ class RobotClock:
 
     Between two measurements the robot's clock may advance by the periods that their
     sequence numbers tell, or by the tolerated number of missing states. It may stand
-    before the robot starts, and for the tolerated number of states later.
+    before the robot starts, and for the tolerated number of states later. In some
+    hundred states it may not gain or lose more than that either. Of a robot in real
+    time it may not run faster than ours; a slower one shows in the numbers of states,
+    or is a robot that was held up.
 
     After a jump the controller's time goes on by one period: the safe stop that follows
     needs no other.
     """
 
     def __init__(
-        self, start_time: float, period: float, tolerated: int, start_periods: float
+        self,
+        start_time: float,
+        period: float,
+        tolerated: int,
+        start_periods: float,
+        *,
+        real_time: bool = False,
     ) -> None:
         self._start_time, self._period = start_time, period
         self._tolerated, self._start_periods = tolerated, start_periods
+        self._real_time = real_time
         self.restart()
 
     def restart(self) -> None:
         """Begin again with the next measurement."""
         self._last: Measurement | None = None
         self._offset, self._standing, self._moved = 0.0, 0, False
+        self._gained = 0.0  # by the clock, against the number of states [s]
+        self._lead = self._lead_before = -inf  # the greatest against ours [s]
+        self._window_end = -inf
+        self.right = True  # whether it was never wrong
 
     def time(self, measurement: Measurement) -> float:
         """Return the controller's time of the last measurement [s]."""
         return measurement.t + self._offset
 
-    def fault(self, measurement: Measurement) -> str | None:
-        """Return why the clock cannot be right at a new measurement, or None."""
+    def fault(self, measurement: Measurement, arrival: float) -> str | None:
+        """Return why the clock cannot be right at a new measurement, or None.
+
+        ``arrival`` is when it arrived, by our clock [s].
+        """
         last, self._last = self._last, measurement
         if last is None:
             self._offset = self._start_time - measurement.t
             return None
+        fault = self._step_fault(measurement, last) or self._runs_fast(
+            measurement.t, arrival
+        )
+        self.right &= fault is None
+        return fault
+
+    def passed(self, measurement: Measurement, last: Measurement) -> float:
+        """Return the time between two states [s], by their numbers if it was wrong."""
+        states = measurement.sequence - last.sequence
+        return measurement.t - last.t if self.right else states * self._period
+
+    def _runs_fast(self, t: float, arrival: float) -> str | None:
+        """Compare the clock with ours: delays make it late, nothing makes it early."""
+        if not (self._real_time and self._moved):
+            return None
+        lead = t - arrival
+        if arrival > self._window_end:
+            self._lead_before, self._lead = self._lead, -inf
+            self._window_end = arrival + _CLOCK_WINDOW
+        self._lead = max(self._lead, lead)
+        gained = lead - self._lead_before
+        if self._lead_before == -inf or gained <= _LARGEST_LEAD:
+            return None
+        return (
+            f"the robot's clock runs faster than this computer's: it has gained "
+            f"{gained:.3g} s within {_CLOCK_WINDOW:g} s"
+        )
+
+    def _step_fault(self, measurement: Measurement, last: Measurement) -> str | None:
         passed, period = measurement.t - last.t, self._period
         states = measurement.sequence - last.sequence
         longest = (max(states, self._tolerated + 1) + 1) * period
@@ -338,9 +392,29 @@ class RobotClock:
         allowed = self._tolerated if self._moved else self._start_periods
         if self._standing > allowed:
             return f"the robot's clock stands still for {self._standing} states"
-        return None
+        if not self._moved:
+            return None
+        leak = exp(-states / _CLOCK_STATES)
+        self._gained = leak * self._gained + passed - states * period
+        if abs(self._gained) <= (self._tolerated + 1) * period:
+            return None
+        gained, self._gained = self._gained, 0.0
+        return (
+            f"the robot's clock does not fit the number of its states: it has gained "
+            f"{gained:.3g} s within some {_CLOCK_STATES} periods of {period:g} s"
+        )
 
 
+_CLOCK_STATES = 100
+"""States after which what the robot's clock has gained counts for less."""
+_CLOCK_WINDOW = 2.0
+"""How long a robot's clock is compared with ours [s]."""
+_LARGEST_LEAD = 0.1
+"""How much it may gain from one such window to the next [s]."""
+
+
+_FEW = 5
+"""Missing states in a row after which a speed is that of the model, not of the last."""
 _READ_MARGIN = 0.5
 """How late a state may be before its period counts as one without a state [periods]."""
 
@@ -362,17 +436,19 @@ class StateReader:
         self._monitor = MeasurementMonitor(robot, limits, settings, self._period)
         self._reckoning = DeadReckoning(robot, self._period)
         self._frozen = FrozenState(robot, self._period, settings.missing)
+        self._motion = TrustedMotion(robot, settings, self._period)
         self._robot_clock = RobotClock(
             start_time,
             self._period,
             settings.missing,
             settings.start_timeout / self._period,
+            real_time=bool(getattr(hardware, "real_time", False)),
         )
         self._missing = 0
         # the new, valid measurement of this period, or None
         self.measurement: Measurement | None = None
         self.fault: str | None = None  # why the robot must be stopped, or None
-        self.error: Exception | None = None  # what the hardware raised, or None
+        self.error: BaseException | None = None  # what the hardware raised, or None
         self.connection_lost = False  # whether no state can arrive any more
         # when this period's state arrived, by the loop's clock [s]
         self.arrival = self._last_arrival = self._due = clock()
@@ -385,8 +461,16 @@ class StateReader:
 
     @property
     def predicted_for(self) -> float:
-        """Time since the last measurement [s]."""
-        return self._reckoning.predicted_for
+        """Time since the last measurement, of a joint or of all [s]."""
+        return max(self._reckoning.predicted_for, self._motion.unknown_for)
+
+    @property
+    def speed(self) -> float:
+        """Speed of the fastest joint, a mean of some milliseconds, or as predicted."""
+        mean = self._motion.mean_velocity
+        if mean is None or self._missing > _FEW:
+            mean = self.state.v
+        return float(np.abs(mean).max())
 
     def wait_for_first(self) -> Measurement:
         """Wait for the first state, and return it."""
@@ -402,7 +486,7 @@ class StateReader:
                 fault = str(error)
             if fault is not None:
                 raise HardwareError(f"the robot cannot be started: {fault}")
-            self._robot_clock.fault(measurement)
+            self._robot_clock.fault(measurement, self._clock())
             self._accept(measurement)
             return measurement
         raise HardwareError(
@@ -412,6 +496,7 @@ class StateReader:
     def start(self) -> None:
         """Start real-time operation; states skipped before do not count."""
         self._monitor.last = None
+        self._motion.restart()
         self._robot_clock.restart()
         self._last_arrival = self._clock()
         self._due = self._last_arrival + (1.0 + _READ_MARGIN) * self._period
@@ -428,9 +513,10 @@ class StateReader:
             self.deadlines.skipped_states += new.sequence - last.sequence - 1
         self._accept(new)
 
-    def effort_sent(self) -> float:
-        """Record that the period's effort was sent; return the response time [s]."""
+    def effort_sent(self, applied: Array) -> float:
+        """Record the effort that acts now, (nv,); return the response time [s]."""
         response = self._clock() - self.arrival
+        self._motion.applied(self.state.q, self.state.v, applied)
         if self.measurement is not None:
             self.deadlines.add(self.arrival - self._last_arrival, response)
             self._last_arrival = self.arrival
@@ -441,7 +527,9 @@ class StateReader:
         """Return the new measurement if it is the robot's state; set the fault."""
         try:
             raw = self._hardware.read(max(self._due - self._clock(), 0.0))
-        except Exception as error:  # a driver may raise anything
+        except OPERATOR:
+            raise
+        except BaseException as error:  # a driver may raise anything
             self.fault, self.error = f"no state can be read: {described(error)}", error
             self.connection_lost = True
             raw = None
@@ -455,12 +543,24 @@ class StateReader:
             return None
         if not self._monitor.is_new(new):
             return None
-        self.fault = self._robot_clock.fault(new) or self._monitor.violation(new)
-        untrue = self._frozen.fault(new, applied) or self._monitor.jump(new)
-        if untrue is not None:
-            self.fault = self.fault or untrue
+        clock_fault = self._robot_clock.fault(new, self.arrival)
+        self.fault = self._monitor.violation(new) or clock_fault
+        frozen = self._frozen.fault(new, applied)
+        trusted = self._trusted(new)
+        if frozen is not None:
+            self.fault = self.fault or frozen
             return None
-        return new
+        return trusted
+
+    def _trusted(self, new: Measurement) -> Measurement | None:
+        """Return what can be trusted of a measurement; None: not used, no fault yet."""
+        motion = self._motion
+        last = motion.last
+        passed = 0.0 if last is None else self._robot_clock.passed(new, last)
+        jumps, why = self._monitor.jumps(new, motion.trusted_positions)
+        trusted = motion.update(new, passed, jumps)
+        self.fault = self.fault or why or motion.fault
+        return None if motion.doubtful else trusted
 
     def _accept(self, measurement: Measurement) -> None:
         self._monitor.last = self.measurement = measurement

@@ -96,6 +96,8 @@ class UdpHardware:
         closed: Whether `close` was called.
     """
 
+    real_time = True
+
     def __init__(
         self,
         robot: Robot,
@@ -123,7 +125,9 @@ class UdpHardware:
         self._robot = robot
         self._sensors = SensorLayout() if sensors is None else sensors
         session = secrets.randbits(63) if session is None else session
-        self.link = Link(session, address, faults=faults, stream=1)
+        self.link = Link(
+            session, address, faults=faults, stream=1, hears=PacketKind.STATE
+        )
         self._age_estimator = AgeEstimator()
         self.closed = False
 

@@ -14,19 +14,22 @@ another one follows when columns are added or grow. A row is the columns' number
 the order of the heading. The end is JSON: the status of the run and more. A note is
 JSON of another kind: a sweep's journal has one for each run.
 Each frame is one `write`. After that the operating system has it, and a killed process
-loses nothing that it wrote. Reading stops at the first incomplete frame.
+loses nothing that it wrote. Reading stops at an incomplete frame at the end. A damaged
+frame is left out; if its length is damaged, the next whole frame is searched.
 """
 
 import fcntl
 import json
 import math
 import os
+import re
 import struct
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
+from weakref import WeakSet
 
 import numpy as np
 
@@ -36,15 +39,25 @@ from hsp_control.common.exceptions import LogError
 MAGIC = b"hsp_control journal 1\n"
 KILLED = "the journal has no end: its writer was killed"
 
+LARGEST_ROW = 100_000_000
+"""Most bytes of a row; a heading that declares more is none."""
+
 _FRAME = struct.Struct("<cII")
+_KINDS = re.compile(b"[HRNE]")
+_LARGEST_SEARCH = 1_000_000_000
+"""Most bytes whose check is computed in the search for a whole frame."""
 _HEADING, _ROW, _NOTE, _END = b"H", b"R", b"N", b"E"
 
 Shapes = Mapping[str, tuple[int, ...]]
 """The shape of each column in one row."""
 
 
+_writers: "WeakSet[JournalWriter]" = WeakSet()
+"""The journals that this process writes."""
+
+
 class JournalWriter:
-    """Writes a journal."""
+    """Writes a journal; nobody else can meanwhile, until it is closed or forgotten."""
 
     def __init__(self, path: Path, resumed: "JournalReader | None" = None) -> None:
         """Begin a journal, or go on after what a reader of it has read.
@@ -52,11 +65,12 @@ class JournalWriter:
         Else an existing file is overwritten, unless another process writes it.
         """
         self.path = path  # the file
+        self._file = -1
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND
+            flags = os.O_RDWR | os.O_CREAT | os.O_APPEND
             self._file = os.open(path, flags, 0o644)
-        except OSError as error:
+        except (OSError, ValueError) as error:
             raise self._failure(error) from error
         try:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -65,9 +79,12 @@ class JournalWriter:
             if not kept:
                 self._put(MAGIC)
             self._size = kept or len(MAGIC)
-        except OSError as error:
+        except BaseException as error:
             self.close()
-            raise self._failure(error) from error
+            if isinstance(error, OSError):
+                raise self._failure(error) from error
+            raise
+        _writers.add(self)
 
     def write_heading(self, shapes: Shapes, meta: Mapping[str, Any]) -> None:
         """Write a heading for the next rows."""
@@ -82,14 +99,36 @@ class JournalWriter:
         self._frame(_NOTE, _json(note))
 
     def write_end(self, status: str, message: str, **meta: Any) -> None:
-        """Write how the run ended, and meta data that replaces the heading's."""
+        """Write how the run ended, and meta data that replaces the heading's.
+
+        If the file or its folder was deleted meanwhile, it is made anew.
+        """
         self._frame(_END, _json({"status": status, "message": message, **meta}))
+        try:
+            if os.fstat(self._file).st_nlink == 0:
+                self._write_again()
+        except OSError as error:
+            raise self._failure(error) from error
+
+    def _write_again(self) -> None:
+        """Write all that is in the deleted file to another one of its name."""
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        with self.path.open("xb") as file:
+            at = 0
+            while data := os.pread(self._file, 1 << 20, at):
+                file.write(data)
+                at += len(data)
 
     def close(self) -> None:
         """Close the file; a second call does nothing."""
         if self._file >= 0:
             os.close(self._file)
             self._file = -1
+            _writers.discard(self)
+
+    def __del__(self) -> None:
+        """Close the file of a writer that nobody has closed."""
+        self.close()
 
     def _frame(self, kind: bytes, payload: bytes) -> None:
         """Write a frame, whole or not at all: what cuts it short takes it back."""
@@ -109,10 +148,14 @@ class JournalWriter:
         while data:  # a nearly full disk may take only a part
             data = data[os.write(self._file, data) :]
 
-    def _failure(self, error: OSError) -> LogError:
-        reason = error.strerror or str(error)
+    def _failure(self, error: OSError | ValueError) -> LogError:
+        reason = getattr(error, "strerror", None) or str(error)
         if isinstance(error, BlockingIOError):
             reason = "another process writes it; wait for it, or give another --out"
+            if any(
+                writer.path.absolute() == self.path.absolute() for writer in _writers
+            ):
+                reason = "this program writes it already: close that log first"
         return LogError(f"{self.path}: cannot write the journal: {reason}")
 
 
@@ -127,6 +170,7 @@ class JournalReader:
         self.count = 0  # the rows that were read
         self.ended = False  # whether the writer has written its end
         self.notes: list[Any] = []  # all of them
+        self.damaged = 0  # the frames that were left out
         self._most, self._at = most, len(MAGIC)
         self._parts: list[tuple[Shapes, list[Array]]] = []
 
@@ -138,21 +182,45 @@ class JournalReader:
         """
         before = self.count
         for kind, payload in self._frames():
-            if kind == _HEADING:
-                heading = json.loads(payload)
-                self.meta = heading["meta"]
-                shapes = {n: tuple(s) for n, s in heading["columns"].items()}
-                self._parts.append((shapes, []))
-            elif kind == _ROW and self._parts:
-                self._parts[-1][1].append(np.frombuffer(payload, "<f8"))
-                self.count += 1
-                if self._most is not None:
-                    del self._parts[:-1], self._parts[-1][1][: -self._most]
-            elif kind == _NOTE:
-                self.notes.append(json.loads(payload))
-            elif kind == _END:
-                self.meta, self.ended = {**self.meta, **json.loads(payload)}, True
+            try:
+                self._take(kind, payload)
+            except LogError:
+                raise
+            except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+                what = {_HEADING: "heading", _NOTE: "note"}.get(kind, "end")
+                raise LogError(
+                    f"{self.path}: a {what} of the journal is none"
+                ) from None
         return self.count - before
+
+    def _take(self, kind: bytes, payload: bytes) -> None:
+        """Use a frame."""
+        if kind == _HEADING:
+            heading = json.loads(payload)
+            shapes = {n: tuple(s) for n, s in heading["columns"].items()}
+            sizes = [size for shape in shapes.values() for size in shape]
+            if not all(type(size) is int and size >= 0 for size in sizes):
+                raise ValueError
+            if 8 * width(shapes) > LARGEST_ROW:
+                raise LogError(
+                    f"{self.path}: a row would have {8 * width(shapes):g} bytes; at "
+                    f"most {LARGEST_ROW:g}"
+                )
+            self.meta = dict(heading["meta"])
+            self._parts.append((shapes, []))
+        elif kind == _ROW:
+            # After a heading that was lost its rows have other lengths.
+            if not self._parts or len(payload) != 8 * width(self._parts[-1][0]):
+                self.damaged += 1
+                return
+            self._parts[-1][1].append(np.frombuffer(payload, "<f8"))
+            self.count += 1
+            if self._most is not None:
+                del self._parts[:-1], self._parts[-1][1][: -self._most]
+        elif kind == _NOTE:
+            self.notes.append(json.loads(payload))
+        elif kind == _END:
+            self.meta, self.ended = {**self.meta, **json.loads(payload)}, True
 
     def whole(self) -> int:
         """Read what has come, and return how many bytes of all are whole frames."""
@@ -168,6 +236,8 @@ class JournalReader:
     def _frames(self) -> Iterator[tuple[bytes, bytes]]:
         """Yield kind and payload of every new frame before the first incomplete one."""
         try:
+            if self.path.exists() and not self.path.is_file():
+                raise LogError(f"{self.path} is no journal")
             with self.path.open("rb") as file:
                 if not MAGIC.startswith(file.read(len(MAGIC))):
                     raise LogError(f"{self.path} is no journal")
@@ -175,17 +245,58 @@ class JournalReader:
                 data = file.read()
         except FileNotFoundError:  # its writer has not begun
             return
-        except OSError as error:
-            raise LogError(f"{self.path}: cannot be read: {error.strerror}") from error
+        except LogError:
+            raise
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "strerror", None) or str(error)
+            raise LogError(f"{self.path}: cannot be read: {reason}") from error
         at = 0
-        while at + _FRAME.size <= len(data):
-            kind, length, check = _FRAME.unpack_from(data, at)
-            payload = data[at + _FRAME.size : at + _FRAME.size + length]
-            if len(payload) < length or zlib.crc32(payload, zlib.crc32(kind)) != check:
-                return
-            at += _FRAME.size + length
-            self._at += _FRAME.size + length
+        while at < len(data):
+            payload = _whole_frame(data, at)
+            if payload is None:
+                # The last frame may still be written; others follow a damaged one.
+                after = _next_frame(data, at)
+                if after is None:
+                    return
+                self.damaged += 1
+                self._at += after - at
+                at = after
+                continue
+            kind = data[at : at + 1]
+            at += _FRAME.size + len(payload)
+            self._at += _FRAME.size + len(payload)
             yield kind, payload
+
+
+def _whole_frame(data: bytes, at: int) -> bytes | None:
+    """Return the payload of the frame at a place; None if none is there."""
+    if at + _FRAME.size > len(data):
+        return None
+    kind, length, check = _FRAME.unpack_from(data, at)
+    payload = data[at + _FRAME.size : at + _FRAME.size + length]
+    if len(payload) < length or zlib.crc32(payload, zlib.crc32(kind)) != check:
+        return None
+    return payload
+
+
+def _next_frame(data: bytes, at: int) -> int | None:
+    """Return where the next whole frame after a damaged one is; None if none is."""
+    _, length, _ = _FRAME.unpack_from(data.ljust(at + _FRAME.size, b"\0"), at)
+    expected: int = at + _FRAME.size + length
+    if _whole_frame(data, expected) is not None:
+        return expected
+    searched = 0
+    for found in _KINDS.finditer(data, at + 1):
+        place = found.start()
+        if place + _FRAME.size > len(data) or searched > _LARGEST_SEARCH:
+            return None
+        _, length, _ = _FRAME.unpack_from(data, place)
+        if place + _FRAME.size + length > len(data):
+            continue
+        searched += length
+        if _whole_frame(data, place) is not None:
+            return place
+    return None
 
 
 def is_journal(path: Path) -> bool:

@@ -25,6 +25,7 @@ from hsp_control.geometry.shapes import shape_to_log
 from hsp_control.law.problem import Record
 from hsp_control.null_space.metrics import FixedMetric
 from hsp_control.robot import Robot, RobotState
+from hsp_control.robot.recorded import robot_record
 from hsp_control.simulation.journal import JournalWriter
 from hsp_control.simulation.limit_excess import VELOCITY, LimitExcess
 from hsp_control.simulation.log_columns import (
@@ -118,6 +119,7 @@ class LogWriter:
             column(f"{prefix}.quaternion", (4,), "-", "orientation (x, y, z, w)")
         columns.lay_out()
         self._meta = dict(meta or {})
+        self._robot_record = robot_record(robot)
         self._journal = None if path is None else JournalWriter(path)
         self._headed: Array | None = None  # the row for which there is a heading
 
@@ -244,10 +246,17 @@ class LogWriter:
             return
         try:
             self._journal.write_end(status, message, **self._came_during_run(), **meta)
-        except Exception:  # not Ctrl-C, after which it may be called again
+        except KeyboardInterrupt:  # after which it may be called again
+            raise
+        except BaseException:
             self._journal.close()
             raise
         self._journal.close()
+
+    def close(self) -> None:
+        """Close the journal, if there is one, without an end."""
+        if self._journal is not None:
+            self._journal.close()
 
     def rollout(self, status: str, message: str, **meta: Any) -> Rollout:
         """Return the rows in memory as a rollout."""
@@ -273,6 +282,7 @@ class LogWriter:
                 "continuous": continuous_dofs(robot),
                 "skeleton_parents": self._parents,
                 "joint_coordinates": robot.source.joint_coordinates,
+                "record": self._robot_record,
             },
             "limits": {}
             if limits is None

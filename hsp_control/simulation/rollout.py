@@ -1,6 +1,8 @@
 """The rollout of a run: named columns with their descriptions, and its file."""
 
 import json
+import logging
+import math
 import zipfile
 import zlib
 from collections.abc import Callable, Mapping, Sequence
@@ -16,12 +18,17 @@ from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.declaration.language import spoken
 from hsp_control.robot import Robot, RobotState
 from hsp_control.simulation.journal import KILLED, JournalReader, is_journal
+from hsp_control.simulation.log_shapes import WrongColumnError, check_columns
+
+LARGEST = 20_000_000_000
+"""Most bytes of a log that is read."""
+_log = logging.getLogger(__name__)
 
 FORMAT = "hsp_control rollout 1"
 _REQUIRED = ("t", "q", "v", "tau")
 _UNREADABLE = (
     OSError, ValueError, EOFError, KeyError, NotImplementedError,
-    zipfile.BadZipFile, zlib.error,
+    zipfile.BadZipFile, zlib.error, RecursionError, MemoryError, TypeError,
 )  # fmt: skip
 """What a file raises that is cut, spoilt or something else."""
 
@@ -130,9 +137,9 @@ class Rollout:
             with part.open("wb") as file:
                 np.savez_compressed(file, allow_pickle=False, **arrays)
             part.replace(path)
-        except OSError as error:
+        except (OSError, ValueError) as error:  # a name may contain what none can
             _remove(part)
-            reason = error.strerror or str(error)
+            reason = getattr(error, "strerror", None) or str(error)
             raise LogError(f"{path}: cannot write the log: {reason}") from error
         except BaseException:  # also a second Ctrl-C: leave no temporary file
             _remove(part)
@@ -153,8 +160,16 @@ class Rollout:
             made = spoken(f"hsp run {path} writes", "load_experiment(...).run() makes")
             raise LogError(f"{path}: a configuration, not a log; {made} one")
         try:
+            if not (path.is_file() or path.is_dir()) and path.exists():
+                raise LogError(
+                    f"{path}: a device or a pipe, which may never end; no log"
+                )
             reading = _read_journal if is_journal(path) else _read_npz
             columns, meta = reading(path)
+            if meta.get("format") == FORMAT:
+                check_columns(columns, meta)
+        except WrongColumnError as error:
+            raise LogError(f"{path}: {error}") from None
         except LogError:
             raise
         except FileNotFoundError:
@@ -186,11 +201,18 @@ def _read_journal(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
     reader.read()
     if not reader.meta:
         why = "is a sweep's" if reader.notes else "ends before its first heading"
+        why = "has no whole heading: it is damaged" if reader.damaged else why
         raise LogError(f"{path}: the journal {why}")
     columns, meta = reader.rows(0), reader.meta
+    check_columns(columns, meta)
     complete_columns(columns, meta["robot"]["continuous"])
     if not reader.ended:
         meta = {**meta, "status": "interrupted", "message": KILLED}
+    if reader.damaged:
+        lost = f"{reader.damaged} damaged rows of the journal are left out"
+        _log.warning("%s: %s", path, lost)
+        meta = {**meta, "damaged": reader.damaged}
+        meta["message"] = "; ".join(filter(None, (meta.get("message"), lost)))
     return columns, meta
 
 
@@ -200,11 +222,14 @@ def _read_npz(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
         if not zipfile.is_zipfile(file):
             raise zipfile.BadZipFile("no archive")
         file.seek(0)
+        with zipfile.ZipFile(file) as archive:
+            _check_sizes(archive)
+        file.seek(0)
         with np.load(file, allow_pickle=False) as archive:
             columns = {name: archive[name] for name in archive.files}
     try:
         meta = json.loads(columns.pop("meta").item())
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, TypeError, ValueError, RecursionError):
         meta = None
     if not isinstance(meta, dict):
         raise LogError(
@@ -214,8 +239,29 @@ def _read_npz(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
     return {name: np.asarray(c, dtype=float) for name, c in columns.items()}, meta
 
 
+def _check_sizes(archive: zipfile.ZipFile) -> None:
+    """Check that arrays have the sizes that they declare, before memory is taken."""
+    total = 0
+    for entry in archive.infolist():
+        total += entry.file_size
+        with archive.open(entry) as file:
+            version = np.lib.format.read_magic(file)
+            read = {
+                (1, 0): np.lib.format.read_array_header_1_0,
+                (2, 0): np.lib.format.read_array_header_2_0,
+            }[version]
+            shape, _, kind = read(file)
+        if math.prod(shape) * kind.itemsize > entry.file_size:
+            size = math.prod(shape) * kind.itemsize
+            raise ValueError(
+                f"{entry.filename} declares {size:.3g} bytes and has {entry.file_size}"
+            )
+    if total > LARGEST:
+        raise ValueError(f"it has {total:.3g} bytes; at most {LARGEST:g} are read")
+
+
 def _remove(part: Path) -> None:
-    with suppress(OSError):  # its folder may not exist
+    with suppress(OSError, ValueError):  # its folder may not exist
         part.unlink(missing_ok=True)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from hsp_control.common.exceptions import HardwareError
 from hsp_control.common.suggestions import did_you_mean
 from hsp_control.companions.datagrams.targets import address_of
-from hsp_control.companions.shared import name_and_options, rate_of
+from hsp_control.companions.shared import Rate, name_and_options, rate_of
 from hsp_control.compiled.rotations import quaternion_from_rotation
 from hsp_control.declaration.nested import parts_within
 from hsp_control.robot import RobotState
@@ -77,10 +77,9 @@ class Teller:
             rate: Datagrams in a second of the controller's time [1/s].
             source: What computes the efforts.
         """
-        self._to, self._every, self._source = to, 1.0 / rate, source
+        self._to, self._rate, self._source = to, Rate(rate), source
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
-        self._next = float("-inf")
         self._number, self._said = 0, False
         robot, tasks = source.controller.robot, source.controller.tasks
         frames = [getattr(each, "frame", None) or robot.end_effector for each in tasks]
@@ -95,9 +94,8 @@ class Teller:
         Args:
             t: The controller's time [s].
         """
-        if t < self._next - 1e-9:
+        if not self._rate.due(t):
             return
-        self._next = t + self._every
         self._send({"phase": "running", **self._state()})
 
     def ended(self, ended: str, reason: str) -> None:

@@ -158,12 +158,15 @@ class GripperClient:
             while ready := select([self.inbox, link], [], [], waiting)[0]:
                 if link in ready:
                     return
-                text, sender = self.inbox.recvfrom(LONGEST)
+                try:
+                    text, sender = self.inbox.recvfrom(LONGEST)
+                except OSError:  # who was told something is not there any more
+                    continue
                 listeners.add(sender)
                 waiting = 0.0
                 try:
                     wanted = self.read(json.loads(text), sender, wanted)
-                except (ValueError, TypeError, LookupError) as error:
+                except Exception as error:  # a datagram may say anything
                     self.say(f"a message is dropped: {error}")
             try:
                 self.move(wanted)
@@ -173,10 +176,15 @@ class GripperClient:
                 continue
             answer = {"value": [0.5 * state.width], "grasped": state.is_grasped}
             for listener in listeners:
-                self.inbox.sendto(json.dumps(answer).encode(), listener)
+                try:
+                    self.inbox.sendto(json.dumps(answer).encode(), listener)
+                except OSError as error:
+                    self.say(f"{listener[0]}:{listener[1]} is not told: {error}")
 
     def read(self, message: Any, sender: tuple[str, int], wanted: float) -> float:
         """Return the opening that a message asks for, if it does."""
+        if not isinstance(message, dict):
+            raise ValueError("it needs a mapping with value: [OPENING]")
         value = message["values"][-1] if "values" in message else message.get("value")
         if value is None:
             return wanted
@@ -192,11 +200,11 @@ class GripperClient:
         """Open, or close and grasp what is there."""
         last = self.opening
         if abs(opening - last) > _SAME:
-            self.opening = opening
             if opening < last:
                 self.gripper.grasp(2.0 * opening, SPEED, FORCE, 0.1, 0.1)
             else:
                 self.gripper.move(2.0 * opening, SPEED)
+            self.opening = opening  # what failed is tried again when it is asked for
 
     def say(self, line: str) -> None:
         """Print a line once."""

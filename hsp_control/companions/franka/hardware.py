@@ -40,6 +40,7 @@ class FrankaHardware:
     """
 
     period = 0.001
+    real_time = True
 
     def __init__(
         self,

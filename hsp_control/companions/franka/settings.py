@@ -37,6 +37,10 @@ _Positive7 = Annotated[
 ]
 
 
+_FURTHEST = 2.0
+"""How far from the flange a load's centre of mass may be along an axis [m]."""
+
+
 class Load(Part, error=LiveError):
     """What the hand holds, beyond the end effector that Desk knows (``set_load``)."""
 
@@ -52,8 +56,15 @@ class Load(Part, error=LiveError):
         """Check that some body has this inertia.
 
         Raises:
-            LiveError: If none has: not symmetric, or moments a, b, c with a + b < c.
+            LiveError: If none has: not symmetric, moments a, b, c with a + b < c, or a
+                centre too far away.
         """
+        furthest = float(np.abs(np.asarray(self.center)).max())
+        if furthest > _FURTHEST:
+            raise LiveError(
+                f"the centre of mass is {furthest:g} m from the flange along an axis; "
+                f"at most {_FURTHEST:g} m"
+            )
         inertia = np.asarray(self.inertia)
         moments = np.linalg.eigvalsh(0.5 * (inertia + inertia.T))
         slack = 1e-9 + 1e-6 * abs(moments[2])

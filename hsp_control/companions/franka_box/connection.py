@@ -37,6 +37,10 @@ class ConnectionEnd(HardwareError):
     answered = False
 
 
+_PATIENCE = 2.0
+"""How long a client may say nothing at first, while another one waits [s]."""
+
+
 class Request(NamedTuple):
     """A request.
 
@@ -72,9 +76,14 @@ class Connection:
         self.udp.setblocking(False)
         self.udp.bind((host, 0))
         self._peer, self._buffer = (peer[0], 0), b""
-        self._sent = 0
+        self._sent, self._begun = 0, time.monotonic()
         self.connected = False
         self.outdated = self.late = self.malformed = 0
+
+    @property
+    def silent(self) -> bool:
+        """Whether it has not said for some time which version it speaks."""
+        return not self.connected and time.monotonic() - self._begun > _PATIENCE
 
     def requests(self) -> Iterator[Request]:
         """Yield the complete requests that have arrived; answer the first by itself."""

@@ -8,6 +8,7 @@ import socket
 import struct
 import time
 from contextlib import suppress
+from math import isfinite
 from select import select
 from threading import Thread
 
@@ -23,6 +24,10 @@ _PERIOD = 0.02
 _HEADER, _STATE = struct.Struct("<HII"), struct.Struct("<IddBH")
 _CONNECT, _HOMING, _GRASP, _MOVE, _STOP = range(5)
 _NUMBERS = {_CONNECT: "<HH", _HOMING: "<", _GRASP: "<5d", _MOVE: "<2d", _STOP: "<"}
+_LARGEST = 256
+"""Most bytes of a request."""
+_PATIENCE = 2.0
+"""How long a client may be silent amid a request, and before its first [s]."""
 _FAILED = 2
 """The status of what did not come about; that of success is 0."""
 
@@ -49,17 +54,23 @@ class Gripper(Thread):
         """Serve until the process ends."""
         while True:
             tcp, self._peer = self._listener.accept()[0], ("", 0)
-            with tcp, suppress(OSError, struct.error, KeyError):
+            tcp.settimeout(_PATIENCE)
+            with tcp, suppress(OSError, struct.error, KeyError, ValueError):
                 self._serve(tcp)
 
     def _serve(self, tcp: socket.socket) -> None:
         """Answer requests, until one cannot be read."""
+        begun = time.monotonic()
         while True:
             if not select([tcp], [], [], _PERIOD)[0]:
+                if not self._peer[1] and time.monotonic() - begun > _PATIENCE:
+                    return  # others wait
                 self._tell()
                 continue
             header = tcp.recv(_HEADER.size, socket.MSG_WAITALL)
             command, number, size = _HEADER.unpack(header)
+            if not _HEADER.size <= size <= _LARGEST:
+                raise ValueError(f"a request of {size} bytes")
             payload = tcp.recv(size - _HEADER.size, socket.MSG_WAITALL)
             given = struct.unpack(_NUMBERS[command], payload)
             if command == _CONNECT:  # the client's version is ours
@@ -77,6 +88,9 @@ class Gripper(Thread):
         goal, speed = (WIDEST, 0.05) if command == _HOMING else (given[0], given[1])
         if command == _GRASP:
             goal, inner, outer, speed, force = given
+        if not (isfinite(goal) and isfinite(speed) and speed > 0.0 and goal >= 0.0):
+            self._say(f"the gripper cannot go to {goal:g} m at {speed:g} m/s")
+            return False
         does = f"grasps with {force:g} N" if command == _GRASP else "goes"
         self._say(f"the gripper {does} to {1e3 * goal:.0f} mm")
         end = min(max(goal, self.thing if goal < self.width else 0.0), WIDEST)

@@ -26,7 +26,8 @@ Say = Callable[[str], object]
 _TOLERANCE = 1e-5
 """How far below zero a moment of inertia may be, by rounding [kg·m²]."""
 _NEAR = 1.0
-"""How far from the flange a load may be along an axis, and reach [m]."""
+"""How far from the flange a load or a frame may be along an axis, and reach [m]."""
+_NO_FRAME = f"not a homogeneous transform, or further than {_NEAR:g} m"
 _HEAVIEST = 1e4
 """Mass from which on it does not matter how much nobody can carry [kg]."""
 _STIFFEST = {"K_theta": np.full(7, 14250.0), "K_x": np.repeat([3000.0, 300.0], 3)}
@@ -157,21 +158,17 @@ class Requests:
         )
 
     def _set_ee_to_k(self, number: int, body: np.void) -> int:
-        frame = placement(body["EE_T_K"])
+        frame = _near(placement(body["EE_T_K"]))
         if frame is None:
-            return self._invalid(
-                FrankaCommand.SET_EE_TO_K, "not a homogeneous transform"
-            )
+            return self._invalid(FrankaCommand.SET_EE_TO_K, _NO_FRAME)
         self._box.model.EE_T_K = frame
         self._box.readings.set_end_effector(self._box.model)
         return FrankaStatus.SUCCESS
 
     def _set_ne_to_ee(self, number: int, body: np.void) -> int:
-        frame = placement(body["NE_T_EE"])
+        frame = _near(placement(body["NE_T_EE"]))
         if frame is None:
-            return self._invalid(
-                FrankaCommand.SET_NE_TO_EE, "not a homogeneous transform"
-            )
+            return self._invalid(FrankaCommand.SET_NE_TO_EE, _NO_FRAME)
         self._box.model.NE_T_EE = frame
         self._box.readings.set_end_effector(self._box.model)
         return FrankaStatus.SUCCESS
@@ -203,6 +200,13 @@ class Requests:
 
 
 _PHASES = ("acceleration", "nominal")
+
+
+def _near(frame: pin.SE3 | None) -> pin.SE3 | None:
+    """Return a frame that an end effector can have, else None."""
+    if frame is None or np.abs(frame.translation).max() > _NEAR:
+        return None
+    return frame
 
 
 def _is_stiffness(values: Array, of: str) -> bool:

@@ -186,6 +186,9 @@ class Server:
 
     def _accept(self) -> None:
         tcp, peer = self._listener.accept()
+        silent = self.client is not None and self.client.silent
+        if silent:  # it has not even said which version it speaks
+            self._part("it says nothing, and another one waits", broken=True)
         if self.client is not None:
             self._say(
                 f"refused: {peer[0]}:{peer[1]}, since {self.client.name} is connected"

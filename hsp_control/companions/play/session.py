@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import HspControlError, SimulationError
+from hsp_control.common.exceptions import SimulationError
 from hsp_control.companions.play.handles import Handles
 from hsp_control.companions.play.knobs import Knob
 from hsp_control.companions.play.operational_space import ComparedCommand
@@ -18,6 +18,7 @@ from hsp_control.companions.viewer.commands import path_element
 from hsp_control.config import Experiment
 from hsp_control.control.changes import Changes
 from hsp_control.control.controller import Controller
+from hsp_control.live.hardware import described
 from hsp_control.live.simulated_robot import sampled
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
@@ -119,9 +120,11 @@ class Session:
             state, output, tau, own = instant
             others = self._plant.log_channels(state.t, state.q, state.v, tau)
             self.recorder.record(state, output, tau, {**own, **others})
-        except HspControlError as error:
-            self.over = f"{error}; reset to go on"
-            _log.warning("%s", error)
+        except (KeyboardInterrupt, SystemExit):
+            raise
+        except BaseException as error:  # a user's task or field may raise anything
+            self.over = f"{described(error)}; reset to go on"
+            _log.warning("%s", described(error))
 
     # -- messages ---------------------------------------------------------------------
 

@@ -51,6 +51,8 @@ class Ros2Hardware:
         old: Number of states whose stamp was not later than the last one's.
     """
 
+    real_time = True
+
     def __init__(
         self, address: str, robot: Robot, period: float, *, timeout: float = 10.0
     ) -> None:

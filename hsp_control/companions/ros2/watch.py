@@ -16,7 +16,7 @@ from hsp_control.companions.ros2.messages import (
     Time,
 )
 from hsp_control.companions.ros2.node import Node, TopicPublisher
-from hsp_control.companions.shared import rate_of
+from hsp_control.companions.shared import Rate, rate_of
 from hsp_control.simulation.control_chain import EffortSource
 from hsp_control.tasks import Task
 
@@ -44,7 +44,7 @@ class Watched:
         """
         self._prefix, domain, options = parse(address, ("rate",))
         try:
-            self._every = 1.0 / rate_of(options)
+            self._rate = Rate(rate_of(options))
         except ValueError as error:
             raise HardwareError(f"{address}: {error}") from None
         self._source = effort_source
@@ -58,7 +58,6 @@ class Watched:
             if task.drawn in {_POSITION, _POSE}:
                 for what in ("reference", "actual"):
                     self._pose(task, what)
-        self._next = float("-inf")
 
     def __call__(self, t: float) -> None:
         """Publish, if it is time again.
@@ -66,9 +65,8 @@ class Watched:
         Args:
             t: The controller's time [s].
         """
-        if t < self._next - 1e-9:
+        if not self._rate.due(t):
             return
-        self._next = t + self._every
         stamp, state = time_ns(), self._source.state
         tau = self._source.output.tau
         self._states.send(self._joints.message(stamp, state.q, state.v, tau))

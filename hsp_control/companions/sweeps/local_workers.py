@@ -31,7 +31,7 @@ _ONE_THREAD = dict.fromkeys(
 
 _MAIN = f"from {main.__module__} import main; main()"
 
-_Results: TypeAlias = "queue.SimpleQueue[tuple[int, str] | Exception | None]"
+_Results: TypeAlias = "queue.SimpleQueue[tuple[int, str] | BaseException | None]"
 """Runs and results from the threads that serve workers; None: a thread has ended."""
 
 
@@ -94,7 +94,7 @@ class LocalWorkers:
                         break
                     reason, process = _end(process), None
                 done.put((run, crashed(reason) if result is None else result))
-        except Exception as error:
+        except BaseException as error:
             done.put(error)
         finally:
             if process is not None:

@@ -25,8 +25,8 @@ def run_task(task: str) -> str:
         status, message, rollout = _run(task)
         if rollout is not None:
             found = measures(rollout)
-    except Exception as error:  # one failed run must not end the sweep
-        status, message = "failed", f"{type(error).__name__}: {error}"
+    except BaseException as error:  # one failed run must not end the sweep
+        status, message = "failed", _described(error)
     return json.dumps(
         {
             "status": status,
@@ -35,6 +35,14 @@ def run_task(task: str) -> str:
             "wall_time": perf_counter() - start,
         }
     )
+
+
+def _described(error: BaseException) -> str:
+    name = type(error).__name__
+    try:
+        return f"{name}: {error}"
+    except BaseException:
+        return name
 
 
 def crashed(reason: str) -> str:

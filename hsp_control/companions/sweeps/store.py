@@ -41,10 +41,10 @@ class Store:
         try:
             if not fresh:
                 self._resume(out, self._journal)
-        except SweepError:
+        except BaseException:
             self._journal.close()
             if self._journal.identity is None:
-                self._journal.path.unlink()
+                self._journal.path.unlink(missing_ok=True)
             raise
         if self._journal.identity is None:
             self._journal.begin(identity)
@@ -69,7 +69,7 @@ class Store:
         if self._out is not None and self._journal is not None:
             try:
                 sweep.save(self._out)
-            except SweepError:
+            except BaseException:
                 self._journal.close()
                 raise
             self._journal.remove()

@@ -320,7 +320,13 @@ def _listen(host: str, port: int) -> socket.socket:
         try:
             listener = socket.create_server((host, candidate))
         except OSError as error:
-            reason = os.strerror(error.errno or 0)
+            number = error.errno or 0
+            if number < 0:  # of the look-up of names, no error of the system
+                reason = (error.strerror or "").partition(" (while")[0]
+                raise OSError(
+                    f"cannot listen on {host}: no computer has this name: {reason}"
+                ) from None
+            reason = os.strerror(number)
         else:
             listener.setblocking(False)
             return listener

@@ -20,6 +20,7 @@ from hsp_control.declaration.language import check_kind
 from hsp_control.robot import Robot
 from hsp_control.robot.description.access import ANYWHERE, Access, only_within
 from hsp_control.robot.description.sources import packaged_folders
+from hsp_control.robot.recorded import recorded_robot, usable_record
 from hsp_control.simulation import Rollout
 
 _log = logging.getLogger(__name__)
@@ -35,7 +36,7 @@ def access_for(
 
 
 def robot_of(rollout: Rollout, access: Access = ANYWHERE) -> Robot:
-    """Return the robot of a log, rebuilt from the configuration in the log.
+    """Return the robot of a log, which is in the log, or in its configuration.
 
     Args:
         rollout: The log.
@@ -44,6 +45,14 @@ def robot_of(rollout: Rollout, access: Access = ANYWHERE) -> Robot:
     Raises:
         ViewerError: If the log has no configuration, or its robot cannot be rebuilt.
     """
+    record = usable_record(rollout.meta)
+    try:
+        if record is not None:
+            return recorded_robot(record, access)
+    except AccessError:
+        raise
+    except HspControlError as error:
+        raise ViewerError(f"the log's robot cannot be rebuilt: {error}") from error
     document = _document(rollout, access)
     try:
         robot = load_robot(document, validate(document, Scenario))
@@ -57,6 +66,8 @@ def rebuild_run(rollout: Rollout, name: str, access: Access = ANYWHERE) -> Compa
     for obstacle, about in rollout.meta.get("obstacles", {}).items():
         if file := about.get("parameters", {}).get("file"):
             access.check(Path(str(file)), f"{name}: obstacle {obstacle!r}: mesh")
+    if rollout.config is None and usable_record(rollout.meta) is not None:
+        return ComparedRun(name, robot_of(rollout, access), rollout)
     try:
         experiment = build(_document(rollout, access))
     except AccessError:
@@ -168,11 +179,19 @@ def _document(rollout: Rollout, access: Access) -> Document:
         name = rollout.meta.get("robot", {}).get("name", "?")
         raise ViewerError(
             f"this log was made from Python: it has no configuration of its robot "
-            f"{name!r}; give the robot, as in Viewer(robot).play(rollout)"
+            f"{name!r}{_why_missing(rollout)}; give the robot, as in "
+            "Viewer(robot).play(rollout)"
         )
     document = Document(rollout.config, {}, "the log's configuration")
     document.access = access
+    document.recorded_robot = usable_record(rollout.meta)
     return document
+
+
+def _why_missing(rollout: Rollout) -> str:
+    record = rollout.meta.get("robot", {}).get("record")
+    why = record.get("missing") if isinstance(record, dict) else None
+    return f", and {why}" if why else ""
 
 
 def _names(logs: Sequence[Path]) -> list[str]:

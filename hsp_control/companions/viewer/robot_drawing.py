@@ -30,6 +30,7 @@ from hsp_control.robot.description.mesh_files import candidates, find_problem
 from hsp_control.robot.description.mesh_units import mesh_units
 from hsp_control.robot.description.sources import BodyShape, RobotSource
 from hsp_control.robot.description.urdf import read_urdf
+from hsp_control.robot.recorded import text_of
 
 _GREY = (0.72, 0.74, 0.76, 1.0)
 _MESHES = {".dae", ".obj", ".stl"}  # formats that the page reads itself
@@ -397,7 +398,7 @@ def _thing(visual: Visual) -> Json | None:
 
 def _hint(robot: Robot) -> str:
     texts = [
-        part.source.urdf.read_text(errors="replace")
+        text_of(part.source).decode(errors="replace")
         for part in robot.parts
         if part.source.shapes is None
     ]

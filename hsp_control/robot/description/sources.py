@@ -278,6 +278,10 @@ def _from_path(
     with suppress(RuntimeError):  # an unknown user: reported below as "no such file"
         path = path.expanduser()
     access.check(path, "robot")
+    try:
+        path.is_file()
+    except OSError as error:  # the name is too long, or its folder may not be read
+        raise RobotNotFoundError(f"{path!s:.200}: {error.strerror}") from None
     if path.is_dir():
         robots = sorted(file.name for file in path.glob("*") if is_path(file.name))
         raise RobotNotFoundError(

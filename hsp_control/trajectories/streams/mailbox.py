@@ -124,6 +124,8 @@ def recorded(
 def read_recording(path: Path) -> list[dict[str, Any]]:
     """Return the messages in a file of JSON lines."""
     try:
+        if path.exists() and not path.is_file():
+            raise StreamError(f"{path}: no file, but a folder, a device or a pipe")
         if (size := path.stat().st_size) > LARGEST_FILE:
             raise StreamError(
                 f"{path}: {size} bytes; a recording has at most {LARGEST_FILE}"

@@ -239,11 +239,14 @@ def test_the_gripper_goes_where_openings_say_and_tells_where_it_is() -> None:
         other.close()
         with closing(connect(settings, circle().robot, PERIOD)):
 
-            def told(message: dict[str, Any], sender: socket.socket) -> Any:
+            def told(message: Any, sender: socket.socket) -> Any:
                 sender.sendto(json.dumps(message).encode(), (box.host, port))
                 return json.loads(sender.recv(999))
 
             assert told({}, policy) == {"value": [0.04], "grasped": False}
+            for odd in ([], "x", 3, None, {"value": 3}, {"value": []}, {"values": []},
+                        {"value": [{}]}, {"value": "x"}, [[[]]]):  # fmt: skip
+                assert told(odd, policy) == {"value": [0.04], "grasped": False}
             assert told({"value": [0.0]}, policy) == {"value": [0.015], "grasped": True}
             assert told({"value": [np.nan]}, policy)["grasped"]
             with closing(udp()) as second:

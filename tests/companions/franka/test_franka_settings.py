@@ -57,6 +57,8 @@ def test_a_load_is_a_body() -> None:
     with pytest.raises(LiveError, match="add up to the largest"):
         Load(1.0, inertia=np.diag([1.0, 1.0, 3.0]))
     Load(1.0, inertia=np.diag([1.0, 1.0, 2.0]))
+    with pytest.raises(LiveError, match=r"1e\+30 m from the flange along an axis"):
+        Load(1.0, center=[0.0, 1e30, 0.0])
 
 
 def test_every_error_and_mode_of_libfranka_is_explained() -> None:

@@ -21,7 +21,7 @@ from hsp_control.companions.franka.layouts import (
     FrankaCommand,
     message,
 )
-from hsp_control.companions.franka_box import ControlBox, Server
+from hsp_control.companions.franka_box import ControlBox, Server, connection
 from hsp_control.companions.franka_box.connection import Connection
 
 LONGEST = 30.0
@@ -216,3 +216,12 @@ def test_addresses_beyond_loopback_and_taken_ones_are_refused() -> None:
             Server(box, print, host=host)
     with served() as rig, pytest.raises(HardwareError, match="knows no other port"):
         Server(box, print, host=rig.host)
+
+
+def test_a_client_that_says_nothing_makes_room_for_the_next_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(connection, "_PATIENCE", 0.0)
+    with served() as rig, client(rig):  # it is silent
+        assert serves(rig)
+        assert rig.tells("says nothing")

@@ -1,6 +1,7 @@
 """A session that is played with, without a page: what is said becomes motion."""
 
 import math
+from asyncio import CancelledError
 from pathlib import Path
 from typing import Any
 
@@ -443,3 +444,24 @@ def test_a_robot_that_walks_can_be_pulled_but_not_led(tmp_path: Path) -> None:
     log.save(tmp_path / "walked.npz")
     again = hsp.load_experiment(tmp_path / "walked.npz").run()
     np.testing.assert_array_equal(again.q, log.q)
+
+
+@pytest.mark.parametrize(
+    "error", [ValueError("mine"), CancelledError(), GeneratorExit(), MemoryError()]
+)
+def test_whatever_a_field_raises_ends_the_run_and_not_the_session(
+    error: BaseException, session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    go(session, 0.05)
+
+    def fail(*_: object, **__: object) -> None:
+        raise error
+
+    with monkeypatch.context() as patch:
+        patch.setattr(type(session._command), "effort", fail)
+        session.advance()
+    assert session.over.startswith(type(error).__name__)
+    assert len(session.rollout()) >= 5
+    session.reset()
+    go(session, 0.05)
+    assert not session.over

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from asyncio import CancelledError
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,7 @@ from hsp_control.common.exceptions import (
     LogError,
     SweepError,
 )
-from hsp_control.companions.sweeps import Choices, Sweep, local_workers
+from hsp_control.companions.sweeps import Choices, Sweep, local_workers, run_task
 from hsp_control.companions.sweeps.journal import SweepJournal, journal_of
 from hsp_control.simulation.journal import JournalReader, JournalWriter
 
@@ -315,7 +316,7 @@ def test_one_process_at_a_time(tmp_path: Path) -> None:
     out = tmp_path / "one.parquet"
     journal = SweepJournal(journal_of(out), fresh=False)
     try:
-        with pytest.raises(LogError, match="another process writes it"):
+        with pytest.raises(LogError, match="this program writes it already"):
             hsp.sweeps.sweep(MOVING, OVER, overrides=QUICK, out=out)
     finally:
         journal.remove()
@@ -358,3 +359,46 @@ def test_a_bad_key_is_found_before_any_worker_is_asked() -> None:
     with pytest.raises(HspControlError, match="'x': needs the form key=value"):
         hsp.sweeps.sweep(MOVING, OVER, overrides=["x"])
     assert Choices((1,)).levels() == (1,)
+
+
+@pytest.mark.parametrize(
+    "error", [ValueError("mine"), CancelledError(), GeneratorExit()], ids=repr
+)
+def test_whatever_raises_in_the_parent_leaves_the_journal_free(
+    error: BaseException, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In the main thread, or in one that serves a worker: nothing waits for ever."""
+    out = tmp_path / "x.parquet"
+
+    def fail(*_: object) -> None:
+        raise error
+
+    def raises(**options: Any) -> None:
+        with pytest.raises(type(error)):
+            hsp.sweeps.sweep(
+                MOVING, OVER, out=out, workers=1, overrides=QUICK, **options
+            )
+
+    raises(on_progress=fail)
+    with monkeypatch.context() as patch:
+        patch.setattr(local_workers, "_ask", fail)
+        raises()
+    with monkeypatch.context() as patch:
+        patch.setattr(Sweep, "save", fail)
+        patch.setattr("hsp_control.companions.sweeps.sweep_runs._run_pending", fail)
+        raises()
+    writer = JournalWriter(journal_of(out))
+    writer.close()
+
+
+def test_what_is_no_exception_is_a_row() -> None:
+    for error in (CancelledError("x"), GeneratorExit(), SystemExit(3)):
+        with pytest.MonkeyPatch.context() as patch:
+
+            def fail(*_: object, error: BaseException = error) -> None:
+                raise error
+
+            patch.setattr(run_task, "_run", fail)
+            row, _ = run_task.read_result(0, run_task.run_task("{}"))
+        assert row.status == "failed"
+        assert row.message.startswith(type(error).__name__)

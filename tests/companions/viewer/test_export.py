@@ -441,9 +441,9 @@ def test_what_cannot_be_drawn_does_not_break_the_page(
 def test_what_cannot_be_exported_is_said(
     planar: Rollout, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    anonymous = Rollout(
-        planar.columns, {k: v for k, v in planar.meta.items() if k != "config"}
-    )
+    robot = {k: v for k, v in planar.meta["robot"].items() if k != "record"}
+    meta = {k: v for k, v in planar.meta.items() if k != "config"}
+    anonymous = Rollout(planar.columns, {**meta, "robot": robot})
     with pytest.raises(ViewerError, match="made from Python"):
         export_html(anonymous, tmp_path / "page.html")
     named = export_html(anonymous, tmp_path / "page.html", robot=Robot.load("planar3r"))

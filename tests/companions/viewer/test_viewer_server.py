@@ -383,3 +383,8 @@ def test_importing_the_package_pulls_in_no_viewer_and_that_no_meshcat() -> None:
     package, viewer = (set(line.split()) for line in printed.splitlines())
     assert not {"tornado", "umsgpack", "hsp_control.companions.viewer"} & package
     assert not {"meshcat", "tornado", "zmq", "IPython", "matplotlib"} & viewer
+
+
+def test_a_host_that_nobody_knows_is_named() -> None:
+    with pytest.raises(ViewerError, match=r"on no\.such\.host\.invalid: no computer"):
+        PageServer(host="no.such.host.invalid")

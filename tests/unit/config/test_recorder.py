@@ -1,5 +1,6 @@
 """A loop of one's own is recorded in the log that all commands take."""
 
+from asyncio import CancelledError
 from contextlib import suppress
 from pathlib import Path
 
@@ -69,3 +70,45 @@ def test_what_cannot_be_repeated_says_why_and_an_error_ends_the_log(
         empty.close()
     with pytest.raises(LogError, match="log_period is 0 s; must be positive"):
         hsp.Recorder(controller, log_period=0)
+
+
+@pytest.mark.parametrize("rows", [0, 1])
+@pytest.mark.parametrize(
+    "error",
+    [ValueError("mine"), CancelledError(), GeneratorExit(), SystemExit(1)],
+    ids=repr,
+)
+def test_whatever_is_raised_the_next_recorder_can_write(
+    error: BaseException, rows: int, tmp_path: Path
+) -> None:
+    path, controller = tmp_path / "mine.npz", law(hsp.JointCentering())
+    first = hsp.Recorder(controller, path)
+
+    def loop() -> None:
+        with first:
+            run(controller, first, rows)
+            raise error
+
+    with pytest.raises(type(error)) as raised:
+        loop()
+    assert raised.value is error
+    left = [each.name for each in tmp_path.iterdir()]
+    assert left == (["mine.npz"] if rows else [])
+    again = law(hsp.JointCentering())
+    with hsp.Recorder(again, path) as second:
+        run(again, second, 30)
+    assert hsp.Rollout.load(path).status == "completed"
+    if rows:
+        assert first.rollout.status == "stopped"
+
+
+def test_a_recorder_that_nobody_closed_is_named_until_it_is_forgotten(
+    tmp_path: Path,
+) -> None:
+    path, controller = tmp_path / "mine.npz", law(hsp.JointCentering())
+    open_one = hsp.Recorder(controller, path)
+    with pytest.raises(LogError, match="this program writes it already: close that"):
+        hsp.Recorder(controller, path)
+    del open_one
+    with hsp.Recorder(controller, path) as recorder:
+        run(controller, recorder, 30)

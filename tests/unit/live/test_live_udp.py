@@ -251,3 +251,30 @@ def test_a_robot_that_nobody_wants_or_whose_parent_dies_ends() -> None:
     hardware.close()
     hardware.drain()
     link.close()
+
+
+def test_our_own_packets_that_come_back_are_foreign() -> None:
+    """A switch that mirrors, or a second socket: states go on to count."""
+    robot = Link(7, hears=PacketKind.EFFORT)
+    loop = Link(7, peer=robot.address, hears=PacketKind.STATE)
+    robot.peer = loop.address
+    for k in range(5):
+        for _ in range(3):  # the loop is ahead of the robot in its numbers
+            loop.send(PacketKind.EFFORT, np.zeros(7))
+        reflected = [encode(each) for each in robot.receive(0.1)]
+        for data in reflected:
+            robot._socket.sendto(data, loop.address)
+        robot.send(PacketKind.STATE, np.full(14, float(k)))
+        found = loop.receive(0.5)
+        while not found:
+            found = loop.receive(0.5)
+        assert [each.payload[0] for each in found] == [float(k)]
+    assert loop.counts["foreign"] == 15
+    loop.send(PacketKind.BYE)
+    (bye,) = [each for each in robot.receive(0.5) if each.kind is PacketKind.BYE]
+    robot._socket.sendto(encode(bye), loop.address)
+    robot.send(PacketKind.BYE)
+    kinds = [each.kind for each in loop.receive(0.5)]
+    assert kinds == [PacketKind.BYE]
+    for link in (loop, robot):
+        link.close()

@@ -2,6 +2,7 @@
 
 import io
 import json
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -202,9 +203,36 @@ FOREIGN: dict[str, tuple[Callable[[], bytes], str]] = {
     "another format": (lambda: npz(meta=meta(format="hsp_control rollout 2"), **TWO),
                        r"its format is 'hsp_control rollout 2'; this version reads"),
     "column": (lambda: npz(meta=meta(), **ROW), r"the log lacks the column 't'"),
+    "a number for a column": (lambda: npz(meta=meta(), **{**TWO, "e": np.array(1.0)}),
+                              r"the column 'e' has shape \(\); needs \d+ rows"),
+    "a short column": (lambda: npz(meta=meta(), **{**TWO, "v": TWO["v"][:1]}),
+                       r"the column 'v' has shape .*; needs"),
+    "times of NaN": (lambda: npz(meta=meta(), **{**TWO, "t": np.full(2, np.nan)}),
+                     r"the column 't' is not finite in row 0"),
+    "positions of NaN": (lambda: npz(meta=meta(), **{**TWO, "q": np.nan * TWO["q"]}),
+                         r"the column 'q' is not finite in row 0"),
+    "times that run back": (lambda: npz(meta=meta(), **{**TWO, "t": np.eye(2)[0]}),
+                            r"the time runs back from 1 to 0 s in row 1"),
+    "51 TiB": (lambda: declared((7_000_000_000_000,)), r".* declares 5.6e\+13 bytes"),
+    "nested": (lambda: npz(meta=np.array("[" * 200_000 + "]" * 200_000), **TWO),
+               NOT_OURS),
+    "another robot": (lambda: npz(meta=meta(robot={"nq": 9, "nv": 9}), **TWO),
+                      r"the column 'q' has shape .*; needs \(2, 9\)"),
     "described column": (lambda: npz(meta=meta(columns={"e": {}}), **TWO),
                          r"the log lacks the column 'e'"),
 }  # fmt: skip
+
+
+def declared(shape: tuple[int, ...]) -> bytes:
+    """Return a log whose column t declares a shape, and has no numbers."""
+    head = io.BytesIO()
+    np.lib.format.write_array_header_1_0(
+        head, {"descr": "<f8", "fortran_order": False, "shape": shape}
+    )
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w") as archive:
+        archive.writestr("t.npy", head.getvalue())
+    return file.getvalue()
 
 
 def npy(array: Array) -> bytes:

@@ -1,0 +1,67 @@
+"""Which efforts a robot can have: those that were sent, or its own at the start."""
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+
+_ROUNDING, _LARGEST_ROUNDING = 0.01, 1.0
+"""By how much an effort may be beyond what was sent: a part of the limit, and the most
+[N·m or N]. Motors have steps."""
+_START, _LARGEST_START = 0.1, 10.0
+"""The same at the start, when the robot has held itself: it may know another load."""
+_START_PERIODS = 5
+"""How long its own effort may last after that [periods]."""
+_FADES = 0.99
+"""By which factor what is beyond all that was sent must come nearer each period: a
+filter of 1.6 Hz at 1 kHz."""
+
+
+class SentEfforts:
+    """What was sent in the last periods, and whether the robot can have an effort.
+
+    It has one of these, or a mean of some where it filters.
+    """
+
+    def __init__(self, limits: Array, periods: int) -> None:
+        """``limits`` are those of the efforts, shape (nv,), inf where unlimited."""
+        self._rounding = np.minimum(_ROUNDING * limits, _LARGEST_ROUNDING)
+        self._start = np.minimum(_START * limits, _LARGEST_START)
+        self._sent: Array = np.zeros((periods, limits.size))
+        self.restart(np.zeros(limits.size))
+
+    def restart(self, effort: Array) -> None:
+        """Begin where the robot holds itself, with an effort near this one, (nv,)."""
+        self._sent[:] = effort
+        self._count = self._answers = 0
+        self._above, self._below = np.zeros((2, effort.size))
+
+    def add(self, effort: Array) -> None:
+        """Record an effort that is sent, shape (nv,)."""
+        self._sent[self._count % len(self._sent)] = effort
+        self._count += 1
+
+    def bounds_of(self, effort: Array) -> tuple[Array, Array, Array]:
+        """Return the least and the most that it can have, and what rounding adds.
+
+        Args:
+            effort: What the robot says that it has, shape (nv,).
+
+        Returns:
+            Three arrays, shape (nv,).
+        """
+        sent_least = np.minimum.reduce(self._sent)
+        sent_most = np.maximum.reduce(self._sent)
+        self._answers += 1
+        if self._answers <= _START_PERIODS:
+            least, most = np.minimum(sent_least, 0.0), np.maximum(sent_most, 0.0)
+            spare = self._start
+        else:
+            least = sent_least - _FADES * self._below
+            most = sent_most + _FADES * self._above
+            spare = self._rounding
+        # What is beyond by rounding alone does not add up.
+        beyond = np.maximum(effort, sent_most) - sent_most
+        self._above = np.minimum(beyond, most - sent_most)
+        beyond = sent_least - np.minimum(effort, sent_least)
+        self._below = np.minimum(beyond, sent_least - least)
+        return least, most, spare

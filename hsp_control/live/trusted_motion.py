@@ -1,0 +1,227 @@
+"""What can be trusted of a joint's measured motion: velocity, positions, or neither."""
+
+from math import exp
+
+import numpy as np
+
+from hsp_control.common.arrays import Array, Flags, Indices
+from hsp_control.common.exceptions import HspControlError
+from hsp_control.control.measurement import Measurement
+from hsp_control.live.settings import LiveSettings
+from hsp_control.live.velocity_check import VelocityCheck
+from hsp_control.robot import Robot
+
+_BANDWIDTH = 30.0
+"""With which an expected velocity follows a source [1/s]."""
+_ALONE = 3.0
+"""The same if the other source was wrong: a joint that is braked must obey [1/s]."""
+_MEMORY = 0.2
+"""Time constant with which a surprise is forgotten [s]."""
+_CLEARLY = 0.5
+"""One source is right, and the other wrong, if it surprised by so much less."""
+_SPREAD = 0.25
+"""A joint's velocity may be further from what is expected by this part of that."""
+_SMALL = 2.0
+"""A contradiction up to this, relative to the error of velocities, may be the lag."""
+
+
+class ExpectedMotion:
+    """What the model expects of a joint's velocity, from each source that tells it.
+
+    The sources are the rows of all arrays: the measured velocity, the slope of the
+    positions, and their mean. Each expectation goes on with the model under the efforts
+    applied, and follows its source by a limited step, so that a sensor that jumps is
+    not followed at once; a second state learns the acceleration that the model misses.
+
+    Attributes:
+        v: The velocities that are expected, shape (3, nv) [rad/s or m/s].
+        surprise: The largest differences of late, shape (3, nv).
+    """
+
+    def __init__(self, robot: Robot, error: float, period: float) -> None:
+        self._robot, self._error = robot, error
+        self._rate = min(_BANDWIDTH, 0.3 / period)
+        self._rates = np.array([0.0, _ALONE, self._rate])
+        self._sources = np.zeros((3, robot.nv))
+        self.begin(np.zeros(robot.nv))
+
+    def begin(self, v: Array) -> None:
+        """Begin at a velocity, shape (nv,), for all sources."""
+        self.v: Array = np.tile(v, (3, 1))
+        self.surprise: Array = np.zeros((3, v.size))
+        self._missed = np.zeros((3, v.size))
+        self._acceleration = np.zeros(v.size)
+
+    def apply(self, q: Array, v: Array, tau: Array) -> None:
+        """Record the effort that acts from now on, shape (nv,), at a state."""
+        if self._robot.unactuated:  # nobody knows what the feet push
+            return
+        try:
+            acceleration = self._robot.forward_dynamics(q, v, tau)
+        except HspControlError:
+            return
+        if np.isfinite(acceleration).all():
+            self._acceleration = acceleration
+
+    def advance(self, passed: float) -> None:
+        """Go on for some time [s]."""
+        self.v = self.v + passed * (self._acceleration + self._missed)
+
+    def follow(
+        self, velocity: Array, slope: Array, known: Indices, passed: float
+    ) -> None:
+        """Compare with the sources, shapes (nv,), and follow them.
+
+        ``known`` is how many of them are trusted, shape (nv,). A joint of which none is
+        goes on as it is expected.
+        """
+        sources = self._sources
+        sources[0], sources[1] = velocity, slope
+        sources[2] = 0.5 * (velocity + slope)
+        difference = sources - self.v
+        faded = exp(-passed / _MEMORY) * self.surprise
+        self.surprise = np.maximum(faded, np.abs(difference))
+        step = np.minimum(np.maximum(difference, -self._error), self._error)
+        rate = self._rates[known]
+        self.v = self.v + np.minimum(2.0 * rate * passed, 1.0) * step
+        gain = min(self._rate**2 * passed, self._rate)
+        self._missed = (self._missed + gain * step) * (known == 2)
+
+
+class TrustedMotion:
+    """Judges measured positions and velocities; says which of them can be used.
+
+    Where they contradict each other, that one is wrong which did what the model did not
+    expect. If that is not clear, both are wrong where they differ much, else it is the
+    velocity. Where both are wrong, or the sensor is dead, the expectation is used. What
+    was wrong once is not used again.
+
+    Attributes:
+        fault: What contradicts what, or None.
+        doubtful: Whether the last measurement should not be used, though it is no fault
+            yet.
+        complete: Whether all that is measured is trusted.
+        unknown_for: Time since which some joint was only expected, not measured [s].
+        last: The last measurement, as it came; None before the first.
+    """
+
+    def __init__(self, robot: Robot, settings: LiveSettings, period: float) -> None:
+        self._robot, self._error = robot, settings.velocity_error
+        self._check = VelocityCheck(robot, settings, period)
+        self._expected = ExpectedMotion(robot, settings.velocity_error, period)
+        self.restart()
+
+    def restart(self) -> None:
+        """Trust everything."""
+        self._check.restart()
+        self.last: Measurement | None = None
+        self._q: Array = np.zeros(0)  # the last trusted configuration
+        self.complete = True
+        self._moving = False  # whether the robot's clock has begun
+        self._positions = np.ones(self._robot.nv, dtype=bool)
+        self._velocities = np.ones(self._robot.nv, dtype=bool)
+        self.fault: str | None = None
+        self.doubtful = False
+        self.unknown_for = 0.0
+
+    @property
+    def mean_velocity(self) -> Array | None:
+        """Mean velocity of some milliseconds, (nv,); None if it is not trusted."""
+        return self._check.mean if self._moving and self.complete else None
+
+    @property
+    def trusted_positions(self) -> Flags:
+        """Joints whose positions are trusted, shape (nv,)."""
+        return self._positions
+
+    def applied(self, q: Array, v: Array, tau: Array) -> None:
+        """Record the effort that acts from now on, shape (nv,), at a state."""
+        self._expected.apply(q, v, tau)
+
+    def update(self, new: Measurement, passed: float, jumps: Flags) -> Measurement:
+        """Return a measurement of what can be trusted; set the fault.
+
+        Args:
+            new: A valid measurement.
+            passed: Time since the last one [s]; 0: the robot has not started.
+            jumps: Joints whose position the robot cannot have come to, shape (nv,).
+        """
+        last, self.last = self.last, new
+        self.fault, self.doubtful = None, False
+        if last is None or passed <= 0.0:
+            if self.complete:
+                self._expected.begin(new.v)
+                self._q = new.q
+            return new
+        check, expected = self._check, self._expected
+        way = self._robot.difference(last.q, new.q)
+        if not self._moving:  # a robot starts at rest: the smaller one is right
+            self._moving = True
+            slope = way / passed
+            expected.begin(np.where(np.abs(slope) < np.abs(new.v), slope, new.v))
+        expected.advance(passed)
+        check.update(way, new.v, passed)
+        known = self._velocities.astype(np.int64) + self._positions
+        expected.follow(check.mean, check.slope, known, passed)
+        self._judge(new.v, jumps)
+        if self.complete:
+            self.doubtful = bool(check.doubtful.any())
+            self._q = new.q
+            return new
+        all_known = (self._velocities | self._positions).all()
+        self.unknown_for = 0.0 if all_known else self.unknown_for + passed
+        both = self._positions & self._velocities
+        self.doubtful = self.fault is None and bool((check.doubtful & both).any())
+        v = np.where(self._positions, check.slope, expected.v[2])
+        v = np.where(self._velocities, new.v, v)
+        way = self._robot.difference(self._q, new.q)
+        way = np.where(self._positions, way, passed * v)
+        self._q = self._robot.integrate(self._q, way)
+        return new._replace(q=self._q, v=v)
+
+    def _judge(self, v: Array, jumps: Flags) -> None:
+        """Find what is wrong now, and what is not trusted from now on."""
+        check = self._check
+        wrong = check.contradicted | check.dead | jumps
+        if self.complete and not wrong.any():
+            return
+        both = self._positions & self._velocities
+        wrong &= both
+        by_v, by_q, _ = self._expected.surprise
+        greatest = np.maximum(by_v, by_q)
+        good_v = by_v < _CLEARLY * greatest
+        small = check.difference < _SMALL * self._error
+        good_q = (by_q < _CLEARLY * greatest) | (~good_v & small)
+        good_q &= ~jumps
+        self._positions &= ~wrong | good_q
+        smooth = np.abs(v - self._expected.v[0]) < 0.5 * self._error
+        self._velocities &= ~wrong | (good_v & ~jumps) | (jumps & smooth)
+        lost = check.dead & (self._positions | self._velocities)
+        lost |= self._left(v)
+        self._positions &= ~lost
+        self._velocities &= ~lost
+        self.complete = bool(self._positions.all() and self._velocities.all())
+        if (wrong | lost).any():
+            i = int(np.flatnonzero(wrong | lost)[0])
+            self.fault = self._described(i, v, bool(check.dead[i]))
+
+    def _left(self, v: Array) -> Flags:
+        """Return the joints whose only source left what the model expects."""
+        expected, slope = self._expected.v, self._check.slope
+        used = np.where(self._velocities, v - expected[0], slope - expected[1])
+        allowed = self._error + _SPREAD * np.abs(expected[2])
+        left: Flags = np.abs(used) > allowed
+        return left & (self._positions ^ self._velocities)
+
+    def _described(self, i: int, v: Array, dead: bool) -> str:
+        name, unit = self._robot.dof_names[i], self._robot.units[i]
+        if dead:
+            return (
+                f"{name} stands from one state to the next, where the model expects "
+                f"{self._expected.v[2, i]:.3g} {unit}/s: its sensor is dead"
+            )
+        return (
+            f"the velocity of {name} contradicts its positions: {v[i]:.3g} {unit}/s "
+            f"are measured, and its positions change by {self._check.slope[i]:.3g} "
+            f"{unit}/s"
+        )

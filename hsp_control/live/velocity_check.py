@@ -1,0 +1,138 @@
+"""Compares measured velocities with the slope of the measured positions."""
+
+from math import ceil, exp
+
+import numpy as np
+
+from hsp_control.common.arrays import Array, Flags
+from hsp_control.live.settings import LiveSettings
+from hsp_control.robot import Robot
+
+_WINDOW = 0.05
+"""How old the motion may be that a velocity tells of [s]: a delay of 5 ms and a filter
+of 20 Hz, whose step response ends after 40 ms."""
+_MEAN_TIME, _MEAN_ERROR = 0.012, 0.3
+"""Time constant of the mean of what is beyond [s], and how large that may be besides
+its noise, relative to the error of velocities."""
+_FEWEST = 3
+"""Fewest slopes that are compared, where a period is long."""
+_LAG = 0.015
+"""Mean lag of a velocity: that of this delay and this filter [s]."""
+_MEMORY = 0.5
+"""Time constant with which small differences are summed [s]."""
+_CONSTANT = 0.01
+"""Position that may differ for other reasons, such as a coarse encoder [rad or m]."""
+_DOUBT_LEAK, _DOUBT = 0.9, 1.9
+"""Each doubtful velocity counts 1, and 0.9 times that at the next one: two in a row
+are a fault, or three of five. A single one is not."""
+_SLOPE_TIME = 0.008
+"""Over which a joint's slope is taken, if it replaces its velocity [s]."""
+_STILL = 3
+"""States with the same position and velocity from which a sensor is dead."""
+_STOPS = 50.0
+"""Largest deceleration of a joint that friction stops [rad/s² or m/s²]."""
+_STEP = 2e-3
+"""Largest step of an encoder [rad or m]."""
+
+
+class VelocityCheck:
+    """Finds joints whose measured velocity contradicts their measured positions.
+
+    What is delayed and filtered is a mean of earlier velocities: it lies between the
+    least and the greatest slope of positions in a window. The velocity may be beyond
+    them by `LiveSettings.velocity_error`, and its mean of some milliseconds by less. A
+    smaller difference that stays is found by a leaky sum of dq - v h, which noise and
+    lags leave small.
+
+    A joint's position and velocity that stay to the last bit are those of a dead sensor
+    if the joint was fast before: no brake stops it in a period.
+
+    A base without motors is not judged: its motion is an estimate, and jumps.
+
+    Attributes:
+        doubtful: Joints whose last velocity is not used yet, shape (nv,).
+        contradicted: Joints whose velocity contradicts their positions, shape (nv,).
+        dead: Joints whose sensor says nothing any more, shape (nv,).
+        slope: Slope of the last positions, shape (nv,) [rad/s or m/s].
+        difference: Between velocity and slope at the last one, shape (nv,).
+        mean: Mean velocity in the same time, shape (nv,).
+    """
+
+    def __init__(self, robot: Robot, settings: LiveSettings, period: float) -> None:
+        self._error, self._period = settings.velocity_error, period
+        self._judged = np.ones(robot.nv, dtype=bool)
+        self._judged[list(robot.unactuated)] = False
+        self._few = max(2, ceil(_SLOPE_TIME / period))
+        self._slopes = np.zeros((max(ceil(_WINDOW / period), _FEWEST), robot.nv))
+        self._velocities = np.zeros_like(self._slopes)
+        # Which of them are the last few, by the place of the next one.
+        size = len(self._slopes)
+        self._latest = (np.arange(size)[:, None] - 1 - np.arange(self._few)) % size
+        # Noise of this size, six standard deviations, leaves a sum of this size.
+        noise = self._error * np.sqrt(0.5 * period * _MEMORY)
+        self._allowed = _CONSTANT + float(noise)
+        noise = np.sqrt(period / (2.0 * _MEAN_TIME + period))
+        self._allowed_mean = self._error * (_MEAN_ERROR + float(noise))
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget all positions."""
+        nv = self._judged.size
+        self._count = 0
+        self._sum, self._fastest, self._doubts, self._beyond = np.zeros((4, nv))
+        self._still = np.zeros(nv, dtype=np.int64)
+        self._before, self._last_v, self._speed = np.zeros((3, nv))
+        self.slope: Array = np.zeros(nv)
+        self.mean: Array = np.zeros(nv)
+        self.difference: Array = np.zeros(nv)
+        self.doubtful: Flags = np.zeros(nv, dtype=bool)
+        self.contradicted: Flags = np.zeros(nv, dtype=bool)
+        self._none = np.zeros(nv, dtype=bool)
+        self.dead: Flags = self._none
+
+    def update(self, way: Array, v: Array, passed: float) -> None:
+        """Judge a new measurement.
+
+        Args:
+            way: Displacement since the last one, shape (nv,) [rad or m].
+            v: Measured velocity, shape (nv,).
+            passed: Time since the last one [s].
+        """
+        slope = way / passed
+        self.difference = np.abs(v - slope)
+        self._slopes[self._count % len(self._slopes)] = slope
+        self._velocities[self._count % len(self._slopes)] = v
+        self._count += 1
+        known = self._slopes[: self._count]
+        few, end = min(self._count, self._few), self._count % len(self._slopes)
+        latest = self._latest[end] if few == self._few else slice(0, few)
+        self.slope = np.add.reduce(self._slopes[latest]) / few
+        self.mean = np.add.reduce(self._velocities[latest]) / few
+        least, most = np.minimum.reduce(known), np.maximum.reduce(known)
+        beyond = v - np.minimum(np.maximum(v, least), most)
+        self.doubtful = (np.abs(beyond) > self._error) & self._judged
+        self._beyond += min(passed / _MEAN_TIME, 1.0) * (beyond - self._beyond)
+        self._doubts = _DOUBT_LEAK * self._doubts + self.doubtful
+        leak = exp(-passed / _MEMORY)
+        self._sum = leak * self._sum + way - passed * v
+        self._fastest = np.maximum(leak * self._fastest, np.abs(v))
+        differs = np.abs(self._sum) > self._allowed + 2.0 * _LAG * self._fastest
+        differs |= np.abs(self._beyond) > self._allowed_mean
+        self.contradicted = (differs | (self._doubts >= _DOUBT)) & self._judged
+        self._find_dead(way, v, slope)
+
+    def _find_dead(self, way: Array, v: Array, slope: Array) -> None:
+        still = (np.abs(way) < 1e-12) & (v == self._last_v)
+        self._last_v = v
+        # The speed before it stood, of two states: the last may show a part of the lie.
+        # It is measured: friction that the model misses must not count.
+        now = np.minimum(np.abs(v), np.abs(slope))
+        speed, self._speed = np.maximum(now, self._speed), now
+        if not still.any():
+            self._still[:], self._before, self.dead = 0, speed, self._none
+            return
+        self._before = np.where(still, self._before, speed)
+        self._still = np.where(still, self._still + 1, 0)
+        moved = self._before * self._still * self._period
+        fast = (self._before > 2.0 * _STOPS * self._period) & (moved > _STEP)
+        self.dead = (self._still >= _STILL) & fast & self._judged

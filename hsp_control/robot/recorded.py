@@ -1,0 +1,217 @@
+"""The robot of a log: what is written of it, and the robot made of that again."""
+
+import logging
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+from xml.etree.ElementTree import Element
+
+import pinocchio as pin
+
+from hsp_control.common.exceptions import (
+    HspControlError,
+    ModelError,
+    RobotNotFoundError,
+)
+from hsp_control.declaration.plain_data import plain_data
+from hsp_control.robot.description.access import ANYWHERE, Access, XmlError, read_xml
+from hsp_control.robot.description.loading import load_model, placement
+from hsp_control.robot.description.recorded_model import (
+    model_data,
+    model_of,
+    packed,
+    shapes_data,
+    shapes_of,
+    unpacked,
+)
+from hsp_control.robot.description.robot_description import OneRobot, RobotDescription
+from hsp_control.robot.description.sources import PINOCCHIO, RobotSource
+from hsp_control.robot.robot import Robot
+
+_log = logging.getLogger(__name__)
+
+
+def robot_record(robot: Robot) -> dict[str, Any]:
+    """Return what a log says of its robot, so that it is there without its files.
+
+    It is the text of each URDF and what `Robot.load` was told, or the model itself if
+    there is no such text. Where a robot cannot be written, it says why.
+    """
+    try:
+        description = robot.description
+        if description is None or any(p.source.shapes is not None for p in robot.parts):
+            return _model_record(robot)
+        return {
+            "description": plain_data(description),
+            "home": _home(robot),
+            "parts": [_text_record(part.source) for part in robot.parts],
+        }
+    except HspControlError as error:
+        return {"missing": str(error)}
+
+
+def usable_record(meta: Mapping[str, Any]) -> Mapping[str, Any] | None:
+    """Return what a log says of its robot; None if that is not enough to make it."""
+    robot = meta.get("robot")
+    record = robot.get("record") if isinstance(robot, Mapping) else None
+    if not isinstance(record, Mapping) or "missing" in record:
+        return None
+    return record
+
+
+def _home(robot: Robot) -> list[float]:
+    home = robot.difference(robot.neutral(), robot.home())
+    return [float(position) for position in home]
+
+
+def _model_record(robot: Robot) -> dict[str, Any]:
+    source = robot.source
+    return {
+        "model": model_data(robot.model),
+        "name": robot.name,
+        "root": source.root,
+        "end_effector": robot.end_effector,
+        "home": _home(robot),
+        "shapes": shapes_data(source.shapes or ()),
+        "excluded": sorted(sorted(pair) for pair in source.excluded),
+    }
+
+
+def _text_record(source: RobotSource) -> dict[str, Any]:
+    return {
+        "name": source.name,
+        "file": str(source.urdf),
+        "urdf": packed(text_of(source)),
+        "root": source.root,
+        "locked": dict(source.locked),
+        "end_effector": source.end_effector,
+        "joint_coordinates": source.joint_coordinates,
+        "excluded": sorted(sorted(pair) for pair in _excluded(source)),
+    }
+
+
+def text_of(source: RobotSource) -> bytes:
+    """Return the text of a robot's URDF."""
+    if source.expanded is not None:
+        return source.expanded.encode()
+    try:
+        return source.urdf.read_bytes()
+    except OSError as error:
+        raise ModelError(f"{source.urdf}: {error.strerror}") from None
+
+
+def _excluded(source: RobotSource) -> frozenset[frozenset[str]]:
+    """Return which links never collide, also those of the SRDF."""
+    found = set(source.excluded)
+    if source.srdf is not None:
+        try:
+            srdf: Element = read_xml(source.srdf)
+        except (XmlError, OSError) as error:
+            raise ModelError(f"{source.srdf}: {error}") from None
+        for pair in srdf.iter("disable_collisions"):
+            found.add(frozenset((pair.get("link1", ""), pair.get("link2", ""))))
+    return frozenset(found)
+
+
+def recorded_robot(record: Any, access: Access = ANYWHERE) -> Robot:
+    """Return the robot of a log.
+
+    It is the one that the log was made with: where the file of its URDF says something
+    else today, a warning names it. Meshes are looked up beside that file, or in the
+    robot's package.
+
+    Args:
+        record: What `robot_record` returned.
+        access: Which files may be read.
+
+    Raises:
+        ModelError: If the log does not contain the robot, or it is damaged.
+        AccessError: If a file that exists is not allowed.
+    """
+    if not isinstance(record, Mapping):
+        raise ModelError("the log does not contain its robot")
+    if "missing" in record:
+        raise ModelError(f"the log does not contain its robot: {record['missing']}")
+    try:
+        if "model" in record:
+            return _of_model(record)
+        return _of_texts(record, access)
+    except HspControlError:
+        raise
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
+        raise ModelError(f"the robot in the log is damaged: {error!r}") from None
+
+
+def _of_model(record: Mapping[str, Any]) -> Robot:
+    model = model_of(record["model"])
+    name = str(record["name"])
+    source = RobotSource(
+        name=name,
+        urdf=Path(name),
+        root=record["root"],
+        origin=PINOCCHIO,
+        end_effector=record["end_effector"],
+        home=tuple(map(float, record["home"])),
+        shapes=shapes_of(record["shapes"]),
+        excluded=frozenset(frozenset(pair) for pair in record["excluded"]),
+    )
+    return Robot(model, source)
+
+
+class _Part(NamedTuple):
+    """One of the robots that a description names."""
+
+    told: OneRobot
+    place: pin.SE3
+
+
+def _of_texts(record: Mapping[str, Any], access: Access) -> Robot:
+    description = RobotDescription(**record["description"])
+    texts, gravity = record["parts"], description.gravity
+    if description.parts is None:
+        source = _source(texts[0], description, access)
+        source = replace(source, home=tuple(map(float, record["home"])))
+        model = load_model(source, description, gravity)
+        return Robot(model, source, description=description)
+    robots = {}
+    for (name, part), text in zip(description.parts.items(), texts, strict=True):
+        own = _source(text, part, access)
+        model = load_model(own, part, gravity)
+        robots[name] = Robot(model, own), placement(part.position, part.rotation)
+    whole = Robot.combine(robots)
+    source = replace(whole.source, home=tuple(map(float, record["home"])))
+    return Robot(whole.model, source, whole.parts, description)
+
+
+def _source(record: Mapping[str, Any], told: OneRobot, access: Access) -> RobotSource:
+    """Return the source of a text: its files are those of this computer."""
+    text = unpacked(record["urdf"]).decode()
+    try:
+        there: RobotSource | None = told.find(access)
+    except (ModelError, RobotNotFoundError):  # not on this computer
+        there = None
+    if there is not None:
+        try:
+            differs = text_of(there).decode(errors="replace") != text
+        except ModelError:
+            differs = False
+        if differs:
+            _log.warning(
+                "%s has changed since the log was made: the robot is that of the log",
+                there.urdf,
+            )
+    urdf = Path(str(record["file"])) if there is None else there.urdf
+    return RobotSource(
+        name=str(record["name"]),
+        urdf=urdf,
+        root=record["root"],
+        package_dirs=() if there is None else there.package_dirs,
+        origin="file" if there is None else there.origin,
+        locked={str(name): float(at) for name, at in record["locked"].items()},
+        end_effector=record["end_effector"],
+        joint_coordinates=record["joint_coordinates"],
+        access=access,
+        excluded=frozenset(frozenset(pair) for pair in record["excluded"]),
+        expanded=text,
+    )

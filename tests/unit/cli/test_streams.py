@@ -1,0 +1,68 @@
+"""Commands write to whatever they are given: nothing, ASCII, a pipe that is closed."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from hsp_control.common.exceptions import LogError, StreamError
+from hsp_control.simulation import Rollout
+from hsp_control.simulation.journal import JournalReader
+from hsp_control.trajectories.streams.mailbox import read_recording
+
+CODE = """
+import os, sys
+sys.argv = ["hsp"]
+{before}
+from hsp_control.cli.streams import make_usable
+make_usable()
+print("\u00b5 \u2264", flush=True)
+print("\u00b5", file=sys.stderr, flush=True)
+descriptor = os.open(os.devnull, os.O_RDONLY)
+sys.exit(7 if descriptor > 2 and sys.stdin.read() == "" else 3)
+"""
+
+
+@pytest.mark.parametrize("closed", [(), (1,), (2,), (1, 2), (0, 1, 2)])
+@pytest.mark.parametrize("encoding", ["ascii", "utf-8", "latin-1"])
+@pytest.mark.smoke
+def test_any_text_can_be_written(closed: tuple[int, ...], encoding: str) -> None:
+    def close() -> None:
+        for number in closed:
+            os.close(number)
+
+    done = subprocess.run(
+        [sys.executable, "-c", CODE.format(before="")],
+        env={**os.environ, "PYTHONIOENCODING": encoding},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        preexec_fn=close,
+        check=False,
+    )
+    assert done.returncode == 7, done.stderr.decode()
+    if 1 not in closed:
+        expected = {"ascii": b"? ?", "latin-1": b"\xb5 ?"}
+        assert done.stdout.strip() == expected.get(encoding, "\u00b5 \u2264".encode())
+
+
+@pytest.mark.smoke
+def test_the_schema_needs_no_docstrings() -> None:
+    code = "from hsp_control.config.scenario import json_schema; json_schema()"
+    subprocess.run([sys.executable, "-OO", "-c", code], check=True)
+
+
+@pytest.mark.parametrize("kind", ["fifo", "device"])
+def test_what_never_ends_is_no_log_and_no_recording(kind: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    if kind == "fifo":
+        os.mkfifo(path)
+    else:
+        path.symlink_to("/dev/zero")
+    with pytest.raises(LogError, match="a device or a pipe"):
+        Rollout.load(path)
+    with pytest.raises(LogError, match="is no journal"):
+        JournalReader(path).read()
+    with pytest.raises(StreamError, match="no file, but a folder, a device or a pipe"):
+        read_recording(path)

@@ -1,0 +1,287 @@
+"""Whatever a robot's sensors say, the loop and its safe stop accelerate no joint."""
+
+from dataclasses import replace
+from functools import cache
+from zlib import crc32
+
+import numpy as np
+import pytest
+from lies import LIES, Lie, Sensors
+from live_rigs import PERIOD, Rig, panda, start, watched
+
+import hsp_control as hsp
+from hsp_control.common.arrays import Array
+from hsp_control.live import (
+    LiveSettings,
+    LoopReport,
+    Measurement,
+    StopSettings,
+    run_loop,
+)
+from hsp_control.live.state_reader import RobotClock
+from hsp_control.live.trusted_motion import TrustedMotion
+
+STOP = StopSettings(hold=0.02, longest_damping=0.3)
+SETTINGS = LiveSettings(effort_rate=1000.0, stop=STOP)
+# The robot itself stops late: what the loop does must be enough.
+PATIENT = replace(SETTINGS, velocity_margin=99.0)
+AT_REST, IN_MOTION, WATCHED = 30, 250, 150
+"""The reads at which a lie begins, and how many periods of it are looked at."""
+ALL = list(range(7))
+
+
+class Liar(Rig):
+    """A robot whose sensors lie about some joints, and its true speeds."""
+
+    def __init__(self, lie: Lie | None, joints: list[int], begin: int) -> None:
+        super().__init__(watched(PATIENT))
+        about = np.zeros(7, dtype=bool)
+        about[joints] = True
+        self.lie = lie
+        self.sensors = Sensors(about, begin, np.random.default_rng(0))
+        self.speeds: list[Array] = []
+        self.stopped = 0  # the number of the last read before the safe stop
+
+    def running(self) -> None:
+        self.stopped = self.reads
+
+    def read(self, timeout: float) -> Measurement | None:
+        found = super().read(timeout)
+        assert found is not None
+        self.speeds.append(np.abs(found.v))
+        return found if self.lie is None else self.sensors(found, self.lie)
+
+
+def moving() -> hsp.Controller:
+    """A circle a second, 12 cm wide, and an elbow that swings: up to 0.9 rad/s."""
+    tip = panda().state(0.0, start(), np.zeros(7)).position("panda_tcp")
+    center = tip + np.array([0.0, 0.0, 0.12])
+    path = hsp.Circle(0.12, 1.0, center, normal=[1.0, 0.0, 0.0])
+    task = hsp.FramePosition("panda_tcp", path, gains=hsp.Gains(natural_frequency=10.0))
+    q = start()
+    q[0] += 0.5
+    return hsp.Controller(panda(), [task], hsp.TargetPosture(q), null_space_gain=10.0)
+
+
+def resting() -> hsp.Controller:
+    tip = panda().state(0.0, start(), np.zeros(7)).position("panda_tcp")
+    task = hsp.FramePosition("panda_tcp", tip, gains=hsp.Gains(natural_frequency=10.0))
+    field = hsp.TargetPosture(start())
+    return hsp.Controller(panda(), [task], field, null_space_gain=10.0)
+
+
+def run(begin: int, lie: Lie | None, joints: list[int]) -> tuple[Liar, LoopReport]:
+    robot = Liar(lie, joints, begin)
+    law = moving() if begin == IN_MOTION else resting()
+    return robot, run_loop(
+        law,
+        robot,
+        duration=(begin + WATCHED) * PERIOD,
+        settings=SETTINGS,
+        on_period=lambda t: robot.running(),
+    )
+
+
+@cache
+def honest_speeds(begin: int) -> Array:
+    robot, report = run(begin, None, [])
+    assert report.ended == "completed"
+    return np.array(robot.speeds)
+
+
+@pytest.mark.parametrize("begin", [AT_REST, IN_MOTION])
+@pytest.mark.parametrize("kind", LIES)
+def test_no_lie_accelerates_a_joint(kind: str, begin: int) -> None:
+    """About one joint, another one for each kind of lie, and about all."""
+    one = crc32(kind.encode()) % 7
+    usual = honest_speeds(begin)[begin - 1 : begin + WATCHED].max(axis=0)
+    for joints in ([one], ALL):
+        robot, report = run(begin, LIES[kind], joints)
+        speeds = np.array(robot.speeds)
+        before, after = speeds[begin - 1 : robot.stopped], speeds[robot.stopped :]
+        assert (before <= np.maximum(1.5 * usual, 0.35)).all(), report.reason
+        at_fault = speeds[robot.stopped - 1]
+        assert (after <= np.maximum(1.5 * at_fault, 0.3)).all(), report.reason
+        assert np.abs(robot.robot.v).max() < 0.05  # it has come to rest
+        assert robot.robot.phase is robot.robot.phase.HOLDING
+
+
+@pytest.mark.parametrize(
+    "kind", ["+3", "-2", "+0.5", "the sign", "degrees", "stuck at 1"]
+)
+def test_a_wrong_velocity_is_named_and_braked_with_the_slope(kind: str) -> None:
+    """The loop holds the robot itself to the end: the positions are still right."""
+    robot, report = run(IN_MOTION, LIES[f"velocity: {kind}"], [3])
+    assert report.ended == "fault"
+    assert "panda_joint4" in report.reason
+    assert not report.silent
+    assert report.at_rest
+    assert robot.robot.reason == "the loop has ended"
+
+
+@pytest.mark.parametrize("kind", ["stuck", "drifting", "mirrored"])
+def test_a_wrong_position_is_braked_with_the_velocity(kind: str) -> None:
+    what = "both" if kind == "mirrored" else "position"
+    _, report = run(IN_MOTION, LIES[f"{what}: {kind}"], [3])
+    assert report.ended == "fault"
+    assert "panda_joint4" in report.reason
+    assert not report.silent
+    assert report.speed < 0.15
+
+
+def test_a_dead_sensor_leaves_it_to_the_robot() -> None:
+    _, report = run(IN_MOTION, LIES["both: stands"], [3])
+    assert "panda_joint4 stands from one state to the next" in report.reason
+    assert report.silent
+
+
+@pytest.mark.parametrize("kind", ["+60", "-8", "another joint's", "the sign"])
+def test_no_wrong_effort_makes_the_next_one_jump(kind: str) -> None:
+    robot, report = run(IN_MOTION, LIES[f"effort: {kind}"], ALL)
+    assert report.ended == "fault"
+    assert "the robot says it has an effort of" in report.reason
+    steps = np.abs(np.diff(robot.sent, axis=0))
+    assert steps.max() <= 1000.0 * PERIOD * (1.0 + 1e-9)
+
+
+# --- no false alarm ------------------------------------------------------------------
+
+
+class Noisy(Rig):
+    """Velocities with noise, delay and a filter; states that are lost."""
+
+    def __init__(
+        self,
+        noise: float,
+        delay: float,
+        frequency: float,
+        lost: float,
+        encoder: float,
+        seed: int,
+    ) -> None:
+        super().__init__(watched(PATIENT))
+        self.noise, self.lost, self.encoder = noise, lost, encoder
+        self.delayed = [np.zeros(7)] * (round(delay / PERIOD) + 1)
+        self.part = 1.0 - np.exp(-2.0 * np.pi * frequency * PERIOD)
+        self.filtered = np.zeros(7)
+        self.rng = np.random.default_rng(seed)
+
+    def read(self, timeout: float) -> Measurement | None:
+        found = super().read(timeout)
+        assert found is not None
+        v = found.v + self.rng.normal(0.0, self.noise, 7)
+        self.filtered = self.filtered + self.part * (v - self.filtered)
+        self.delayed = [*self.delayed[1:], self.filtered]
+        q = found.q
+        if self.encoder:
+            q = np.round(q / self.encoder) * self.encoder
+        if found.t > 0.0 and self.rng.random() < self.lost:
+            return None
+        return found._replace(q=q, v=self.delayed[0])
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.05])
+@pytest.mark.parametrize(("delay", "frequency"), [(0.0, np.inf), (0.005, 20.0)])
+@pytest.mark.parametrize("encoder", [0.0, 1.5e-3])
+def test_what_real_sensors_do_is_no_lie(
+    noise: float, delay: float, frequency: float, encoder: float
+) -> None:
+    if encoder and not np.isfinite(frequency):
+        encoder = 1e-4  # a coarse one comes with a filter
+    robot = Noisy(noise, delay, frequency, 0.1, encoder, seed=3)
+    settings = replace(SETTINGS, velocity_margin=1.0)
+    report = run_loop(moving(), robot, duration=1.2, settings=settings)
+    assert report.ended == "completed", report.reason
+
+
+@pytest.mark.parametrize("period", [0.001, 0.002, 0.005, 0.01])
+def test_noise_of_hours_is_no_lie(period: float) -> None:
+    """The check alone, without a robot: two joints of each kind of motion."""
+    robot, rng = panda(), np.random.default_rng(1)
+    motion = TrustedMotion(robot, LiveSettings(), period)
+    q0, none = start(), np.zeros(7, dtype=bool)
+    size = np.array([0.0, 0.1, 0.2, 0.2, 0.3, 0.4, 0.5])
+    rate = np.array([1.0, 1.0, 5.0, 8.0, 6.0, 4.0, 5.0])
+    filtered, last = np.zeros(7), 0.0
+    part = 1.0 - np.exp(-2.0 * np.pi * 20.0 * period)
+    delay = 0.005
+    for k in range(8000):
+        t = k * period
+        q = q0 + size * np.sin(rate * t) / rate
+        v = size * np.cos(rate * max(t - delay, 0.0)) + rng.normal(0.0, 0.05, 7)
+        filtered = filtered + part * (v - filtered) if k else v
+        shown = v if k % 2 and period > 0.005 else filtered
+        if rng.random() < 0.1:
+            continue
+        motion.applied(q, shown, robot.inverse_dynamics(q, shown, np.zeros(7)))
+        motion.update(Measurement(k, t, q, shown), t - last, none)
+        last = t
+        assert motion.fault is None
+    assert motion.complete
+
+
+def test_a_clock_that_runs_faster_than_ours_is_named() -> None:
+    """Also where the number of states agrees with it; delays are none."""
+    rng = np.random.default_rng(0)
+    for rate, real_time in ((1.0, True), (1.2, True), (1.2, False)):
+        clock = RobotClock(0.0, PERIOD, 20, 1000, real_time=real_time)
+        faults = []
+        for k in range(6000):
+            ours = k * PERIOD / rate + rng.exponential(0.003)
+            found = clock.fault(Measurement(k, k * PERIOD, start(), start()), ours)
+            faults += [found] if found else []
+        if rate > 1.0 and real_time:
+            assert "clock runs faster than this computer's" in faults[0]
+        else:
+            assert not faults
+
+
+@pytest.mark.parametrize("rate", [0.5, 0.7, 1.5, 2.0])
+def test_a_clock_that_does_not_fit_its_states_is_named(rate: float) -> None:
+    clock = RobotClock(0.0, PERIOD, 20, 1000)
+    found = None
+    for k in range(200):
+        t = k * PERIOD + (rate - 1.0) * max(k - 50, 0) * PERIOD
+        found = found or clock.fault(Measurement(k, t, start(), start()), 0.0)
+    assert found is not None
+    assert "does not fit the number of its states" in found
+
+
+def test_lost_states_that_have_no_number_are_no_wrong_clock() -> None:
+    clock, rng = RobotClock(0.0, PERIOD, 20, 1000), np.random.default_rng(0)
+    states = np.flatnonzero(rng.random(5000) > 0.1)
+    for number, k in enumerate(states.tolist()):
+        new = Measurement(number, k * PERIOD, start(), start())
+        assert clock.fault(new, 0.0) is None
+
+
+def test_a_collision_is_no_lie() -> None:
+    """Positions and velocities agree: the joint really stopped."""
+    motion = TrustedMotion(panda(), LiveSettings(), PERIOD)
+    q, none = start(), np.zeros(7, dtype=bool)
+    speed = np.array([1.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0])
+    rng = np.random.default_rng(0)
+    for k in range(300):
+        v = speed * (k < 100) - 0.1 * speed * (100 <= k < 130)
+        q = q + PERIOD * v + rng.normal(0.0, 1e-6, 7)
+        motion.update(Measurement(k, k * PERIOD, q, v), PERIOD * (k > 0), none)
+        assert motion.fault is None, k
+    assert motion.complete
+
+
+def test_friction_that_the_model_misses_is_no_dead_sensor() -> None:
+    """A joint turns round, and sticks for 50 ms there, under an effort that grows."""
+    motion, none = TrustedMotion(panda(), LiveSettings(), PERIOD), np.zeros(7, bool)
+    q, at = start(), np.zeros(7)
+    at[3] = 1.0
+    for k in range(400):
+        t = k * PERIOD
+        speed = 0.4 * np.cos(10.0 * t)
+        sticks = abs(speed) < 0.04
+        v = at * (0.0 if sticks else speed)
+        q = q + PERIOD * v
+        held = panda().inverse_dynamics(q, v, -4.0 * np.sin(10.0 * t) * at)
+        motion.applied(q, v, held + 10.0 * np.sign(-np.sin(10.0 * t)) * at)
+        motion.update(Measurement(k, t, q, v), PERIOD * (k > 0), none)
+        assert motion.fault is None, k
+    assert motion.complete

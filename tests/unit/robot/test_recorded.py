@@ -1,0 +1,166 @@
+"""A log contains its robot: another computer, or an edited file, changes nothing."""
+
+import logging
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import hsp_control as hsp
+from hsp_control.common.exceptions import ModelError
+from hsp_control.robot.description.robot_description import (
+    PlacedRobot,
+    RobotDescription,
+    ToolFrame,
+)
+from hsp_control.robot.recorded import recorded_robot, robot_record
+
+TWO = RobotDescription(
+    parts={
+        "left": PlacedRobot("ur5", position=(0.0, 0.5, 0.0)),
+        "right": PlacedRobot("panda", rotation=(0.0, 0.0, 1.0)),
+    }
+)
+TOOL = RobotDescription(
+    "panda",
+    locked={"panda_joint7": 0.3},
+    tool_frames={"tip": ToolFrame("panda_hand", translation=(0.0, 0.0, 0.1))},
+    gravity=(0.0, 1.0, -9.0),
+)
+
+
+def all_joints() -> hsp.Robot:
+    model = pin.Model()
+    kinds = [
+        pin.JointModelFreeFlyer(), pin.JointModelRX(), pin.JointModelRUBY(),
+        pin.JointModelPZ(), pin.JointModelSpherical(), pin.JointModelTranslation(),
+        pin.JointModelRevoluteUnaligned(np.array([0.0, 0.6, 0.8])),
+        pin.JointModelPrismaticUnaligned(np.array([0.6, 0.0, 0.8])),
+    ]  # fmt: skip
+    for k, kind in enumerate(kinds):
+        pose = pin.exp6(pin.Motion(0.1 * np.arange(6.0)))
+        model.addJoint(k, kind, pose, f"j{k}")
+        model.appendBodyToJoint(k + 1, pin.Inertia.Random(), pose)
+        frame = pin.Frame(f"b{k}", k + 1, 0, pose, pin.FrameType.BODY)
+        model.addFrame(frame, False)
+    model.armature[:] = 0.3
+    model.effortLimit[:] = 7.0
+    model.gravity.linear = np.array([1.0, 0.0, -9.0])
+    return hsp.Robot.from_pinocchio(model)
+
+
+ROBOTS = {
+    "panda": lambda: hsp.Robot.load("panda"),
+    "a tool, a lock, gravity": lambda: hsp.Robot.load(TOOL),
+    "two": lambda: hsp.Robot.load(TWO),
+    "free": lambda: hsp.Robot.load("panda", root="free_flyer"),
+    "combined": lambda: hsp.Robot.combine(
+        {name: (hsp.Robot.load("ur5"), pin.SE3.Identity()) for name in "ab"}
+    ),
+    "pinocchio": all_joints,
+}
+
+
+def equal(one: hsp.Robot, other: hsp.Robot) -> None:
+    """The same motion of the same frames, to the last bit."""
+    assert one.frame_names == other.frame_names
+    assert one.dof_names == other.dof_names
+    assert one.end_effector == other.end_effector
+    np.testing.assert_array_equal(one.home(), other.home())
+    rng = np.random.default_rng(0)
+    q, v = one.random_configuration(rng), rng.standard_normal(one.nv)
+    np.testing.assert_allclose(
+        one.inverse_dynamics(q, v, v), other.inverse_dynamics(q, v, v), atol=1e-12
+    )
+    for name in ("effortLimit", "velocityLimit", "armature", "lowerPositionLimit"):
+        np.testing.assert_array_equal(
+            getattr(one.model, name), getattr(other.model, name)
+        )
+    a, b = one.state(0.0, q, v), other.state(0.0, q, v)
+    for name in one.frame_names:
+        np.testing.assert_allclose(a.position(name), b.position(name), atol=1e-15)
+
+
+@pytest.mark.parametrize("kind", ROBOTS)
+def test_a_record_is_the_robot(kind: str) -> None:
+    robot = ROBOTS[kind]()
+    equal(recorded_robot(robot_record(robot)), robot)
+
+
+def copied(folder: Path) -> Path:
+    """Return a URDF of one's own: a bundled one in another folder."""
+    source = hsp.Robot.load("planar3r").source.urdf
+    folder.mkdir(exist_ok=True)
+    return Path(shutil.copy(source, folder / "mine.urdf"))
+
+
+def log_of(robot: hsp.Robot, path: Path) -> hsp.Rollout:
+    task = hsp.FramePosition(robot.end_effector)
+    controller = hsp.Controller(robot, [task], hsp.Rest(), null_space_gain=1.0)
+    run = hsp.simulate(controller, robot.home(), duration=0.02, control_period=0.01)
+    run.save(path)
+    return run
+
+
+def test_an_edited_urdf_is_named_and_the_log_s_own_counts(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    urdf = copied(tmp_path / "robots")
+    robot = hsp.Robot.load(urdf)
+    record = robot_record(robot)
+    with caplog.at_level(logging.WARNING):
+        equal(recorded_robot(record), robot)
+    assert not caplog.records
+    urdf.write_text(urdf.read_text().replace('mass value="', 'mass value="1'))
+    with caplog.at_level(logging.WARNING):
+        equal(recorded_robot(record), robot)
+    assert f"{urdf} has changed since the log was made" in caplog.text
+    shutil.rmtree(urdf.parent)
+    equal(recorded_robot(record), robot)
+
+
+@pytest.mark.parametrize("kind", ["urdf", "pinocchio"])
+def test_a_log_from_python_is_shown_without_its_files(
+    kind: str, tmp_path: Path
+) -> None:
+    urdf = copied(tmp_path / "robots")
+    robot = hsp.Robot.load(urdf)
+    if kind == "pinocchio":
+        robot = hsp.Robot.from_pinocchio(robot.model)
+    log_of(robot, tmp_path / "a.npz")
+    shutil.rmtree(urdf.parent)
+    page = tmp_path / "a.html"
+    from hsp_control.cli import main
+
+    assert main(["export", str(tmp_path / "a.npz"), "--html", str(page)]) == 0
+    assert page.stat().st_size > 10_000
+
+
+def test_a_recorded_run_is_repeated_without_its_files(tmp_path: Path) -> None:
+    urdf = copied(tmp_path / "robots")
+    robot = hsp.Robot.load(urdf)
+    task = hsp.FramePosition(robot.end_effector)
+    controller = hsp.Controller(robot, [task], hsp.Rest(), null_space_gain=1.0)
+    q, v = robot.home(), np.zeros(robot.nv)
+    with hsp.Recorder(controller, tmp_path / "b.npz") as recorder:
+        for k in range(30):
+            recorder.record(controller.compute(0.01 * k, q, v))
+    shutil.rmtree(urdf.parent)
+    again = hsp.load_experiment(tmp_path / "b.npz")
+    equal(again.robot, robot)
+    with pytest.raises(hsp.HspControlError):
+        hsp.load_experiment(tmp_path / "b.npz", f"robot.name={urdf}")
+
+
+@pytest.mark.parametrize(
+    "record",
+    [None, {}, {"missing": "why"}, {"model": {}}, {"model": {"joints": 3}},
+     {"description": {"name": "panda"}, "parts": [], "home": []},
+     {"description": {"name": "panda"}, "home": [],
+      "parts": [{"urdf": "no", "file": "", "name": ""}]}],
+)  # fmt: skip
+def test_a_damaged_record_is_one_message(record: object) -> None:
+    with pytest.raises(ModelError, match=r"the (log|recorded)|recorded robot"):
+        recorded_robot(record)
