@@ -69,6 +69,8 @@ class Controller(Composition):
             ShapeError: If q or v has the wrong shape.
             NonFiniteError: If t, q or v contains NaN or inf, or a task or the field
                 does; a non-finite effort is never returned.
+            RateError: In the first step of a run, if a rate that somebody has written
+                of the field or the metric is wrong, or the field depends on v.
             ConfigurationError: If a quaternion or a (cos, sin) pair is not of norm 1,
                 or an angle of the first state (also after `restart`; later ones are
                 not looked at) is farther from the middle of its joint's range than
@@ -138,6 +140,7 @@ class Controller(Composition):
             sent = self._limits.sent.memory()
             self._compose(here, self._time_line.made)
             self._limits.remember(sent)
+        self.check_derivatives(self._state)
         self._run.begun = True
 
     def _advance(self) -> None:
