@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ControllerError, NonFiniteError
 from hsp_control.control.active_stack import ActiveStack
-from hsp_control.control.actuation.limited_step import RELAXED
+from hsp_control.control.actuation.limited_step import BEYOND, RELAXED
 from hsp_control.control.bound_step import FreeStep
 from hsp_control.control.changes import Change
 from hsp_control.control.composition import Composition, PresentRun
@@ -100,9 +100,8 @@ class Controller(Composition):
                 run.bound = bound or mixture.bound_step()
             run.acceleration, status = delivered[1], delivered[3]
             # Kernels have looked at all other efforts already.
-            if (status is RELAXED or modifier is not None) and not isfinite(
-                delivered[0] @ delivered[0]
-            ):
+            unlike = status is RELAXED or status is BEYOND or modifier is not None
+            if unlike and not isfinite(delivered[0] @ delivered[0]):
                 stack.raise_not_finite()
             out = ControlOutput() if out is None else out
             out.overwrite(delivered, stack, damped)

@@ -17,6 +17,12 @@ something blocks drifts by all that it should accelerate."""
 MOTION, EFFORT = 1, 2
 """Flags of what is violated: bounds on the acceleration, bounds on the effort."""
 
+BEYOND_POSITION = 1e-3
+"""A joint that is so far behind the end of its range is beyond it [rad or m]."""
+BEYOND_SPEED = 0.02
+"""A joint that is faster by this part of its speed limit is beyond that: the noise of
+a measured velocity is less."""
+
 
 class MotionLimits(NamedTuple):
     """The limits that the barriers keep, margins included."""
@@ -29,6 +35,23 @@ class MotionLimits(NamedTuple):
     # inertia, shape (nv,) [rad/s³ or m/s³]
     jerk: Array
     bandwidth: Array  # α of the barriers, shape (1,) [1/s]
+
+
+class Ends(NamedTuple):
+    """Where a joint is beyond its limits, however it got there."""
+
+    lower: Array  # lower position, shape (nv,) [rad or m]
+    upper: Array  # upper position, shape (nv,) [rad or m]
+    velocity: Array  # speed, shape (nv,) [rad/s or m/s]
+
+    @classmethod
+    def of(cls, lower: Array, upper: Array, velocity: Array) -> "Ends":
+        """Return those of the limits themselves, shape (nv,) each."""
+        return cls(
+            lower - BEYOND_POSITION,
+            upper + BEYOND_POSITION,
+            (1.0 + BEYOND_SPEED) * velocity,
+        )
 
 
 class Bounds(NamedTuple):
@@ -142,6 +165,18 @@ def violated_limits(
     violated = 0 if within(a, bounds.a_lower, bounds.a_upper) else MOTION
     effort_ok = within(tau, bounds.tau_lower, bounds.tau_upper)
     return violated if effort_ok else violated + EFFORT
+
+
+@kernel
+def is_beyond(q: Array, v: Array, where: Indices, ends: Ends) -> bool:
+    """Return whether a joint is beyond a limit; see `acceleration_bounds` for where."""
+    found = False
+    for i in range(v.shape[0]):
+        found = found or abs(v[i]) > ends.velocity[i]
+        if where[i] >= 0:
+            position = q[where[i]]
+            found = found or not ends.lower[i] <= position <= ends.upper[i]
+    return found
 
 
 @kernel

@@ -276,6 +276,38 @@ def test_contradiction_is_relaxed_and_told() -> None:
     assert 0.0 < out.relaxation < np.inf
 
 
+def told(
+    controller: hsp.Controller, dof: int, *, away: float = 0.0, speed: float = 0.0
+) -> Status:
+    """Return the status where a joint is beyond its upper end, and moves back."""
+    robot = controller.robot
+    q, v, (_, upper) = robot.home(), np.zeros(7), robot.position_limits()
+    if away:
+        q[dof] = upper[dof] + away
+    v[dof] = speed * float(robot.model.velocityLimit[dof])
+    return controller.compute(0.0, q, v).status
+
+
+@pytest.mark.parametrize("dof", [0, 3, 6])
+def test_what_is_measured_beyond_a_limit_is_told_in_that_step(dof: int) -> None:
+    """Whatever is delivered, also a free step on the way back."""
+    law = hsp.Controller(panda(), [hsp.FramePosition("panda_tcp")])
+    for _ in range(3):  # the first steps, and those that are one call
+        assert told(law, dof, away=1.1e-3) is Status.BEYOND
+        assert told(law, dof, away=1.1e-3, speed=-0.9) is Status.BEYOND
+        assert told(law, dof, away=0.9e-3) < Status.BEYOND
+        for sign in (-1.0, 1.0):
+            assert told(law, dof, speed=1.021 * sign) is Status.BEYOND
+            assert told(law, dof, speed=1.019 * sign) < Status.BEYOND
+    # Where one set of limits follows another, that of either counts.
+    wide = hsp.Limits(position="none", velocity=10.0)
+    law.at(-1.0).ramp(10.0).limits(wide)
+    assert told(law, dof, away=1.1e-3) is Status.BEYOND
+    for limits in (None, wide):
+        free = hsp.Controller(panda(), [hsp.FramePosition("panda_tcp")], limits=limits)
+        assert told(free, dof, away=1.1e-3) < Status.BEYOND
+
+
 def test_effort_rate_needs_to_know_what_went_out() -> None:
     robot = panda()
     limits = hsp.Limits(effort_rate=1000.0)
