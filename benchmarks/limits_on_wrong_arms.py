@@ -11,6 +11,7 @@ leaves its range, the speed its limit, and what share of it the status told.
 
 import argparse
 import warnings
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from hsp_control.control.actuation import Status
 from hsp_control.control.compensation import Compensation, MomentumObserver
 from hsp_control.simulation import plants
 from hsp_control.simulation.plants.drives import Drive, Driving
+from hsp_control.simulation.plants.model_changes import MotorInertia, changed
 from hsp_control.trajectories import ComposedPose, HoldOrientation
 
 ROBOTS = ("panda", "iiwa14", "xarm7", "ur5")
@@ -32,6 +34,7 @@ BEYOND = 0.3  # of a target, behind it [rad]
 DELAY, LAG, NOISE, LOAD = 2, 0.003, 0.01, 1.0  # [periods, s, rad/s, kg]
 COULOMB, VISCOUS = 0.005, 0.002  # of a joint's largest effort, at 1 rad/s
 KINDS = ("pose", "posture", "field")
+EASY = ("held", "circle")  # away from the ends
 OBSERVER = Compensation(momentum_observer=MomentumObserver(30.0))
 
 
@@ -91,8 +94,12 @@ def controller(arm: Arm, kind: str, q0: Array, rng: np.random.Generator) -> Any:
     """Return a controller that drives joints against their ranges."""
     start = arm.robot.joint_positions(q0)
     goal = beyond(arm, start, rng)
+    if kind in EASY:
+        x: Any = hsp.Circle(0.08, 2.0) if kind == "circle" else hsp.Hold()
+        task: Any = hsp.FramePose(arm.frame, ComposedPose(x), blend=1.0)
+        return hsp.Controller(arm.robot, [task], hsp.JointCentering(), start=q0)
     if kind == "posture":
-        task: Any = hsp.JointPosture(goal)
+        task = hsp.JointPosture(goal)
         return hsp.Controller(arm.robot, [task], start=q0)
     if kind == "field":
         pose, _ = arm.at(start)  # the same, held
@@ -106,11 +113,14 @@ def controller(arm: Arm, kind: str, q0: Array, rng: np.random.Generator) -> Any:
     return hsp.Controller(arm.robot, [task], hsp.JointCentering(), start=q0)
 
 
-def measure(arm: Arm, seed: int, compensation: Any) -> dict[str, Any]:
+def measure(
+    arm: Arm, seed: int, compensation: Any, kinds: Sequence[str]
+) -> dict[str, Any]:
     """Return the numbers of one run."""
     rng = np.random.default_rng([seed, 0])
-    kind = KINDS[seed % len(KINDS)]
-    q0 = arm.configuration(start_of(arm, rng))
+    kind = kinds[seed % len(kinds)]
+    near = kind not in EASY
+    q0 = arm.configuration(start_of(arm, rng) if near else arm.start(rng))
     made = controller(arm, kind, q0, rng)
     found: dict[str, Any] = {"kind": kind}
     try:
@@ -143,17 +153,21 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=40)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--only", choices=("without", "observer"))
+    parser.add_argument("--rotors", type=float, default=0.0)
+    parser.add_argument("--kinds", nargs="*", default=KINDS)
     parser.add_argument("--verbose", action="store_true")
     asked = parser.parse_args()
     warnings.simplefilter("ignore")
     for name in asked.robots:
         arm = Arm(name)
+        if asked.rotors:  # of the model and the arm
+            arm.robot = changed(arm.robot, [MotorInertia(asked.rotors)])
         for words, own in (("without", None), ("observer", OBSERVER)):
             if asked.only not in (None, words):
                 continue
             rows = []
             for seed in range(asked.first, asked.first + asked.seeds):
-                rows.append({"seed": seed, **measure(arm, seed, own)})
+                rows.append({"seed": seed, **measure(arm, seed, own, asked.kinds)})
                 if asked.verbose:
                     each = {k: round(float(x), 4) if isinstance(x, float) else x
                             for k, x in rows[-1].items()}  # fmt: skip

@@ -251,8 +251,8 @@ def _check(
     # ``solve_if``, as `OnlyIf` reads it.
     observe(v, held, time[0])
     flags = violated_limits(
-        q, v, a, tau, where, limits, held.error, held.drift, held.steady,
-        held.disturbance, bounds,
+        q, v, a, tau, where, limits, held.error, held.least, held.most, held.lasting,
+        held.steady, held.disturbance, bounds,
     )  # fmt: skip
     beyond = _BEYOND if is_beyond(q, v, where, ends) else 0
     look = _unlimited(code, found) if flags + beyond == 0 else LOOK
