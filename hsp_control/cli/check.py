@@ -134,6 +134,7 @@ _LIMITS = {
     "redistributed": "shift contact forces at the start",
     "limited": "bind at the start: the law is not exact there",
     "relaxed": "contradict each other at the start",
+    "beyond": "are not kept at the start: a joint is beyond its range or its speed",
 }
 """What the step's status says of the limits."""
 

@@ -90,12 +90,16 @@ def limit_rows(rollout: Rollout) -> Iterator[str]:
     if POSITION not in rollout.columns:
         return
     status = rollout["status"]
-    limited, relaxed = (int((status == s).sum()) for s in (2, 3))
-    if limited or relaxed:
-        yield f"{limited} rows limited of {len(rollout)}" + (
-            f", {relaxed} relaxed by up to {np.nanmax(rollout['relaxation']):.3g}"
-            if relaxed
-            else ""
+    limited, relaxed, beyond = (int((status == s).sum()) for s in (2, 3, 4))
+    if limited or relaxed or beyond:
+        yield (
+            f"{limited} rows limited of {len(rollout)}"
+            + (
+                f", {relaxed} relaxed by up to {np.nanmax(rollout['relaxation']):.3g}"
+                if relaxed
+                else ""
+            )
+            + (f", {beyond} beyond a limit" if beyond else "")
         )
     yield from excess_rows(rollout)
 

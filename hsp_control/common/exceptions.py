@@ -94,6 +94,10 @@ class FieldError(HspControlError, ValueError):
     """A null-space field or cost is invalid, or returned a wrong shape, NaN or inf."""
 
 
+class RateError(HspControlError, ValueError):
+    """A rate or a gradient that a field, a weight or a metric declares is wrong."""
+
+
 class MetricError(HspControlError, ValueError):
     """A joint-space metric is not a symmetric positive definite matrix."""
 

@@ -210,6 +210,8 @@ class Experiment:
             v0 = scenario.start.velocity_of(controller, q0)
             if controller.limits is not None:
                 controller.limits.check_start(q0, v0)
+        with document.at():  # the first step would have no place in the file
+            controller.check_derivatives(robot.state(0.0, q0, v0))
         if scenario.plan is not None:
             with document.at("plan"):
                 scenario.plan.begin(controller).start(robot.state(0.0, q0, v0))

@@ -16,12 +16,15 @@ from hsp_control.constraints.limits import Limits, RobotLimits
 from hsp_control.control.actuation.limits_in_force import LimitsInForce
 from hsp_control.control.bound_step import BoundStep
 from hsp_control.control.changes import Change, Changes, TimeLine
+from hsp_control.control.declared_rates import check_field, check_metric
 from hsp_control.control.gains_in_force import GainsInForce, check_held
 from hsp_control.control.mixture import Mixture
-from hsp_control.control.setup import Base, DeclaredController
+from hsp_control.control.setup import Base, DeclaredController, PlannedTerm, Setup
 from hsp_control.control.targets import RAMP, followed_stream, new_stream, target_of
+from hsp_control.declaration import within
 from hsp_control.geometry.scene import Obstacle, Scene, Start
 from hsp_control.null_space.fields import NullSpaceField
+from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.metrics import Metric
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import Task
@@ -188,6 +191,7 @@ class Composition:
             ControllerError: If it names something that does not exist at its time.
             UnstableRateError: If gains that follow make the running loop unstable at
                 its period, without delays, where the robot is now.
+            RateError: If a rate that somebody has written of a new field is wrong.
             HspControlError: If its parts do not fit the robot.
         """
         with self._lock:
@@ -199,9 +203,36 @@ class Composition:
             if period := self._limits.sent.period:
                 state = (here or time_line.start).state
                 check_held(self._setup, time_line.setup, state, period)
+            if self._run.begun:
+                self._check_terms(time_line.setup, self._setup.terms, self._state)
             self._follow(time_line)
             if self._run.begun:  # compile now, not in a step
                 self._mixture.prepare(self._mixture.stack_at(now))
+
+    def check_derivatives(self, state: RobotState) -> None:
+        """Check what somebody has written of the field and the metric, at a state.
+
+        The first step of a run does; see `hsp_control.control.declared_rates`.
+
+        Raises:
+            RateError: If a rate or a gradient is wrong, or the field depends on v.
+        """
+        with within("null_space", "metric"):
+            check_metric(self._setup.metric, state)
+        self._check_terms(self._setup, (), state)
+
+    def _check_terms(
+        self, setup: Setup, known: Sequence[PlannedTerm], state: RobotState
+    ) -> None:
+        """Check what somebody has written of the terms that are not known yet."""
+        checked = {id(each.field) for each in known}
+        # Those of the start come first; what a change brings has no place.
+        places = 0 if known else len(terms_of(self._declared.field))
+        for k, each in enumerate(setup.terms):
+            if id(each.field) in checked:
+                continue
+            with within(*(("null_space", "fields", k) if k < places else ())):
+                check_field(each.field, state)
 
     # -- what it is made of -----------------------------------------------------------
 

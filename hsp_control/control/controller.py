@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ControllerError, NonFiniteError
 from hsp_control.control.active_stack import ActiveStack
-from hsp_control.control.actuation.limited_step import RELAXED
+from hsp_control.control.actuation.limited_step import BEYOND, RELAXED
 from hsp_control.control.bound_step import FreeStep
 from hsp_control.control.changes import Change
 from hsp_control.control.composition import Composition, PresentRun
@@ -72,6 +72,8 @@ class Controller(Composition):
             ShapeError: If q or v has the wrong shape.
             NonFiniteError: If t, q or v contains NaN or inf, or a task or the field
                 does; a non-finite effort is never returned.
+            RateError: In the first step of a run, if a rate that somebody has written
+                of the field or the metric is wrong, or the field depends on v.
             ConfigurationError: If a quaternion or a (cos, sin) pair is not of norm 1,
                 or an angle of the first state (also after `restart`; later ones are
                 not looked at) is farther from the middle of its joint's range than
@@ -103,9 +105,8 @@ class Controller(Composition):
                 run.bound = bound or mixture.bound_step()
             run.acceleration, status = delivered[1], delivered[3]
             # Kernels have looked at all other efforts already.
-            if (status is RELAXED or modifier is not None) and not isfinite(
-                delivered[0] @ delivered[0]
-            ):
+            unlike = status is RELAXED or status is BEYOND or modifier is not None
+            if unlike and not isfinite(delivered[0] @ delivered[0]):
                 stack.raise_not_finite()
             out = ControlOutput() if out is None else out
             out.overwrite(delivered, stack, damped)
@@ -143,6 +144,7 @@ class Controller(Composition):
             sent = self._limits.sent.memory()
             self._compose(here, self._time_line.made)
             self._limits.remember(sent)
+        self.check_derivatives(self._state)
         self._run.begun = True
 
     def _advance(self) -> None:

@@ -106,7 +106,7 @@ class LogWriter:
             "first level, 1 the highest, that is damped at a singularity; 0: exact",
         )
         column("status", (), "-", "0 exact law; 1 forces redistributed; 2 limited; "
-               "3 limits relaxed")  # fmt: skip
+               "3 limits relaxed; 4 beyond a limit")  # fmt: skip
         column("relaxation", (), "(rad or m)/s²", "largest violation of a limit")
         self._contacts = ContactColumns(controller, columns)
         self._excess = LimitExcess(robot)

@@ -5,6 +5,11 @@ import pytest
 
 from hsp_control import Rollout, load_experiment
 from hsp_control.cli.main import main
+from hsp_control.constraints.limits.acceleration_bounds import (
+    BEYOND_POSITION,
+    BEYOND_SPEED,
+)
+from hsp_control.control.actuation import Status
 from hsp_control.simulation.measures import measures
 
 pytest.importorskip("mujoco")
@@ -55,10 +60,13 @@ def test_a_joint_beyond_its_limit_is_told(case, tmp_path, capsys):
         every["joint_positions"] - limits.upper, limits.lower - every["joint_positions"]
     )
     outside = np.maximum(outside, 0.0)
-    # The push is stronger than the motors; the status cannot say so.
+    # The push is stronger than the motors, and the status says when.
     worst, dof = np.unravel_index(outside.argmax(), outside.shape)
     assert outside[worst, dof] > 0.03
-    assert set(run["status"]) <= {0.0, 1.0, 2.0, 3.0}
+    fast = np.abs(every.v) > (1.0 + BEYOND_SPEED) * limits.velocity
+    beyond = (outside > BEYOND_POSITION).any(axis=1) | fast.any(axis=1)
+    np.testing.assert_array_equal(every["status"] == Status.BEYOND, beyond)
+    np.testing.assert_array_equal(run["status"] == Status.BEYOND, beyond[::10])
     # A row tells the worst control period since the row before it: none is missed.
     told = run["position_excess"]
     assert len(told) == 31
@@ -76,6 +84,7 @@ def test_a_joint_beyond_its_limit_is_told(case, tmp_path, capsys):
         assert main(["run", config, *words, "--out", folder]) == 0
         said = " ".join(capsys.readouterr().out.split())
         assert f"{name} is {told.max():.3g} rad beyond its position limit" in said
+        assert f"{beyond[::10].sum()} beyond a limit" in said
 
 
 def test_without_a_push_no_joint_is_beyond():

@@ -11,11 +11,21 @@ _STEEPER = 4.0
 """How much steeper the velocity barrier is beyond the guarded speed."""
 
 _SHIFT = 0.1
-"""How much of a joint's range the drift may take away at one end: a joint that
-something blocks drifts by all that it should accelerate."""
+"""How much of a joint's range a mean error may take away at one end: a joint that
+something blocks errs by all that it should accelerate."""
+
+_HELD = 0.002
+"""What the effort's rate can do in this time [s] is held against a force that lasts,
+where that is more: a light wrist with a tool that nobody declared."""
 
 MOTION, EFFORT = 1, 2
 """Flags of what is violated: bounds on the acceleration, bounds on the effort."""
+
+BEYOND_POSITION = 1e-3
+"""A joint that is so far behind the end of its range is beyond it [rad or m]."""
+BEYOND_SPEED = 0.02
+"""A joint that is faster by this part of its speed limit is beyond that: the noise of
+a measured velocity is less."""
 
 
 class MotionLimits(NamedTuple):
@@ -29,6 +39,23 @@ class MotionLimits(NamedTuple):
     # inertia, shape (nv,) [rad/s³ or m/s³]
     jerk: Array
     bandwidth: Array  # α of the barriers, shape (1,) [1/s]
+
+
+class Ends(NamedTuple):
+    """Where a joint is beyond its limits, however it got there."""
+
+    lower: Array  # lower position, shape (nv,) [rad or m]
+    upper: Array  # upper position, shape (nv,) [rad or m]
+    velocity: Array  # speed, shape (nv,) [rad/s or m/s]
+
+    @classmethod
+    def of(cls, lower: Array, upper: Array, velocity: Array) -> "Ends":
+        """Return those of the limits themselves, shape (nv,) each."""
+        return cls(
+            lower - BEYOND_POSITION,
+            upper + BEYOND_POSITION,
+            (1.0 + BEYOND_SPEED) * velocity,
+        )
 
 
 class Bounds(NamedTuple):
@@ -47,7 +74,9 @@ def acceleration_bounds(
     where: Indices,
     limits: MotionLimits,
     error: Array,
-    drift: Array,
+    least: Array,
+    most: Array,
+    lasting: Array,
     steady: Array,
     a_lower: Array,
     a_upper: Array,
@@ -59,10 +88,12 @@ def acceleration_bounds(
     can. ``where`` is the index in q of each dof's coordinate, -1 for none.
 
     The margin of the speed covers the largest ``error`` that the acceleration had of
-    late, up to half the speed. The barrier of the position makes up for
-    the ``drift``, the mean error, where it leads beyond the limit. ``steady`` is what
-    of it is still there: what is commanded against a steady force moves nothing, and
-    the barriers are wider by as much.
+    late, up to half the speed. A position limit would be passed by a mean error over
+    the bandwidth's square; so its barrier makes up for the worst mean of late that
+    leads beyond it, ``least`` at the lower end and ``most`` at the upper one, and for
+    all that is ``lasting`` now. ``steady`` is what of a longer mean is still there:
+    what is commanded against a steady force moves nothing, and the barriers are wider
+    by as much.
     """
     lower, upper, velocity, acceleration, jerk, alpha = limits
     bandwidth = alpha[0]
@@ -73,10 +104,10 @@ def acceleration_bounds(
             damping = 2.0 * bandwidth * v[i]
             low = -bandwidth * bandwidth * (position - lower[i]) - damping
             high = bandwidth * bandwidth * (upper[i] - position) - damping
-            # While it lasts, a limit would be passed by the drift over α².
-            most = _SHIFT * bandwidth * bandwidth * (upper[i] - lower[i])
-            low += min(max(-drift[i], 0.0), most)
-            high -= min(max(drift[i], 0.0), most)
+            shift = _SHIFT * bandwidth * bandwidth * (upper[i] - lower[i])
+            held = max(shift, _HELD * jerk[i])
+            low += max(min(-least[i], shift), min(-lasting[i], held))
+            high -= max(min(most[i], shift), min(lasting[i], held))
             low -= max(steady[i], 0.0)
             high -= min(steady[i], 0.0)
         speed = velocity[i] - error[i] / (2.0 * bandwidth * _STEEPER)
@@ -119,7 +150,9 @@ def violated_limits(
     where: Indices,
     limits: MotionLimits,
     error: Array,
-    drift: Array,
+    least: Array,
+    most: Array,
+    lasting: Array,
     steady: Array,
     disturbance: Array,
     bounds: Bounds,
@@ -132,16 +165,38 @@ def violated_limits(
     that ends does no harm. See `acceleration_bounds` for the other arguments.
     """
     acceleration_bounds(
-        q, v, where, limits, error, drift, steady, bounds.a_lower, bounds.a_upper
+        q,
+        v,
+        where,
+        limits,
+        error,
+        least,
+        most,
+        lasting,
+        steady,
+        bounds.a_lower,
+        bounds.a_upper,
     )
     for i in range(a.shape[0]):
-        most = 2.0 * limits.bandwidth[0] * limits.velocity[i]
+        brake = 2.0 * limits.bandwidth[0] * limits.velocity[i]
         up, down = max(disturbance[i], 0.0), min(disturbance[i], 0.0)
-        bounds.a_lower[i] -= up + max(down, -most)
-        bounds.a_upper[i] -= min(up, most) + down
+        bounds.a_lower[i] -= up + max(down, -brake)
+        bounds.a_upper[i] -= min(up, brake) + down
     violated = 0 if within(a, bounds.a_lower, bounds.a_upper) else MOTION
     effort_ok = within(tau, bounds.tau_lower, bounds.tau_upper)
     return violated if effort_ok else violated + EFFORT
+
+
+@kernel
+def is_beyond(q: Array, v: Array, where: Indices, ends: Ends) -> bool:
+    """Return whether a joint is beyond a limit; see `acceleration_bounds` for where."""
+    found = False
+    for i in range(v.shape[0]):
+        found = found or abs(v[i]) > ends.velocity[i]
+        if where[i] >= 0:
+            position = q[where[i]]
+            found = found or not ends.lower[i] <= position <= ends.upper[i]
+    return found
 
 
 @kernel

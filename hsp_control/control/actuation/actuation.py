@@ -25,11 +25,14 @@ from hsp_control.constraints.limits.acceleration_bounds import (
     EFFORT,
     MOTION,
     Bounds,
+    Ends,
     MotionLimits,
+    is_beyond,
     violated_limits,
     within,
 )
 from hsp_control.control.actuation.limited_step import (
+    BEYOND,
     EXACT,
     LIMITED,
     UNSOLVED,
@@ -46,6 +49,8 @@ from hsp_control.law import Resolution
 from hsp_control.law.resolution import BEYOND_ANY_LEVEL
 from hsp_control.robot import RobotState
 
+_BEYOND = 4
+"""Flag besides `MOTION` and `EFFORT`: the robot is beyond a limit; see `Status`."""
 LOOK = 2.0
 """What the last of `Actuation.calls` returns, or more, where a limit is violated or the
 law is not finite: `Actuation.found` and the law's code say which. Where neither is the
@@ -103,7 +108,7 @@ class Actuation:
         if limits.limits is None:
             return _unlimited, found
         moving = state.time, state.q, state.v, self._wanted.acceleration, state.effort
-        within = limits.motion, limits.sent.held, limits.bounds
+        within = limits.motion, limits.ends, limits.sent.held, limits.bounds
         given = *moving, state.robot.dof_indices, *within, *found, self._solve_if
         return _check, given
 
@@ -134,9 +139,16 @@ class Actuation:
 
     def delivered(self, a: Array, offset: Array | None = None) -> Delivered:
         """Return what is delivered, after `calls`; for the arguments see `deliver`."""
+        delivered = self._within_limits(a, offset)
+        if self.found.item(0) & _BEYOND:
+            return delivered._replace(status=BEYOND)
+        return delivered
+
+    def _within_limits(self, a: Array, offset: Array | None) -> Delivered:
+        """Return what is delivered, whether or not a joint is beyond a limit."""
         if self.found.item(1) != UNSOLVED:
             return self._solved
-        violated = self.found.item(0)
+        violated = self.found.item(0) & ~_BEYOND
         if self.direct and not violated and offset is None:
             return Delivered(self._state.effort, a, self.own.forces, EXACT, 0.0)
         motion_ok, effort_ok = not violated & MOTION, not violated & EFFORT
@@ -232,6 +244,7 @@ def _check(
     tau: Array,
     where: Indices,
     limits: MotionLimits,
+    ends: Ends,
     held: Held,
     bounds: Bounds,
     code: Indices,
@@ -243,10 +256,11 @@ def _check(
     # ``solve_if``, as `OnlyIf` reads it.
     observe(v, held, time[0])
     flags = violated_limits(
-        q, v, a, tau, where, limits, held.error, held.drift, held.steady,
-        held.disturbance, bounds,
+        q, v, a, tau, where, limits, held.error, held.least, held.most, held.lasting,
+        held.steady, held.disturbance, bounds,
     )  # fmt: skip
-    look = _unlimited(code, found) if flags == 0 else LOOK
-    found[0], found[1] = flags, UNSOLVED
+    beyond = _BEYOND if is_beyond(q, v, where, ends) else 0
+    look = _unlimited(code, found) if flags + beyond == 0 else LOOK
+    found[0], found[1] = flags + beyond, UNSOLVED
     solve_if[0], solve_if[1] = look, flags
     return look

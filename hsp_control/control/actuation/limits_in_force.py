@@ -8,7 +8,11 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.compiled.kernels import KernelCall, kernel
 from hsp_control.constraints.limits import RobotLimits
-from hsp_control.constraints.limits.acceleration_bounds import Bounds, MotionLimits
+from hsp_control.constraints.limits.acceleration_bounds import (
+    Bounds,
+    Ends,
+    MotionLimits,
+)
 from hsp_control.control.actuation.sent_effort import SentEffort
 from hsp_control.control.evolution import Evolution, PlannedLimits
 from hsp_control.robot import Robot, RobotState
@@ -50,6 +54,7 @@ class LimitSet:
         self.rate = bool(np.isfinite(limits.effort_rate).any())
         numbers = (np.array(each) for each in limits.motion)
         self.motion = MotionLimits(*numbers)
+        self.ends = Ends.of(limits.lower, limits.upper, limits.velocity)
         # writes the bounds on the next effort
         most = np.array(limits.effort), np.array(limits.effort_rate)
         window = self.bounds.tau_lower, self.bounds.tau_upper
