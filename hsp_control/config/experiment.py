@@ -43,7 +43,7 @@ from hsp_control.robot.integrators import Integrator
 from hsp_control.simulation import Rollout, simulate
 from hsp_control.simulation.initial_state import InitialState
 from hsp_control.simulation.log_writer import LogWriter
-from hsp_control.simulation.plants import Plant, PlantPart, SampledPlant
+from hsp_control.simulation.plants import Plant, PlantPart, SampledPlant, is_exact
 from hsp_control.simulation.simulate import (
     SimulationSettings,
     check_steps,
@@ -217,7 +217,7 @@ class Experiment:
             begun(scenario.estimators, controller, plant.inertial())
         _check_compensation(document, scenario, controller)
         with document.at():
-            rates = _rate_findings(scenario, controller, q0, plant.robot)
+            rates = _rate_findings(scenario, controller, q0, plant)
         vars(self).update(
             name=Path(document.name).stem,
             scenario=scenario,
@@ -238,8 +238,25 @@ class Experiment:
 
     @property
     def compensation(self) -> Compensation:
-        """Compensators for differences between plant and model."""
-        return self.scenario.compensation
+        """Compensators for differences between plant and model, decided for both.
+
+        A real robot gets those of its `scenario` instead, in which ``auto`` is not
+        decided by the plant.
+        """
+        own = self.scenario.compensation
+        return own.decided(self.controller, *self._loop)
+
+    @property
+    def on_observer(self) -> str:
+        """A few words: whether there is a momentum observer, its rate, and why."""
+        own = self.scenario.compensation
+        return own.on_observer(self.controller, *self._loop)
+
+    @property
+    def _loop(self) -> tuple[float | None, bool]:
+        """The control period [s], if there is one, and whether the plant is exact."""
+        period = self.scenario.simulation.control_period
+        return period, is_exact(self.plant, self.robot)
 
     @property
     def integrator(self) -> Integrator:
@@ -299,7 +316,7 @@ class Experiment:
             log_period=settings.log_period,
             integrator=self.integrator,
             plant=self.plant,
-            compensation=self.compensation,
+            compensation=self.scenario.compensation,
             plan=self.scenario.plan,
             estimators=self.scenario.estimators,
             scene=self.scene,
@@ -440,20 +457,22 @@ def _check_compensation(
 
 
 def _rate_findings(
-    scenario: Scenario, controller: Controller, q0: Array, moving: Robot
+    scenario: Scenario, controller: Controller, q0: Array, moving: Plant
 ) -> tuple[RateFinding, ...]:
     """Check that the loop is stable at its rate; return gains that are high for it."""
     settings, plant = scenario.simulation, scenario.plant
     if settings.control_period is None or not settings.check_rate:
         return ()
+    period, exact = settings.control_period, is_exact(moving, controller.robot)
     found = check_rate(
         controller,
         q0,
-        settings.control_period,
-        scenario.compensation,
+        period,
+        scenario.compensation.decided(controller, period, exact),
         effort_delay=plant.effort_delay,
+        effort_lag=plant.effort_lag,
         sensor_delay=plant.sensor_delay,
-        plant=moving,
+        plant=moving.robot,
     )
     return tuple(found)
 

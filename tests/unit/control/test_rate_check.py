@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import yaml
 from carriage import carriage, check_that_it_is_the_loop
+from compensators import only
 from runs import held
 
 import hsp_control as hsp
@@ -123,7 +124,7 @@ def test_the_linear_loop_is_the_chain_link_by_link(
     robot = carriage(tmp_path)
     h, frequency = 0.01, 12.0
     task = JointPosture(np.zeros(1), gains=Gains(natural_frequency=frequency))
-    made, parts = Controller(robot, [task], limits=None), Compensation(**compensation)
+    made, parts = Controller(robot, [task], limits=None), only(**compensation)
     plant = ImperfectPlant(
         IntegratedPlant(RigidBodyPlant(changed(robot, [Inertias(heavy)])), Rk4(h)),
         [SensorDelay(delays[1])],
