@@ -83,6 +83,7 @@ def _checked(
         },
         "plant": experiment.plant.describe()["type"],
         "compensation": list(experiment.compensation.names),
+        "momentum_observer": experiment.on_observer,
         "limits": "none" if controller.limits is None else output.status.name.lower(),
         "effort_rate": _rates(controller),
         "singular_values": list(map(float, values)),
@@ -115,6 +116,7 @@ def _check_table(found: dict[str, Any]) -> Table:
     table.add_row("null space", f"{dofs}, {null_space['field']}")
     table.add_row("plant", found["plant"])
     table.add_row("compensation", ", ".join(found["compensation"]) or "none")
+    table.add_row("momentum observer", found["momentum_observer"])
     table.add_row("limits", _LIMITS[found["limits"]])
     rates = [rate for rate in found["effort_rate"] if rate is not None]
     if rates:

@@ -238,13 +238,12 @@ class Experiment:
 
     @property
     def compensation(self) -> Compensation:
-        """Compensators for differences between plant and model, decided for both.
+        """Compensators for differences between plant and model: those that suit both.
 
-        A real robot gets those of its `scenario` instead, in which ``auto`` is not
-        decided by the plant.
+        A real robot gets those of its `scenario` instead, which do not know the plant.
         """
         own = self.scenario.compensation
-        return own.decided(self.controller, *self._loop)
+        return own.suited(self.controller, *self._loop)
 
     @property
     def on_observer(self) -> str:

@@ -158,8 +158,7 @@ def simulate(
     period = log_period / periods if periods else None
     decided = compensation.decided(controller, period, exact)
     observed = compensation.on_observer(controller, period, exact)
-    if decided.momentum_observer is None:
-        compensation = decided
+    compensation = compensation.suited(controller, period, exact)
     running: RunningPlan | None = None
     if isinstance(plant, ContinuousPlant):
         loop = continuous_loop(controller, plant, integrator, times, q, v)

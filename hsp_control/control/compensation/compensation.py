@@ -91,6 +91,16 @@ class Compensation(Part, error=CompensationError):
         choice = automatic_observer(controller, period, exact)
         return replace(self, momentum_observer=choice.observer)
 
+    def suited(
+        self, controller: Controller, period: float | None, exact: bool
+    ) -> "Compensation":
+        """Return what a `Command` runs in a loop: None for ``auto`` where that is off.
+
+        Elsewhere ``auto`` stays, since the tasks of a running loop may change.
+        """
+        decided = self.decided(controller, period, exact)
+        return decided if decided.momentum_observer is None else self
+
     def on_observer(
         self, controller: Controller, period: float | None, exact: bool
     ) -> str:
