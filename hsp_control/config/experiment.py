@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import count
 from os import PathLike
 from pathlib import Path
@@ -43,6 +43,7 @@ from hsp_control.robot.integrators import Integrator
 from hsp_control.simulation import Rollout, simulate
 from hsp_control.simulation.initial_state import InitialState
 from hsp_control.simulation.log_writer import LogWriter
+from hsp_control.simulation.model_errors import ModelErrors, model_errors
 from hsp_control.simulation.plants import Plant, PlantPart, SampledPlant, is_exact
 from hsp_control.simulation.simulate import (
     SimulationSettings,
@@ -250,6 +251,27 @@ class Experiment:
         """A few words: whether there is a momentum observer, its rate, and why."""
         own = self.scenario.compensation
         return own.on_observer(self.controller, *self._loop)
+
+    @cached_property
+    def model_errors(self) -> ModelErrors | None:
+        """What the loop bears at the start of what its model does not say.
+
+        As it is on a robot that is not its model. None without a control period, and
+        where `model_errors` has no answer.
+        """
+        period = self.scenario.simulation.control_period
+        if period is None:
+            return None
+        plant = self.scenario.plant
+        return model_errors(
+            self.controller.preview(),
+            self.q0,
+            period,
+            self.scenario.compensation,
+            effort_delay=plant.effort_delay,
+            sensor_delay=plant.sensor_delay,
+            effort_lag=plant.effort_lag,
+        )
 
     @property
     def _loop(self) -> tuple[float | None, bool]:

@@ -278,22 +278,26 @@ class LoadedLoop(NamedTuple):
         return replace(self.loop, share=share, slope=share @ (s * self.slope))
 
 
-def loaded_loop(
-    controller: Controller,
-    state: RobotState,
-    plant: Robot,
-    chain: LinearLoop,
-) -> LoadedLoop | None:
+class WholeLoop(NamedTuple):
+    """The loop of tasks and null space together, for a robot that is its model.
+
+    Its coordinates are y = T δq; see `LoadedLoop`.
+    """
+
+    loop: LinearLoop
+    into: Array  # T, shape (nv, nv)
+    to_error: Array  # U S, shape (m, m): e = U S y₁, of the task's rows
+
+
+def whole_loop(
+    controller: Controller, state: RobotState, chain: LinearLoop
+) -> WholeLoop | None:
     """Return the loop of the whole robot at a state, with the chain of another loop.
 
-    None where it is the model's, or where the law is damped or leaves motion free.
+    None where the law is damped or leaves motion free, and for a floating base.
     """
     robot = controller.robot
-    M = state.mass_matrix
-    others = plant.state(state.t, state.q, state.v).mass_matrix - M
-    weight = weight_slope(robot, state.q) - weight_slope(plant, state.q)
-    same = np.abs(others).max() < 1e-9 and np.abs(weight).max() < 1e-6
-    if robot.unactuated or controller.contacts or same:
+    if robot.unactuated or controller.contacts:
         return None
     J = controller.stack(state).jacobian
     problem = controller.active_stack.resolution
@@ -328,12 +332,31 @@ def loaded_loop(
         K = (T @ controller.null_space_gain @ back)[m:, m:]
         kp[m:], kv[m:] = K @ A, A
         kv[m:, m:] += K
+    return WholeLoop(replace(chain, kp=kp, kv=kv, ki=ki), T, out_of)
+
+
+def loaded_loop(
+    controller: Controller, state: RobotState, plant: Robot, chain: LinearLoop
+) -> LoadedLoop | None:
+    """Return the loop of a robot with other bodies; see `whole_loop`.
+
+    None also where the bodies are the model's.
+    """
+    robot, M = controller.robot, state.mass_matrix
+    others = plant.state(state.t, state.q, state.v).mass_matrix - M
+    weight = weight_slope(robot, state.q) - weight_slope(plant, state.q)
+    if np.abs(others).max() < 1e-9 and np.abs(weight).max() < 1e-6:
+        return None
+    whole = whole_loop(controller, state, chain)
+    if whole is None:
+        return None
+    T, out_of = whole.into, whole.to_error
+    back, m, n = np.linalg.inv(T), len(out_of), robot.nv
     difference = T @ np.linalg.solve(M, others) @ back
     performed = np.linalg.inv(np.eye(n) + difference)
-    beta = np.linalg.eigvals(out_of @ performed[:m, :m] @ into).real.min()
-    loop = replace(chain, kp=kp, kv=kv, ki=ki)
+    beta = np.linalg.eigvals(out_of @ performed[:m, :m] @ np.linalg.inv(out_of))
     slope = T @ np.linalg.solve(M, weight) @ back
-    return LoadedLoop(loop, difference, float(1.0 / beta), slope)
+    return LoadedLoop(whole.loop, difference, float(1.0 / beta.real.min()), slope)
 
 
 def weight_slope(robot: Robot, q: Array) -> Array:
