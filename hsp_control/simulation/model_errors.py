@@ -39,7 +39,7 @@ _BODIES: Sequence[tuple[Inertias, int]] = [
         for seed in range(6)
     ),
 ]
-_LONGEST = 0.1
+_LONGEST = 0.05
 """Longest delay and lag that are tried [s]."""
 _LARGEST_ROTOR = 10.0
 """Largest inertia of a rotor that is tried [kg·m²]."""
@@ -181,17 +181,20 @@ def _last_stable(
     values: Sequence[float],
     beyond: float | None = None,
 ) -> float:
-    """Return the last value before the first with a growing mode, by bisection.
+    """Return the last value before the first with a growing mode.
 
-    0 if the first grows, and ``beyond``, or the last one, if the last does not.
+    0 if the first grows, and ``beyond``, or the last one, if the last does not. Large
+    values are tried last: a long delay makes a large loop.
     """
 
     def grows(k: int) -> bool:
         return _growth(loop(float(values[k]))) > SLOWEST_GROWTH
 
-    if not grows(len(values) - 1):
-        return float(values[-1]) if beyond is None else beyond
-    low, high = -1, len(values) - 1
+    low, high, end = -1, 0, len(values) - 1
+    while not grows(high):
+        if high == end:
+            return float(values[-1]) if beyond is None else beyond
+        low, high = high, min(2 * high + 1, end)
     while high - low > 1:
         middle = (low + high) // 2
         low, high = (low, middle) if grows(middle) else (middle, high)

@@ -186,7 +186,9 @@ def test_weight_that_nothing_holds_is_told_and_an_observer_holds_it() -> None:
     made = hsp.Controller(arm, [hand], limits=None, start=Q0)
     (found,) = check_rate(made, Q0, H, plant=true)
     assert found.path == ("compensation", "momentum_observer")
-    assert re.search(r"leaves the start as exp\(0\.\d+ t\); use a momentum", found.message)
+    assert re.search(
+        r"leaves the start as exp\(0\.\d+ t\); use a momentum", found.message
+    )
     assert not check_rate(made, Q0, H, Compensation(), plant=true)
     held = hsp.Controller(arm, [hand], 5.0 * hsp.TargetPosture(Q0), start=Q0)
     assert not check_rate(held, Q0, H, plant=true)
