@@ -113,7 +113,7 @@ class AutomaticObserver(RunningObserver):
 def _what_forbids(controller: Controller) -> str:
     """Return why nothing may be cancelled, empty if nothing forbids it."""
     if controller.robot.unactuated:
-        return "the base floats, and its contact forces are not measured"
+        return "the base floats, and its contact forces are not known"
     if controller.contacts:
         return "a contact presses"
     for task in controller.planned_tasks:

@@ -395,6 +395,11 @@ def _stabilising_changes(
         choices.append(f"a control_period of at most {rounded_down(s * h)} s")
         shorter = rounded_down(min(s * h, rule / speed.rate))
         good.append(f"a control_period of at most {shorter} s")
+    for fewer in range(loop.effort_delay - 1, -1, -1):
+        if replace(loop, effort_delay=fewer).radius() <= 1.0 + _ROUNDING:
+            less = f"at most {fewer} period{'s' * (fewer != 1)}" if fewer else "none"
+            choices.append(f"a delay of the efforts of {less}")
+            break
     if own.observer is not None and own.observer.cancel:
         running = own.observer
         rate = running.bandwidth
