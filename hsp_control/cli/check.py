@@ -22,6 +22,7 @@ from hsp_control.robot.description.urdf import read_urdf
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.demand_check import missed_forces, out_of_reach, too_weak
 from hsp_control.simulation.initial_state import posture_search
+from hsp_control.simulation.model_errors import describe, lines
 
 ROUNDING = 1e-9
 """A singular value below this share of the largest one is zero but for rounding."""
@@ -49,7 +50,11 @@ def check(options: argparse.Namespace) -> int:
     if options.json:
         print(json.dumps(found | {"advice": advice}, indent=2, ensure_ascii=False))
         return 0
-    out.print(_check_table(found))
+    table = _check_table(found)
+    if (borne := experiment.model_errors) is not None:
+        for about, words in lines(borne).items():
+            table.add_row(about, words)
+    out.print(table)
     for line in advice:
         out.print(line, markup=False)
     out.print(f"{options.config}: OK")
@@ -62,6 +67,7 @@ def _checked(
     """Return what a configuration is made of, and its numbers at the start."""
     robot, controller = experiment.robot, experiment.controller
     values, efforts = diagnostics.singular_values, np.abs(output.tau)
+    borne = experiment.model_errors
     rank = int(np.sum(values > ROUNDING * values.max(initial=0.0)))
     held = controller.active_stack.first_task_row  # by contacts, or without motors
     tasks = {}
@@ -83,6 +89,8 @@ def _checked(
         },
         "plant": experiment.plant.describe()["type"],
         "compensation": list(experiment.compensation.names),
+        "momentum_observer": experiment.on_observer,
+        "wrong_model": None if borne is None else describe(borne),
         "limits": "none" if controller.limits is None else output.status.name.lower(),
         "effort_rate": _rates(controller),
         "singular_values": list(map(float, values)),
@@ -115,6 +123,7 @@ def _check_table(found: dict[str, Any]) -> Table:
     table.add_row("null space", f"{dofs}, {null_space['field']}")
     table.add_row("plant", found["plant"])
     table.add_row("compensation", ", ".join(found["compensation"]) or "none")
+    table.add_row("momentum observer", found["momentum_observer"])
     table.add_row("limits", _LIMITS[found["limits"]])
     rates = [rate for rate in found["effort_rate"] if rate is not None]
     if rates:

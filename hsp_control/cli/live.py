@@ -68,7 +68,8 @@ def live(options: argparse.Namespace) -> int:
         experiment = Experiment.of(loaded)
         check_live(experiment)
         stack.enter_context(stop_signals(requests, takes_over=True))
-        command = Command(experiment.controller, experiment.compensation)
+        real = options.robot is not None
+        command = _command(experiment, real=real)
         plan = experiment.scenario.plan
         options_of_loop: dict[str, Any] = {
             "plan": plan,
@@ -106,6 +107,7 @@ def live(options: argparse.Namespace) -> int:
             duration=min(duration, _DRY_RUN if plan is None else _DRY_RUN_OF_A_PLAN),
             **options_of_loop,
         )
+        out.print(_observer(experiment, real=real), highlight=False)
         # A robot, and what else listens
         hardware: Hardware | None = None
         if options.robot is not None:
@@ -114,7 +116,7 @@ def live(options: argparse.Namespace) -> int:
         if isinstance(hardware, LocatedHardware):
             experiment = begun_where_it_is(experiment, options, hardware.q)
             options_of_loop["scene"] = experiment.scene
-            command = Command(experiment.controller, experiment.compensation)
+            command = _command(experiment, real=real)
         if isinstance(hardware, AdaptingHardware):
             options_of_loop["settings"] = hardware.adapted(experiment.scenario.live)
             for line in hardware.lines:
@@ -159,6 +161,22 @@ def live(options: argparse.Namespace) -> int:
     if not regular:
         print(f"hsp: {report.reason}", file=sys.stderr)
     return 0 if regular and robot_report is not None and kept else 2
+
+
+def _command(experiment: Experiment, *, real: bool) -> Command:
+    """Return the chain to the effort; what ``auto`` is depends on what moves."""
+    own = experiment.scenario.compensation if real else experiment.compensation
+    return Command(experiment.controller, own)
+
+
+def _observer(experiment: Experiment, *, real: bool) -> str:
+    """Return whether there is a momentum observer, as a line."""
+    words = experiment.on_observer
+    if real:
+        controller, period = experiment.controller, live_period(experiment)
+        own = experiment.scenario.compensation
+        words = own.on_observer(controller, period, exact=False)
+    return f"Momentum observer: {words}"
 
 
 def _table(title: str, *headings: str) -> Table:

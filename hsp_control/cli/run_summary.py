@@ -29,6 +29,8 @@ def summary(rollout: Rollout) -> Table:
     table.add_row(
         "run", f"{len(rollout)} rows to t = {rollout.t[-1]:g} s, {rollout.status}"
     )
+    if observed := rollout.meta.get("momentum_observer"):
+        table.add_row("momentum observer", observed)
     tasks = rollout.meta["tasks"]
     away = {each.task: each for each in unreached(rollout.columns, tasks)}
     for k, task in enumerate(tasks):

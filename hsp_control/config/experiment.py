@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import count
 from os import PathLike
 from pathlib import Path
@@ -43,7 +43,8 @@ from hsp_control.robot.integrators import Integrator
 from hsp_control.simulation import Rollout, simulate
 from hsp_control.simulation.initial_state import InitialState
 from hsp_control.simulation.log_writer import LogWriter
-from hsp_control.simulation.plants import Plant, PlantPart, SampledPlant
+from hsp_control.simulation.model_errors import ModelErrors, model_errors
+from hsp_control.simulation.plants import Plant, PlantPart, SampledPlant, is_exact
 from hsp_control.simulation.simulate import (
     SimulationSettings,
     check_steps,
@@ -219,7 +220,7 @@ class Experiment:
             begun(scenario.estimators, controller, plant.inertial())
         _check_compensation(document, scenario, controller)
         with document.at():
-            rates = _rate_findings(scenario, controller, q0, plant.robot)
+            rates = _rate_findings(scenario, controller, q0, plant)
         vars(self).update(
             name=Path(document.name).stem,
             scenario=scenario,
@@ -240,8 +241,45 @@ class Experiment:
 
     @property
     def compensation(self) -> Compensation:
-        """Compensators for differences between plant and model."""
-        return self.scenario.compensation
+        """Compensators for differences between plant and model: those that suit both.
+
+        A real robot gets those of its `scenario` instead, which do not know the plant.
+        """
+        own = self.scenario.compensation
+        return own.suited(self.controller, *self._loop)
+
+    @property
+    def on_observer(self) -> str:
+        """A few words: whether there is a momentum observer, its rate, and why."""
+        own = self.scenario.compensation
+        return own.on_observer(self.controller, *self._loop)
+
+    @cached_property
+    def model_errors(self) -> ModelErrors | None:
+        """What the loop bears at the start of what its model does not say.
+
+        As it is on a robot that is not its model. None without a control period, and
+        where `model_errors` has no answer.
+        """
+        period = self.scenario.simulation.control_period
+        if period is None:
+            return None
+        plant = self.scenario.plant
+        return model_errors(
+            self.controller.preview(),
+            self.q0,
+            period,
+            self.scenario.compensation,
+            effort_delay=plant.effort_delay,
+            sensor_delay=plant.sensor_delay,
+            effort_lag=plant.effort_lag,
+        )
+
+    @property
+    def _loop(self) -> tuple[float | None, bool]:
+        """The control period [s], if there is one, and whether the plant is exact."""
+        period = self.scenario.simulation.control_period
+        return period, is_exact(self.plant, self.robot)
 
     @property
     def integrator(self) -> Integrator:
@@ -301,7 +339,7 @@ class Experiment:
             log_period=settings.log_period,
             integrator=self.integrator,
             plant=self.plant,
-            compensation=self.compensation,
+            compensation=self.scenario.compensation,
             plan=self.scenario.plan,
             estimators=self.scenario.estimators,
             scene=self.scene,
@@ -442,20 +480,22 @@ def _check_compensation(
 
 
 def _rate_findings(
-    scenario: Scenario, controller: Controller, q0: Array, moving: Robot
+    scenario: Scenario, controller: Controller, q0: Array, moving: Plant
 ) -> tuple[RateFinding, ...]:
     """Check that the loop is stable at its rate; return gains that are high for it."""
     settings, plant = scenario.simulation, scenario.plant
     if settings.control_period is None or not settings.check_rate:
         return ()
+    period, exact = settings.control_period, is_exact(moving, controller.robot)
     found = check_rate(
         controller,
         q0,
-        settings.control_period,
-        scenario.compensation,
+        period,
+        scenario.compensation.decided(controller, period, exact),
         effort_delay=plant.effort_delay,
+        effort_lag=plant.effort_lag,
         sensor_delay=plant.sensor_delay,
-        plant=moving,
+        plant=moving.robot,
     )
     return tuple(found)
 

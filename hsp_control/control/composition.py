@@ -247,6 +247,11 @@ class Composition:
         return tuple(task for level in self.levels for task in level)
 
     @property
+    def planned_tasks(self) -> tuple[Task, ...]:
+        """All tasks, placed: those that count, have not come yet, or have gone."""
+        return tuple(each.task for each in self._setup.tasks)
+
+    @property
     def levels(self) -> tuple[tuple[Task, ...], ...]:
         """The tasks that count now or fade, by level, the highest priority first."""
         now = self._latest

@@ -14,7 +14,7 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FallError, HspControlError, LiveError
-from hsp_control.control.compensation import Command
+from hsp_control.control.compensation import Command, Compensation
 from hsp_control.control.controller import Controller
 from hsp_control.control.estimator import Estimator
 from hsp_control.control.falling import FallDetector
@@ -34,9 +34,11 @@ from hsp_control.live.real_time import no_garbage_collection, real_time_priority
 from hsp_control.live.report import Ended, LoopReport
 from hsp_control.live.safe_stop import Phase, SafeStop, StandingFeet
 from hsp_control.live.settings import LiveSettings, check_held
+from hsp_control.live.simulated_robot import InProcessRobot
 from hsp_control.live.state_reader import StateReader
 from hsp_control.robot import RobotState
 from hsp_control.simulation.control_chain import ControlChain, EffortSource
+from hsp_control.simulation.plants import is_exact
 from hsp_control.trajectories.schedule import Schedule
 
 _WARM_UP = 20
@@ -75,7 +77,9 @@ def run_loop(
     Ctrl-C and SIGTERM are the operator's stop (`stop_signals`).
 
     Args:
-        controller: The controller, or an `EffortSource` around one.
+        controller: The controller, or an `EffortSource` around one. A controller gets a
+            momentum observer where nothing is to yield, unless the robot is simulated
+            and its own model (`Compensation.momentum_observer`).
         hardware: The robot.
         duration: Time from the first state to the stop [s]; None: until the operator
             stops.
@@ -106,7 +110,11 @@ def run_loop(
         HspControlError: If the controller, the plan or an estimator raises at the first
             state: what it needs may not be measured.
     """
-    source = Command(controller) if isinstance(controller, Controller) else controller
+    source = (
+        Command(controller, _compensation(controller, hardware))
+        if isinstance(controller, Controller)
+        else controller
+    )
     settings = settings or LiveSettings()
     chain = ControlChain(source, plan, estimators)
     controller = source.controller
@@ -162,6 +170,14 @@ def run_loop(
                 loop_log.abandon()
             raise
         return loop.finish()
+
+
+def _compensation(controller: Controller, hardware: Hardware) -> Compensation:
+    """Return the compensators of a controller for which nobody gave any."""
+    if isinstance(hardware, InProcessRobot):
+        exact = is_exact(hardware.robot.plant, controller.robot)
+        return Compensation().suited(controller, hardware.period, exact)
+    return Compensation()
 
 
 def _check(period: float, duration: float | None, log_period: float) -> None:

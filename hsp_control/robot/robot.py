@@ -65,6 +65,7 @@ class Robot(RobotModel):
         project_inertias: bool = False,
         xacro_args: Mapping[str, str | bool | float] | None = None,
         srdf: str | Path | None = None,
+        motor_inertia: ArrayLike | Mapping[str, float] | str | None = None,
         access: Access = ANYWHERE,
     ) -> Self:
         """Load a bundled robot, one of an installed package, or a URDF or xacro file.
@@ -87,6 +88,9 @@ class Robot(RobotModel):
             xacro_args: Arguments of a xacro file, by name.
             srdf: An SRDF whose disabled pairs of links never collide. None: the one
                 beside the URDF that is called like it, if there is one.
+            motor_inertia: Inertia of the rotors as the joints feel it [kg·m² or kg]:
+                one number, one for each joint, by name, or ``bundled``: what the README
+                of a bundled robot gives. None: what the URDF's transmissions say.
             access: Which files may be read: a URDF given by path, and the meshes that
                 it names. Use `access.only_within` for untrusted files.
 
@@ -109,6 +113,7 @@ class Robot(RobotModel):
             "project_inertias": project_inertias or None,
             "xacro_args": xacro_args,
             "srdf": srdf,
+            "motor_inertia": motor_inertia,
         }
         given = {key: value for key, value in given.items() if value is not None}
         if not isinstance(name, RobotDescription):

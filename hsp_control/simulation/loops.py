@@ -116,7 +116,7 @@ def _native_loop(
 ) -> "NativeLoop | None":
     """Return what moves on many periods at once; None where each must be made alone."""
     command = chain.command
-    bare = chain.is_bare and type(command) is Command and not command.compensation.names
+    bare = chain.is_bare and type(command) is Command and not command.stages
     if not bare or type(plant) is not IntegratedPlant:  # not a subclass of either
         return None
     steps = plant.native_steps()

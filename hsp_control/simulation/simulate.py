@@ -43,6 +43,7 @@ from hsp_control.simulation.plants import (
     SampledPlant,
     check_plant,
     differing_bodies,
+    is_exact,
 )
 from hsp_control.simulation.rollout import Rollout
 
@@ -94,7 +95,8 @@ def simulate(
             controller's own model. A sampled plant has its own integrator, and needs a
             control period.
         compensation: Compensators for what the model lacks; they need a control
-            period.
+            period. None: a momentum observer, where the plant is not the controller's
+            own model (`Compensation.momentum_observer`).
         plan: What writes references and switches contacts; the controller is made of
             its `Plan.parts`. It needs a control period.
         estimators: What completes each measurement, for the plan and the controller;
@@ -143,7 +145,8 @@ def simulate(
     times = [start_time + row * log_period for row in range(rows)]
     if isinstance(plant, ContinuousPlant) and periods:
         plant = IntegratedPlant(plant, integrator)
-    if compensation is not None and compensation.names and not periods:
+    compensation = compensation or Compensation()
+    if compensation.names and not periods:
         names = ", ".join(compensation.names)
         raise _no_period(f"compensation ({names}) is computed once a period: it needs")
     if plan is not None and not periods:
@@ -151,6 +154,11 @@ def simulate(
     if estimators and not periods:
         raise _no_period("estimators estimate once a period: they need")
     # The loop
+    exact = is_exact(plant, robot)
+    period = log_period / periods if periods else None
+    decided = compensation.decided(controller, period, exact)
+    observed = compensation.on_observer(controller, period, exact)
+    compensation = compensation.suited(controller, period, exact)
     running: RunningPlan | None = None
     if isinstance(plant, ContinuousPlant):
         loop = continuous_loop(controller, plant, integrator, times, q, v)
@@ -160,8 +168,9 @@ def simulate(
                 controller,
                 q,
                 log_period / periods,
-                compensation,
+                decided,
                 effort_delay=plant.effort_delay,
+                effort_lag=plant.effort_lag,
                 sensor_delay=plant.sensor_delay,
                 plant=plant.robot,
             )
@@ -183,7 +192,11 @@ def simulate(
         rows,
         running,
         path=None if log is None else Path(log),
-        meta={"plant": description, **(meta or {})},
+        meta={
+            "plant": description,
+            "momentum_observer": observed,
+            **(meta or {}),
+        },
     )
 
     status, message = "stopped", "an error that is not ours"

@@ -155,6 +155,9 @@ def _number(limit: Element, name: str) -> float:
 
 
 _SAMPLES = 64
+_NO_ROTORS = 1e3
+"""Condition number above which an arm has no rotors: those of light wrists are at least
+a thousandth of what the first joints feel."""
 _DOUBTFUL = 1e5
 """Condition number above which efforts have few valid digits."""
 
@@ -185,6 +188,26 @@ def check_mass_matrix(condition: float, dof: str) -> Iterator[Finding]:
             else "M is not positive definite everywhere",
             "check the inertias beyond it, or lock it",
         )
+
+
+def check_rotors(robot: Robot, condition: float, dof: str) -> Iterator[Finding]:
+    """Yield a mass matrix that no real arm has, because its motors are not in it."""
+    if robot.unactuated or robot.model.armature.any() or not condition > _NO_ROTORS:
+        return
+    rest = np.zeros(robot.nv)
+    own = robot.dof_names.index(dof)
+    inverse = np.linalg.inv(robot.state(0.0, robot.home(), rest).mass_matrix)
+    felt, unit = 1.0 / inverse[own, own], robot.units[own]
+    unit = "kg" if unit == "m" else "kg m²"
+    yield Finding(
+        "note",
+        "rotors",
+        f"joint {dof!r}",
+        f"the condition number of M reaches {condition:.1e}, which no real arm has: at "
+        f"home this joint feels {felt:.1g} {unit}, and a rotor behind its gear has "
+        "0.01 to 1",
+        "give the rotors: robot: {motor_inertia: ...}, or transmissions in the URDF",
+    )
 
 
 def check_self_collisions(robot: Robot) -> Iterator[Finding]:
@@ -353,6 +376,7 @@ def _of_robot(robot: Robot) -> tuple[list[Finding], dict[str, str]]:
     """Return what is odd about a robot that was loaded, and the facts about it."""
     condition, dof = worst_condition(robot)
     findings = [*check_size(robot), *check_mass_matrix(condition, dof)]
+    findings += check_rotors(robot, condition, dof)
     try:
         findings += check_self_collisions(robot)
     except ModelError as error:
@@ -372,6 +396,7 @@ def _of_robot(robot: Robot) -> tuple[list[Finding], dict[str, str]]:
         "springs": _springs(robot),
         "mass": f"{pin.computeTotalMass(robot.model):.4g} kg move",
         "mass matrix": f"condition number up to {condition:.2g}, by {dof}",
+        "rotors": _rotors(robot),
         "home": f"[{home}]",
     }
 
@@ -392,6 +417,15 @@ def _points_of_shapes(robot: Robot) -> dict[str, Array]:
         ends = reach * np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]])
         points.setdefault(shape.link, []).extend(place.act(end) for end in ends)
     return {link: np.array(found) for link, found in points.items()}
+
+
+def _rotors(robot: Robot) -> str:
+    own = robot.model.armature[robot.model.armature > 0.0]
+    if not own.size:
+        return "none in the model; robot: motor_inertia adds them"
+    low, high = (f"{each:.3g}" for each in (own.min(), own.max()))
+    each = low if low == high else f"{low} to {high}"
+    return f"{each} kg m² (or kg) on {own.size} of {robot.nv} degrees of freedom"
 
 
 def _rates(robot: Robot) -> str:

@@ -17,6 +17,7 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.compensation.compensation import Compensation
+from hsp_control.control.compensation.momentum_observer import RunningObserver
 from hsp_control.control.compensation.stage import Run, Stage
 from hsp_control.control.controller import Controller
 from hsp_control.control.measurement import NO_WRENCHES, LogChannel
@@ -27,9 +28,10 @@ from hsp_control.robot import RobotState
 class Command:
     """A controller with its compensators: computes one effort per period.
 
-    Without compensators it returns the controller's effort, bit for bit. A run is one
-    `restart`, then one `effort` per period, in order of time. What the compensators
-    remember during a run is the command's own.
+    Without compensators (`Compensation(momentum_observer=None)`) it returns the
+    controller's effort, bit for bit. A run is one `restart`, then one `effort` per
+    period, in order of time. What the compensators remember during a run is the
+    command's own.
 
     Attributes:
         controller: The controller.
@@ -63,7 +65,6 @@ class Command:
         feedback = own.force_feedback
         self.feels_contacts = feedback is not None and feedback.force == "measured"
         self._changes_state = (own.velocity_filter or own.predictor) is not None
-        self._remembers = (own.momentum_observer or own.predictor) is not None
         self.restart()
 
     def restart(self) -> None:
@@ -73,6 +74,8 @@ class Command:
         periods = 0 if ahead is None else ahead.periods
         self._run = run = Run(self.controller, self._measured, periods)
         self.stages = self.compensation.begin(self.controller)
+        observes = any(isinstance(each, RunningObserver) for each in self.stages)
+        self._remembers = observes or ahead is not None
         self._acting = [x for x in self.stages if type(x).act is not Stage.act]
         self._pressing = run.none
         self._shown = self.state.q.copy(), self.state.v.copy()

@@ -1,11 +1,15 @@
 """The set of compensators around the law."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import KW_ONLY
+from dataclasses import KW_ONLY, replace
 from typing import Any, Literal
 
 from hsp_control.common.exceptions import CompensationError
 from hsp_control.constraints.contacts import Contact
+from hsp_control.control.compensation.automatic_observer import (
+    automatic_observer,
+    begin_automatic,
+)
 from hsp_control.control.compensation.force_feedback import (
     ForceFeedback,
     RunningForceFeedback,
@@ -36,8 +40,9 @@ from hsp_control.tasks.compliant_task import impedance_of
 class Compensation(Part, error=CompensationError):
     """Compensators for the differences between the robot and its model.
 
-    Each is off unless it is given; None turns it off. They have no memory: a `Command`
-    makes what runs, so one set serves many controllers, runs and threads.
+    Each is off unless it is given, but for the momentum observer, which is on where it
+    makes sense; None turns it off. They have no memory: a `Command` makes what runs, so
+    one set serves many controllers, runs and threads.
     """
 
     _: KW_ONLY
@@ -45,9 +50,10 @@ class Compensation(Part, error=CompensationError):
     """Butterworth low-pass filter of the measured velocity."""
     predictor: Predictor | None = None
     """Evaluates the law for the predicted state in which its effort will act."""
-    momentum_observer: MomentumObserver | None = None
+    momentum_observer: Literal["auto"] | MomentumObserver | None = "auto"
     """Estimates the efforts that the model does not explain, and cancels them if it is
-    to."""
+    to. ``auto``: it cancels them on a robot that may differ from its model, at a rate
+    that suits the period, unless a hand is to yield or a contact to press."""
     friction_feed_forward: Literal["urdf"] | FrictionFeedForward | None = None
     """Adds efforts against friction at the desired velocity; ``urdf`` takes the
     friction from the robot's file."""
@@ -60,23 +66,70 @@ class Compensation(Part, error=CompensationError):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The names of the compensators that are not None."""
-        return tuple(self.changed_fields())
+        """The names of the compensators that are on for sure."""
+        fields = self.changed_fields()
+        return tuple(name for name in fields if getattr(self, name) is not None)
+
+    @property
+    def observer(self) -> MomentumObserver | None:
+        """The momentum observer that is declared; None where ``auto`` decides."""
+        own = self.momentum_observer
+        return own if isinstance(own, MomentumObserver) else None
+
+    def decided(
+        self, controller: Controller, period: float | None, exact: bool
+    ) -> "Compensation":
+        """Return the compensators of a loop, with an observer or None for ``auto``.
+
+        Args:
+            controller: The controller.
+            period: The control period [s]; None: efforts are not held.
+            exact: Whether what moves is the controller's model and nothing else.
+        """
+        if self.momentum_observer != "auto":
+            return self
+        choice = automatic_observer(controller, period, exact)
+        return replace(self, momentum_observer=choice.observer)
+
+    def suited(
+        self, controller: Controller, period: float | None, exact: bool
+    ) -> "Compensation":
+        """Return what a `Command` runs in a loop: None for ``auto`` where that is off.
+
+        Elsewhere ``auto`` stays, since the tasks of a running loop may change.
+        """
+        decided = self.decided(controller, period, exact)
+        return decided if decided.momentum_observer is None else self
+
+    def on_observer(
+        self, controller: Controller, period: float | None, exact: bool
+    ) -> str:
+        """Return a few words: whether there is an observer, its rate, and why."""
+        own, automatic = self.momentum_observer, self.momentum_observer == "auto"
+        if own == "auto":
+            own, reason = automatic_observer(controller, period, exact)
+            if own is None:
+                return f"off: {reason}"
+        if own is None:
+            return "off"
+        rate = f"{own.bandwidth:g} 1/s{' (auto)' if automatic else ''}"
+        return f"on, {rate}" if own.cancel else f"only estimates, {rate}"
 
     def begin(self, controller: Controller) -> list[Stage]:
-        """Return what runs, in the order of the chain; see `Command`."""
-        return [
+        """Return what runs on a robot, in the order of the chain; see `Command`."""
+        running = [
             begin(getattr(self, name), controller)
             for name, begin in STAGES.items()
             if getattr(self, name) is not None
         ]
+        return [stage for stage in running if stage is not None]
 
     def check(
         self, robot: Robot, tasks: Sequence[Task], contacts: Sequence[Contact] = ()
     ) -> None:
         """Check that the compensators fit a robot, its tasks and contacts."""
         for name in ("predictor", "momentum_observer", "start_up_ramp"):
-            if robot.unactuated and getattr(self, name) is not None:
+            if robot.unactuated and getattr(self, name) not in (None, "auto"):
                 with within(name):
                     raise CompensationError(
                         f"{robot.name} has a free-flyer root, and its contact forces "
@@ -95,7 +148,7 @@ class Compensation(Part, error=CompensationError):
 
     def _check_forces(self, contacts: Sequence[Contact]) -> None:
         """Check that there are forces to feed back, and that none is cancelled."""
-        observer = self.momentum_observer
+        observer = self.observer  # ``auto``: none where there are contacts
         if observer is not None and observer.cancel and contacts:
             with within("momentum_observer"):
                 raise CompensationError(
@@ -108,7 +161,7 @@ class Compensation(Part, error=CompensationError):
 
     def _check_compliance(self, tasks: Sequence[Task]) -> None:
         """Check that no force is cancelled to which a task is to yield."""
-        observer = self.momentum_observer
+        observer = self.observer
         if observer is None or not observer.cancel or observer.clip is not None:
             return
         for task in tasks:
@@ -121,11 +174,19 @@ class Compensation(Part, error=CompensationError):
                     )
 
 
-STAGES: dict[str, Callable[[Any, Controller], Stage]] = {
+def _begun_observer(
+    own: Literal["auto"] | MomentumObserver, controller: Controller
+) -> Stage | None:
+    if own == "auto":
+        return begin_automatic(controller)
+    return own.begin(controller.robot)
+
+
+STAGES: dict[str, Callable[[Any, Controller], Stage | None]] = {
     "velocity_filter": lambda own, _: RunningFilter(own),
     "start_up_ramp": lambda own, _: RunningRamp(own),
     "friction_feed_forward": lambda own, made: RunningFriction(own, made.robot),
-    "momentum_observer": lambda own, made: own.begin(made.robot),
+    "momentum_observer": _begun_observer,
     "predictor": lambda own, made: RunningPredictor(own, made.robot),
     "force_feedback": RunningForceFeedback,
     "integral_action": RunningIntegral,

@@ -1,12 +1,14 @@
 """Sampled control loops of linear errors: rigid, elastic, or loaded by other bodies."""
 
 from dataclasses import dataclass, field, replace
+from math import exp
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.compensation.compensation import Compensation
+from hsp_control.control.compensation.momentum_observer import low_pass
 from hsp_control.control.controller import Controller
 from hsp_control.law import FieldSample, MetricSample
 from hsp_control.robot import Robot, RobotState
@@ -66,22 +68,30 @@ class LinearLoop:
     effort_delay: int = 0  # delay of efforts, in periods
     sensor_delay: int = 0  # delay of measurements, in periods
     # what counts: velocity filter, predictor, momentum observer; integral action is ki
-    compensation: Compensation = field(default_factory=Compensation)
+    compensation: Compensation = field(
+        default_factory=lambda: Compensation(momentum_observer=None)
+    )
     # part of u that the robot performs: below 1 where it is heavier than its model; a
     # matrix, shape (m, m), where that differs with the direction
     share: float | Array = 1.0
     # elastic joint that performs u; None: a rigid one
     joint: ElasticJoint | None = None
+    # time constant of drives of first order, which follow u [s]; 0: they are u
+    lag: float = 0.0
+    # what else accelerates a rigid robot beside x = 0: x'' = share u + slope x, shape
+    # (m, m) [1/s²]; weight that the model does not explain
+    slope: Array | None = None
 
     def transition(self) -> Array:
         """Return the transition matrix over one period, of the robot and all memory."""
         m, own = len(self.kp), self.compensation
         ahead = 0 if own.predictor is None else own.predictor.periods
         moving = 2 if self.joint is None else 4
-        # x, v, and those of an elastic joint's motor; ∫x, r, the last momentum; the
-        # filter's memory; the efforts sent, for the observer and the predictor; the
-        # efforts and measurements under way.
-        counts = [moving, 3, 4, 1 + ahead, self.effort_delay, 2 * self.sensor_delay]
+        # x, v, and those of an elastic joint's motor; ∫x, the drive, the observer's two
+        # states (the second is r), the last momentum; the filter's memory; the efforts
+        # sent, for the observer and the predictor; the efforts and measurements under
+        # way.
+        counts = [moving, 5, 4, 1 + ahead, self.effort_delay, 2 * self.sensor_delay]
         size = m * sum(counts)
         basis = np.eye(size).reshape(-1, m, size)
         parts = np.split(basis, np.cumsum(counts)[:-1])
@@ -102,7 +112,8 @@ class LinearLoop:
         sensors: list[Array],
     ) -> list[Array]:
         """Return all states one period later, in the order of the arguments."""
-        (z, r, momentum), h, own = memory, self.period, self.compensation
+        (z, drive, first, r, momentum), h, own = memory, self.period, self.compensation
+        observer = own.observer
         on_motor = self.joint is not None and self.joint.measured == "motor"
         sensors = [*sensors, *(plant[2:] if on_motor else plant[:2])]
         x_seen, v_seen, sensors = sensors[0], sensors[1], sensors[2:]
@@ -111,31 +122,51 @@ class LinearLoop:
             past = [*kept]
         else:
             past = [0.0 * each for each in past]
-        if own.momentum_observer is not None:
+        if observer is not None:
             disturbance = (v_seen - momentum) / h - sent[0]
-            share = 1.0 - np.exp(-own.momentum_observer.bandwidth * h)
-            r = r + share * (disturbance - r)
+            states: tuple[Array, ...] = (first, r)[-observer.order :]
+            states = low_pass(disturbance, states, observer.bandwidth, h)
+            first, r = states[0], states[-1]
             momentum = v_seen
         else:
-            r, momentum = 0.0 * r, 0.0 * momentum
+            first, r, momentum = 0.0 * first, 0.0 * r, 0.0 * momentum
         for u in sent[1:]:
             x_seen, v_seen = _moved(x_seen, v_seen, u + r, h)
         u = -self.kp @ x_seen - self.kv @ v_seen - self.ki @ z
-        if own.momentum_observer is not None and own.momentum_observer.cancel:
+        if observer is not None and observer.cancel:
             u = u - r
         integrated = np.any(self.ki != 0.0, axis=0, keepdims=True).T
         z = np.where(integrated, z + h * x_seen, 0.0)
         drives = [*drives, u]
-        plant = self._after(plant, self._performed(drives[0]))
-        rest = [*past, *sent[1:], u, *drives[1:], *sensors]
-        return [each[None] for each in (*plant, z, r, momentum, *rest)]
+        asked, drives = drives[0], drives[1:]
+        plant = self._after(plant, asked, drive)
+        drive = asked + self._left * (drive - asked) if self.lag else 0.0 * drive
+        rest = [*past, *sent[1:], u, *drives, *sensors]
+        memory = [z, drive, first, r, momentum]
+        return [each[None] for each in (*plant, *memory, *rest)]
 
-    def _after(self, plant: list[Array], u: Array) -> list[Array]:
+    @property
+    def _left(self) -> float:
+        """The part of a drive's difference from u that is left after a period."""
+        return exp(-self.period / self.lag) if self.lag else 0.0
+
+    def _after(self, plant: list[Array], u: Array, drive: Array) -> list[Array]:
         """Return the plant's state one period later, under the acceleration u."""
+        h, lag, late = self.period, self.lag, drive - u
+        # The drive is u + late exp(-t/lag); once and twice integrated over the period:
+        once, twice = lag * (1.0 - self._left), 0.0
+        if lag:
+            twice = lag * h - lag * once
         if self.joint is None:
-            return [*_moved(plant[0], plant[1], u, self.period)]
-        transition, effect = self.joint.transition(self.period)
+            acceleration = self._performed(u)
+            if self.slope is not None:
+                acceleration = acceleration + self.slope @ plant[0]
+            x, v = _moved(plant[0], plant[1], acceleration, h)
+            late = self._performed(late)
+            return [x + twice * late, v + once * late]
+        transition, effect = self.joint.transition(h)
         moved = np.tensordot(transition, np.array(plant), axes=1)
+        u = self._performed(u + once / h * late)
         return [*(moved + effect[:, None, None] * u)]
 
     def _performed(self, u: Array) -> Array:
@@ -207,6 +238,10 @@ def field_slope(controller: Controller, state: RobotState) -> Array:
     return slope
 
 
+NO_GAINS = (np.zeros((0, 0)),) * 3
+"""Kp, Kv and Ki of a loop that stands for its chain."""
+
+
 class LoadedLoop(NamedTuple):
     """The loop of a whole robot, for any part of its difference from the model.
 
@@ -215,13 +250,13 @@ class LoadedLoop(NamedTuple):
     for its model. In coordinates y = T δq with T = Vᵀ Lᵀ, orthonormal in the metric
     W = L Lᵀ, and J L⁻ᵀ = U [S 0] Vᵀ, all are one linear loop:
 
-        y'' = T M̃⁻¹ M T⁻¹ u,
+        y'' = T M̃⁻¹ M T⁻¹ u + T M̃⁻¹ (∂(G - G̃)/∂q) T⁻¹ y,
         u₁ = -S⁻¹ Uᵀ (Kp e + Kv e' + Ki ∫e),     e = U S y₁,
         u₂ = -(K_N + A₂₂) y₂' - K_N A₂ y - A₂₁ y₁',
 
-    with the field's slope A = -T (∂g/∂q) T⁻¹, without saddles. It is exact about a
-    state at rest of a robot without weight. A payload's weight adds a slow motion in
-    the null space.
+    with the field's slope A = -T (∂g/∂q) T⁻¹, without saddles, and the gravity G of the
+    model and G̃ of the robot. It is that about a state at rest; the small one to which
+    the difference of the weights has moved the robot is taken for the model's.
     """
 
     loop: LinearLoop  # loop of a robot that equals its model
@@ -230,6 +265,8 @@ class LoadedLoop(NamedTuple):
     # how many times as heavy as its model the robot is at the tasks, in the heaviest
     # direction: 1/β with the smallest eigenvalue β of J M̃⁻¹ M J#
     heavier: float
+    # T M⁻¹ (∂(G - G̃)/∂q) T⁻¹: how the unexplained weight changes beside the state
+    slope: Array
 
     def largest_part(self, wanted: float) -> float:
         """Return this part, or less: what is lighter must keep a tenth of its mass."""
@@ -240,23 +277,29 @@ class LoadedLoop(NamedTuple):
         """Return the loop of a robot with s times the difference."""
         one = np.eye(len(self.difference))
         share: Array = np.asarray(np.linalg.inv(one + s * self.difference), float)
-        return replace(self.loop, share=share)
+        return replace(self.loop, share=share, slope=share @ (s * self.slope))
 
 
-def loaded_loop(
-    controller: Controller,
-    state: RobotState,
-    plant: Robot,
-    period: float,
-    effort_delay: int,
-    sensor_delay: int,
-    compensation: Compensation,
-) -> LoadedLoop | None:
-    """Return the loop of the whole robot at a state."""
+class WholeLoop(NamedTuple):
+    """The loop of tasks and null space together, for a robot that is its model.
+
+    Its coordinates are y = T δq; see `LoadedLoop`.
+    """
+
+    loop: LinearLoop
+    into: Array  # T, shape (nv, nv)
+    to_error: Array  # U S, shape (m, m): e = U S y₁, of the task's rows
+
+
+def whole_loop(
+    controller: Controller, state: RobotState, chain: LinearLoop
+) -> WholeLoop | None:
+    """Return the loop of the whole robot at a state, with the chain of another loop.
+
+    None where the law is damped or leaves motion free, and for a floating base.
+    """
     robot = controller.robot
-    M = state.mass_matrix
-    others = plant.state(state.t, state.q, state.v).mass_matrix - M
-    if robot.unactuated or controller.contacts or np.abs(others).max() < 1e-9:
+    if robot.unactuated or controller.contacts:
         return None
     J = controller.stack(state).jacobian
     problem = controller.active_stack.resolution
@@ -271,7 +314,7 @@ def loaded_loop(
     into, out_of = (U / S).T, U * S  # S⁻¹ Uᵀ and U S
     rows = controller.active_stack.task_rows
     Kp, Kv, Ki = (np.zeros((m, m)) for _ in range(3))
-    action = compensation.integral_action
+    action = chain.compensation.integral_action
     integral = {} if action is None else action.gains(controller.tasks)
     for task in controller.tasks:
         if (at := rows.get(task.name)) is None:
@@ -291,8 +334,40 @@ def loaded_loop(
         K = (T @ controller.null_space_gain @ back)[m:, m:]
         kp[m:], kv[m:] = K @ A, A
         kv[m:, m:] += K
+    return WholeLoop(replace(chain, kp=kp, kv=kv, ki=ki), T, out_of)
+
+
+def loaded_loop(
+    controller: Controller, state: RobotState, plant: Robot, chain: LinearLoop
+) -> LoadedLoop | None:
+    """Return the loop of a robot with other bodies; see `whole_loop`.
+
+    None also where the bodies are the model's.
+    """
+    robot, M = controller.robot, state.mass_matrix
+    others = plant.state(state.t, state.q, state.v).mass_matrix - M
+    weight = weight_slope(robot, state.q) - weight_slope(plant, state.q)
+    if np.abs(others).max() < 1e-9 and np.abs(weight).max() < 1e-6:
+        return None
+    whole = whole_loop(controller, state, chain)
+    if whole is None:
+        return None
+    T, out_of = whole.into, whole.to_error
+    back, m, n = np.linalg.inv(T), len(out_of), robot.nv
     difference = T @ np.linalg.solve(M, others) @ back
     performed = np.linalg.inv(np.eye(n) + difference)
-    beta = np.linalg.eigvals(out_of @ performed[:m, :m] @ into).real.min()
-    loop = LinearLoop(kp, kv, ki, period, effort_delay, sensor_delay, compensation)
-    return LoadedLoop(loop, difference, float(1.0 / beta))
+    beta = np.linalg.eigvals(out_of @ performed[:m, :m] @ np.linalg.inv(out_of))
+    slope = T @ np.linalg.solve(M, weight) @ back
+    return LoadedLoop(whole.loop, difference, float(1.0 / beta.real.min()), slope)
+
+
+def weight_slope(robot: Robot, q: Array) -> Array:
+    """Return ∂G/∂q of a robot, shape (nv, nv) [N·m/rad]."""
+    slope, rest = np.zeros((robot.nv, robot.nv)), np.zeros(robot.nv)
+    for i in range(robot.nv):
+        for sign in (1.0, -1.0):
+            moved = np.zeros(robot.nv)
+            moved[i] = sign * _STEP
+            weight = robot.inverse_dynamics(robot.integrate(q, moved), rest, rest)
+            slope[:, i] += sign * weight / (2.0 * _STEP)
+    return slope

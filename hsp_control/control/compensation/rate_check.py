@@ -15,6 +15,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError, UnstableRateError
 from hsp_control.control.compensation.compensation import Compensation
 from hsp_control.control.compensation.linear_loop import (
+    NO_GAINS,
     LinearLoop,
     LoadedLoop,
     loaded_loop,
@@ -38,6 +39,8 @@ as it may elsewhere on its way."""
 RULE_HEAVY = 5.0
 """Integral action must stay stable for a robot up to this many times as heavy, at a
 task, as its model. Without other compensators this is a rate of Kv/5."""
+SLOWEST_GROWTH = 0.02
+"""Rate of growth that is told of [1/s]: slower ones need a minute to be seen."""
 _ROUNDING = 1e-7
 """Tolerance of the radius: self-motion without a field has eigenvalues of 1."""
 
@@ -67,6 +70,7 @@ def check_rate(
     *,
     effort_delay: int | None = None,
     sensor_delay: int | None = None,
+    effort_lag: float = 0.0,
     plant: Robot | None = None,
     strict: bool = True,
 ) -> list[RateFinding]:
@@ -76,16 +80,20 @@ def check_rate(
         controller: The controller.
         q: The configuration at which the loop is looked at, shape (nq,).
         period: The control period [s].
-        compensation: The compensators; None: there are none.
+        compensation: The compensators; None: there are none. An observer that is
+            ``auto`` is that of a real robot.
         effort_delay: Delay of efforts, in periods; None: that of the predictor.
         sensor_delay: Delay of measurements, in periods; None: that of the predictor.
+        effort_lag: Time constant of drives of first order [s]; 0: they do not lag.
         plant: The robot that moves, where it is known to differ from the model.
         strict: Whether it is an error if the loop is unstable.
 
     Raises:
         UnstableRateError: If the loop is unstable, unless `strict` is false.
     """
-    compensation = Compensation() if compensation is None else compensation
+    if compensation is None:
+        compensation = Compensation(momentum_observer=None)
+    compensation = compensation.decided(controller, period, exact=False)
     if compensation.velocity_filter is not None:
         with within("compensation", "velocity_filter"):
             compensation.velocity_filter.coefficients(period)
@@ -94,14 +102,14 @@ def check_rate(
         effort_delay = 0 if known is None else known.effort_delay
     if sensor_delay is None:
         sensor_delay = 0 if known is None else known.sensor_delay
-    delays = effort_delay, sensor_delay, compensation
+    delays = _Chain(effort_delay, sensor_delay, compensation, effort_lag)
     state = controller.robot.state(0.0, q, np.zeros(controller.robot.nv))
     found = [
         *_task_findings(controller, controller.tasks, state, period, delays),
         *_null_space_findings(controller, state, period, delays),
     ]
     if plant is not None and not any(each and each.unstable for each in found):
-        loaded = loaded_loop(controller, state, plant, period, *delays)
+        loaded = loaded_loop(controller, state, plant, delays.loop(*NO_GAINS, period))
         found.append(None if loaded is None else _loaded_finding(loaded))
     problems = [finding for finding in found if finding is not None]
     for finding in problems:
@@ -111,7 +119,18 @@ def check_rate(
     return problems
 
 
-_Delays = tuple[int, int, Compensation]
+class _Chain(NamedTuple):
+    """What is between the law and the robot."""
+
+    effort_delay: int
+    sensor_delay: int
+    compensation: Compensation
+    lag: float
+
+    def loop(self, kp: Array, kv: Array, ki: Array, period: float) -> LinearLoop:
+        """Return the loop of these gains."""
+        delays = self.effort_delay, self.sensor_delay
+        return LinearLoop(kp, kv, ki, period, *delays, self.compensation, lag=self.lag)
 
 
 def _task_findings(
@@ -119,9 +138,9 @@ def _task_findings(
     tasks: Sequence[Task],
     state: RobotState,
     period: float,
-    delays: _Delays,
+    delays: _Chain,
 ) -> list["RateFinding | None"]:
-    action = delays[2].integral_action
+    action = delays.compensation.integral_action
     integral = {} if action is None else action.gains(controller.tasks)
     found: list[RateFinding | None] = []
     for task in tasks:
@@ -139,17 +158,17 @@ def _findings_of(
     Ki: Array,
     since: float,
     period: float,
-    delays: _Delays,
+    delays: _Chain,
 ) -> list["RateFinding | None"]:
     """Return the problems of a task with these gains, in force from a time on [s]."""
     name, zero = task.name, np.zeros_like(Kp)
     of = f"of task {name!r}" + (f" from t = {since:g} s on" if since > -np.inf else "")
     if task.order == 1:  # e' + K e = 0 with K in the place of Kp
-        loop = LinearLoop(zero, Kp.copy(), zero, period, *delays)
+        loop = delays.loop(zero, Kp.copy(), zero, period)
         speed = _of_gain(f"K {of}", float(np.diag(Kp).max()))
         path: tuple[str, ...] = ("tasks", name)
     else:
-        loop = LinearLoop(Kp.copy(), Kv.copy(), Ki, period, *delays)
+        loop = delays.loop(Kp.copy(), Kv.copy(), Ki, period)
         frequency = float(np.sqrt(np.abs(np.linalg.eigvals(Kp)).max()))
         path = ("tasks", name, "gains")
         speed = _of_gain(f"ω0 {of}", frequency)
@@ -158,7 +177,8 @@ def _findings_of(
             damped = 0.5 * float(np.abs(np.linalg.eigvals(Kv)).max())
             of += "" if since > -np.inf else " at the start"
             speed = _of_impedance(of, frequency, damped)
-    delayed = delays[0] + delays[1] > 0 and delays[2].predictor is None
+    late = delays.effort_delay + delays.sensor_delay > 0
+    delayed = late and delays.compensation.predictor is None
     if since > -np.inf:  # a change makes them; the message says when, and of what
         path = ("changes",)
     found = [_finding(path, loop, speed, RULE_DELAYED if delayed else RULE, "")]
@@ -211,7 +231,7 @@ def _integral_finding(name: str, loop: LinearLoop) -> RateFinding | None:
     less = (
         "" if scale is None else f" Ki of at most {rounded_down(scale)} times this, or"
     )
-    faster = "" if loop.compensation.momentum_observer is None else " faster"
+    faster = "" if loop.compensation.observer is None else " faster"
     return RateFinding(
         ("compensation", "integral_action"),
         f"if the robot is {times * RULE_HEAVY:.3g} times as heavy at task {name!r} as "
@@ -228,9 +248,11 @@ def _loaded_finding(loaded: LoadedLoop) -> RateFinding | None:
     wanted = loaded.with_part(part)
     if wanted.radius() <= 1.0 + _ROUNDING:
         return None
+    if replace(wanted, slope=None).radius() <= 1.0 + _ROUNDING:
+        return _weight_finding(loaded)
     times = _largest(lambda s: loaded.with_part(s * part))
     if times is None:  # unstable with the exact model, too
-        return None
+        return _weight_finding(loaded)
     radius = loaded.with_part(1.0).radius()
     grows = (
         f"grows by a factor of up to {radius:.6g} per period"
@@ -242,7 +264,7 @@ def _loaded_finding(loaded: LoadedLoop) -> RateFinding | None:
         path = ("compensation", "integral_action")
         if (s := _largest(lambda s: replace(wanted, ki=s * wanted.ki))) is not None:
             choices.append(f"Ki of at most {rounded_down(s)} times this")
-        running = loaded.loop.compensation.momentum_observer is not None
+        running = loaded.loop.compensation.observer is not None
         choices.append(f"a {'faster ' if running else ''}momentum observer")
     if not choices:
         choices.append("smaller gains or a shorter control_period")
@@ -256,15 +278,33 @@ def _loaded_finding(loaded: LoadedLoop) -> RateFinding | None:
     )
 
 
+def _weight_finding(loaded: LoadedLoop) -> RateFinding | None:
+    """Return the problem of weight that the model does not explain."""
+    whole = loaded.with_part(1.0)
+    rate = float(np.log(whole.radius())) / whole.period
+    if rate <= SLOWEST_GROWTH:
+        return None
+    cancels = whole.compensation.observer
+    way = "a faster" if cancels is not None and cancels.cancel else "a"
+    return RateFinding(
+        ("compensation", "momentum_observer"),
+        "the plant's bodies differ from the model's, and nothing holds the robot "
+        f"against their weight: the posture leaves the start as exp({rate:.3g} t); use "
+        f"{way} momentum observer, a field that holds the posture, or the right masses",
+        whole.radius(),
+        False,
+    )
+
+
 def _null_space_findings(
-    controller: Controller, state: RobotState, period: float, delays: _Delays
+    controller: Controller, state: RobotState, period: float, delays: _Chain
 ) -> list["RateFinding | None"]:
     K, A = null_space_rates(controller, state)
     if not K.size:
         return []
     stiffness = float(np.linalg.eigvalsh(A).max())
     gain = float(np.abs(np.linalg.eigvals(K)).max())
-    loop = LinearLoop(K @ A, K + A, np.zeros_like(K), period, *delays)
+    loop = delays.loop(K @ A, K + A, np.zeros_like(K), period)
     extra = "" if stiffness < 1e-3 * gain else (
         f", with a field of stiffness {stiffness:.4g} 1/s"
     )  # fmt: skip
@@ -355,8 +395,13 @@ def _stabilising_changes(
         choices.append(f"a control_period of at most {rounded_down(s * h)} s")
         shorter = rounded_down(min(s * h, rule / speed.rate))
         good.append(f"a control_period of at most {shorter} s")
-    if own.momentum_observer is not None and own.momentum_observer.cancel:
-        running = own.momentum_observer
+    for fewer in range(loop.effort_delay - 1, -1, -1):
+        if replace(loop, effort_delay=fewer).radius() <= 1.0 + _ROUNDING:
+            less = f"at most {fewer} period{'s' * (fewer != 1)}" if fewer else "none"
+            choices.append(f"a delay of the efforts of {less}")
+            break
+    if own.observer is not None and own.observer.cancel:
+        running = own.observer
         rate = running.bandwidth
 
         def observer(s: float) -> LinearLoop:

@@ -24,6 +24,7 @@ from hsp_control.common.exceptions import (
     ModelError,
 )
 from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.declaration import within
 from hsp_control.declaration.rotation import matrix_of
 from hsp_control.robot.description.inertias import impossible_inertias, project_inertias
 from hsp_control.robot.description.mesh_files import check_mesh_name
@@ -31,6 +32,10 @@ from hsp_control.robot.description.mimics import (
     name_coordinates,
     name_frames,
     write_for_pinocchio,
+)
+from hsp_control.robot.description.motor_inertia import (
+    rotors_of_urdf,
+    write_motor_inertia,
 )
 from hsp_control.robot.description.planar_axes import write_planar_axes
 from hsp_control.robot.description.robot_description import (
@@ -53,11 +58,18 @@ def load_model(
     """Return the Pinocchio model of a URDF; what mimics a locked joint is locked."""
     if settings is None:
         settings = RobotDescription(source.name)
-    model = _parse(source, settings)
+    xml = read_urdf(source)
+    try:
+        rotors = rotors_of_urdf(xml)
+    except ModelError as error:
+        raise ModelError(f"{source.urdf}: {error}") from None
+    model = _parse(source, settings, xml)
     locks = source.locked if settings.locked is None else settings.locked
     if locks:
         model = _lock(model, locks)
     name_frames(model)
+    with within("motor_inertia"):
+        write_motor_inertia(model, settings.motor_inertia, source, rotors)
     return completed(model, source, settings.tool_frames, gravity)
 
 
@@ -126,9 +138,8 @@ def reference_posture(
     return tuple(pin.difference(model, pin.neutral(model), pin.normalize(model, q)))
 
 
-def _parse(source: RobotSource, settings: OneRobot) -> pin.Model:
+def _parse(source: RobotSource, settings: OneRobot, xml: Element) -> pin.Model:
     urdf, mimic = source.urdf, settings.mimic
-    xml = read_urdf(source)
     if source.access.strict:
         for name, where in named_files(xml):
             check_mesh_name(source, name, f"{urdf}: {where}", source.access)
@@ -377,6 +388,11 @@ def combine(parts: Sequence[tuple[RobotPart, pin.Model]]) -> pin.Model:
     if any(model.gravity != parts[0][1].gravity for _, model in parts):
         raise ModelError("robots to combine differ in gravity; load all with one value")
     whole.gravity = parts[0][1].gravity
+    for part, model in parts:  # appendModel drops it (seen with Pinocchio 4.1)
+        for name, joint in moving_joints(model).items():
+            own = whole.joints[whole.getJointId(part.prefix + name)].idx_v
+            of_joint = slice(joint.idx_v, joint.idx_v + joint.nv)
+            whole.armature[own : own + joint.nv] = model.armature[of_joint]
     return whole
 
 

@@ -21,6 +21,7 @@ from hsp_control.declaration.quantities import (
 )
 from hsp_control.declaration.rotation import Rotation
 from hsp_control.robot.description.access import ANYWHERE, Access
+from hsp_control.robot.description.motor_inertia import MotorInertias
 from hsp_control.robot.description.sources import (
     FILE_ENDINGS,
     RobotSource,
@@ -33,6 +34,7 @@ from hsp_control.robot.description.xacro_files import xacro_text
 _ZERO = (0.0, 0.0, 0.0)
 _OF_ONE = {
     "root", "locked", "tool_frames", "mimic", "project_inertias", "xacro_args", "srdf",
+    "motor_inertia",
 }  # fmt: skip
 
 
@@ -79,6 +81,11 @@ class OneRobot(Part, error=ModelError):
     srdf: FileName | None = None
     """SRDF file whose disabled pairs of links never collide; by default the one beside
     the URDF that is called like it, if there is one."""
+    motor_inertia: MotorInertias | None = None
+    """Inertia of the rotors as the joints feel it, times their reductions squared
+    [kg·m² or kg]: one number, or one for each joint in a list or by name. ``bundled``:
+    what the README of a bundled robot gives. By default what the ``<transmission>``
+    elements of the URDF say."""
 
     def find(self, access: Access = ANYWHERE) -> RobotSource:
         """Return where it comes from; see `find_robot` and `find_description`.
@@ -167,6 +174,10 @@ class RobotDescription(OneRobot):
             for key in ("project_inertias", "xacro_args", "srdf"):
                 if getattr(self, key):
                     raise ModelError(f"{key} is not for mjcf")
+            if self.motor_inertia is not None:
+                raise ModelError(
+                    "motor_inertia is not for mjcf, whose joints have an armature"
+                )
             return
         allowed = get_args(Root)
         if self.root is not None and self.root not in allowed:

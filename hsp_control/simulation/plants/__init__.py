@@ -6,6 +6,7 @@ from hsp_control.robot.friction import Friction as Friction
 from .drives import Drive as Drive
 from .drives import DroppedPeriods as DroppedPeriods
 from .drives import EffortDelay as EffortDelay
+from .drives import EffortLag as EffortLag
 from .drives import EffortNoise as EffortNoise
 from .drives import Jitter as Jitter
 from .drives import Saturation as Saturation
@@ -25,6 +26,7 @@ from .push import Push as Push
 from .rigid_body import RigidBody as RigidBody
 from .rigid_body import RigidBodyPlant as RigidBodyPlant
 from .rigid_body import StickingPlant as StickingPlant
+from .rigid_body import is_exact as is_exact
 from .rigid_contacts import ContactKind as ContactKind
 from .rigid_contacts import ContactPlant as ContactPlant
 from .rigid_contacts import RigidContact as RigidContact

@@ -3,6 +3,7 @@
 from abc import abstractmethod
 from collections import deque
 from collections.abc import Callable, Sequence
+from math import exp
 from typing import Annotated, ClassVar, Literal, TypeAlias
 
 import numpy as np
@@ -25,9 +26,14 @@ class Drive(Imperfection, family="drives", error=SimulationError):
     """One imperfection of the actuation; several make a chain.
 
     A subclass declares its parameters as fields (see `Part`) and implements `begin`.
-    Stages: `DroppedPeriods` 10, `EffortDelay` 20, `Jitter` 30, `EffortNoise` 40,
-    `Saturation` 50; see `Imperfection`.
+    Stages: `DroppedPeriods` 10, `EffortDelay` 20, `Jitter` 30, `EffortLag` 35,
+    `EffortNoise` 40, `Saturation` 50; see `Imperfection`.
     """
+
+    @property
+    def lag(self) -> float:
+        """The time constant with which it follows [s], for the rate check."""
+        return 0.0
 
     @abstractmethod
     def begin(self, robot: Robot, random: np.random.Generator) -> Driving:
@@ -89,6 +95,42 @@ class EffortDelay(Drive, type="delay"):
             return queue.popleft(), 0.0
 
         return drive
+
+
+class EffortLag(Drive, type="lag"):
+    """A drive of first order, τ f' = effort - f; over a period its mean acts."""
+
+    stage: ClassVar[float] = 35.0
+    strength: ClassVar[str] = "time_constant"
+
+    time_constant: NonNegative
+    """Time constant τ [s]."""
+
+    @property
+    def lag(self) -> float:
+        """The time constant; see `Drive.lag`."""
+        return float(self.time_constant)
+
+    def begin(self, robot: Robot, random: np.random.Generator) -> Driving:
+        """Return what follows, at first at the first effort; see `Drive.begin`."""
+        return RunningLag(self.lag)
+
+
+class RunningLag:
+    """A drive of first order in one run; it is told how long each period is."""
+
+    def __init__(self, time_constant: float) -> None:
+        self._time_constant = time_constant
+        self.period = 0.0  # [s]
+        self._effort: Array | None = None
+
+    def __call__(self, tau: Array) -> tuple[Array, float]:
+        """Return the mean over the period; see `Driving`."""
+        before = tau if self._effort is None else self._effort
+        left = exp(-self.period / self._time_constant)
+        self._effort = tau + left * (before - tau)
+        share = self._time_constant / self.period * (1.0 - left)
+        return tau + share * (before - tau), 0.0
 
 
 class EffortNoise(Drive, type="noise"):

@@ -12,7 +12,7 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.control.measurement import Inertial, LogChannel
 from hsp_control.declaration import within
-from hsp_control.simulation.plants.drives import Drive, Driving
+from hsp_control.simulation.plants.drives import Drive, Driving, RunningLag
 from hsp_control.simulation.plants.plant import SampledPlant, to_json_data
 from hsp_control.simulation.plants.sensors import RunningImu, Sensing, Sensor
 
@@ -43,6 +43,7 @@ class ImperfectPlant(SampledPlant):
         self.seed = seed
         self.sensor_delay = sum(sensor.periods for sensor in sensors)
         self.effort_delay = sum(drive.periods for drive in drives)
+        self.effort_lag = sum(drive.lag for drive in drives)
         self._measured = plant.robot.neutral(), np.zeros(plant.robot.nv)
         self._applied: Array | None = None
         self._begin(*self._measured)
@@ -65,6 +66,8 @@ class ImperfectPlant(SampledPlant):
         """Move on under the output of the drives; see `SampledPlant.advance`."""
         effort, delay = tau, 0.0
         for drive in self._driving:
+            if isinstance(drive, RunningLag):
+                drive.period = end - t
             effort, later = drive(effort)
             delay += later
         arrival = min(t + delay, end)

@@ -17,6 +17,7 @@ from hsp_control.declaration.quantities import (
     Weights,
 )
 from hsp_control.robot import Robot
+from hsp_control.robot.description.motor_inertia import MOST
 from hsp_control.simulation.plants.imperfect_plant import seeded_generator
 
 
@@ -118,7 +119,13 @@ class MotorInertia(ModelChange):
 
     def apply(self, model: pin.Model, robot: Robot, seed: int) -> None:
         """Add the inertia."""
-        model.armature += robot.per_dof(self.inertia)
+        inertia = robot.per_dof(self.inertia)
+        if inertia.min() < 0.0 or inertia.max() > MOST:
+            given = inertia.min() if inertia.min() < 0.0 else inertia.max()
+            raise SimulationError(
+                f"{given:g} kg m² (or kg); a rotor behind its gear has 0 to {MOST:g}"
+            )
+        model.armature += inertia
 
 
 class Payload(ModelChange):

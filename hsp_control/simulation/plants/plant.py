@@ -28,10 +28,12 @@ class Plant:
         robot: The robot that moves; its joints are those of the controller's model.
         sensor_delay: Delay of the measurements [control periods].
         effort_delay: Delay of the efforts [control periods].
+        effort_lag: Time constant with which efforts follow the commanded ones [s].
     """
 
     sensor_delay: int = 0
     effort_delay: int = 0
+    effort_lag: float = 0.0
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot

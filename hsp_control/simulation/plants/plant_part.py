@@ -105,6 +105,11 @@ class PlantPart(Part, ABC, family="plants", error=SimulationError):
         """Delay of the efforts [control periods]."""
         return sum(drive.periods for drive in self.drives)
 
+    @property
+    def effort_lag(self) -> float:
+        """Time constant with which efforts follow the commanded ones [s]."""
+        return sum(drive.lag for drive in self.drives)
+
     def located(self, folder: Path) -> Self:
         """Return it with the full path of its robot's URDF, if that is in a folder."""
         if self.robot is None:

@@ -17,8 +17,10 @@ from hsp_control.robot.integrators import Integrator
 from hsp_control.robot.kinematics import Term
 from hsp_control.simulation.plants.plant import (
     ContinuousPlant,
+    IntegratedPlant,
     Plant,
     SampledPlant,
+    differing_bodies,
     to_json_data,
 )
 from hsp_control.simulation.plants.plant_part import FrictionalPart
@@ -53,6 +55,16 @@ class RigidBodyPlant(ContinuousPlant):
     def describe(self) -> dict[str, Any]:
         """Return its pushes."""
         return {"type": "RigidBodyPlant", "pushes": to_json_data(self.pushes.pushes)}
+
+
+def is_exact(plant: Plant, robot: Robot) -> bool:
+    """Return whether a plant is a controller's own model, and nothing else.
+
+    Pushes are no difference of the robot. What another class does is not known.
+    """
+    if type(plant) is IntegratedPlant:
+        plant = plant.plant
+    return type(plant) is RigidBodyPlant and not differing_bodies(plant, robot)
 
 
 class StickingPlant(SampledPlant):

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from compensators import only
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from places import THOROUGH
@@ -14,7 +15,7 @@ from places import THOROUGH
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
 from hsp_control.control.actuation import Status, actuation
-from hsp_control.control.compensation import Command, Compensation, FrictionFeedForward
+from hsp_control.control.compensation import Command, FrictionFeedForward
 from hsp_control.trajectories import HoldOrientation, Schedule
 
 ROBOTS = ["planar3r", "panda", "iiwa14", "ur5", "xarm7"]
@@ -381,7 +382,7 @@ def test_what_opposes_friction_fades_with_the_tasks() -> None:
     case = Case("panda", 0)
     controller = a_task_is_added(case)
     friction = FrictionFeedForward(coulomb=1.0, viscous=0.5)
-    command = Command(controller, Compensation(friction_feed_forward=friction))
+    command = Command(controller, only(friction_feed_forward=friction))
     columns = command.log_channels
     times = START + np.array([-1e-9, 1e-9, RAMP - 1e-9, RAMP + 1e-9])
     tau, sent = [], []

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from compensation_cases import ALL, EVERYTHING, PANDA, Q0, H, circle, controller
+from compensators import ALONE, only
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.linalg import expm
 from task_cases import placed
@@ -41,7 +42,7 @@ def run(
 ) -> hsp.Rollout:
     settings: dict[str, Any] = {
         "duration": 0.3, "control_period": H, "log_period": H, "integrator": Rk4(H),
-        "compensation": compensation, **options,
+        "compensation": compensation or ALONE, **options,
     }  # fmt: skip
     return hsp.simulate(made, Q0, **settings)
 
@@ -54,7 +55,7 @@ def test_without_compensators_it_is_the_controller_to_the_last_bit() -> None:
     made = controller(limits=hsp.Limits(effort_rate=1000.0))
     engine = hsp.plants.IntegratedPlant(hsp.plants.RigidBodyPlant(PANDA), Rk4(H))
     plant = hsp.plants.ImperfectPlant(engine, [VelocityNoise(0.02)], [], seed=3)
-    ours = run(made, Compensation(), plant=plant, duration=0.1)
+    ours = run(made, plant=plant, duration=0.1)
 
     state = hsp.RobotState(PANDA)
     q, v = Q0, np.zeros(7)
@@ -73,7 +74,7 @@ def test_without_compensators_it_is_the_controller_to_the_last_bit() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [*EVERYTHING, "all"])
 def test_a_run_repeats_itself_and_its_compensators_travel(name: str) -> None:
-    compensation = ALL if name == "all" else Compensation(**{name: EVERYTHING[name]})
+    compensation = ALL if name == "all" else only(**{name: EVERYTHING[name]})
     assert compensation.names == (tuple(EVERYTHING) if name == "all" else (name,))
     made = controller()
     first = run(made, compensation, duration=0.05)
@@ -166,7 +167,7 @@ def test_known_friction_costs_nothing_and_the_observer_leaves_it_alone() -> None
     assert off > 8e-4  # [m]
     late = slice(1, None)
     for compensation in (
-        Compensation(friction_feed_forward=known),
+        only(friction_feed_forward=known),
         Compensation(
             friction_feed_forward=known, momentum_observer=MomentumObserver(50.0)
         ),
@@ -178,7 +179,7 @@ def test_known_friction_costs_nothing_and_the_observer_leaves_it_alone() -> None
         )
         errors = log["task.hand.error"][late] - bare["task.hand.error"][late]
         assert np.abs(errors).max() < 0.1 * off
-        if compensation.momentum_observer is not None:
+        if compensation.observer is not None:
             assert np.abs(log["observer.disturbance"][late]).max() < 0.1 * friction
 
 
@@ -332,9 +333,7 @@ def test_the_predictor_knows_where_the_robot_will_be(
         [SensorDelay(sensors)] if sensors else [],
         [EffortDelay(efforts)] if efforts else [],
     )
-    log = run(
-        controller(), Compensation(predictor=Predictor(efforts, sensors)), plant=plant
-    )
+    log = run(controller(), only(predictor=Predictor(efforts, sensors)), plant=plant)
     k = efforts
     started = efforts + sensors + 1
     shown, then = log["shown.q"][started : len(log) - k], log.q[started + k :]

@@ -6,6 +6,7 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 from carriage import MASS, carriage, check_that_it_is_the_loop
+from compensators import only
 from scipy.integrate import solve_ivp
 
 import hsp_control as hsp
@@ -80,7 +81,7 @@ def test_a_simulated_joint_obeys_the_loop_s_polynomial(
     task = JointPosture(np.zeros(1), gains=Gains(natural_frequency=8.0))
     made, parts = (
         Controller(robot, [task], limits=None),
-        hsp.compensation.Compensation(**compensation),
+        only(**compensation),
     )
     plant = ImperfectPlant(
         Sprung(robot, joint), [SensorDelay(delays[1])], [EffortDelay(delays[0])]

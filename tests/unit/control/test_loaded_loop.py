@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from compensators import ALONE, only
 
 import hsp_control as hsp
 from hsp_control.control.compensation import (
@@ -15,6 +16,8 @@ from hsp_control.control.compensation import (
     check_rate,
 )
 from hsp_control.control.compensation.linear_loop import (
+    NO_GAINS,
+    LinearLoop,
     LoadedLoop,
     loaded_loop,
 )
@@ -43,7 +46,8 @@ def loaded(times: float = 1.0) -> hsp.Robot:
 
 def whole(made: hsp.Controller, parts: Compensation, delay: int) -> LoadedLoop:
     state = ARM.state(0.0, Q0, np.zeros(7))
-    found = loaded_loop(made, state, loaded(), H, 0, delay, parts)
+    chain = LinearLoop(*NO_GAINS, H, 0, delay, parts)
+    found = loaded_loop(made, state, loaded(), chain)
     assert found is not None
     return found
 
@@ -86,7 +90,7 @@ def test_the_robot_grows_and_decays_at_the_rate_of_the_linear_loop(case: str) ->
 
     A point mass: the difference of the mass matrices is linear in it.
     """
-    parts, delay = Compensation(**CASES[case][0]), CASES[case][1]
+    parts, delay = only(**CASES[case][0]), CASES[case][1]
     made = holding()
     loop = whole(made, parts, delay)
     edge = boundary(loop)
@@ -112,7 +116,7 @@ def test_the_robot_grows_and_decays_at_the_rate_of_the_linear_loop(case: str) ->
 
 
 def test_what_is_told_is_the_boundary_and_the_advice_works() -> None:
-    made, strong = holding(), Compensation(integral_action=IntegralAction(7.0))
+    made, strong = holding(), only(integral_action=IntegralAction(7.0))
     edge = boundary(whole(made, strong, 0))
     (found,) = check_rate(made, Q0, H, strong, plant=loaded())
     assert found.path == ("compensation", "integral_action")
@@ -134,9 +138,7 @@ def test_what_is_told_is_the_boundary_and_the_advice_works() -> None:
     assert float(told[1]) == pytest.approx(1.0 / beta, rel=5e-3)
     assert float(told[2]) == pytest.approx(edge, rel=5e-3)
     weaker = IntegralAction(7.0 * float(told[3]))
-    assert not check_rate(
-        made, Q0, H, Compensation(integral_action=weaker), plant=loaded()
-    )
+    assert not check_rate(made, Q0, H, only(integral_action=weaker), plant=loaded())
     observed = Compensation(
         integral_action=IntegralAction(7.0), momentum_observer=MomentumObserver(50.0)
     )
@@ -149,9 +151,12 @@ def test_what_is_told_is_the_boundary_and_the_advice_works() -> None:
 
 
 def test_configurations_with_a_payload_are_warned_of_it() -> None:
-    """2 kg are borne at a rate of 5 1/s; 3 kg, which the arm carries, are not at 7."""
+    """2 kg are borne at a rate of 5 1/s; 3 kg, which the arm carries, are not at 7.
+
+    Without weight; with it, self-motion that nothing holds runs away with any load.
+    """
     document: dict[str, Any] = {
-        "robot": {"name": "panda"},
+        "robot": {"name": "panda", "gravity": [0.0, 0.0, 0.0]},
         "tasks": {
             "hand": {
                 "type": "frame_position",
@@ -161,7 +166,7 @@ def test_configurations_with_a_payload_are_warned_of_it() -> None:
             }
         },
         "null_space": {"gain": 10},
-        "compensation": {"integral_action": {"rate": 5}},
+        "compensation": {"integral_action": {"rate": 5}, "momentum_observer": None},
         "plant": {"type": "rigid_body", "payload": {"frame": "panda_hand", "mass": 2}},
         "simulation": {"duration": 0.02, "control_period": H},
     }
@@ -171,3 +176,30 @@ def test_configurations_with_a_payload_are_warned_of_it() -> None:
     assert "it is 5.26 times as heavy at the tasks" in found.message
     driven = document | {"compensation": {}, "simulation": {"duration": 0.02}}
     assert not hsp.load_experiment(driven, "plant.payload.mass=3").rate_findings
+
+
+def test_weight_that_nothing_holds_is_told_and_an_observer_holds_it() -> None:
+    """The arm does what is told: its posture runs away, or stays where it is."""
+    arm = hsp.Robot.load("panda")
+    hand = hsp.FramePosition("panda_tcp", gains=hsp.Gains(natural_frequency=20.0))
+    true = changed(arm, [Payload(frame="panda_hand", mass=1.0)])
+    made = hsp.Controller(arm, [hand], limits=None, start=Q0)
+    (found,) = check_rate(made, Q0, H, plant=true)
+    assert found.path == ("compensation", "momentum_observer")
+    assert re.search(
+        r"leaves the start as exp\(0\.\d+ t\); use a momentum", found.message
+    )
+    assert not check_rate(made, Q0, H, Compensation(), plant=true)
+    held = hsp.Controller(arm, [hand], 5.0 * hsp.TargetPosture(Q0), start=Q0)
+    assert not check_rate(held, Q0, H, plant=true)
+
+    def away(compensation: Compensation) -> float:
+        log = hsp.simulate(
+            made, Q0, duration=2.0, control_period=H, log_period=0.01,
+            compensation=compensation, plant=hsp.plants.RigidBodyPlant(true),
+            check_rate=False,
+        )  # fmt: skip
+        return float(np.abs(log.q[-1] - Q0).max())
+
+    assert away(ALONE) > 0.2
+    assert away(Compensation()) < 0.01

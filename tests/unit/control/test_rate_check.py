@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import yaml
 from carriage import carriage, check_that_it_is_the_loop
+from compensators import only
 from runs import held
 
 import hsp_control as hsp
@@ -42,7 +43,7 @@ from hsp_control.simulation.plants import (
     IntegratedPlant,
     RigidBodyPlant,
 )
-from hsp_control.simulation.plants.drives import EffortDelay
+from hsp_control.simulation.plants.drives import EffortDelay, EffortLag
 from hsp_control.simulation.plants.model_changes import Inertias, changed
 from hsp_control.simulation.plants.sensors import SensorDelay
 
@@ -104,6 +105,7 @@ def test_the_limits_of_theory(make: Any, limit: float) -> None:
         ((1, 1), {"predictor": Predictor(1, 1)}),
         ((2, 0), {"predictor": Predictor(1, 0)}),
         ((1, 0), {"momentum_observer": MomentumObserver(50.0)}),
+        ((0, 2), {"momentum_observer": MomentumObserver(15.0, order=2)}),
         ((0, 0), {"integral_action": IntegralAction(20.0)}),
         (
             (1, 1),
@@ -123,7 +125,7 @@ def test_the_linear_loop_is_the_chain_link_by_link(
     robot = carriage(tmp_path)
     h, frequency = 0.01, 12.0
     task = JointPosture(np.zeros(1), gains=Gains(natural_frequency=frequency))
-    made, parts = Controller(robot, [task], limits=None), Compensation(**compensation)
+    made, parts = Controller(robot, [task], limits=None), only(**compensation)
     plant = ImperfectPlant(
         IntegratedPlant(RigidBodyPlant(changed(robot, [Inertias(heavy)])), Rk4(h)),
         [SensorDelay(delays[1])],
@@ -139,6 +141,38 @@ def test_the_linear_loop_is_the_chain_link_by_link(
     loop = LinearLoop(Kp, Kv, Ki, h, *delays, parts, 1.0 / heavy)
     other = LinearLoop(1.1 * Kp, Kv, Ki, h, *delays, parts, 1.0 / heavy)
     check_that_it_is_the_loop(x, loop, other)
+
+
+@pytest.mark.parametrize("lag", [0.004, 0.03])
+@pytest.mark.parametrize("observer", [None, MomentumObserver(10.0, order=2)])
+def test_a_lag_of_the_drives_is_in_the_linear_loop(
+    lag: float, observer: MomentumObserver | None, tmp_path: Path
+) -> None:
+    """Beside a drive that holds the mean of each period; x differs within one.
+
+    x(t) moves under the mean as if it acted from the period's begin: second order in h.
+    """
+    robot, h = carriage(tmp_path), 0.002
+    task = JointPosture(np.zeros(1), gains=Gains(natural_frequency=12.0))
+    made, parts = (
+        Controller(robot, [task], limits=None),
+        only(momentum_observer=observer),
+    )
+    plant = ImperfectPlant(
+        IntegratedPlant(RigidBodyPlant(robot), Rk4(h)), [], [EffortLag(lag)]
+    )
+    log = simulate(
+        made, [1.0], duration=0.6, control_period=h, log_period=h, plant=plant,
+        compensation=parts, check_rate=False,
+    )  # fmt: skip
+    Kp, Kv, *_ = made.feedback("posture")
+    loop = LinearLoop(Kp, Kv, ZERO, h, 0, 0, parts, lag=lag)
+    A = loop.transition()
+    z = np.zeros(len(A))
+    z[0], z[3] = 1.0, -float(Kp[0, 0])  # the drive begins at the first effort
+    for k in range(1, len(log)):
+        z = A @ z
+        assert z[0] == pytest.approx(log.q[k, 0], abs=2e-3), k
 
 
 @pytest.mark.slow

@@ -21,6 +21,7 @@ YAML_KEYS = {
     "locked",
     "end_effector",
     "home",
+    "motor_inertia",
     "joint_coordinates",
     "licence",
     "source",

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from closed_loops import load, planar_controller, planar_start
+from compensators import ALONE
 
 from hsp_control import Robot, RobotState, Rollout, simulate
 from hsp_control.common.arrays import Array
@@ -52,6 +53,7 @@ def run_sampled(plant: Plant | None) -> Rollout:
         control_period=0.005,
         integrator=Rk4(0.001),
         plant=plant,
+        compensation=ALONE,
         start_time=1.0,
     )
 

@@ -1,0 +1,14 @@
+"""Compensators and nothing besides: no momentum observer that nobody asked for."""
+
+from typing import Any
+
+from hsp_control.control.compensation import Compensation
+
+
+def only(**parts: Any) -> Compensation:
+    """Return compensation of these parts; without a momentum observer if none is."""
+    return Compensation(**{"momentum_observer": None, **parts})
+
+
+ALONE = only()
+"""The law alone, whatever the plant."""

@@ -1,0 +1,119 @@
+"""What a loop bears of what its model lacks: told, and done by the arm."""
+
+import numpy as np
+import pytest
+from compensators import ALONE
+from wrong_arms import ARMS, H, WrongArm, holding, posture
+
+import hsp_control as hsp
+from hsp_control.common.arrays import Array
+from hsp_control.control.compensation import Compensation
+from hsp_control.robot.integrators import Rk4
+from hsp_control.simulation.model_errors import ModelErrors, lines, model_errors
+from hsp_control.simulation.plants import (
+    ImperfectPlant,
+    IntegratedPlant,
+    RigidBodyPlant,
+)
+from hsp_control.simulation.plants.drives import EffortDelay
+from hsp_control.simulation.plants.model_changes import MotorInertia, changed
+
+
+def borne(
+    name: str, compensation: Compensation, motor_inertia: float | None = None
+) -> tuple[ModelErrors, hsp.Controller, Array]:
+    made, q = holding(WrongArm(name, 0, motor_inertia=motor_inertia))
+    found = model_errors(made, q, H, compensation)
+    assert found is not None
+    return found, made, q
+
+
+def growth(
+    made: hsp.Controller, q: Array, plant: hsp.plants.Plant, until: float
+) -> float:
+    """Return by how much a small motion has grown in the second half of a run."""
+    start = made.robot.integrate(q, 1e-4 * np.random.default_rng(0).normal(size=len(q)))
+    log = hsp.simulate(
+        made, start, duration=until, control_period=H, plant=plant, check_rate=False
+    )
+    error = np.linalg.norm(log["task.hand.error"], axis=1)
+    part = len(error) // 4
+    return float(error[-part:].max() / error[part : 2 * part].max())
+
+
+@pytest.mark.parametrize("name", ["panda", "iiwa14", "xarm7"])
+def test_rotors_that_are_told_are_borne_and_larger_ones_are_not(name: str) -> None:
+    found, made, q = borne(name, Compensation())
+    for times, grows in ((0.6, False), (1.6, True)):
+        rotors = changed(made.robot, [MotorInertia(times * found.rotor)])
+        assert (growth(made, q, RigidBodyPlant(rotors), 6.0) > 1.0) is grows
+    # With rotors in the model, more of them are borne.
+    more, *_ = borne(name, Compensation(), motor_inertia=0.1)
+    assert more.rotor > 5.0 * min(found.rotor, 0.1)
+
+
+@pytest.mark.parametrize("name", ["panda", "ur5"])
+def test_a_delay_that_is_told_is_borne_and_a_longer_one_is_not(name: str) -> None:
+    found, made, q = borne(name, Compensation())
+    periods = round(found.delay / H)
+    for late, grows in ((periods - 3, False), (periods + 3, True)):
+        engine = IntegratedPlant(RigidBodyPlant(made.robot), Rk4(H))
+        plant = ImperfectPlant(engine, [], [EffortDelay(late)])
+        assert (growth(made, q, plant, 2.0) > 1.0) is grows, late
+
+
+class Pushed(RigidBodyPlant):
+    """The model under an effort that nobody commands."""
+
+    push: Array
+
+    def acceleration(self, t: float, q: Array, v: Array, tau: Array) -> Array:
+        return super().acceleration(t, q, v, tau + self.push)
+
+
+@pytest.mark.parametrize("joint", [0, 3, 5])
+def test_an_unknown_effort_moves_the_hand_as_far_as_is_told(joint: int) -> None:
+    """A hundredth of what is told for 1 N·m, where the arm is linear."""
+    small = 0.01
+    for compensation in (ALONE, Compensation()):
+        found, made, q = borne("panda", compensation)
+        plant = Pushed(made.robot)
+        plant.push = small * np.eye(7)[joint]
+        log = hsp.simulate(
+            made, q, duration=3.0, control_period=H, log_period=H, plant=plant,
+            compensation=compensation, check_rate=False,
+        )  # fmt: skip
+        for each, rows in zip(found.moved, (slice(0, 3), slice(3, 6)), strict=True):
+            away = np.linalg.norm(log["task.hand.error"][:, rows], axis=1)
+            peak = small * each.peak[joint]
+            if compensation == ALONE:  # 3 s are 30 of its time constants
+                resting = small * each.resting[joint]
+                assert away[-1] == pytest.approx(resting, rel=0.03, abs=1e-7)
+            else:
+                assert away.max() == pytest.approx(peak, rel=0.03, abs=1e-7)
+                assert away[-1] < 0.02 * peak
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_no_mode_grows_by_default_and_it_takes_no_time(name: str) -> None:
+    """Where it does without an observer it is told, in words as well."""
+    found, made, q = borne(name, Compensation())
+    assert (found.growing, found.growth) == (0, 0.0)
+    assert lines(found)["masses ±20 %"] == "no growing mode"
+    assert found.delay >= 0.005
+    assert found.lag >= 0.005
+    alone, *_ = borne(name, ALONE)
+    told = lines(alone)["masses ±20 %"]
+    assert told.startswith(f"{alone.growing} of 8 grow") is (alone.growing > 0)
+    if name == "iiwa14":
+        assert alone.growing > 0
+    assert (alone.moved[0].resting == pytest.approx(found.moved[0].resting)) is True
+    assert (found.moved[0].peak < 0.5 * found.moved[0].resting + 1e-6).all()
+    assert posture(made.robot, name) == pytest.approx(q)
+
+
+def test_it_has_no_answer_where_the_loop_is_not_that_of_an_arm() -> None:
+    walker = hsp.Robot.load("talos")
+    hand = hsp.FramePosition(walker.end_effector)
+    floating = hsp.Controller(walker, [hand], base="driven")
+    assert model_errors(floating, walker.home(), H, Compensation()) is None
