@@ -1,13 +1,13 @@
 """Does every arm come to rest at its edge? Defaults only, random cases of each kind.
 
-    .venv/bin/python benchmarks/edge_rest.py [--cases N] [--keep FILE] [ROBOT ...]
+    .venv/bin/python benchmarks/edge_rest.py [--cases N] [--keep FILE] [--mass] [ROBOT]
 
 Of each robot, kind and period: hands whose target is 5 cm to 1 m out of reach, at once,
 streamed in a line, dragged about, on springs, either above an orientation, also 5 mm
 within to 1 cm beyond the reach, and along one axis or two; a centre of mass that far
 from where it is; steps of 0.5 m within reach, turns of 170°, and pushes of 50 to 200 N
 for 0.2 s. Efforts are held for a period and clipped. Writes the third table of
-benchmarks/results/edge.md.
+benchmarks/results/edge.md; with --mass the fourth, in the metric M(q).
 """
 
 import argparse
@@ -147,8 +147,8 @@ def messages(case: Case, here: pin.SE3, pose: bool) -> list[dict[str, Any]]:
     return found
 
 
-def controller(case: Case, robot: hsp.Robot) -> hsp.Controller:
-    """Return the controller of a case."""
+def controller(case: Case, robot: hsp.Robot, metric: Any = None) -> hsp.Controller:
+    """Return the controller of a case; the metric is the default one if it is None."""
     frame, goal, planar = robot.end_effector, np.array(case.goal), is_planar(case.robot)
     spring = hsp.Impedance(case.number) if case.kind in SPRINGS else None
     streamed = case.kind in ("stream", "drag")
@@ -181,7 +181,8 @@ def controller(case: Case, robot: hsp.Robot) -> hsp.Controller:
         hand = hsp.FramePosition(frame, impedance=spring, name="hand", **declared)
     below = [hsp.FrameOrientation(frame, priority=2)] * (case.kind in ABOVE)
     field: Any = hsp.TargetPosture(case.q0) if planar else hsp.JointCentering()
-    made = hsp.Controller(robot, [hand, *below], field, start=case.q0)
+    tasks = [hand, *below]
+    made = hsp.Controller(robot, tasks, field, start=case.q0, metric=metric)
     if not streamed and case.kind not in ("push", "steady"):
         made.at(BEGIN).ramp(0.0).reference("hand", reference)
     return made
@@ -195,7 +196,7 @@ def rests_from(case: Case, robot: hsp.Robot) -> float:
     return BEGIN + long.get(case.kind, PUSH) + REST + turn
 
 
-def measure(case: Case, robot: hsp.Robot) -> dict[str, Any]:
+def measure(case: Case, robot: hsp.Robot, metric: Any = None) -> dict[str, Any]:
     """Return the numbers of a run.
 
     Returns:
@@ -216,7 +217,7 @@ def measure(case: Case, robot: hsp.Robot) -> dict[str, Any]:
     rests, end = rests_from(case, robot), ""
     try:
         run = hsp.simulate(
-            controller(case, robot), case.q0, duration=rests + WATCHED,
+            controller(case, robot, metric), case.q0, duration=rests + WATCHED,
             control_period=h, log_period=h, plant=RigidBodyPlant(robot, pushes),
         )  # fmt: skip
     except SimulationError as fault:
@@ -319,9 +320,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--cases", type=int, default=40, help="of a kind and robot")
     parser.add_argument("--keep", type=Path, help="a file of runs, which is extended")
+    parser.add_argument("--mass", action="store_true", help="in the metric M(q)")
     parser.add_argument("robots", nargs="*", default=list(ROBOTS))
     options = parser.parse_args()
     warnings.simplefilter("ignore")
+    metric = hsp.metrics.MassMatrixMetric() if options.mass else None
     made: dict[str, dict[str, Any]] = {}
     if options.keep and options.keep.exists():
         for line in options.keep.read_text(encoding="utf-8").splitlines():
@@ -333,7 +336,7 @@ def main() -> None:
             for k, each in enumerate(drawn([name], 1, seed)):
                 key = f"{name} {seed} {k}"
                 if key not in made:
-                    made[key] = {"key": key, **measure(each, loaded[name])}
+                    made[key] = {"key": key, **measure(each, loaded[name], metric)}
                     if options.keep:
                         with options.keep.open("a", encoding="utf-8") as file:
                             file.write(json.dumps(made[key]) + "\n")
@@ -342,7 +345,8 @@ def main() -> None:
     table = HEADER + rows(runs)
     print(table)
     if options.robots == list(ROBOTS):
-        replace_section(RESULTS / "edge.md", "rest", table)
+        section = "rest in M" if options.mass else "rest"
+        replace_section(RESULTS / "edge.md", section, table)
 
 
 if __name__ == "__main__":

@@ -16,6 +16,7 @@ from hsp_control.common.suggestions import listing
 from hsp_control.config import Experiment
 from hsp_control.control import Controller, ControlOutput, Diagnostics
 from hsp_control.control.first_state import warn_of_jump, warn_of_slow_efforts
+from hsp_control.law.edge import FAR, NEAR
 from hsp_control.robot import Robot
 from hsp_control.robot.description.inertias import impossible_inertias
 from hsp_control.robot.description.urdf import read_urdf
@@ -23,6 +24,7 @@ from hsp_control.simulation import Rollout
 from hsp_control.simulation.demand_check import missed_forces, out_of_reach, too_weak
 from hsp_control.simulation.initial_state import posture_search
 from hsp_control.simulation.model_errors import describe, lines
+from hsp_control.tasks import SecondOrderTask
 
 ROUNDING = 1e-9
 """A singular value below this share of the largest one is zero but for rounding."""
@@ -92,10 +94,33 @@ def _checked(
         "momentum_observer": experiment.on_observer,
         "wrong_model": None if borne is None else describe(borne),
         "limits": "none" if controller.limits is None else output.status.name.lower(),
+        "exact": _exact(controller),
         "effort_rate": _rates(controller),
         "singular_values": list(map(float, values)),
         "largest_effort": float(efforts.max()),
         "effort_unit": "N" if robot.units[efforts.argmax()] == "m" else "N·m",
+    }
+
+
+def _exact(controller: Controller) -> dict[str, Any] | None:
+    """Return where the law is exact, see `law/edge.py`; None with a floating base."""
+    robot, stack = controller.robot, controller.active_stack
+    rows = stack.rows.jacobian[stack.first_task_row :]
+    if robot.unactuated or not robot.size or not len(rows):
+        return None
+    errors = {
+        f"{task.name} {part.name}": [FAR * longest, part.unit]
+        for task in controller.tasks
+        if isinstance(task, SecondOrderTask) and isinstance(task.largest_error, tuple)
+        for part, longest in zip(task.error_parts, task.largest_error, strict=True)
+        if longest is not None
+    }
+    return {
+        "errors": errors,
+        "singular_value": max(
+            NEAR * robot.size, 2.0 * controller.singularity_threshold
+        ),
+        "singular_value_at_start": float(np.linalg.svd(rows, compute_uv=False)[-1]),
     }
 
 
@@ -125,6 +150,8 @@ def _check_table(found: dict[str, Any]) -> Table:
     table.add_row("compensation", ", ".join(found["compensation"]) or "none")
     table.add_row("momentum observer", found["momentum_observer"])
     table.add_row("limits", _LIMITS[found["limits"]])
+    if (exact := found["exact"]) is not None:
+        table.add_row("exact", _where_exact(exact))
     rates = [rate for rate in found["effort_rate"] if rate is not None]
     if rates:
         low, high = (f"{1e-3 * each:.2g}" for each in (min(rates), max(rates)))
@@ -135,6 +162,20 @@ def _check_table(found: dict[str, Any]) -> Table:
     largest = f"{found['largest_effort']:.3g} {found['effort_unit']}"
     table.add_row("largest effort", f"{largest} at the start")
     return table
+
+
+def _where_exact(exact: dict[str, Any]) -> str:
+    """Return in words where the law is exact."""
+    errors = ", ".join(
+        f"{name} below {np.rad2deg(most):.0f}°" if unit == "rad" else
+        f"{name} below {most:.2g} {unit}"
+        for name, (most, unit) in exact["errors"].items()
+    )  # fmt: skip
+    return (
+        f"{errors or 'for every error'}; at any speed; while no limit binds, and the "
+        f"smallest singular value of J is above {exact['singular_value']:.2g} "
+        f"({exact['singular_value_at_start']:.2g} at the start)"
+    )
 
 
 _LIMITS = {

@@ -19,6 +19,8 @@ from hsp_control.simulation.measures import (
     unreached,
 )
 
+LOST, STILL = 0.5, 0.05
+"""Share of a field, and a speed [rad/s or m/s], from which on limits keep it off."""
 GIVEN_UP = 0.01
 """Share of a commanded force from which on its plan does not keep it."""
 
@@ -57,6 +59,8 @@ def summary(rollout: Rollout) -> Table:
         "null space",
         f"|e_N| {norm[0]:.3g} {unit} at the start, {norm[-1]:.3g} {unit} at the end",
     )
+    if beyond := beyond_limits(rollout):
+        table.add_row("", beyond)
     smallest = f"smallest singular value {np.nanmin(rollout['singular_values']):.3g}"
     if rows_compare(rollout):
         least = f"minimum {np.nanmin(rollout['manipulability']):.4g}, {smallest}"
@@ -71,6 +75,21 @@ def summary(rollout: Rollout) -> Table:
     if damped := int((rollout["damped"] > 0.0).sum()):
         table.add_row("singular", f"{damped} rows: the law was damped there, not exact")
     return table
+
+
+def beyond_limits(rollout: Rollout) -> str:
+    """Return that a field asks for more than limits give, if it does at the end."""
+    last = slice(-max(len(rollout) // 10, 1), None)
+    asked = np.linalg.norm(rollout["field.g"][-1])
+    missing = rollout["null_space_norm"][-1]
+    held = np.isin(rollout["status"][last], (2, 4)).all()
+    if not held or missing < LOST * asked or missing < STILL:
+        return ""
+    unit = rate_unit(rollout)
+    return (
+        f"the field asks for more than the limits give: |g| {asked:.3g} {unit}, "
+        f"|e_N| {missing:.3g} {unit} at the end"
+    )
 
 
 def force_rows(rollout: Rollout) -> Iterator[tuple[str, str]]:

@@ -312,7 +312,7 @@ class SecondOrderTask(Task):
     so that a target far away, or out of reach, asks for no more [m or rad]. One number,
     or one for each part of the error; "none": no bound, and near a singularity the
     paper's law down to the controller's threshold. By default 0.35 of the robot's size
-    for a position (`Robot.size`), 1 rad for an orientation, and none for joints."""
+    for a position (`Robot.size`), 1.25 rad for an orientation, and none for joints."""
 
     def feedback(self) -> Feedback:
         """Return new arrays of feedback; see `Task.feedback`."""
