@@ -22,6 +22,7 @@ from hsp_control.robot.description.inertias import impossible_inertias
 from hsp_control.robot.description.urdf import read_urdf
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.demand_check import missed_forces, out_of_reach, too_weak
+from hsp_control.simulation.heavy_plant import heavy_plant
 from hsp_control.simulation.initial_state import posture_search
 from hsp_control.simulation.model_errors import describe, lines
 from hsp_control.tasks import SecondOrderTask
@@ -190,8 +191,10 @@ _LIMITS = {
 
 
 def warn_of_reach(experiment: Experiment) -> None:
-    """Print which targets and commanded forces cannot be had, and when."""
+    """Print what the plant's motors cannot move, and which targets cannot be had."""
     robot, law = experiment.robot, experiment.controller
+    for message in heavy_plant(experiment.scenario.plant, robot, experiment.q0):
+        print(f"hsp: {message}", file=sys.stderr)
     if robot.unactuated and experiment.scenario.plan is not None:
         return  # it moves contacts and references
     duration = experiment.scenario.simulation.duration

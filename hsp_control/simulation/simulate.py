@@ -31,6 +31,7 @@ from hsp_control.declaration.quantities import Flag, Positive
 from hsp_control.geometry.scene import Scene
 from hsp_control.robot.integrators import Dop853, Integrator, Rk4
 from hsp_control.simulation.control_chain import ControlChain
+from hsp_control.simulation.heavy_plant import heavy_plant
 from hsp_control.simulation.log_writer import LogWriter
 from hsp_control.simulation.loops import continuous_loop, sampled_loop
 from hsp_control.simulation.plants import (
@@ -135,6 +136,8 @@ def simulate(
     if plant is None:
         plant = RigidBodyPlant(robot)
     elif isinstance(plant, PlantPart):
+        for message in heavy_plant(plant, robot, robot.check_configuration(q0)):
+            warnings.warn(message, StartWarning, stacklevel=2)
         with within("plant"):
             plant = plant.build(robot, integrator)
     # Rows, periods, and where it begins

@@ -14,7 +14,7 @@ from hsp_control.simulation.measures import measures
 
 pytest.importorskip("mujoco")
 TWIST = "{frame: panda_hand, moment: [0, 0, -60], start: 0.05, duration: 0.1}"
-SHOVE = "{frame: arm_left_7_link, force: [0, 100, 0], start: 0.1, duration: 0.1}"
+SHOVE = "{frame: arm_left_7_link, force: [0, 200, 0], start: 0.1, duration: 0.1}"
 PANDA = {
     "robot": {"name": "panda"},
     "start": {"configuration": [0, 0, 0, -1.6, 0, 1.6, 2.8]},

@@ -52,6 +52,10 @@ class ElasticJoint:
         return after[:4, :4], after[:4, 4]
 
 
+_NOTHING = 1e-12
+"""What couples two rows by less than this part of the gains is rounding."""
+
+
 @dataclass(frozen=True)
 class LinearLoop:
     """The loop x'' = u, held over a period h, with u = -Kp x - Kv x' - Ki ∫x.
@@ -100,6 +104,16 @@ class LinearLoop:
 
     def radius(self) -> float:
         """Return the spectral radius: the loop is stable if it is below 1."""
+        gains = np.array([self.kp, self.kv, self.ki])
+        between = np.abs(gains - gains * np.eye(len(self.kp))).max()
+        alone = between <= _NOTHING * np.abs(gains).max()
+        if len(self.kp) > 1 and np.ndim(self.share) == 0 and alone:
+            # Rows that do not depend on one another are as many small loops.
+            rows = gains.diagonal(axis1=1, axis2=2).T
+            same = np.round(rows / (_NOTHING + np.abs(gains).max()), 12)
+            rows = rows[np.unique(same, axis=0, return_index=True)[1]]
+            ones = (row.reshape(3, 1, 1) for row in rows)
+            return max(replace(self, kp=p, kv=v, ki=i).radius() for p, v, i in ones)
         return float(np.abs(np.linalg.eigvals(_coupled(self.transition()))).max())
 
     def _step(

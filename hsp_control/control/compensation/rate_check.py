@@ -41,6 +41,9 @@ RULE_HEAVY = 5.0
 task, as its model. Without other compensators this is a rate of Kv/5."""
 SLOWEST_GROWTH = 0.02
 """Rate of growth that is told of [1/s]: slower ones need a minute to be seen."""
+_LONG = 50
+"""A delay of more periods is first compared with what the loop bears: the matrix of a
+loop grows with its delay."""
 _ROUNDING = 1e-7
 """Tolerance of the radius: self-motion without a field has eigenvalues of 1."""
 
@@ -333,7 +336,19 @@ def _finding(
     extra: str,
     null_space: tuple[Array, Array] | None = None,
 ) -> RateFinding | None:
-    radius, gain, h = loop.radius(), speed.rate, loop.period
+    gain, h, late = speed.rate, loop.period, loop.effort_delay + loop.sensor_delay
+    if late > _LONG and (borne := _borne(loop)) is not None:
+        # What a loop bears is a product of rate and delay.
+        share = borne / late
+        slower = f" or {speed.at_most(share * gain)}" if share else ""
+        return RateFinding(
+            path,
+            f"unstable with a delay of {late} periods ({late * h:.4g} s): the loop "
+            f"bears at most {borne} ({borne * h:.4g} s); use a shorter delay{slower}",
+            np.inf,
+            True,
+        )
+    radius = loop.radius()
     product = f"{speed.what} times the period is {gain * h:.3g}{extra}"
     if radius > 1.0 + _ROUNDING:
         good, stable = _stabilising_changes(loop, speed, rule, null_space)
@@ -345,7 +360,6 @@ def _finding(
             else "no control rate is stable: reduce the integral gain or the filter's "
             "delay"
         )
-        late = loop.effort_delay + loop.sensor_delay
         delay = f", {late} period{'s' * (late > 1)} of delay" if late else ""
         return RateFinding(
             path,
@@ -391,6 +405,9 @@ def _stabilising_changes(
 
         if (s := _largest(weights)) is not None:
             choices.append(f"fields of at most {rounded_down(s)} times these weights")
+    if (periods := _borne(loop)) is not None:
+        text = f"a delay of at most {periods} period{'s' * (periods != 1)}"
+        choices.append(f"{text} ({rounded_down(periods * h)} s)" if periods else text)
     if (s := _largest(lambda s: replace(loop, period=s * h), least)) is not None:
         choices.append(f"a control_period of at most {rounded_down(s * h)} s")
         shorter = rounded_down(min(s * h, rule / speed.rate))
@@ -425,6 +442,32 @@ def _stabilising_changes(
                 f"velocity_filter.cutoff of at least {filter_.cutoff / s * 1.01:.3g} Hz"
             )
     return good, choices
+
+
+def _borne(loop: LinearLoop) -> int | None:
+    """Return the most periods of delay with which a loop is stable.
+
+    None if it is stable with the delay that it has, or unstable without any.
+    """
+    late = loop.effort_delay + loop.sensor_delay
+
+    def stable(periods: int) -> bool:
+        efforts = periods * loop.effort_delay // late
+        measured = periods - efforts
+        some = replace(loop, effort_delay=efforts, sensor_delay=measured)
+        return some.radius() <= 1.0 + _ROUNDING
+
+    if not late or not stable(0):
+        return None
+    low, high = 0, 1
+    while stable(high):
+        if high == late:
+            return None
+        low, high = high, min(2 * high, late)
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if stable(middle) else (low, middle)
+    return low
 
 
 def _largest(

@@ -120,7 +120,7 @@ class PlantPart(Part, ABC, family="plants", error=SimulationError):
         self, robot: Robot, integrator: Integrator, *, access: Access = ANYWHERE
     ) -> Plant:
         """Return the plant, which has the controller's joints."""
-        plant = self.engine(self._simulated(robot, access), integrator)
+        plant = self.engine(self.simulated(robot, access), integrator)
         check_plant(plant, robot)
         sensors = [sensor for sensor in self.sensors if sensor.active]
         drives = [drive for drive in self.drives if drive.active]
@@ -134,7 +134,7 @@ class PlantPart(Part, ABC, family="plants", error=SimulationError):
             )
         return ImperfectPlant(plant, sensors, drives, self.seed)
 
-    def _simulated(self, robot: Robot, access: Access) -> Robot:
+    def simulated(self, robot: Robot, access: Access) -> Robot:
         """Return the simulated robot; the controller's object if they are the same."""
         own = robot
         if self.robot is not None:

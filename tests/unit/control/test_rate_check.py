@@ -323,6 +323,39 @@ def test_the_advice_on_a_compensator_works(
     check_rate(made, Q0, H, make(best), effort_delay=delay)
 
 
+@pytest.mark.parametrize("late", [45, 70, 300, 100_000])
+@pytest.mark.parametrize("which", ["effort_delay", "sensor_delay"])
+def test_a_delay_that_the_loop_does_not_bear_is_told_with_one_that_it_bears(
+    which: str, late: int
+) -> None:
+    """For ω0 = 20: the phase margin over the crossover, less half a period's hold."""
+    robot = Robot.load("panda")
+    hand = FramePosition("panda_tcp", gains=Gains(natural_frequency=20.0))
+    law = Controller(robot, [hand], Rest(), start=robot.home())
+
+    def check(periods: int) -> list[Any]:
+        delays = {"effort_delay": 0, "sensor_delay": 0, which: periods}
+        return check_rate(law, robot.home(), H, **delays, strict=False)
+
+    (found,) = (each for each in check(late) if "tasks" in each.path)
+    assert found.unstable
+    kp, kv = 400.0, 40.0
+    crossover = np.sqrt(0.5 * (kv**2 + np.sqrt(kv**4 + 4.0 * kp**2)))
+    margin = np.arctan(crossover * kv / kp) / crossover
+    most = int(margin / H - 0.5)
+    assert f"at most {most}" in found.message
+    assert not any(each.unstable for each in check(most))
+    assert any(each.unstable for each in check(most + 1))
+
+
+def test_rows_that_do_not_depend_on_one_another_are_as_many_loops() -> None:
+    rng = np.random.default_rng(0)
+    kp, kv = np.diag(rng.uniform(50.0, 2e5, 4)), np.diag(rng.uniform(5.0, 900.0, 4))
+    loop = LinearLoop(kp, kv, 0.0 * kp, H, 3, 2)
+    together = np.abs(np.linalg.eigvals(loop.transition())).max()
+    assert loop.radius() == pytest.approx(together, rel=1e-9)
+
+
 def test_a_field_s_slope_is_taken_in_the_null_space_and_the_metric() -> None:
     """TargetPosture has the Hessian 1; over M it is the slope of -M⁻¹∇f."""
     state = PANDA.state(0.0, Q0, np.zeros(7))
