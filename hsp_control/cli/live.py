@@ -90,6 +90,7 @@ def live(options: argparse.Namespace) -> int:
                     "name": f"{experiment.name}, live",
                     "title": experiment.scenario.title,
                     "config": experiment.config,
+                    "momentum_observer": _on_observer(experiment, real=real),
                 },
                 priority=options.priority,
                 on_period=lambda t: [each(t) for each in on_period],
@@ -107,7 +108,8 @@ def live(options: argparse.Namespace) -> int:
             duration=min(duration, _DRY_RUN if plan is None else _DRY_RUN_OF_A_PLAN),
             **options_of_loop,
         )
-        out.print(_observer(experiment, real=real), highlight=False)
+        observed = _on_observer(experiment, real=real)
+        out.print(f"Momentum observer: {observed}", highlight=False)
         # A robot, and what else listens
         hardware: Hardware | None = None
         if options.robot is not None:
@@ -169,14 +171,12 @@ def _command(experiment: Experiment, *, real: bool) -> Command:
     return Command(experiment.controller, own)
 
 
-def _observer(experiment: Experiment, *, real: bool) -> str:
-    """Return whether there is a momentum observer, as a line."""
-    words = experiment.on_observer
-    if real:
-        controller, period = experiment.controller, live_period(experiment)
-        own = experiment.scenario.compensation
-        words = own.on_observer(controller, period, exact=False)
-    return f"Momentum observer: {words}"
+def _on_observer(experiment: Experiment, *, real: bool) -> str:
+    """Return a few words: whether there is a momentum observer, and why."""
+    if not real:
+        return experiment.on_observer
+    own, period = experiment.scenario.compensation, live_period(experiment)
+    return own.on_observer(experiment.controller, period, exact=False)
 
 
 def _table(title: str, *headings: str) -> Table:

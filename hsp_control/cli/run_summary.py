@@ -33,6 +33,8 @@ def summary(rollout: Rollout) -> Table:
     )
     if observed := rollout.meta.get("momentum_observer"):
         table.add_row("momentum observer", observed)
+        for row in unexplained_rows(rollout):
+            table.add_row("", row)
     tasks = rollout.meta["tasks"]
     away = {each.task: each for each in unreached(rollout.columns, tasks)}
     for k, task in enumerate(tasks):
@@ -104,6 +106,32 @@ def force_rows(rollout: Rollout) -> Iterator[tuple[str, str]]:
             yield "", f"{rows} rows: {why}"
         if lost:
             yield "", f"{lost} rows: contact lost"
+
+
+LARGE_SHARE = 0.25
+"""Share of an effort limit from which on unexplained effort is no small error."""
+
+
+def unexplained_rows(rollout: Rollout) -> Iterator[str]:
+    """Yield what an observer found that the model does not explain, one sentence."""
+    found = rollout.columns.get("observer.disturbance")
+    if found is None:
+        return
+    size = np.abs(found).max(axis=0)
+    dof = int(size.argmax())
+    unit = effort_units(rollout)[dof]
+    text = f"up to {size[dof]:.3g} {unit} that the model does not explain, on "
+    yield text + rollout.meta["robot"]["dofs"][dof]
+    limits = np.array(rollout.meta["limits"].get("effort", []), dtype=float)
+    if len(limits) == len(size):  # NaN: there is none
+        share = size / np.where(limits > 0.0, limits, np.inf)
+        dof = int(share.argmax())
+        if share[dof] > LARGE_SHARE:
+            yield (
+                "the robot does not do what the model says: that is "
+                f"{100.0 * share[dof]:.0f} % of the effort limit of "
+                f"{rollout.meta['robot']['dofs'][dof]}; is there a load, or a contact?"
+            )
 
 
 def limit_rows(rollout: Rollout) -> Iterator[str]:

@@ -56,7 +56,9 @@ def test_the_page_of_compliance_is_true() -> None:
     text = (ROOT / "docs" / "compliance.md").read_text(encoding="utf-8")
     (snippet,) = blocks(text, "python")
     exec(compile(snippet, "compliance.md", "exec"), {})
-    (configuration,) = blocks(text, "yaml")
+    *others, configuration = blocks(text, "yaml")
+    for other in others:
+        assert load_experiment(yaml.safe_load(other)).run().status == "completed"
     rest = {
         "robot": {"name": "panda"},
         "simulation": {"duration": 0.02, "control_period": 0.001},

@@ -26,6 +26,7 @@ from hsp_control.companions.inspection.reading import (
     check_srdf,
     check_unread,
 )
+from hsp_control.control.compensation.automatic_observer import largest_cancelled
 from hsp_control.geometry import Proximity, link_shapes, self_pairs
 from hsp_control.geometry.good_postures import PostureSearch, Rows
 from hsp_control.robot import Robot, RobotDescription
@@ -397,6 +398,7 @@ def _of_robot(robot: Robot) -> tuple[list[Finding], dict[str, str]]:
         "mass": f"{pin.computeTotalMass(robot.model):.4g} kg move",
         "mass matrix": f"condition number up to {condition:.2g}, by {dof}",
         "rotors": _rotors(robot),
+        "observer": _observer(robot),
         "home": f"[{home}]",
     }
 
@@ -426,6 +428,21 @@ def _rotors(robot: Robot) -> str:
     low, high = (f"{each:.3g}" for each in (own.min(), own.max()))
     each = low if low == high else f"{low} to {high}"
     return f"{each} kg m² (or kg) on {own.size} of {robot.nv} degrees of freedom"
+
+
+def _observer(robot: Robot) -> str:
+    if robot.unactuated:
+        return "none by default: the base floats"
+    limits = largest_cancelled(robot)
+    limits = limits[np.isfinite(limits)]
+    most = "any effort"
+    if limits.size:
+        low, high = (f"{each:.3g}" for each in (limits.min(), limits.max()))
+        most = f"at most {low if low == high else f'{low} to {high}'} N·m or N"
+    return (
+        f"a momentum observer is on by default where nothing is to yield; it cancels "
+        f"{most}"
+    )
 
 
 def _rates(robot: Robot) -> str:

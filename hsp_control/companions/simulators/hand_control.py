@@ -72,7 +72,9 @@ class HandControl:
                 limits=settings.limits,
                 scene=settings.scene,
             )
-            self.command = Command(controller, settings.compensation)
+            # The robot is the simulator's own, and what it touches is no error of it.
+            own = settings.compensation.suited(controller, None, exact=True)
+            self.command = Command(controller, own)
         self._indices = axis_indices(axes or "")  # now that the task has checked them
         self._strongest = robot.model.upperEffortLimit
         self._expected, self._period = nan, nan

@@ -54,7 +54,8 @@ class HandSettings(Part, error=ConfigError):
     """Limits that the law keeps: by default those of the joints' motion. Efforts are
     also clipped, as a simulator clips those of its own controllers."""
     compensation: Compensation = Compensation(friction_feed_forward="urdf")
-    """Compensators; by default the friction of the simulated joints is fed forward."""
+    """Compensators; by default the friction of the simulated joints is fed forward. An
+    observer that is ``auto`` is off: the model is the simulator's own."""
     scene: Scene = Scene()
     """Obstacles that fields and limits name."""
 

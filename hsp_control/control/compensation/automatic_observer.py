@@ -29,7 +29,7 @@ from hsp_control.control.compensation.momentum_observer import (
 )
 from hsp_control.control.compensation.stage import Run
 from hsp_control.control.controller import Controller
-from hsp_control.robot import RobotState
+from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.compliant_task import impedance_of
 
 BANDWIDTH = 50.0
@@ -65,7 +65,10 @@ def automatic_observer(
     if reason := _what_forbids(controller):
         return Choice(None, reason)
     rate = min(BANDWIDTH, MOST_PER_PERIOD / period)
-    clip = [each if each < np.inf else None for each in _clip(controller).tolist()]
+    clip = [
+        each if each < np.inf else None
+        for each in largest_cancelled(controller.robot).tolist()
+    ]
     unlimited = all(each is None for each in clip)
     observer = MomentumObserver(rate, None if unlimited else clip, order=2)
     return Choice(observer, "")
@@ -87,7 +90,7 @@ class AutomaticObserver(RunningObserver):
     """
 
     def __init__(self, controller: Controller) -> None:
-        clip = _clip(controller)
+        clip = largest_cancelled(controller.robot)
         super().__init__(BANDWIDTH, clip, 2, most_per_period=MOST_PER_PERIOD)
         self._tasks, self._forbidden = controller.planned_tasks, False
         self._weight = 1.0  # part of the estimate that is cancelled
@@ -122,7 +125,7 @@ def _what_forbids(controller: Controller) -> str:
     return ""
 
 
-def _clip(controller: Controller) -> Array:
+def largest_cancelled(robot: Robot) -> Array:
     """Return the largest effort that is cancelled, shape (nv,); inf: any."""
-    own = np.array(controller.robot.model.effortLimit)
+    own = np.array(robot.model.effortLimit)
     return np.where(own > 0.0, LARGEST_SHARE * own, np.inf)

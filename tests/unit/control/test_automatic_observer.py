@@ -82,7 +82,7 @@ def test_it_says_why_it_is_off() -> None:
             floating,
             H,
             False,
-            "the base floats, and its contact forces are not measured",
+            "the base floats, and its contact forces are not known",
         ),
         (wiping, H, False, "a contact presses"),
     ):

@@ -1,0 +1,64 @@
+"""What check and the summary of a run say of the momentum observer and of a load."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from hsp_control.cli.main import main
+from hsp_control.cli.run_summary import unexplained_rows
+from hsp_control.config import load_experiment
+
+CONFIG: dict[str, Any] = {
+    "robot": {"name": "panda"},
+    "tasks": {"hand": {"type": "frame_pose"}},
+    "simulation": {"duration": 0.3, "control_period": 0.001},
+}
+LOAD: dict[str, Any] = {
+    "type": "rigid_body",
+    "payload": {"frame": "panda_tcp", "mass": 3.0},
+}
+SPRING = {"type": "frame_pose", "impedance": {"stiffness": 600, "damping": 30}}
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({}, "off: the robot is its model"),
+        ({"plant": LOAD}, "on, 50 1/s (auto)"),
+        ({"plant": LOAD, "compensation": {"momentum_observer": None}}, "off"),
+        ({"plant": LOAD, "compensation": {"momentum_observer": {"bandwidth": 20}}},
+         "on, 20 1/s"),
+        ({"plant": LOAD, "tasks": {"hand": SPRING}},
+         "off: a hand with an impedance yields, task 'hand'"),
+    ],
+)  # fmt: skip
+def test_check_says_it(
+    changes: dict[str, Any],
+    words: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    path = tmp_path / "held.yaml"
+    path.write_text(yaml.safe_dump(CONFIG | changes), encoding="utf-8")
+    assert main(["check", str(path), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["momentum_observer"] == words
+    borne = found["wrong_model"]
+    assert borne["growing"] <= borne["tried"] == 8
+    assert len(borne["moved"][0]["resting"]) == 7
+
+
+def test_a_run_says_how_much_nobody_explained() -> None:
+    """3 kg at the Panda's hand: 15 N·m and more on joint 2, a sixth of its limit."""
+    heavy = load_experiment(CONFIG | {"plant": LOAD}).run()
+    (row,) = unexplained_rows(heavy)
+    assert row.startswith("up to ")
+    assert row.endswith(" N·m that the model does not explain, on panda_joint2")
+    beside = {**LOAD, "payload": {**LOAD["payload"], "center": [0.15, 0.0, 0.0]}}
+    _, told = unexplained_rows(load_experiment(CONFIG | {"plant": beside}).run())
+    assert told.startswith("the robot does not do what the model says: that is ")
+    assert "of the effort limit of panda_joint" in told
+    assert not [*unexplained_rows(load_experiment(CONFIG).run())]
