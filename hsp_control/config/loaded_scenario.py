@@ -70,7 +70,8 @@ def load_scenario(document: Document) -> LoadedScenario:
 
 def load_robot(document: Document, scenario: Scenario) -> Robot:
     """Return the robot of a configuration; that of a log is in the log."""
-    if document.recorded_robot is not None:
+    there = scenario.robot.mjcf is not None and Path(scenario.robot.mjcf).is_file()
+    if document.recorded_robot is not None and not there:  # scenes are in their files
         with document.at("robot"):
             return recorded_robot(document.recorded_robot, document.access)
     keys = [key for key in ("name", "description") if getattr(scenario.robot, key)]

@@ -48,8 +48,13 @@ class EdgeMemory(NamedTuple):
     )
     damped: Array  # a_damped, shape (nv,); a_exact where nothing is damped
     exact_e_N: Array  # shape (nv,)
-    self_motions: Array  # P a of a and of a_damped, if they were asked for, (2, nv)
+    # P a of a and of a_damped, and what brakes them, K_N P v, shape (2, nv) each; they
+    # are written where a limit is violated
+    self_motions: Array
+    brakings: Array
     share: Array  # μ, without the share of the limits, shape (1,)
+    # how much the tasks are held, by their edge or by limits, where a limit binds, (1,)
+    held: Array
     code: Indices  # of a_damped, see `outcome_of`, shape (1,)
 
     @classmethod
@@ -63,7 +68,9 @@ class EdgeMemory(NamedTuple):
             damped=np.zeros(nv),
             exact_e_N=np.zeros(nv),
             self_motions=np.zeros((2, nv)),
+            brakings=np.zeros((2, nv)),
             share=np.zeros(1),
+            held=np.ones(1),
             code=np.zeros(1, dtype=np.int64),
         )
 

@@ -160,7 +160,7 @@ class Resolution:
         return resolve, (self._step(v, controls),)
 
     def self_motions(self, v: Array) -> KernelCall:
-        """Return the call that writes P a of a and of a_damped, after `call`.
+        """Return the call that writes the parts of a and of a_damped, after `call`.
 
         It writes to `edge`.
         """
@@ -344,29 +344,50 @@ def _resolve_levels(step: LawStep) -> int:
 
 @kernel
 def _write_self_motions(step: LawStep) -> None:
-    """Write P a of a and of a_damped."""
-    edge, rows, form = step.scratch.edge, step.scratch.rows, step.form
-    J, L = step.task.jacobian, step.metric.L
-    m, n = J.shape
-    Jx, part, moved = rows[0, :m], rows[1, :m], rows[2, :n]
-    ours, damped = edge.self_motions[0], edge.self_motions[1]
-    share = edge.share[0]
-    if edge.code[0] == 0 or step.alone:
+    """Write P a of a and of a_damped, and K_N P v of both."""
+    edge, rows = step.scratch.edge, step.scratch.rows
+    n, share = step.v.shape[0], edge.share[0]
+    exact, moved = rows[3, :n], rows[4, :n]
+    _damped_self_motion(step, edge.damped, edge.self_motions[1])
+    _damped_self_motion(step, step.v, moved)
+    multiply(step.K_N, moved, edge.brakings[1])
+    copy(edge.self_motions[1], edge.self_motions[0])
+    copy(edge.brakings[1], edge.brakings[0])
+    if edge.code[0] == 0 or share == 1.0:
+        return
+    _self_motion(step, edge.Q, edge.X, edge.exact, exact)
+    for i in range(n):
+        edge.self_motions[0, i] = exact[i] + share * (
+            edge.self_motions[1, i] - exact[i]
+        )
+    _self_motion(step, edge.Q, edge.X, step.v, moved)
+    multiply(step.K_N, moved, exact)
+    for i in range(n):
+        edge.brakings[0, i] = exact[i] + share * (edge.brakings[1, i] - exact[i])
+
+
+@kernel
+def _damped_self_motion(step: LawStep, x: Array, out: Array) -> None:
+    """Write P x, with the inverse of the damped law."""
+    if step.scratch.edge.code[0] == 0 or step.alone:
         Q, X = step.scratch.factors
-        multiply(J, edge.damped, Jx)
-        apply_pseudo_inverse(Q, X, L, form, Jx, part, moved)
-        for i in range(n):
-            damped[i] = edge.damped[i] - moved[i]
+        _self_motion(step, Q, X, x, out)
     else:
-        multiply(step.metric.W, edge.damped, moved)
-        multiply(step.scratch.inner, moved, damped)
-    copy(damped, ours)
-    if edge.code[0] > 0 and share < 1.0:
-        multiply(J, edge.exact, Jx)
-        apply_pseudo_inverse(edge.Q, edge.X, L, form, Jx, part, moved)
-        for i in range(n):
-            exact = edge.exact[i] - moved[i]
-            ours[i] = exact + share * (damped[i] - exact)
+        lowered = step.scratch.rows[2, : x.shape[0]]
+        multiply(step.metric.W, x, lowered)
+        multiply(step.scratch.inner, lowered, out)
+
+
+@kernel
+def _self_motion(step: LawStep, Q: Array, X: Array, x: Array, out: Array) -> None:
+    """Write x - J# J x, for an inverse Qᵀ X."""
+    J, rows = step.task.jacobian, step.scratch.rows
+    m, n = J.shape
+    moves, part, back = rows[0, :m], rows[1, :m], rows[2, :n]
+    multiply(J, x, moves)
+    apply_pseudo_inverse(Q, X, step.metric.L, step.form, moves, part, back)
+    for i in range(n):
+        out[i] = x[i] - back[i]
 
 
 @kernel

@@ -25,6 +25,7 @@ STEP, TURN, FORCE = 0.2, np.deg2rad(60.0), 40.0
 RATE, DURATION = 10.0, 0.5  # ω0 [rad/s], how long it is watched [s]
 SAMPLED = 5.0  # error of a held effort, relative to the step, over a period [1/s]
 CASES = 3
+STEPPED = np.array([0.0, 0.12, 0.05])  # of two hands, and on rails
 BENT = (0.2, 0.6, 0.3, -1.6, 0.5, 1.3, 0.4)  # a posture of an arm of seven joints
 WELL = 1.3 * NEAR  # at the start
 
@@ -165,7 +166,7 @@ def test_two_arms_and_rails_are_exact_too() -> None:
         q0 = np.full(robot.nv, 0.4)
         here = robot.state(0.0, q0, np.zeros(robot.nv))
         tasks = [
-            hsp.FramePosition(each, hsp.Hold([*here.position(each), 0.0, 0.12, 0.05]))
+            hsp.FramePosition(each, hsp.Hold(here.position(each) + STEPPED))
             for each in frames
         ]
         gains = hsp.Gains(natural_frequency=RATE)

@@ -152,8 +152,9 @@ class Actuation:
         if self.direct and not violated and offset is None:
             return Delivered(self._state.effort, a, self.own.forces, EXACT, 0.0)
         motion_ok, effort_ok = not violated & MOTION, not violated & EFFORT
+        # A QP that was tried at once has overwritten what is wanted.
         wanted, support = self._wanted.effort, self._support
-        wanted[:] = self._state.effort
+        self._wanted.acceleration[:], wanted[:] = a, self._state.effort
         if offset is not None:
             wanted += offset
             effort_ok = bool(self._effort_within())

@@ -98,7 +98,7 @@ class Directions(NamedTuple):
         problem, least = resolution.problem, _LEAST ** (1.0 / max(levels, 1))
         return cls(
             J, problem.metric.L, resolution.form, resolution.ends, problem.task.error,
-            problem.springs, size, int(supported), least, np.ones(1),
+            problem.springs, size, int(supported), least, resolution.edge.held,
             resolution.thresholds, resolution.factors, resolution.projectors,
             resolution.edge.code,
             np.empty((m, n)), np.empty((m, m)),

@@ -314,10 +314,11 @@ class LimitedStep:
         rows: list[AnyCall] = [*state.inertia.calls]
         if permitted is not None:
             kept, edge = slice(barriers, contacts), resolution.edge
-            parts = Parts(resolution.acceleration, edge.damped, *edge.self_motions)
+            law = resolution.acceleration, edge.damped
+            parts = Parts(*law, *edge.self_motions, *edge.brakings)
             barred = Barred(A[kept], lower[kept])
             target = *wanted, parts, bounds, permitted, barred, zeros((4, n))
-            shares = edge.share, directions.held
+            shares = edge.share, edge.held
             rows.append(resolution.self_motions(state.v))
             rows.append((write_limited_target, (*target, *shares)))
         rows.append((_write_rows, (*around, self._rows)))

@@ -12,8 +12,9 @@ than its motors give, from one side and then from the other: the nearest step wi
 limits would swing with it. So as far as a_t alone is beyond the limits, the step comes
 near to the damped law instead (`law/edge.py`).
 
-*The self-motion is bounded.* A field may ask for anything; at most what the limits
-permit far from them is asked of the QP.
+*What a field asks for is bounded.* That is a_n + K_N P v, the self-motion without what
+brakes it. A field may ask for anything; at most what the limits permit far from them is
+asked of the QP, and what brakes stays whole: else it would swing at the limits.
 
 Where a_t alone is within the limits, the null space gives way at a millionth of what a
 task costs, and no field takes a task away. Where it is not, or the law is damped, the
@@ -54,12 +55,14 @@ class Permitted(NamedTuple):
 
 
 class Parts(NamedTuple):
-    """The law's acceleration and the damped law's, and their self-motions P a."""
+    """The law's acceleration and the damped law's, and what they are made of."""
 
     law: Array  # shape (nv,) each
     damped: Array
-    law_self_motion: Array
+    law_self_motion: Array  # P a
     damped_self_motion: Array
+    law_braking: Array  # K_N P v
+    damped_braking: Array
 
 
 class Barred(NamedTuple):
@@ -108,11 +111,15 @@ def write_limited_target(
     held[0] = max(share[0], tasks)
     for i in range(n):
         change[i] = tasks * (parts.damped[i] - parts.law[i])
-    ours = 1.0 - _bounded(M, parts.law_self_motion, permitted, part)
-    damped = 1.0 - _bounded(M, parts.damped_self_motion, permitted, part)
+    asked, asked_damped = scratch[0], scratch[1]
     for i in range(n):
-        change[i] -= whole * (1.0 - tasks) * ours * parts.law_self_motion[i]
-        change[i] -= whole * tasks * damped * parts.damped_self_motion[i]
+        asked[i] = parts.law_self_motion[i] + parts.law_braking[i]
+        asked_damped[i] = parts.damped_self_motion[i] + parts.damped_braking[i]
+    ours = 1.0 - _permitted_part(M, asked, permitted, part)
+    theirs = 1.0 - _permitted_part(M, asked_damped, permitted, part)
+    for i in range(n):
+        change[i] -= whole * (1.0 - tasks) * ours * asked[i]
+        change[i] -= whole * tasks * theirs * asked_damped[i]
     multiply(M, change, part)
     for i in range(n):
         a[i] += change[i]
@@ -151,11 +158,11 @@ def _excess(
 
 
 @kernel
-def _bounded(M: Array, self_motion: Array, permitted: Permitted, part: Array) -> float:
-    """Return which part of a self-motion the limits permit far from them."""
-    multiply(M, self_motion, part)
+def _permitted_part(M: Array, asked: Array, permitted: Permitted, tau: Array) -> float:
+    """Return which part of an acceleration the limits permit far from them."""
+    multiply(M, asked, tau)
     most = 1.0
-    for i in range(part.shape[0]):
-        most = max(most, abs(part[i]) / permitted.effort[i])
-        most = max(most, abs(self_motion[i]) / permitted.acceleration[i])
+    for i in range(tau.shape[0]):
+        most = max(most, abs(tau[i]) / permitted.effort[i])
+        most = max(most, abs(asked[i]) / permitted.acceleration[i])
     return 1.0 / most

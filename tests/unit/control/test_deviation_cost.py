@@ -117,7 +117,7 @@ def test_springs_yield_as_a_body_with_stops(seed: int) -> None:
     """Only joints at a bound get a reaction, and it leads away from the bound."""
     rng, robot = np.random.default_rng(seed), panda()
     q = robot.home() + 0.2 * rng.standard_normal(7)
-    state = robot.state(0.0, q, 0.05 * rng.standard_normal(7))
+    state = robot.state(0.0, q, 0.01 * rng.standard_normal(7))
     wanted = on_springs(None).compute(state).acceleration
     bounds = hsp.Limits(acceleration=2.0, effort="none", effort_rate="none")
     got = on_springs(bounds).compute(state).acceleration

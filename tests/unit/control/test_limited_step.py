@@ -106,8 +106,8 @@ def test_it_is_the_optimum(name: str, spread: float, seed: int) -> None:
     if status != Status.LIMITED:
         return
     stack, state = made.active_stack, made.state
-    wanted, weight = stack.resolution.acceleration, stack.support.weight
-    bounds = actuation_of(made)._limits.bounds
+    weight, bounds = stack.support.weight, actuation_of(made)._limits.bounds
+    wanted = actuation_of(made)._wanted.acceleration  # see `limited_target`
     qp = limit_oracle.limited_step(
         state.mass_matrix,
         wanted,

@@ -194,8 +194,11 @@ class OwnBarrier(Barrier):
 def of_function(place: str) -> Callable[[RobotState], Any]:
     def function(state: RobotState) -> Any:
         attacked.by(place, state)
-        vector = "field" in place or "gradient" in place or "rate" in place
-        return state.q.copy() if vector else 1.0
+        if "rate" in place:
+            return state.v.copy()
+        if "field" in place or "gradient" in place:
+            return state.q.copy()
+        return 1.0 if "Weight" in place else 0.5 * float(state.q @ state.q)
 
     return function
 

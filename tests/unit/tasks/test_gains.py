@@ -46,7 +46,7 @@ def test_the_largest_errors_of_a_robot() -> None:
     """0.35 of its size for positions, 1 rad for orientations, none for joints."""
     robot = panda()
     pose = placed(hsp.FramePose("panda_tcp"), robot)
-    assert pose.largest_error == (0.35 * robot.size, 1.0)
+    assert pose.largest_error == (0.35 * robot.size, 1.25)
     assert placed(hsp.JointPosture("home"), robot).largest_error == (None,)
     one = placed(hsp.FramePose("panda_tcp", largest_error=0.2), robot)
     assert one.largest_error == (0.2, 0.2)
