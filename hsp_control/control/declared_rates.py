@@ -32,6 +32,7 @@ from hsp_control.null_space.fields import (
 from hsp_control.null_space.fields.weight import Product, sample_weight
 from hsp_control.null_space.metrics import Metric
 from hsp_control.robot import Robot, RobotState
+from hsp_control.robot.state import as_given
 
 _INTERVAL = 5e-5
 """Time between two of the five states [s], along joints that turn at up to 1 rad/s."""
@@ -84,7 +85,8 @@ def check_metric(metric: Metric, state: RobotState) -> None:
         return
 
     def at(state: RobotState) -> tuple[Array, Array]:
-        out = metric.evaluate(state, MetricSample.allocate(state.robot.nv))
+        given = as_given(metric, state)
+        out = metric.evaluate(given, MetricSample.allocate(state.robot.nv))
         return out.W.ravel(), out.W_dot.ravel()
 
     def entry(i: int) -> str:
@@ -114,7 +116,8 @@ def _rate_of(field: NullSpaceField, robot: Robot) -> _Declared:
     def at(state: RobotState) -> tuple[Array, Array]:
         nv = state.robot.nv
         out = FieldSample.allocate(nv)
-        field.evaluate(state, MetricSample.allocate(nv), IDENTITY, out)
+        given = as_given(field, state)
+        field.evaluate(given, MetricSample.allocate(nv), IDENTITY, out)
         return sign * out.g, sign * out.g_dot
 
     def entry(i: int) -> str:
@@ -134,10 +137,10 @@ def _gradient_of(cost: Cost, by: str) -> _Declared:
     """Return f and ∇f·v of a cost, along q alone."""
 
     def at(state: RobotState) -> tuple[Array, Array]:
-        value = cost.value(state)
+        value = cost.value(state.read_only)
         nv = state.robot.nv
         out = FieldSample.allocate(nv)
-        cost.evaluate(state, MetricSample.allocate(nv), IDENTITY, out)
+        cost.evaluate(as_given(cost, state), MetricSample.allocate(nv), IDENTITY, out)
         return np.array([value]), np.array([-out.g @ state.v])
 
     words = "f", "∇f·v"
@@ -170,7 +173,7 @@ def _weight_of(field: NullSpaceField, weight: Weight) -> _Declared:
     """Return w and w' of a weight."""
 
     def at(state: RobotState) -> tuple[Array, Array]:
-        w, w_dot = sample_weight(weight, state)
+        w, w_dot = sample_weight(weight, state.read_only)
         return np.array([w], dtype=float), np.array([w_dot], dtype=float)
 
     by = "" if isinstance(weight, StateWeight) else _by(weight, ("sample",))

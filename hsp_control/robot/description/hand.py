@@ -58,11 +58,10 @@ def find_hand(model: pin.Model) -> Hand:
         why += ", where fingers branch off"
     elif gripper := [repr(model.names[joint]) for joint in chain[len(arm) :]]:
         why += f": {listing(gripper)} after it {_is(gripper)} a gripper's"
-    links = [
-        frame.name
-        for frame in model.frames
-        if frame.parentJoint == end and frame.type == pin.FrameType.BODY
-    ]
+    there = [frame for frame in model.frames if frame.parentJoint == end]
+    links = [frame.name for frame in there if frame.type == pin.FrameType.BODY]
+    if not links:  # a model of one's own may have no links
+        links = [frame.name for frame in (there or model.frames)]
     hands = [link for link in links if not _NO_HAND.search(link.lower())] or links
     for what, name in _HANDS:
         called = [link for link in hands if name.search(link.lower())]
