@@ -63,6 +63,9 @@ PEERS = {
     "robosuite_osc": "operational space (robosuite)",
     "pink_rnea": "pink + RNEA",
 }
+GUESSED = 0.1
+"""Rotors in the model of one row, twice those of the arms as real [kg m²]."""
+ROTORS = f"this law, motor_inertia: {GUESSED:g}"
 WITHOUT, OURS = "this law, no observer", "this law, as it comes"
 IMPEDANCE = "this law, crisp's impedance"
 
@@ -104,8 +107,14 @@ class Case:
         return 1e3 * float(off), float(angle)
 
 
-def ours(case: Case, compensation: Compensation, impedance: bool = False) -> Command:
+def ours(
+    case: Case,
+    compensation: Compensation,
+    impedance: bool = False,
+    rotors: float | None = None,
+) -> Command:
     """Return the chain of this law: the default gains, and a posture to return to."""
+    robot = hsp.Robot.load(case.robot.name, motor_inertia=rotors)
     options: dict[str, Any] = {}
     if impedance:
         K, D = [600.0] * 3 + [30.0] * 3, [60.0] * 3 + [10.0] * 3
@@ -117,7 +126,7 @@ def ours(case: Case, compensation: Compensation, impedance: bool = False) -> Com
         both = hsp.trajectories.ComposedPose(path)
         task = hsp.FramePose(case.frame, both, blend=1.0, name="hand", **options)
     field = hsp.TargetPosture(case.q0) if case.robot.nv > case.rows else None
-    made = hsp.Controller(case.robot, [task], field, start=case.q0)
+    made = hsp.Controller(robot, [task], field, start=case.q0)
     return Command(made, compensation)
 
 
@@ -177,11 +186,13 @@ def measured(case: Case, plant: SampledPlant, compute: Compute) -> Run:
     return Run(float(value[0]), float(value[1]), noise, fastest < AT_REST)
 
 
-def laws(case: Case, missing: dict[str, str]) -> dict[str, Callable[[], Compute]]:
+def laws(
+    case: Case, kind: str, missing: dict[str, str]
+) -> dict[str, Callable[[], Compute]]:
     """Return what makes each controller of a case."""
 
-    def chain(compensation: Compensation, impedance: bool = False) -> Compute:
-        command = ours(case, compensation, impedance)
+    def chain(compensation: Compensation, **options: Any) -> Compute:
+        command = ours(case, compensation, **options)
         return lambda t, q, v: command.effort(t, q, v, PERIOD)
 
     found: dict[str, Callable[[], Compute]] = {
@@ -189,6 +200,8 @@ def laws(case: Case, missing: dict[str, str]) -> dict[str, Callable[[], Compute]
         WITHOUT: lambda: chain(Compensation(momentum_observer=None)),
         IMPEDANCE: lambda: chain(Compensation(), impedance=True),
     }
+    if kind == "real":  # else the arms have no rotors
+        found[ROTORS] = lambda: chain(Compensation(), rotors=GUESSED)
     for module, name in PEERS.items():
         try:
             peer = importlib.import_module(f"controllers.{module}")
@@ -229,7 +242,7 @@ def main() -> None:
             runs: dict[str, list[list[Run]]] = {}
             for case in (still, moving):
                 for name, make in track(
-                    laws(case, missing).items(), f"{arm}, {kind}", transient=True
+                    laws(case, kind, missing).items(), f"{arm}, {kind}", transient=True
                 ):
                     own = [
                         measured(case, wrong_arm(case, kind, seed), make())
@@ -239,8 +252,9 @@ def main() -> None:
             for name, (held, circled) in runs.items():
                 lines.append(row(arm, name, held, circled))
     case = Case("panda", moves=False)
-    lines += ["", "## The delay that is borne", "", "| law | Panda [ms] |", "|---|--:|"]
-    for name, make in laws(case, missing).items():
+    lines += ["", "## The delay that is borne", "", BORNE, ""]
+    lines += ["| law | Panda [ms] |", "|---|--:|"]
+    for name, make in laws(case, "exact", missing).items():
         lines.append(f"| {name} | {borne_delay(case, make)} |")
     lines += [f"\nNot installed: {name} ({why})." for name, why in missing.items()]
     options.out.write_text("\n".join(lines) + "\n", encoding="utf-8")
@@ -268,6 +282,9 @@ def _number(value: float) -> str:
     return "–" if not np.isfinite(value) else f"{value:.2g}" if value < 99 else "99+"
 
 
+BORNE = """\
+With which a pose settles on the model itself, whose wrist has no rotors: a damping of
+10 N·m·s/rad on 0.007 kg m² bears less than a period."""
 HEADER = (
     "| arm | law | held: hand [mm] | angle [°] | circle: hand [mm] | angle [°] "
     "| effort's change [N·m] | rests |\n|---|---|--:|--:|--:|--:|--:|--:|"
@@ -285,9 +302,10 @@ many rest, with no joint faster than 0.05 rad/s in the last second. – diverges
 Gains are those of each project: crisp_py's for a Franka, Isaac-Reach-Franka-OSC,
 robosuite's `osc_pose.json`, pink's example with Kp = 100 and Kv = 20 in joint space.
 This law has its defaults (Kp = 100, Kv = 20, K_N = 10): without an observer, as it
-comes, and with crisp's stiffness as its impedance, where the observer is off because a
-spring must yield.
-Targets of peers have no velocity, so that they follow a circle late."""
+comes, with crisp's stiffness as its impedance, where the observer is off because a
+spring must yield, and with rotors in its model: 0.1 kg m² for each joint, a guess,
+where the arms as real have 0.05. Targets of peers have no velocity, so that they follow
+a circle late."""
 
 
 if __name__ == "__main__":

@@ -56,9 +56,7 @@ def test_the_page_of_compliance_is_true() -> None:
     text = (ROOT / "docs" / "compliance.md").read_text(encoding="utf-8")
     (snippet,) = blocks(text, "python")
     exec(compile(snippet, "compliance.md", "exec"), {})
-    *others, configuration = blocks(text, "yaml")
-    for other in others:
-        assert load_experiment(yaml.safe_load(other)).run().status == "completed"
+    (configuration,) = blocks(text, "yaml")
     rest = {
         "robot": {"name": "panda"},
         "simulation": {"duration": 0.02, "control_period": 0.001},
@@ -141,7 +139,9 @@ def test_the_readme_s_yaml_is_a_configuration() -> None:
 
 def test_the_compensators_of_the_document_are_a_configuration() -> None:
     text = (ROOT / "docs" / "robustness.md").read_text(encoding="utf-8")
-    (configuration,) = blocks(text, "yaml")
+    *others, configuration = blocks(text, "yaml")
+    for other in others:
+        assert load_experiment(yaml.safe_load(other)).run().status == "completed"
     experiment = load_experiment(
         yaml.safe_load(configuration), "simulation.duration=0.02"
     )

@@ -10,9 +10,9 @@ observer's own poles,
     e'' = -ρ (Kp e + Kv e') (s + K_O)/(s + ρ K_O).
 
 A heavy robot (ρ < 1, rotors that the model lacks) makes the observer ρ K_O slow: with
-Kp = 100 and Kv = 20 it winds up below ρ = 0.09 at 50 1/s, and below 0.16 at 30. On a
-light one it is the faster the less time the loop has: with 2 ms of delay and 3 ms of
-lag, ρ = 4 is borne at 50 1/s, 2 at 100. Its noise is less than that of the law's own
+Kp = 100 and Kv = 20 it winds up below ρ = 0.08 at 50 1/s, and below 0.11 at 30. On a
+lighter one (ρ > 1) a fast observer bears less delay: with 2 ms and a lag of 3 ms, ρ = 4
+is borne at 50 1/s, 2 at 100. Its noise is less than that of the law's own
 damping up to 58 1/s at 1 kHz (`MomentumObserver.order`). So 50 1/s; and at longer
 periods as many per period, since half a period of hold and one of computing is delay.
 """

@@ -20,7 +20,7 @@ LOAD: dict[str, Any] = {
     "type": "rigid_body",
     "payload": {"frame": "panda_tcp", "mass": 3.0},
 }
-SPRING = {"type": "frame_pose", "impedance": {"stiffness": 600, "damping": 30}}
+SPRING = {"type": "frame_position", "impedance": {"stiffness": 600, "damping": 30}}
 
 
 @pytest.mark.parametrize(
@@ -52,11 +52,11 @@ def test_check_says_it(
 
 
 def test_a_run_says_how_much_nobody_explained() -> None:
-    """3 kg at the Panda's hand: 15 N·m and more on joint 2, a sixth of its limit."""
+    """3 kg at the Panda's hand: 15 N·m on joint 4, a sixth of its limit."""
     heavy = load_experiment(CONFIG | {"plant": LOAD}).run()
     (row,) = unexplained_rows(heavy)
     assert row.startswith("up to ")
-    assert row.endswith(" N·m that the model does not explain, on panda_joint2")
+    assert row.endswith(" N·m that the model does not explain, on panda_joint4")
     beside = {**LOAD, "payload": {**LOAD["payload"], "center": [0.15, 0.0, 0.0]}}
     _, told = unexplained_rows(load_experiment(CONFIG | {"plant": beside}).run())
     assert told.startswith("the robot does not do what the model says: that is ")

@@ -236,6 +236,23 @@ def test_an_arm_with_its_rotors_bears_a_load_on_its_light_wrist() -> None:
     assert 1e3 * np.linalg.norm(log["task.hand.error"][-1, :3]) < 1.0
 
 
+def test_two_arms_are_held_as_one_is() -> None:
+    """The bundled pair on their paths: an observer takes most of the error away."""
+    found = []
+    for observer in ("auto", "null"):
+        log = hsp.load_experiment(
+            "dual_panda",
+            "plant={type: rigid_body, inertias: {random_mass: 0.2, random_com: 0.01}, "
+            "drives: {delay: 2, lag: 0.003}}",
+            f"compensation.momentum_observer={observer}",
+            "simulation={duration: 2, control_period: 0.001, check_rate: false}",
+        ).run()
+        errors = [log[f"task.{name}.error"][log.t > 1.0] for name in ("left", "right")]
+        found.append([1e3 * np.sqrt(np.mean(np.sum(e**2, axis=1))) for e in errors])
+    assert max(found[0]) < 1.0  # mm
+    assert min(found[1]) > 5.0 * max(found[0])
+
+
 @pytest.mark.parametrize("name", ["panda", "ur5"])
 def test_a_circle_is_followed(name: str) -> None:
     """8 cm at 2 rad/s, within 1 mm and 1°, in both directions of the normal."""

@@ -25,6 +25,7 @@ from hsp_control import (
     simulate,
 )
 from hsp_control.cli.main import main
+from hsp_control.common.exceptions import UnstableRateError
 from hsp_control.control.compensation import (
     Compensation,
     IntegralAction,
@@ -477,3 +478,19 @@ def test_a_simulation_refuses_what_a_run_refuses(
     (name,) = gains
     mended = {name: 100.0 if delay else 200.0}
     simulate(holding(**mended), Q0, control_period=H, **how)
+
+
+def test_a_delay_that_is_not_borne_is_told_with_the_one_that_is() -> None:
+    robot = Robot.load("panda")
+    task = JointPosture(Q0, gains=Gains(natural_frequency=40.0))
+    made = Controller(robot, [task], limits=None)
+    with pytest.raises(UnstableRateError) as caught:
+        check_rate(made, Q0, H, Compensation(), effort_delay=30)
+    told = re.search(
+        r"a delay of the efforts of at most (\d+) period", str(caught.value)
+    )
+    assert told is not None, caught.value
+    most = int(told[1])
+    check_rate(made, Q0, H, Compensation(), effort_delay=most)
+    with pytest.raises(UnstableRateError):
+        check_rate(made, Q0, H, Compensation(), effort_delay=most + 1)

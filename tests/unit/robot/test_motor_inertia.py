@@ -9,7 +9,11 @@ import pinocchio as pin
 import pytest
 
 import hsp_control as hsp
-from hsp_control.common.exceptions import JointNotFoundError, ModelError
+from hsp_control.common.exceptions import (
+    JointNotFoundError,
+    ModelError,
+    SimulationError,
+)
 from hsp_control.robot.description.robot_description import RobotDescription
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants import RigidBody
@@ -136,6 +140,13 @@ def test_a_plant_has_the_rotors_of_the_controller_and_its_own_besides() -> None:
     ):
         plant = part.build(robot, Rk4(1e-3))
         np.testing.assert_allclose(plant.robot.model.armature, expected)
+
+
+def test_a_plant_s_rotors_are_those_of_a_robot() -> None:
+    robot = hsp.Robot.load("panda")
+    message = r"motor_inertia: 1e\+06 kg m² \(or kg\); a rotor behind its gear has 0 to"
+    with pytest.raises(SimulationError, match=message):
+        RigidBody(motor_inertia=1e6).build(robot, Rk4(1e-3))
 
 
 @pytest.mark.parametrize(
