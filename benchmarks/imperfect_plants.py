@@ -82,6 +82,7 @@ def configuration(robot: str, hand: str, plant: dict[str, Any]) -> dict[str, Any
             "fields": [{"type": "joint_centering", "weight": 2.0}],
         },
         "plant": plant,
+        "compensation": {"momentum_observer": None},
         "simulation": {
             "duration": 4.0,
             "control_period": 0.001,

@@ -155,7 +155,7 @@ def configuration(case: Case, x: float, *, check: bool) -> dict[str, Any]:
         },
         "limits": None,  # it is the law's own loop that grows or dies
         "plant": {"type": "rigid_body", "drives": {}, "sensors": {}},
-        "compensation": {},
+        "compensation": {"momentum_observer": None},
         "simulation": {
             "duration": PERIODS * h,
             "control_period": h,

@@ -184,7 +184,7 @@ def experiment(job: Job, folder: Path) -> dict[str, Any]:
     config = configuration(job.robot, HANDS[job.robot], plant)
     config["simulation"]["control_period"] = 1.0 / row.frequency
     config["simulation"]["log_period"] = 1.0 / row.frequency
-    config["compensation"] = compensation
+    config["compensation"] = {"momentum_observer": None, **(compensation or {})}
     config["limits"] = {"effort_rate": "none"}
     return config
 
