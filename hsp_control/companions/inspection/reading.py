@@ -22,7 +22,7 @@ _READ = {
 }  # fmt: skip
 """Elements that count, by what they are in."""
 _UNREAD = {
-    "transmission": "but for rotors: positions, speeds and efforts are the joints'",
+    "transmission": "but for its rotor: positions, speeds and efforts are the joints'",
     "calibration": "positions count from where the model has its zero",
     "gazebo": "it is for Gazebo alone",
 }

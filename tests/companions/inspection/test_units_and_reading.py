@@ -117,8 +117,8 @@ def test_what_nobody_reads_is_named(look: Look) -> None:
     text = text.replace("</joint>", '<calibration rising="0.1"/></joint>', 1)
     found = {f.element: f.message for f in look(text)["not read"]}
     assert found == {
-        "<transmission>": "of 'gear' is not read: positions, speeds and efforts are "
-        "those of the joints",
+        "<transmission>": "of 'gear' is not read: but for its rotor: positions, speeds "
+        "and efforts are the joints'",
         "<gazebo>": "of 'upper', 'lower' is not read: it is for Gazebo alone",
         "<sensor>": "of 'eye' is not read",
         "<calibration>": "of 'shoulder' is not read: positions count from where the "

@@ -39,8 +39,8 @@ HEAVY: dict[str, tuple[Any, Any]] = {
         scaled(inertia_factor=1e6),
         lambda x: scaled(inertia_factor=x),
     ),
-    "plant.motor_inertia is 1e+06: ": (
-        {"motor_inertia": 1e6},
+    "plant.motor_inertia is 1000: ": (
+        {"motor_inertia": 1e3},
         lambda x: {"motor_inertia": x},
     ),
 }
@@ -64,10 +64,10 @@ def test_what_a_robot_can_move_is_not_told() -> None:
     assert told(motor_inertia=0.3) == []
     # A robot without limits of its motors is not looked at.
     arm = hsp.Robot.load("planar3r")
-    plant = RigidBody(motor_inertia=1e6)
+    plant = RigidBody(motor_inertia=1e3)
     assert [*heavy_plant(plant, arm, arm.home())] == []
     # Each field answers for itself.
-    both = told(**payload(30.0), motor_inertia=1e6)
+    both = told(**payload(30.0), motor_inertia=1e3)
     assert [each.split(" is ")[0] for each in both] == [
         "plant.payload.mass",
         "plant.motor_inertia",
@@ -84,13 +84,13 @@ def test_a_simulation_and_the_command_line_say_it(
             HOME,
             duration=0.01,
             control_period=1e-3,
-            plant=RigidBody(motor_inertia=1e6),
+            plant=RigidBody(motor_inertia=1e3),
         )
-    set_ = ["--set", "plant={type: rigid_body, motor_inertia: 1e6}"]
+    set_ = ["--set", "plant={type: rigid_body, motor_inertia: 1e3}"]
     assert main(["check", "panda_limits", *set_]) == 0
     message = capsys.readouterr().err
-    assert "hsp: plant.motor_inertia is 1e+06: " in message
-    assert f"takes {1e6 * 2.61 / 12:.3g} s to its speed limit" in message
+    assert "hsp: plant.motor_inertia is 1000: " in message
+    assert f"takes {1e3 * 2.61 / 12:.3g} s to its speed limit" in message
     assert SLOW == 10.0
 
 
