@@ -78,7 +78,7 @@ def test_a_simulation_and_the_command_line_say_it(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     controller = hsp.Controller(ROBOT, [hsp.FramePosition("panda_tcp")], start=HOME)
-    with pytest.warns(StartWarning, match=r"plant\.motor_inertia is 1e\+06"):
+    with pytest.warns(StartWarning, match=r"plant\.motor_inertia is 1000"):
         hsp.simulate(
             controller,
             HOME,
