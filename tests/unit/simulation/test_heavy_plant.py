@@ -85,6 +85,7 @@ def test_a_simulation_and_the_command_line_say_it(
             duration=0.01,
             control_period=1e-3,
             plant=RigidBody(motor_inertia=1e3),
+            check_rate=False,
         )
     set_ = ["--set", "plant={type: rigid_body, motor_inertia: 1e3}"]
     assert main(["check", "panda_limits", *set_]) == 0
