@@ -43,10 +43,8 @@ class EdgeMemory(NamedTuple):
     Q: Array  # factors of the exact inverse, see `pseudo_inverse.py`: (m, nv)
     X: Array  # (m, m)
     turned: Array  # scratch, (m, nv)
-    exact: (
-        Array  # a_exact, shape (nv,); where the law is wholly damped, it is not known
-    )
-    damped: Array  # a_damped, shape (nv,); a_exact where nothing is damped
+    exact: Array  # a_exact, shape (nv,), where μ < 1 and the laws differ
+    damped: Array  # a_damped, shape (nv,), where they differ or a limit is violated
     exact_e_N: Array  # shape (nv,)
     # P a of a and of a_damped, and what brakes them, K_N P v, shape (2, nv) each; they
     # are written where a limit is violated

@@ -256,11 +256,13 @@ def _mixed(step: LawStep, damped: int) -> int:
     """
     edge, a, e_N = step.scratch.edge, step.a, step.e_N
     edge.code[0] = damped
+    if damped == 0:
+        edge.share[0] = 0.0
+        return damped
     n = a.shape[0]
     copy(a, edge.damped)
-    copy(a, edge.exact)
-    edge.share[0] = 0.0 if damped == 0 else 1.0
-    if damped == 0 or damped >= BEYOND_ANY_LEVEL or not step.exact_beside:
+    edge.share[0] = 1.0
+    if damped >= BEYOND_ANY_LEVEL or not step.exact_beside:
         return damped
     share = far_share(step.stretched)
     if share < 1.0:
@@ -348,6 +350,8 @@ def _write_self_motions(step: LawStep) -> None:
     edge, rows = step.scratch.edge, step.scratch.rows
     n, share = step.v.shape[0], edge.share[0]
     exact, moved = rows[3, :n], rows[4, :n]
+    if edge.code[0] == 0:  # there is one law
+        copy(step.a, edge.damped)
     _damped_self_motion(step, edge.damped, edge.self_motions[1])
     _damped_self_motion(step, step.v, moved)
     multiply(step.K_N, moved, edge.brakings[1])
