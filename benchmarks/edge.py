@@ -7,8 +7,8 @@ one after another (`edge_loop.py`). The other laws are in `controllers`, with th
 that their projects ship for an arm like a Panda; pink and TSID are their own packages,
 and are left out where they are not installed. ``--python LAW=PYTHON`` runs a law in
 another environment, which needs Pinocchio and the law's package only. ``--old`` is a
-checkout of an earlier version of this package. Writes tables into README.md and
-benchmarks/results/edge.md.
+checkout of an earlier version of this package. Writes tables into
+docs/measurements.md and benchmarks/results/edge.md.
 """
 
 import argparse
@@ -144,7 +144,7 @@ SHORT: tuple[Column, ...] = (
         lambda runs: middle(values(of_kinds(runs, "step"), "settling")),
     ),
 )
-"""Columns of the table in README.md."""
+"""Columns of the table in docs/measurements.md."""
 
 LONG: tuple[Column, ...] = (
     *(
@@ -270,7 +270,7 @@ def main() -> None:
     print(long)
     note = f"\nLeft out: {', '.join(left_out)}.\n" if left_out else ""
     if tuple(options.robots) == ROBOTS and not options.dry:
-        replace_section(HERE.parent / "README.md", "edge", short + note)
+        replace_section(HERE.parent / "docs" / "measurements.md", "edge", short + note)
         replace_section(RESULTS / "edge.md", "edge", long + note)
 
 
