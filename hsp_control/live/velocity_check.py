@@ -27,6 +27,9 @@ _DOUBT_LEAK, _DOUBT = 0.9, 1.9
 are a fault, or three of five. A single one is not."""
 _SLOPE_TIME = 0.008
 """Over which a joint's slope is taken, if it replaces its velocity [s]."""
+_GAP = 3.5
+"""Periods without a state from which on the slope across them is that of a time when
+the velocity was another one: the velocity after them is not compared with it."""
 _STILL = 3
 """States with the same position and velocity from which a sensor is dead."""
 _STOPS = 50.0
@@ -87,7 +90,7 @@ class VelocityCheck:
         self.difference: Array = np.zeros(nv)
         self.doubtful: Flags = np.zeros(nv, dtype=bool)
         self.contradicted: Flags = np.zeros(nv, dtype=bool)
-        self._none = np.zeros(nv, dtype=bool)
+        self._none, self._nothing = np.zeros(nv, dtype=bool), np.zeros(nv)
         self.dead: Flags = self._none
 
     def update(self, way: Array, v: Array, passed: float) -> None:
@@ -110,11 +113,14 @@ class VelocityCheck:
         self.mean = np.add.reduce(self._velocities[latest]) / few
         least, most = np.minimum.reduce(known), np.maximum.reduce(known)
         beyond = v - np.minimum(np.maximum(v, least), most)
+        unexplained = way - passed * v
+        if passed > _GAP * self._period:
+            beyond, unexplained = self._nothing, self._nothing
         self.doubtful = (np.abs(beyond) > self._error) & self._judged
         self._beyond += min(passed / _MEAN_TIME, 1.0) * (beyond - self._beyond)
         self._doubts = _DOUBT_LEAK * self._doubts + self.doubtful
         leak = exp(-passed / _MEMORY)
-        self._sum = leak * self._sum + way - passed * v
+        self._sum = leak * self._sum + unexplained
         self._fastest = np.maximum(leak * self._fastest, np.abs(v))
         differs = np.abs(self._sum) > self._allowed + 2.0 * _LAG * self._fastest
         differs |= np.abs(self._beyond) > self._allowed_mean

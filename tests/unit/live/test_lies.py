@@ -20,6 +20,7 @@ from hsp_control.live import (
 )
 from hsp_control.live.state_reader import RobotClock
 from hsp_control.live.trusted_motion import TrustedMotion
+from hsp_control.live.velocity_check import VelocityCheck
 
 STOP = StopSettings(hold=0.02, longest_damping=0.3)
 SETTINGS = LiveSettings(effort_rate=1000.0, stop=STOP)
@@ -289,3 +290,20 @@ def test_friction_that_the_model_misses_is_no_dead_sensor() -> None:
         motion.update(Measurement(k, t, q, v), PERIOD * (k > 0), none)
         assert motion.fault is None, k
     assert motion.complete
+
+
+def test_a_gap_without_states_contradicts_nothing() -> None:
+    """A computer that is busy: 90 ms without a state, in which the joint speeds up."""
+    check = VelocityCheck(panda(), SETTINGS, PERIOD)
+    one = np.ones(7)
+    for _ in range(40):
+        check.update(0.1 * PERIOD * one, 0.1 * one, PERIOD)
+    gap = 45 * PERIOD
+    check.update(0.5 * (0.1 + 1.3) * gap * one, 1.3 * one, gap)
+    assert not (check.contradicted | check.doubtful).any()
+    for _ in range(40):  # and what follows is judged again
+        check.update(1.3 * PERIOD * one, 1.3 * one, PERIOD)
+        assert not check.contradicted.any()
+    for _ in range(3):
+        check.update(1.3 * PERIOD * one, -1.3 * one, PERIOD)
+    assert check.contradicted.all()
