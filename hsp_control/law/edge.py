@@ -30,8 +30,7 @@ from hsp_control.compiled.linalg import copy, orthogonalise_rows, squared_norm
 
 NEAR = 0.1
 """σ_x over the robot's size: the law is exact in every posture that is farther from a
-singular one. A smaller zone is crossed before the motors have braked an arm that comes
-in at full speed, and it swings from one side of it to the other."""
+singular one, whatever a step asks for."""
 
 FAR = 0.85
 """Part of ℓ up to which errors are far from being those of a hand that is held."""
