@@ -1,8 +1,8 @@
 """In the middle the law is exact: steps, pushes and fields, in every metric.
 
 Wherever a target can be reached, no limit binds, and the smallest singular value is
-above a tenth of the robot's size: to what an effort that is held allows, 2e-3 of the
-step for each millisecond.
+above a tenth of the robot's size: to what an effort that is held allows, at most 5e-3
+of the step for each millisecond.
 """
 
 from dataclasses import replace
