@@ -35,7 +35,7 @@ from hsp_control.compiled.kernels import kernel
 from hsp_control.compiled.linalg import multiply, squared_norm
 from hsp_control.constraints.limits.acceleration_bounds import Bounds, MotionLimits
 
-WHOLE = 0.1
+LARGE = 0.1
 """Excess from which on it counts wholly."""
 
 
@@ -154,7 +154,7 @@ def _excess(
             missing -= changed * row[i] * change[i]
         if missing > 0.0:
             most = max(most, missing / (np.sqrt(squared_norm(row)) * least))
-    return float(min(most / WHOLE, 1.0))
+    return float(min(most / LARGE, 1.0))
 
 
 @kernel
