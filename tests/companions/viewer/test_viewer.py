@@ -277,12 +277,12 @@ def test_a_log_whose_controller_is_gone_shows_what_its_columns_tell(
 
 
 def test_a_log_whose_robot_is_gone_says_so(run: Rollout) -> None:
-    anonymous = Rollout(
-        run.columns, {k: v for k, v in run.meta.items() if k != "config"}
-    )
+    robot = {k: v for k, v in run.meta["robot"].items() if k != "record"}
+    meta = {**run.meta, "robot": robot}
+    anonymous = Rollout(run.columns, {k: v for k, v in meta.items() if k != "config"})
     with pytest.raises(ViewerError, match=r"made from Python.*'planar3r'.*Viewer\("):
         robot_of(anonymous)
     config = {**(run.config or {}), "robot": {"name": "planar4r"}}
-    lost = Rollout(run.columns, {**run.meta, "config": config})
+    lost = Rollout(run.columns, {**meta, "config": config})
     with pytest.raises(ViewerError, match=r"cannot be rebuilt.*planar4r"):
         robot_of(lost)
