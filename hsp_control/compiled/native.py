@@ -14,6 +14,7 @@ from typing import Any, Self, TypeGuard
 import numpy as np
 
 from hsp_control.common.arrays import Indices
+from hsp_control.engine import Call
 
 
 class NativeCall(partial[float]):
@@ -59,6 +60,16 @@ class NativeCall(partial[float]):
         row = adapters.foreign_adapter(len(words)), packed.ctypes.data
         call = cls(adapters.entry(), np.array([row]), 0.0)
         call.words, call.recipe = packed, recipe
+        return call
+
+    @classmethod
+    def of_engine(cls, made: Call) -> Self:
+        """Return a call of the engine: it has the signature of adapters."""
+        from hsp_control.compiled import adapters
+
+        free = () if made.kind.timed else (0.0,)
+        call = cls(adapters.entry(), np.array([made.row]), *free)
+        call.kept, call.recipe = made, (cls.of_engine, (made,))
         return call
 
     @classmethod

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.compiled import moves
 from hsp_control.compiled.kernels import (
+    PLAIN,
     TIME,
     AnyCall,
     KernelCalls,
@@ -25,6 +26,7 @@ from hsp_control.compiled.kernels import (
 )
 from hsp_control.compiled.native import NativeCall, are_native, sequence
 from hsp_control.compiled.pinocchio_calls import bind_pinocchio, is_pinocchio
+from hsp_control.engine import Call, Kind
 
 
 class StepPlan(NamedTuple):
@@ -116,6 +118,8 @@ def bind(
             writes the memory of these arrays each time; numbers are constants.
         timed: Whether the kernel has one more argument, the time, given to the call.
     """
+    if isinstance(function, Kind):
+        return engine_call(function(*arguments))
     if not arguments and not is_compiled(function):
         return function
     if is_pinocchio(function):
@@ -126,6 +130,15 @@ def bind(
         if adapters.AVAILABLE:
             return NativeCall.of(function, arguments, timed)
     return partial(function, *arguments)
+
+
+def engine_call(call: Call) -> Callable[..., Any]:
+    """Return a call of the engine as one that stands in a row with compiled kernels."""
+    if PLAIN:
+        return call
+    from hsp_control.compiled import adapters
+
+    return NativeCall.of_engine(call) if adapters.AVAILABLE else call
 
 
 def moving(memory: moves.Memory, calls: Sequence[Callable[[float], Any]]) -> moves.Move:

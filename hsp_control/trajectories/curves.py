@@ -2,18 +2,18 @@
 
 from dataclasses import KW_ONLY
 from functools import cached_property
-from math import cos, sin
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TrajectoryError
-from hsp_control.compiled.kernels import KernelCall, kernel
+from hsp_control.compiled.kernels import KernelCall
 from hsp_control.declaration.quantities import Matrix, Number, Positive, Vector, Vector3
 from hsp_control.trajectories import checks
-from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
+from hsp_control.trajectories.trajectory import Trajectory
 
 
 class Circle(Trajectory, type="circle"):
@@ -78,7 +78,8 @@ class Circle(Trajectory, type="circle"):
     def kernel(self) -> KernelCall:
         """Return the kernel; see `Trajectory.kernel`."""
         radii = self.radius * self._plane
-        return _circle, (self.angular_rate, self.phase, np.asarray(self.center), radii)
+        center = np.asarray(self.center, dtype=float)
+        return engine.Circle, (self.angular_rate, self.phase, center, radii)
 
 
 def _axes_from_normal(normal: Array, toward: ArrayLike | None) -> Array:
@@ -96,25 +97,6 @@ def _axes_from_normal(normal: Array, toward: ArrayLike | None) -> Array:
         )
     first /= length
     return np.stack([first, np.cross(normal, first)])
-
-
-@kernel
-def _circle(
-    rate: float,
-    phase: float,
-    center: Array,
-    radii: Array,
-    out: TrajectorySample,
-    t: float,
-) -> None:
-    position, velocity, acceleration = out
-    cosine, sine = cos(rate * t + phase), sin(rate * t + phase)
-    for i in range(center.size):
-        radial = cosine * radii[0, i] + sine * radii[1, i]
-        tangential = cosine * radii[1, i] - sine * radii[0, i]
-        position[i] = center[i] + radial
-        velocity[i] = rate * tangential
-        acceleration[i] = -rate * rate * radial
 
 
 class Lissajous(Trajectory, type="lissajous"):
@@ -149,19 +131,7 @@ class Lissajous(Trajectory, type="lissajous"):
         """Return the kernel; see `Trajectory.kernel`."""
         phases = np.zeros(self.dimension) if self.phases is None else self.phases
         parameters = [self.center, self.amplitudes, self.rates, phases]
-        return _lissajous, (np.array(parameters, dtype=float),)
-
-
-@kernel
-def _lissajous(parameters: Array, out: TrajectorySample, t: float) -> None:
-    position, velocity, acceleration = out
-    for i in range(position.size):
-        center, amplitude = parameters[0, i], parameters[1, i]
-        rate, phase = parameters[2, i], parameters[3, i]
-        swing = amplitude * sin(rate * t + phase)
-        position[i] = center + swing
-        velocity[i] = rate * amplitude * cos(rate * t + phase)
-        acceleration[i] = -rate * rate * swing
+        return engine.Lissajous, (np.array(parameters, dtype=float),)
 
 
 class UniformLine(Trajectory, type="uniform_line"):
@@ -187,15 +157,5 @@ class UniformLine(Trajectory, type="uniform_line"):
 
     def kernel(self) -> KernelCall:
         """Return the kernel; see `Trajectory.kernel`."""
-        return _line, (np.asarray(self.start), np.asarray(self.velocity))
-
-
-@kernel
-def _line(
-    start: Array, constant_velocity: Array, out: TrajectorySample, t: float
-) -> None:
-    position, velocity, acceleration = out
-    for i in range(position.size):
-        position[i] = start[i] + t * constant_velocity[i]
-        velocity[i] = constant_velocity[i]
-        acceleration[i] = 0.0
+        start, velocity = np.asarray(self.start), np.asarray(self.velocity)
+        return engine.UniformLine, (start, velocity)

@@ -12,13 +12,17 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ShapeError, TrajectoryError
 from hsp_control.compiled.kernels import TIME, KernelCall, KernelCalls, says
 from hsp_control.declaration import Part
+from hsp_control.engine import Kind
 
 
 def sampled(trajectory: Any, t: float, out: Any) -> Any:
     """Write a trajectory's sample at time t [s] with its kernel, and return it."""
     function, arguments = trajectory.kernel()
     given = [x.sample(t) if hasattr(x, "sample") else x for x in arguments]
-    function(*given, out, float(t))
+    if isinstance(function, Kind):
+        function(*given, out)(float(t))
+    else:
+        function(*given, out, float(t))
     return out
 
 

@@ -1,0 +1,69 @@
+#include "call.hpp"
+
+#include <stdexcept>
+
+namespace hsp {
+
+namespace {
+
+std::string size_text(int size) {
+  return is_letter(size) ? std::string(1, static_cast<char>(size)) : std::to_string(size);
+}
+
+template <class Sizes> std::string tuple_text(const Sizes& sizes, int rank) {
+  std::string text = "(";
+  for (int i = 0; i < rank; ++i) text += (i ? ", " : "") + sizes(i);
+  return text + (rank == 1 ? ",)" : ")");
+}
+
+// What the letters stand for; where each was read first is said in a complaint.
+Sizes sizes_of(const Kind& kind, const std::vector<Argument>& arguments) {
+  Sizes sizes;
+  const Field* first['z' + 1] = {};
+  for (std::int64_t k = 0; k < kind.count; ++k) {
+    const Field& field = kind.fields[k];
+    for (int i = 0; i < field.rank; ++i) {
+      const int size = field.shape[i];
+      const std::int64_t given = arguments[k].shape[i];
+      if (is_letter(size) && !first[size]) {
+        first[size] = &field;
+        sizes[size] = given;
+      }
+      if (given == sizes(size)) continue;
+      std::string text = std::string(kind.name) + ": " + field.name + " has the shape ";
+      text += tuple_text([&](int j) { return std::to_string(arguments[k].shape[j]); }, field.rank);
+      text += "; needs " + shape_text(field);
+      if (is_letter(size))
+        text += ", where " + size_text(size) + " = " + std::to_string(sizes(size)) + " as in " +
+                first[size]->name;
+      throw std::invalid_argument(text);
+    }
+  }
+  return sizes;
+}
+
+}  // namespace
+
+std::string shape_text(const Field& field) {
+  return tuple_text([&](int i) { return size_text(field.shape[i]); }, field.rank);
+}
+
+Call::Call(const Kind& kind_, const std::vector<Argument>& arguments) : kind(kind_) {
+  const Sizes sizes = sizes_of(kind, arguments);
+  self_ = ::operator new(kind.size, std::align_val_t(kind.alignment));
+  kind.construct(self_);
+  for (std::int64_t k = 0; k < kind.count; ++k) {
+    const Field& field = kind.fields[k];
+    Argument given = arguments[k];
+    void* data = field.access == Access::Number ? &given.number : given.data;
+    field.bind(static_cast<char*>(self_) + field.offset, data, given.shape);
+  }
+  kind.prepare(self_, sizes);
+}
+
+Call::~Call() {
+  kind.destroy(self_);
+  ::operator delete(self_, std::align_val_t(kind.alignment));
+}
+
+}  // namespace hsp

@@ -1,0 +1,12 @@
+// The kinds of each room; a room's own `kinds.cpp` lists them.
+#pragma once
+#include <hsp/kind.hpp>
+#include <vector>
+
+namespace hsp {
+
+const Kind* const* trajectory_kinds();
+
+inline std::vector<const Kind* const*> rooms() { return {trajectory_kinds()}; }
+
+}  // namespace hsp

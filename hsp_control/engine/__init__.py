@@ -1,0 +1,44 @@
+"""The engine: kinds of calls in C++, by name, and calls of them.
+
+A kind is a struct of the folder ``engine`` in the sources: its members are its arguments,
+its ``operator()`` is its mathematics. ``repr(engine.Circle)`` shows them.
+"""
+
+from typing import Any
+
+try:
+    from ._engine import Call as Call
+    from ._engine import Kind as Kind
+    from ._engine import kinds as _kinds
+except ImportError as error:
+    raise ImportError(
+        f"the compiled part of hsp_control is missing or was built for another Python "
+        f"({error}): install the package anew, with `pip install` or `make`"
+    ) from error
+
+_BY_NAME = {kind.name: kind for kind in _kinds}
+
+
+def kind(name: str) -> Kind:
+    """Return the kind of this name.
+
+    Raises:
+        KeyError: If the engine has none.
+    """
+    return _BY_NAME[name]
+
+
+def call(kind: Kind, arguments: tuple[Any, ...]) -> Call:
+    """Return a call of a kind with these arguments: what copies and pickles are made of."""
+    return kind(*arguments)
+
+
+def __getattr__(name: str) -> Kind:
+    try:
+        return _BY_NAME[name]
+    except KeyError:
+        raise AttributeError(f"the engine has no kind {name!r}") from None
+
+
+def __dir__() -> list[str]:
+    return sorted([*_BY_NAME, "Call", "Kind", "call", "kind"])
