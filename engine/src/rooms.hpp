@@ -5,8 +5,12 @@
 
 namespace hsp {
 
+const Kind* const* plan_kinds();
+const Kind* const* simulation_kinds();
 const Kind* const* trajectory_kinds();
 
-inline std::vector<const Kind* const*> rooms() { return {trajectory_kinds()}; }
+inline std::vector<const Kind* const*> rooms() {
+  return {plan_kinds(), simulation_kinds(), trajectory_kinds()};
+}
 
 }  // namespace hsp

@@ -19,8 +19,8 @@ from numba.core.datamodel.registry import default_manager
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from hsp_control.common.arrays import Array, Indices
-from hsp_control.compiled.kernels import callback, kernel
+from hsp_control.common.arrays import Indices
+from hsp_control.compiled.kernels import callback
 
 _ARRAY = ("meminfo", "parent", "nitems", "itemsize", "data", "shape", "strides")
 """The words of an array in Numba's compiled code, in order."""
@@ -197,60 +197,6 @@ def _called(typing: Any, words: Any, kind: Any) -> Any:
         return context.get_constant(types.float64, 0.0)
 
     return types.float64(types.int64, kind), code
-
-
-@intrinsic
-def _invoke(typing: Any, address: Any, words: Any, t: Any) -> Any:
-    """Call what `adapter` made."""
-
-    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        kind = ir.FunctionType(ir.DoubleType(), [ir.IntType(64), ir.DoubleType()])
-        function = builder.inttoptr(arguments[0], kind.as_pointer())
-        return builder.call(function, arguments[1:])
-
-    return types.float64(types.int64, types.int64, types.float64), code
-
-
-@kernel
-def run(calls: Indices, t: float) -> float:
-    """Make calls, rows (code, arguments), at a time; return the last result."""
-    value = 0.0
-    for k in range(calls.shape[0]):
-        value = _invoke(calls[k, 0], calls[k, 1], t)  # type: ignore[call-arg]
-    return value
-
-
-@kernel
-def run_once(calls: Indices, stamp: Indices, made: Indices) -> None:
-    """Make calls that do not depend on the time, unless ``made`` equals ``stamp``."""
-    if made[0] != stamp[0]:
-        made[0] = stamp[0]
-        run(calls, 0.0)
-
-
-@kernel
-def run_if(calls: Indices, found: Array) -> float:
-    """If ``found[1]``, make the calls; return ``found[0]`` plus the last result."""
-    value = float(found[0])
-    if found[1] != 0.0:
-        value += run(calls, 0.0)
-    return value
-
-
-def entry_point(function: Callable[..., Any], kinds: tuple[Any, ...]) -> Any:
-    """Return a kernel for these types, as Python calls it without asking for them."""
-    compiled = cast("Any", function)
-    compiled.compile(kinds)
-    return compiled.overloads[kinds].entry_point
-
-
-@cache
-def entry() -> Callable[..., float]:
-    """Return `run` as Python calls it."""
-    return cast(
-        "Callable[..., float]",
-        entry_point(run, (types.int64[:, ::1], types.float64)),
-    )
 
 
 def _available() -> bool:

@@ -21,7 +21,8 @@ from pinocchio import pinocchio_pywrap_default
 
 from hsp_control.common.arrays import Array, Indices, matrix_view
 from hsp_control.compiled.kernels import PLAIN, kernel
-from hsp_control.compiled.native import NativeCall, sequence
+from hsp_control.compiled.native import NativeCall
+from hsp_control.engine import Plan, PythonCall
 
 _MODEL = b"N9pinocchio8ModelTplIdLi0ENS_25JointCollectionDefaultTplEEE"
 _DATA = b"N9pinocchio7DataTplIdLi0ENS_25JointCollectionDefaultTplEEE"
@@ -142,7 +143,7 @@ def is_pinocchio(function: Callable[..., object]) -> bool:
 
 def bind_pinocchio(
     what: str, model: pin.Model, data: pin.Data, *vectors: Array
-) -> Callable[[], object]:
+) -> NativeCall | PythonCall:
     """Return a call that computes from what these arrays then hold, into the data.
 
     Args:
@@ -161,7 +162,7 @@ def bind_pinocchio(
         addresses = _object_address(model, _MODEL), _object_address(data, _DATA)
         if all(addresses):
             return _native(what, addresses, (model, data, *vectors))
-    return partial(getattr(pin, what), model, data, *vectors)
+    return PythonCall(partial(getattr(pin, what), model, data, *vectors))
 
 
 def _fits(vector: Array, size: int) -> bool:
@@ -179,14 +180,13 @@ def _native(
     if what in ("crba", "aba"):
         words.append(_LOCAL)
     recipe = bind_pinocchio, (what, *arguments)
-    call = NativeCall.of_function(_address(_NAMES[what]), words, recipe)
-    call.kept = references
-    if what == "crba":  # writes one triangle
-        both = call, NativeCall.of(_mirror, (matrix_view(data.M),), timed=False)
-        mirrored = sequence(both, 0.0)
-        mirrored.recipe, mirrored.kept = recipe, both
-        return mirrored
-    return call
+    address, kept = _address(_NAMES[what]), (arguments, references)
+    call = NativeCall.of_function(address, words, recipe, kept)
+    if what != "crba":
+        return call
+    # It writes one triangle.
+    both = Plan([call, NativeCall.of(_mirror, (matrix_view(data.M),), timed=False)])
+    return NativeCall(both.row, recipe, both)
 
 
 @kernel

@@ -7,18 +7,20 @@ with δ' = v for single-dof joints and δ' = J_r(δ)⁻¹ v for a root.
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import partial
+from math import ceil
 
 import numpy as np
 import pinocchio as pin
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.entry_points import own_names
 from hsp_control.common.exceptions import HspControlError, SimulationError
 from hsp_control.compiled.kernels import TIME, AnyCall, KernelCalls, kernel
-from hsp_control.compiled.native import NativeCall
-from hsp_control.compiled.step_plan import in_equal_steps, planned
+from hsp_control.compiled.step_plan import planned
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Positive
+from hsp_control.engine import Plan
 from hsp_control.robot.kinematics import Term
 from hsp_control.robot.robot import Robot
 
@@ -165,6 +167,11 @@ class SemiImplicitEuler(FixedStep, type="semi_implicit_euler"):
         return _EulerStep(robot, bind_dynamics, self.step)
 
 
+def number_of_steps(duration: float, step: float) -> int:
+    """Return the smallest number of equal steps that are not longer than ``step``."""
+    return max(1, ceil(duration / step - 1e-9))
+
+
 class Steps(ABC):
     """Takes steps of equal length: the memory of a `FixedStep`, called as `Advance`.
 
@@ -176,8 +183,8 @@ class Steps(ABC):
         now: Beginning of the present step [s], shape (1,).
         h: The step [s], shape (1,).
         take: Integrates q and v over the interval.
-        native: Whether `take` is one native call; not if a part of a step, for example
-            v', is none.
+        native: Whether `take` runs no function of Python; a part of a step, for example
+            v', may be one.
     """
 
     def __init__(self, robot: Robot, bind_dynamics: Bind, longest: float) -> None:
@@ -186,9 +193,9 @@ class Steps(ABC):
         self.q, self.v = robot.neutral(), np.zeros(robot.nv)
         self.acceleration = bind_dynamics(self.q, self.v)
         self.interval, self.now, self.h = np.zeros(2), np.zeros(1), np.zeros(1)
-        calls = planned(self._calls()).steps()
-        self.take = in_equal_steps(calls, self.interval, longest, self.now, self.h)
-        self.native = isinstance(self.take, NativeCall)
+        step = Plan(planned(self._calls()).steps())
+        self.take = engine.EqualSteps(step, self.interval, longest, self.now, self.h)
+        self.native = not self.take.python
 
     @abstractmethod
     def _calls(self) -> KernelCalls:

@@ -20,12 +20,11 @@ from hsp_control.companions.mujoco.mjcf import (
     write_mjcf,
 )
 from hsp_control.compiled.kernels import kernel
-from hsp_control.compiled.moves import number_of_steps
 from hsp_control.control.measurement import LogChannel
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Flag, Positive
 from hsp_control.robot import Robot
-from hsp_control.robot.integrators import Integrator
+from hsp_control.robot.integrators import Integrator, number_of_steps
 from hsp_control.simulation.plants.plant import (
     FloatingRoots,
     SampledPlant,

@@ -9,11 +9,10 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.compiled.kernels import kernel
-from hsp_control.compiled.moves import number_of_steps
 from hsp_control.robot import Robot
 from hsp_control.robot.friction import JointFriction
 from hsp_control.robot.inertia import mass_matrix
-from hsp_control.robot.integrators import Integrator
+from hsp_control.robot.integrators import Integrator, number_of_steps
 from hsp_control.robot.kinematics import Term
 from hsp_control.simulation.plants.plant import (
     ContinuousPlant,

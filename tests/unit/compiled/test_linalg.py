@@ -10,7 +10,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from hsp_control.common.arrays import Array
-from hsp_control.compiled import linalg, moves
+from hsp_control.compiled import linalg
 from hsp_control.compiled.linalg import (
     cholesky,
     multiply,
@@ -283,11 +283,6 @@ def arguments(name: str) -> tuple[Any, ...]:
             ),
             *(normal(19, n - 1), kinematics.FrameMotion.allocate(n - 1), np.zeros(6)),
         ),
-        "copy_valid": (
-            *(0.5, np.array([0.6, 0.8, 3.0]), sample[0]),
-            *(np.zeros(1), np.zeros(3), np.zeros(n)),
-            *(np.array([[0, 2]]), np.array([4])),
-        ),
     }[name]
 
 
@@ -299,7 +294,6 @@ KERNELS: dict[str, Callable[..., Any]] = {
     },
     "acceleration": law.acceleration,
     "frame_kinematics": kinematics.frame_kinematics,
-    "copy_valid": moves.copy_valid,
 }
 
 
