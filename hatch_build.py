@@ -1,8 +1,8 @@
 """Builds the engine, the compiled part of the package, into ``hsp_control/engine``.
 
-pip runs it (the hook of the wheel, also of an editable one), and ``make`` where a source
-is newer than the library: ``python hatch_build.py``. A C++ compiler is taken from the
-variable CXX or from the path; where there is none, the package ziglang is one.
+pip runs it (the hook of the wheel, also of an editable one), and ``make`` where a
+source is newer than the library: ``python hatch_build.py``. A C++ compiler is taken
+from the variable CXX or from the path; where there is none, the package ziglang is one.
 """
 
 import os

@@ -103,6 +103,16 @@ NB_MODULE(_engine, m) {
           "kind", [](const CallObject& c) -> const Kind& { return c.call.kind; },
           nb::rv_policy::reference)
       .def_ro("arguments", &CallObject::arguments)
+      .def_prop_ro(
+          "values",
+          [](const CallObject& c) {
+            const Leaves leaves(c.arguments);
+            nb::dict found;
+            for (std::size_t k = 0; k < leaves.values.size(); ++k)
+              found[c.call.kind.fields[k].name] = leaves.values[k];
+            return found;
+          },
+          "The arguments by name.")
       .def("__reduce__", [](const CallObject& c) {
         return nb::make_tuple(
             engine("call"),
@@ -149,6 +159,16 @@ NB_MODULE(_engine, m) {
       .def("__reduce__",
            [](const MoveObject& move) { return nb::make_tuple(engine("Move"), move.arguments); });
   m.attr("REFUSED") = refused;
+
+  m.def(
+      "load_library",
+      [](const std::string& path) {
+        nb::list found;
+        for (const auto* kinds = library_kinds(path); *kinds; ++kinds)
+          found.append(nb::cast(*kinds, nb::rv_policy::reference));
+        return found;
+      },
+      "path"_a);
 
   nb::list all;
   for (const auto* kinds : rooms())

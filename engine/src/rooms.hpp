@@ -5,12 +5,17 @@
 
 namespace hsp {
 
+const Kind* const* edge_kinds();
+const Kind* const* law_kinds();
 const Kind* const* plan_kinds();
 const Kind* const* simulation_kinds();
 const Kind* const* trajectory_kinds();
 
+// The kinds of a library of a user's own, which stays loaded. Throws std::runtime_error.
+const Kind* const* library_kinds(const std::string& path);
+
 inline std::vector<const Kind* const*> rooms() {
-  return {plan_kinds(), simulation_kinds(), trajectory_kinds()};
+  return {plan_kinds(), law_kinds(), edge_kinds(), simulation_kinds(), trajectory_kinds()};
 }
 
 }  // namespace hsp
