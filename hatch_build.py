@@ -11,6 +11,7 @@ import shutil
 import subprocess
 import sys
 import sysconfig
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -32,10 +33,16 @@ def compiler() -> str | None:
     return given or next(filter(shutil.which, ("c++", "g++", "clang++")), None)
 
 
-def needed() -> list[str]:
+def tools() -> list[str]:
     """Return the packages that stand for tools which this machine lacks."""
-    tools = [name for name in ("cmake", "ninja") if not shutil.which(name)]
-    return tools if compiler() else [*tools, "ziglang"]
+    found = [name for name in ("cmake", "ninja") if not shutil.which(name)]
+    return found if compiler() else [*found, "ziglang"]
+
+
+def needs() -> list[str]:
+    """Return all packages that a build takes."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    return [*project["build-system"]["requires"], "editables", *tools()]
 
 
 def zig(folder: Path) -> list[str]:
@@ -73,8 +80,13 @@ def build(kind: str = "Release", folder: Path = ROOT / "build") -> Path:
     if compiler() is None:
         options += zig(place)
     configure = ["cmake", "-G", "Ninja", "-S", str(ROOT / "engine"), "-B", str(place)]
+    # Tools that pip brought are beside Python.
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
+    environment = os.environ | {"PATH": path}
     for command in ([*configure, *options], ["cmake", "--build", str(place)]):
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            command, capture_output=True, text=True, check=False, env=environment
+        )
         if done.returncode:
             sys.stderr.write(done.stdout + done.stderr)
             raise SystemExit(f"the engine was not built: {' '.join(command)} failed")
@@ -91,7 +103,7 @@ class EngineHook(BuildHookInterface):  # type: ignore[misc]
 
     def dependencies(self) -> list[str]:
         """Return what is needed besides what pyproject.toml says."""
-        return needed()
+        return tools()
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Build; the wheel is then one of this Python and this machine."""
@@ -102,4 +114,7 @@ class EngineHook(BuildHookInterface):  # type: ignore[misc]
 
 
 if __name__ == "__main__":
-    print(build(*sys.argv[1:]))
+    if sys.argv[1:] == ["needs"]:
+        print(" ".join(needs()))
+    else:
+        build()

@@ -150,6 +150,12 @@ NB_MODULE(_engine, m) {
         return nb::make_tuple(engine("PythonCall"), nb::make_tuple(call.function, call.timed));
       });
 
+  nb::class_<ForeignCall, Runnable>(
+      m, "ForeignCall", "A C function with words as arguments, and what these point to.",
+      nb::type_slots(slots<ForeignCall, &ForeignCall::kept>))
+      .def(nb::init<Foreign::Word, const std::vector<Foreign::Word>&, nb::object>(), "address"_a,
+           "words"_a, "kept"_a);
+
   nb::class_<MoveObject>(m, "Move", "Copies t, q and v where they are valid, and makes a plan.",
                          nb::type_slots(slots<MoveObject, &MoveObject::arguments>))
       .def("__init__", [](MoveObject* self, nb::args given) { new (self) MoveObject(given); })

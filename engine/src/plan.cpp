@@ -1,6 +1,7 @@
-#include "rooms.hpp"
 #include "plan.hpp"
+#include "foreign.hpp"
+#include "rooms.hpp"
 
 namespace hsp {
-const Kind* const* plan_kinds() { return kinds<Once, OnlyIf, EqualSteps>(); }
+const Kind* const* plan_kinds() { return kinds<Once, OnlyIf, EqualSteps, Mirror>(); }
 }  // namespace hsp

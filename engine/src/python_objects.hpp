@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "arguments.hpp"
+#include "foreign.hpp"
 #include "move.hpp"
 #include "plan.hpp"
 
@@ -57,6 +58,20 @@ struct PythonCall : Runnable {
 
   nanobind::object function;
   bool timed;
+};
+
+// A function of another library, with what its arguments point to.
+struct ForeignCall : Runnable {
+  ForeignCall(Foreign::Word address, const std::vector<Foreign::Word>& words,
+              nanobind::object owner)
+      : kept(std::move(owner)), function(address, words) {
+    row = {[](void* self, double) { return (*static_cast<Foreign*>(self))(); }, &function};
+    python = false;
+  }
+  ForeignCall(const ForeignCall&) = delete;
+
+  nanobind::object kept;
+  Foreign function;
 };
 
 // A state's move, as Python makes it.

@@ -7,7 +7,6 @@ import hashlib
 import struct
 import warnings
 from collections.abc import Callable
-from functools import cache
 from types import FunctionType
 from typing import Any, cast
 
@@ -160,43 +159,6 @@ def _unpacked(typing: Any, words: Any, kind: Any) -> Any:
         return builder.load(builder.inttoptr(arguments[0], pointer))
 
     return values(types.int64, kind), code
-
-
-@cache
-def foreign_adapter(count: int) -> int:
-    """Return the address of what calls a C function with ``count`` words."""
-    place = {
-        "__name__": __name__,
-        "words_of_call": cast("Any", types).UniTuple(types.int64, count + 1),
-        "_called": _called,
-    }
-    call = FunctionType(cast("FunctionType", _call_c).__code__, place)
-    call.__qualname__ = f"c_function_{count}"
-    code = callback(types.float64(types.int64, types.float64), call)
-    _codes.append(code)
-    return int(code.address)
-
-
-def _call_c(words: int, t: float) -> float:
-    return _called(words, words_of_call)  # type: ignore # noqa
-
-
-@intrinsic
-def _called(typing: Any, words: Any, kind: Any) -> Any:
-    """Call the C function that comes first at an address, with what follows there."""
-    count = kind.instance_type.count
-
-    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        word = ir.IntType(64)
-        table = builder.inttoptr(arguments[0], ir.ArrayType(word, count).as_pointer())
-        function, *given = (
-            builder.extract_value(builder.load(table), k) for k in range(count)
-        )
-        kind = ir.FunctionType(ir.VoidType(), [word] * (count - 1))
-        builder.call(builder.inttoptr(function, kind.as_pointer()), given)
-        return context.get_constant(types.float64, 0.0)
-
-    return types.float64(types.int64, kind), code
 
 
 def _available() -> bool:

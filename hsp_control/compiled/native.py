@@ -1,9 +1,7 @@
 """Kernels with their arguments, packed once, as the engine's plans make them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, Self
-
-import numpy as np
 
 from hsp_control.engine import Plan
 
@@ -40,21 +38,6 @@ class NativeCall:
         address = adapters.adapter(kernel, kinds, timed)
         recipe = cls.of, (kernel, arguments, timed)
         return cls((address, words.ctypes.data), recipe, (words, arguments))
-
-    @classmethod
-    def of_function(
-        cls,
-        address: int,
-        words: Sequence[int],
-        recipe: tuple[Any, tuple[Any, ...]],
-        kept: object,
-    ) -> Self:
-        """Return a call of a C function whose arguments are integers and pointers."""
-        from hsp_control.compiled import adapters
-
-        packed = np.array([address, *words], dtype=np.int64)
-        row = adapters.foreign_adapter(len(words)), packed.ctypes.data
-        return cls(row, recipe, (packed, kept))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return self.recipe

@@ -9,6 +9,7 @@ from typing import Any
 try:
     from ._engine import REFUSED as REFUSED
     from ._engine import Call as Call
+    from ._engine import ForeignCall as ForeignCall
     from ._engine import Kind as Kind
     from ._engine import Move as Move
     from ._engine import Plan as Plan

@@ -45,6 +45,9 @@ class PythonCall(Runnable):
     @property
     def timed(self) -> bool: ...
 
+class ForeignCall(Runnable):
+    def __init__(self, address: int, words: list[int], kept: object) -> None: ...
+
 class Move:
     def __init__(self, *arguments: Any) -> None: ...
     @property
