@@ -6,7 +6,8 @@
 namespace hsp {
 
 const Kind* const* trajectory_kinds();
+const Kind* const* geometry_kinds();
 
-inline std::vector<const Kind* const*> rooms() { return {trajectory_kinds()}; }
+inline std::vector<const Kind* const*> rooms() { return {trajectory_kinds(), geometry_kinds()}; }
 
 }  // namespace hsp
