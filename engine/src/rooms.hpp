@@ -7,7 +7,10 @@ namespace hsp {
 
 const Kind* const* trajectory_kinds();
 const Kind* const* geometry_kinds();
+const Kind* const* metric_kinds();
 
-inline std::vector<const Kind* const*> rooms() { return {trajectory_kinds(), geometry_kinds()}; }
+inline std::vector<const Kind* const*> rooms() {
+  return {trajectory_kinds(), geometry_kinds(), metric_kinds()};
+}
 
 }  // namespace hsp
