@@ -8,9 +8,10 @@ namespace hsp {
 const Kind* const* trajectory_kinds();
 const Kind* const* geometry_kinds();
 const Kind* const* metric_kinds();
+const Kind* const* field_kinds();
 
 inline std::vector<const Kind* const*> rooms() {
-  return {trajectory_kinds(), geometry_kinds(), metric_kinds()};
+  return {trajectory_kinds(), geometry_kinds(), metric_kinds(), field_kinds()};
 }
 
 }  // namespace hsp
