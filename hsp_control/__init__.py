@@ -20,6 +20,7 @@ from hsp_control.common.version import __version__ as __version__
 
 if TYPE_CHECKING:  # what a type checker reads; the names are looked up below
     from . import config as config
+    from . import engine as engine
     from . import live as live
     from . import robot as robot
     from . import simulation as simulation

@@ -13,9 +13,10 @@ import numpy as np
 import ruckig
 from numpy.typing import ArrayLike
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import StreamError, TrajectoryError
-from hsp_control.trajectories.piecewise_polynomial import QUINTIC, horner
+from hsp_control.trajectories.piecewise_polynomial import QUINTIC
 from hsp_control.trajectories.streams.chart import State
 
 _PIECES = 4
@@ -187,9 +188,8 @@ class QuinticSegment(Segment):
     def state(self, t: float) -> State:
         """Return the state at time t [s]."""
         x, rate, acceleration = np.empty((3, self._coefficients.shape[1]))
-        width = self.end - self.start
-        u = (t - self.start) / width
-        horner(u, width, self._coefficients, x, rate, acceleration)
+        given = self.start, self.end, self._coefficients
+        engine.Polynomial(*given, x, rate, acceleration)(t)
         return State(x, rate, acceleration, self.base)
 
 
