@@ -6,6 +6,7 @@
 namespace hsp {
 
 const Kind* const* edge_kinds();
+const Kind* const* integrator_kinds();
 const Kind* const* law_kinds();
 const Kind* const* plan_kinds();
 const Kind* const* simulation_kinds();
@@ -15,7 +16,8 @@ const Kind* const* trajectory_kinds();
 const Kind* const* library_kinds(const std::string& path);
 
 inline std::vector<const Kind* const*> rooms() {
-  return {plan_kinds(), law_kinds(), edge_kinds(), simulation_kinds(), trajectory_kinds()};
+  return {plan_kinds(),       law_kinds(),        edge_kinds(),
+          integrator_kinds(), simulation_kinds(), trajectory_kinds()};
 }
 
 }  // namespace hsp

@@ -1,7 +1,6 @@
 from collections.abc import Callable, Iterable
 from typing import Any
 
-
 from hsp_control.common.arrays import Array
 
 REFUSED: float

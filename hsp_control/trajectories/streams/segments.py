@@ -18,6 +18,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import StreamError, TrajectoryError
 from hsp_control.trajectories.piecewise_polynomial import QUINTIC
 from hsp_control.trajectories.streams.chart import State
+from hsp_control.trajectories.trajectory import TrajectorySample
 
 _PIECES = 4
 """A quintic is cut into this many pieces: the bounds of a Bézier curve by its control
@@ -183,13 +184,14 @@ class QuinticSegment(Segment):
     def __init__(self, start: float, end: float, base: Array, ends: Array) -> None:
         """Set x, T x', T² x'' at the start, then at the end, shape (6, n)."""
         super().__init__(start, end, base)
-        self._coefficients = QUINTIC @ ends
+        self._found = TrajectorySample.allocate(ends.shape[1])
+        given = self.start, self.end, QUINTIC @ ends, self._found
+        self._motion = engine.Polynomial(*given)
 
     def state(self, t: float) -> State:
         """Return the state at time t [s]."""
-        x, rate, acceleration = np.empty((3, self._coefficients.shape[1]))
-        given = self.start, self.end, self._coefficients
-        engine.Polynomial(*given, x, rate, acceleration)(t)
+        self._motion(t)
+        x, rate, acceleration = (each.copy() for each in self._found)
         return State(x, rate, acceleration, self.base)
 
 
