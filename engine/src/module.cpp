@@ -4,6 +4,7 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include "functions.hpp"
 #include "python_objects.hpp"
 #include "rooms.hpp"
 
@@ -180,4 +181,5 @@ NB_MODULE(_engine, m) {
   for (const auto* kinds : rooms())
     for (; *kinds; ++kinds) all.append(nb::cast(*kinds, nb::rv_policy::reference));
   m.attr("kinds") = all;
+  bind_functions(m);
 }

@@ -8,6 +8,7 @@ namespace hsp {
 const Kind* const* edge_kinds();
 const Kind* const* field_kinds();
 const Kind* const* geometry_kinds();
+const Kind* const* integrator_kinds();
 const Kind* const* law_kinds();
 const Kind* const* metric_kinds();
 const Kind* const* plan_kinds();
@@ -18,8 +19,17 @@ const Kind* const* trajectory_kinds();
 const Kind* const* library_kinds(const std::string& path);
 
 inline std::vector<const Kind* const*> rooms() {
-  return {plan_kinds(),       law_kinds(),    edge_kinds(),     field_kinds(),
-          geometry_kinds(),   metric_kinds(), simulation_kinds(), trajectory_kinds()};
+  return {
+          plan_kinds(),
+          edge_kinds(),
+          field_kinds(),
+          geometry_kinds(),
+          integrator_kinds(),
+          law_kinds(),
+          metric_kinds(),
+          simulation_kinds(),
+          trajectory_kinds(),
+  };
 }
 
 }  // namespace hsp

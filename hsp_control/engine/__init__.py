@@ -16,6 +16,7 @@ try:
     from ._engine import PythonCall as PythonCall
     from ._engine import Runnable as Runnable
     from ._engine import kinds as _kinds
+    from ._engine import smooth_step as smooth_step
 except ImportError as error:
     raise ImportError(
         f"the compiled part of hsp_control is missing or was built for another Python "
