@@ -12,6 +12,7 @@ const Kind* const* integrator_kinds();
 const Kind* const* law_kinds();
 const Kind* const* metric_kinds();
 const Kind* const* plan_kinds();
+const Kind* const* robot_kinds();
 const Kind* const* simulation_kinds();
 const Kind* const* trajectory_kinds();
 
@@ -27,6 +28,7 @@ inline std::vector<const Kind* const*> rooms() {
           integrator_kinds(),
           law_kinds(),
           metric_kinds(),
+          robot_kinds(),
           simulation_kinds(),
           trajectory_kinds(),
   };
