@@ -5,8 +5,9 @@
 
 namespace hsp {
 
+const Kind* const* limit_kinds();
 const Kind* const* trajectory_kinds();
 
-inline std::vector<const Kind* const*> rooms() { return {trajectory_kinds()}; }
+inline std::vector<const Kind* const*> rooms() { return {limit_kinds(), trajectory_kinds()}; }
 
 }  // namespace hsp
