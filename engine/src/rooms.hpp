@@ -6,8 +6,9 @@
 namespace hsp {
 
 const Kind* const* limit_kinds();
+const Kind* const* qp_kinds();
 const Kind* const* trajectory_kinds();
 
-inline std::vector<const Kind* const*> rooms() { return {limit_kinds(), trajectory_kinds()}; }
+inline std::vector<const Kind* const*> rooms() { return {limit_kinds(), qp_kinds(), trajectory_kinds()}; }
 
 }  // namespace hsp
