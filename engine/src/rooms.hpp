@@ -10,8 +10,10 @@ const Kind* const* field_kinds();
 const Kind* const* geometry_kinds();
 const Kind* const* integrator_kinds();
 const Kind* const* law_kinds();
+const Kind* const* limit_kinds();
 const Kind* const* metric_kinds();
 const Kind* const* plan_kinds();
+const Kind* const* qp_kinds();
 const Kind* const* robot_kinds();
 const Kind* const* simulation_kinds();
 const Kind* const* trajectory_kinds();
@@ -27,7 +29,9 @@ inline std::vector<const Kind* const*> rooms() {
           geometry_kinds(),
           integrator_kinds(),
           law_kinds(),
+          limit_kinds(),
           metric_kinds(),
+          qp_kinds(),
           robot_kinds(),
           simulation_kinds(),
           trajectory_kinds(),
