@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.actuation.support import Support
-from hsp_control.law import Resolution
+from hsp_control.edge import Resolution
 
 _EQUALITY, _INEQUALITY = 5, 0
 _FORCE_COST = 1e-6

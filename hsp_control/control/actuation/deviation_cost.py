@@ -15,9 +15,10 @@ from hsp_control.compiled.linalg import (
     solve_lower_transposed,
     squared_norm,
 )
-from hsp_control.law import IDENTITY, Resolution
+from hsp_control.edge import Resolution
+from hsp_control.edge.step import Factors, Projectors
+from hsp_control.law import IDENTITY
 from hsp_control.law.pseudo_inverse import whiten
-from hsp_control.law.resolution import Factors, Projectors
 
 _LEAST = 1e-6
 """Least cost of null-space deviation relative to the first level. The smaller it is,

@@ -41,14 +41,15 @@ from hsp_control.control.actuation.dual_active_set import (
     Workspace,
     minimise,
 )
-from hsp_control.control.actuation.limited_target import (
+from hsp_control.control.actuation.support import Support
+from hsp_control.edge import Resolution
+from hsp_control.edge.limited_target import (
     Barred,
     Parts,
     Permitted,
+    Within,
     write_limited_target,
 )
-from hsp_control.control.actuation.support import Support
-from hsp_control.law import Resolution
 from hsp_control.robot import RobotState
 
 
@@ -317,10 +318,10 @@ class LimitedStep:
             law = resolution.acceleration, edge.damped
             parts = Parts(*law, *edge.self_motions, *edge.brakings)
             barred = Barred(A[kept], lower[kept])
-            target = *wanted, parts, bounds, permitted, barred, zeros((4, n))
+            target = *wanted, parts, Within(*bounds[:2]), permitted, barred
             shares = edge.share, edge.held
             rows.append(resolution.self_motions(state.v))
-            rows.append((write_limited_target, (*target, *shares)))
+            rows.append((write_limited_target, (*target, zeros((4, n)), *shares)))
         rows.append((_write_rows, (*around, self._rows)))
         write = write_directions_at_once if resolution.alone else write_directions
         closest = (write, (directions,)), *nearest(standing=p > 0, warm=True)

@@ -22,7 +22,7 @@ from hsp_control.control.actuation.deviation_cost import (
     write_directions_at_once,
     write_inverse_root,
 )
-from hsp_control.law import Resolution
+from hsp_control.edge import Resolution
 
 seeds = st.integers(0, 2**32 - 1)
 NOWHERE = np.zeros(0, dtype=np.int64)

@@ -19,7 +19,7 @@ from hsp_control import (
     TargetPosture,
 )
 from hsp_control.common.arrays import Array
-from hsp_control.law.threshold import (
+from hsp_control.edge.threshold import (
     MODEST,
     NOT,
     QUICKEST,

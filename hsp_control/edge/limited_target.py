@@ -10,7 +10,7 @@ a limit, so that the step is a continuous function of the state:
 *The tasks are damped.* An arm that is held at its edge, or rushes to it, asks for more
 than its motors give, from one side and then from the other: the nearest step within the
 limits would swing with it. So as far as a_t alone is beyond the limits, the step comes
-near to the damped law instead (`law/edge.py`).
+near to the damped law instead (`shares.py`).
 
 *What a field asks for is bounded.* That is a_n + K_N P v, the self-motion without what
 brakes it. A field may ask for anything; at most what the limits permit far from them is
@@ -33,7 +33,6 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.compiled.kernels import kernel
 from hsp_control.compiled.linalg import multiply, squared_norm
-from hsp_control.constraints.limits.acceleration_bounds import Bounds, MotionLimits
 
 LARGE = 0.1
 """Excess from which on it counts wholly."""
@@ -46,12 +45,20 @@ class Permitted(NamedTuple):
     acceleration: Array  # [rad/s² or m/s²]
 
     @classmethod
-    def by(cls, effort: Array, motion: MotionLimits) -> Self:
-        """Return it for maximum efforts and the limits of the motion."""
-        bandwidth = motion.bandwidth[0]
-        half = 0.5 * (motion.upper - motion.lower)
-        acceleration = np.minimum(bandwidth * motion.velocity, bandwidth**2 * half)
-        return cls(np.array(effort), np.minimum(acceleration, motion.acceleration))
+    def by(
+        cls, effort: Array, span: Array, speed: Array, most: Array, bandwidth: float
+    ) -> Self:
+        """Return it.
+
+        Args:
+            effort: Maximum efforts, shape (nv,) as all of these.
+            span: Upper minus lower position limits.
+            speed: Maximum speeds.
+            most: Maximum accelerations.
+            bandwidth: α of the barriers that keep positions and speeds [1/s].
+        """
+        acceleration = np.minimum(bandwidth * speed, bandwidth**2 * (0.5 * span))
+        return cls(np.array(effort), np.minimum(acceleration, most))
 
 
 class Parts(NamedTuple):
@@ -63,6 +70,13 @@ class Parts(NamedTuple):
     damped_self_motion: Array
     law_braking: Array  # K_N P v
     damped_braking: Array
+
+
+class Within(NamedTuple):
+    """Bounds on the acceleration, shape (nv,) each."""
+
+    lower: Array
+    upper: Array
 
 
 class Barred(NamedTuple):
@@ -78,7 +92,7 @@ def write_limited_target(
     a: Array,
     effort: Array,
     parts: Parts,
-    bounds: Bounds,
+    bounds: Within,
     permitted: Permitted,
     barred: Barred,
     scratch: Array,
@@ -96,7 +110,7 @@ def write_limited_target(
         permitted: What excesses are relative to.
         barred: Rows of barriers; ``lower`` then is for deviations from the new a.
         scratch: Shape (4, nv).
-        share: How much the law is damped already, shape (1,); see `law/edge.py`.
+        share: How much the law is damped already, shape (1,); see `shares.py`.
         held: How much the tasks are held, by their edge or by limits, shape (1,).
     """
     n = a.shape[0]
@@ -133,7 +147,7 @@ def write_limited_target(
 def _excess(
     a: Array,
     effort: Array,
-    bounds: Bounds,
+    bounds: Within,
     permitted: Permitted,
     barred: Barred,
     change: Array,
@@ -144,7 +158,7 @@ def _excess(
     most, least = 0.0, np.inf
     for i in range(a.shape[0]):
         most = max(most, abs(effort[i]) / permitted.effort[i] - 1.0)
-        beyond = max(a[i] - bounds.a_upper[i], bounds.a_lower[i] - a[i])
+        beyond = max(a[i] - bounds.upper[i], bounds.lower[i] - a[i])
         most = max(most, beyond / permitted.acceleration[i])
         least = min(least, permitted.acceleration[i])
     for r in range(barred.lower.shape[0]):
