@@ -4,6 +4,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array, Flags, Indices
 from hsp_control.compiled.kernels import kernel
+from hsp_control.compiled.linalg import copy
 from hsp_control.edge.threshold import (
     Following,
     Thresholds,
@@ -40,6 +41,7 @@ def write_damped_levels(
     ends: Indices,
     scratch: LevelScratch,
     e_N: Array,
+    by_tasks: Array,
     a: Array,
 ) -> int:
     """Write e_N and a; return the first level with a damped singular value.
@@ -65,6 +67,7 @@ def write_damped_levels(
         ends: Where each level's rows end in the stack.
         scratch: Memory.
         e_N: Null-space error, shape (nv,).
+        by_tasks: What the levels make of a, shape (nv,); the rest is φ_N.
         a: Acceleration, shape (nv,).
     """
     J, J_dot, a_x = task.jacobian, task.jacobian_dot, task.acceleration
@@ -115,12 +118,13 @@ def write_damped_levels(
                     lack -= J[k, i] * drawn[i]
                 wanted += asked[k] * asked[k]
                 lacking += lack * lack
-            held = max(held, how_held(lacking, wanted, following))
+            held = max(held, how_held(lacking, wanted, least, following))
             if damped == 0:
                 damped = level + 1
         close_level(Q, QJ[:, block], G_inv, pushed)
         start = end
 
+    copy(a, by_tasks)
     add_null_space(
         task, field, metric, form, v, K_N, controls, ends, scratch, e_N, a
     )  # fmt: skip

@@ -35,14 +35,13 @@ class EdgeMemory(NamedTuple):
     turned: Array  # scratch, (m, nv)
     exact: Array  # a_exact, shape (nv,), where μ < 1 and the laws differ
     damped: Array  # a_damped, shape (nv,), where they differ or a limit is violated
+    by_tasks: Array  # a_damped without φ_N, where it went level by level, shape (nv,)
     exact_e_N: Array  # shape (nv,)
-    # P a of a and of a_damped, and what brakes them, K_N P v, shape (2, nv) each; they
-    # are written where a limit is violated
+    # φ_N of a and of a_damped, and what brakes them, P K_N P v, shape (2, nv) each;
+    # they are written where a limit is violated
     self_motions: Array
     brakings: Array
     share: Array  # μ, without the share of the limits, shape (1,)
-    # how much the tasks are held, by their edge or by limits, where a limit binds, (1,)
-    held: Array
     code: Indices  # of a_damped, see `outcome_of`, shape (1,)
 
     @classmethod
@@ -54,11 +53,11 @@ class EdgeMemory(NamedTuple):
             turned=np.zeros((m, nv)),
             exact=np.zeros(nv),
             damped=np.zeros(nv),
+            by_tasks=np.zeros(nv),
             exact_e_N=np.zeros(nv),
             self_motions=np.zeros((2, nv)),
             brakings=np.zeros((2, nv)),
             share=np.zeros(1),
-            held=np.ones(1),
             code=np.zeros(1, dtype=np.int64),
         )
 

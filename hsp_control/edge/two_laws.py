@@ -48,7 +48,7 @@ def resolve_by_levels(step: LawStep) -> int:
         damped = write_damped_levels(
             task, step.field, step.metric, step.form, step.v, step.K_N, step.threshold,
             step.following, step.asked, step.yields, step.springs, step.thresholds,
-            step.controls, step.ends, levels, step.e_N, step.a,
+            step.controls, step.ends, levels, step.e_N, scratch.edge.by_tasks, step.a,
         )  # fmt: skip
         if not _all_finite(step.a):
             damped = BEYOND_ANY_LEVEL
@@ -79,7 +79,7 @@ def _write_law(step: LawStep, Q: Array, X: Array, e_N: Array) -> None:
 @kernel
 def _write_thresholds(step: LawStep) -> float:
     """See `write_thresholds`: J is whitened before."""
-    turning = turning_threshold(step.field.g, step.v, step.following)
+    turning = turning_threshold(step.field.g, step.following)
     return write_thresholds(
         step.task.jacobian, step.scratch.wide, step.asked, step.yields, step.pulls,
         step.springs, step.ends, step.threshold, turning, step.following,

@@ -72,7 +72,6 @@ class Directions(NamedTuple):
     size: float  # robot's size [m]
     first: int  # first level that may deviate: 1 below contacts, else 0
     least: float  # least cost of a level relative to the one above it
-    held: Array  # how much tasks are held, from 0 to 1, shape (1,)
     # singular value of each level below which a direction belongs to it in part, shape
     # (levels,)
     thresholds: Array
@@ -99,7 +98,7 @@ class Directions(NamedTuple):
         problem, least = resolution.problem, _LEAST ** (1.0 / max(levels, 1))
         return cls(
             J, problem.metric.L, resolution.form, resolution.ends, problem.task.error,
-            problem.springs, size, int(supported), least, resolution.edge.held,
+            problem.springs, size, int(supported), least,
             resolution.thresholds, resolution.factors, resolution.projectors,
             resolution.edge.code,
             np.empty((m, n)), np.empty((m, m)),
@@ -121,7 +120,7 @@ def _write_costs(directions: Directions) -> None:
             square += e[r] * e[r]
             springs = springs and directions.springs[r]
         of_error = _LEVEL if k < last - 1 else _NULL_SPACE
-        below = directions.held[0] * of_error * np.sqrt(square) / directions.size
+        below = of_error * np.sqrt(square) / directions.size
         if standing:  # whoever stands keeps the balance at any cost
             below = 0.0
         if k >= directions.first and (standing or not springs):
