@@ -17,7 +17,7 @@ with σ the smallest singular value of the stack J, whatever the metric. The fir
 are here, the last is where limits are known, in `limited_target.py`.
 All are continuous, so a is.
 
-``docs/law.md``, The edge, has what follows from it.
+``docs/edge.md`` has what follows from it.
 """
 
 import numpy as np
