@@ -17,11 +17,12 @@ struct DampedMemory {
 };
 
 // Write e_N and a; return the first level with a damped singular value, 1 for the highest one, and
-// 0 if none was damped. The thresholds are raised below levels that turn or are held.
-template <class E, class A>
+// 0 if none was damped. The thresholds are raised below levels that turn or are held. `by_tasks` is
+// what the levels make of a; the rest is φ_N.
+template <class B, class E, class A>
 int write_damped_levels(const LawInput& in, const Asked& rows, double least,
                         const Following& following, Thresholds& thresholds, Projectors& projectors,
-                        DampedMemory& memory, LevelMemory& levels, E& e_N, A& a) {
+                        DampedMemory& memory, LevelMemory& levels, B& by_tasks, E& e_N, A& a) {
   const auto& [J, J_dot, error, error_rate, a_x] = in.task;
   auto& [drawn, all_rest, all_opposed, all_x, all_row, all_G, all_V] = memory;
   invert_metric(in.metric.L, projectors.Q);
@@ -71,6 +72,7 @@ int write_damped_levels(const LawInput& in, const Asked& rows, double least,
     close_level(projectors.Q, QJ, G_inverse, row);
     start = rows.ends[level];
   }
+  by_tasks = a;
   add_null_space(in, rows.ends, projectors, levels, e_N, a);
   return damped;
 }

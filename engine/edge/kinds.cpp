@@ -1,7 +1,8 @@
 #include "../src/rooms.hpp"
+#include "limited_target.hpp"
 #include "resolve.hpp"
 #include "self_motions.hpp"
 
 namespace hsp {
-const Kind* const* edge_kinds() { return kinds<Resolve, SelfMotions>(); }
+const Kind* const* edge_kinds() { return kinds<Resolve, SelfMotions, LimitedTarget>(); }
 }  // namespace hsp

@@ -15,8 +15,9 @@ template <template <int...> class As> struct Factors {
 template <template <int...> class As> struct EdgeMemory {
   As<'m', 'n'> Q;  // factors of the exact inverse
   As<'m', 'm'> X;
-  As<'n'> exact;   // a_exact, where μ < 1 and the laws differ
-  As<'n'> damped;  // a_damped, where they differ or a limit is violated
+  As<'n'> exact;     // a_exact, where μ < 1 and the laws differ
+  As<'n'> damped;    // a_damped, where they differ or a limit is violated
+  As<'n'> by_tasks;  // a_damped without φ_N, where it went level by level
   As<'n'> exact_e_N;
   As<1> share;  // μ, without the share of the limits
 };
@@ -82,13 +83,13 @@ struct Resolve {
       whitened();
     }
     const int damped = write_damped_levels(law, rows, least, following, thresholds, projectors,
-                                           memory.damped, memory.levels, e_N, a);
+                                           memory.damped, memory.levels, edge.by_tasks, e_N, a);
     return std::isfinite(a.sum()) ? damped : static_cast<std::int64_t>(beyond);
   }
 
   // a = a_exact + μ (a_damped - a_exact); the first two shares count here.
   void blend() {
-    auto& [Q, X, exact, damped, exact_e_N, share] = edge;
+    auto& [Q, X, exact, damped, by_tasks, exact_e_N, share] = edge;
     if (damped_code[0] == 0) {
       share[0] = 0.0;
       return;

@@ -13,7 +13,7 @@ from hsp_control.control.actuation import Actuation, Delivered
 from hsp_control.control.actuation.actuation import LOOK
 from hsp_control.control.actuation.limits_in_force import LimitsInForce
 from hsp_control.engine import Move
-from hsp_control.law.resolution import BEYOND_ANY_LEVEL
+from hsp_control.law.outcome import BEYOND_ANY_LEVEL
 from hsp_control.robot import RobotState
 
 

@@ -1,9 +1,8 @@
 """The law: from tasks and a field to an acceleration, equations (7) and (13)."""
 
+from .diagnosis import singular_values as singular_values
+from .outcome import Outcome as Outcome
 from .problem import Problem as Problem
-from .resolution import Outcome as Outcome
-from .resolution import Resolution as Resolution
-from .resolution import singular_values as singular_values
 from .samples import CONSTANT as CONSTANT
 from .samples import IDENTITY as IDENTITY
 from .samples import VARYING as VARYING

@@ -1,8 +1,8 @@
 """Strict priorities: the law for levels of tasks that may conflict.
 
-    Q_0 = W⁻¹,   G_k = J_k Q_{k-1} J_kᵀ
-    a ← a + Q_{k-1} J_kᵀ q(G_k) (a_k - J_k'v - J_k a)
-    Q_k = Q_{k-1} - Q_{k-1} J_kᵀ q(G_k) J_k Q_{k-1}
+    Q_0 = W⁻¹,   G_k = J_k Q_{k-1} J_kᵀ                                  `open_level`
+    a ← a + Q_{k-1} J_kᵀ q(G_k) (a_k - J_k'v - J_k a)                     `add_level`
+    Q_k = Q_{k-1} - Q_{k-1} J_kᵀ q(G_k) J_k Q_{k-1}                     `close_level`
 
 Each level acts in the null space of the levels above. Those stay exact, whatever the
 lower level requires. The field is the last level: with P = Q_K W, J_a the stack of all
@@ -10,7 +10,10 @@ levels, and w any solution of J_aᵀ w = W(I - P)x, found by going back through 
 
     φ_N = Q_K [ W(g' + K_N e_N) - J_a'ᵀ w + W'(x - e_N/2) ],   e_N = P x,  x = g - v
 
-so that V' = -e_NᵀW K_N e_N as long as the stack keeps its rank, conflicts included.
+so that V' = -e_NᵀW K_N e_N as long as the stack keeps its rank, conflicts included:
+`add_null_space`. How far each inverse q(G_k) is bounded is the edge's,
+`edge/damped_levels.py`, which goes through the levels.
+
 If the stack has full rank, this equals the law of `law.py` up to rounding. That law is
 then used, because it takes a tenth of the time. The smallest singular value of the
 stack is a lower bound for those of all levels (Schur complements interlace), so both
@@ -21,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hsp_control.common.arrays import Array, Flags, Indices
+from hsp_control.common.arrays import Array, Indices
 from hsp_control.compiled.kernels import kernel
 from hsp_control.compiled.linalg import (
     multiply,
@@ -32,11 +35,10 @@ from hsp_control.compiled.linalg import (
     squared_norm,
 )
 from hsp_control.law.samples import VARYING, FieldSample, MetricSample, TaskSample
-from hsp_control.law.threshold import Following, Thresholds, how_held, threshold_below
 
 
 class LevelScratch(NamedTuple):
-    """Memory of `resolve_levels` between its steps."""
+    """Memory of the levels between the steps."""
 
     Q: Array  # (nv, nv); the last null space's Q_K = P W⁻¹ afterwards
     QJ: Array  # Q_{k-1} J_kᵀ of all levels side by side, shape (nv, m)
@@ -46,106 +48,113 @@ class LevelScratch(NamedTuple):
 
 
 @kernel
-def resolve_levels(
+def invert_metric(L: Array, out: Array) -> None:
+    """Write W⁻¹ = (L Lᵀ)⁻¹."""
+    n = L.shape[0]
+    for j in range(n):
+        for i in range(n):
+            out[j, i] = 1.0 if i == j else 0.0
+        solve_lower(L, out[j])
+        solve_lower_transposed(L, out[j])
+
+
+@kernel
+def open_level(J: Array, Q: Array, QJ: Array, G: Array, V: Array, x: Array) -> float:
+    """Write Q Jᵀ and J Q Jᵀ = Σ x_r V_r V_rᵀ; return the smallest x."""
+    m, n = J.shape
+    for k in range(m):
+        multiply(Q, J[k], QJ[:, k])
+    for p in range(m):
+        for k in range(p + 1):
+            total = 0.0
+            for i in range(n):
+                total += J[p, i] * QJ[i, k]
+            G[p, k] = G[k, p] = total
+    # G is symmetric and not negative: its rows' lengths become its eigenvalues.
+    orthogonalise_rows(G[:m, :m], V)
+    smallest = np.inf
+    for k in range(m):
+        x[k] = np.sqrt(squared_norm(G[k, :m]))
+        smallest = min(smallest, x[k])
+    return smallest
+
+
+@kernel
+def write_bounded_inverse(
+    V: Array, x: Array, threshold: float, q: Array, out: Array
+) -> None:
+    """Write q(G) of G = Σ x_r V_r V_rᵀ, see `pseudo_inverse.py`; q is overwritten."""
+    m, floor = out.shape[0], threshold * threshold
+    for r in range(m):
+        q[r] = 1.0 / x[r] if x[r] >= floor else (2.0 - x[r] / floor) / floor
+    for p in range(m):
+        for k in range(m):
+            total = 0.0
+            for r in range(m):
+                total += V[r, p] * q[r] * V[r, k]
+            out[p, k] = total
+
+
+@kernel
+def add_level(QJ: Array, G_inverse: Array, rest: Array, row: Array, a: Array) -> None:
+    """Add Q Jᵀ q(G) times what is left to do to a."""
+    n, m = QJ.shape
+    multiply(G_inverse, rest[:m], row[:m])
+    for i in range(n):
+        for k in range(m):
+            a[i] += QJ[i, k] * row[k]
+
+
+@kernel
+def close_level(Q: Array, QJ: Array, G_inverse: Array, row: Array) -> None:
+    """Overwrite Q by Q - QJᵀ q(G) JQ, which stays symmetric."""
+    n, m = QJ.shape
+    for i in range(n):
+        multiply_transposed(G_inverse, QJ[i], row[:m])
+        for j in range(i + 1):
+            total = 0.0
+            for k in range(m):
+                total += row[k] * QJ[j, k]
+            Q[i, j] -= total
+            if j < i:
+                Q[j, i] = Q[i, j]
+
+
+@kernel
+def add_null_space(
     task: TaskSample,
     field: FieldSample,
     metric: MetricSample,
     form: int,
     v: Array,
     K_N: Array,
-    least: float,
-    following: Following,
-    asked: Array,
-    yields: Array,
-    springs: Flags,
-    thresholds: Thresholds,
     controls: bool,
     ends: Indices,
     scratch: LevelScratch,
     e_N: Array,
     a: Array,
-) -> int:
-    """Write e_N and a; return the first level with a damped singular value.
-
-    1 is the highest level; 0: none was damped.
+) -> None:
+    """Write e_N, and add φ_N to a; all levels are closed.
 
     Args:
-        task: All tasks, level after level: J, J' and a_x, m rows.
+        task: All tasks, level after level: J and J', shape (m, nv) each.
         field: g and g', shape (nv,) each.
-        metric: W, its Cholesky factor L and W', shape (nv, nv) each.
+        metric: W and W', shape (nv, nv) each.
         form: The metric's form.
         v: Velocity, shape (nv,).
         K_N: Null-space gain [1/s], shape (nv, nv).
-        least: ε_0.
-        following: How the thresholds of levels below a held one follow.
-        asked: What the feedback asks for at rest, shape (m,).
-        yields: 0 for rows without a bounded error, shape (m,); see `write_thresholds`.
-        springs: Whether a row is that of a spring, shape (m,).
-        thresholds: From which singular values of each level's whitened Jacobian, in
-            the null space of those above, its inverse is bounded; ``own`` is raised
-            here below levels that turn or are held.
         controls: False for φ_N = 0.
         ends: Where each level's rows end in the stack.
-        scratch: Memory.
+        scratch: What the levels left, and memory.
         e_N: Null-space error, shape (nv,).
         a: Acceleration, shape (nv,).
     """
-    J, J_dot, a_x = task.jacobian, task.jacobian_dot, task.acceleration
-    g, g_dot, W, W_dot = field.g, field.g_dot, metric.W, metric.W_dot
-    Q, QJ, G_inverse = scratch.Q, scratch.QJ, scratch.G_inverse
-    square, rows = scratch.square, scratch.rows
+    J, J_dot, g, g_dot = task.jacobian, task.jacobian_dot, field.g, field.g_dot
+    W, W_dot, Q, QJ = metric.W, metric.W_dot, scratch.Q, scratch.QJ
+    G_inverse, square, rows = scratch.G_inverse, scratch.square, scratch.rows
     n = v.shape[0]
-    damped = 0
-    _invert(metric.L, Q)
-    drawn, pushed, shares = rows[2, :n], rows[1], rows[4]
-    for i in range(n):
-        a[i] = drawn[i] = 0.0
-    start, held, above = 0, 0.0, np.inf
-    own, _, scales = thresholds
-    for level in range(ends.shape[0]):
-        end = ends[level]
-        block = slice(start, end)
-        G_inv, rest, opposed = G_inverse[block, block], rows[0], rows[3]
-        threshold = own[level]
-        # What is left for the level to do, and of that f - J a_f, at rest
-        turns = False  # contacts do not: they stay where they are
-        for k in range(end - start):
-            turns = turns or springs[start + k] or yields[start + k] > 0.0
-            rest[k], opposed[k] = a_x[start + k], asked[start + k]
-            for i in range(n):
-                rest[k] -= J_dot[start + k, i] * v[i] + J[start + k, i] * a[i]
-                opposed[k] -= J[start + k, i] * drawn[i]
-        least_here = threshold_below(
-            opposed[: end - start], held, above, level, following, thresholds
-        )
-        threshold = max(threshold, least_here)
-        # What it does with what those above leave
-        x, V = pushed, square[1, : end - start, : end - start]
-        smallest = _open_level(J[block], Q, QJ[:, block], square[0], V, x)
-        _inverted(V, x, threshold, shares, G_inv)
-        _add_level(QJ[:, block], G_inv, rest, shares, a)
-        _add_level(QJ[:, block], G_inv, opposed, shares, drawn)
-        # What it leaves to those below, and how much it turns or is held
-        own[level] = threshold
-        if turns:
-            above = min(above, max(np.sqrt(smallest), threshold) / scales[level])
-        if smallest < threshold * threshold:
-            wanted = lacking = 0.0
-            for k in range(start, end):
-                if springs[k]:
-                    continue
-                lack = asked[k]
-                for i in range(n):
-                    lack -= J[k, i] * drawn[i]
-                wanted += asked[k] * asked[k]
-                lacking += lack * lack
-            held = max(held, how_held(lacking, wanted, following))
-            if damped == 0:
-                damped = level + 1
-        _close_level(Q, QJ[:, block], G_inv, pushed)
-        start = end
 
-    # The null space: x = g - v, and what the levels take of it and of its motion
+    # x = g - v, and what the levels take of it and of its motion
     x, Wx, Y, bent = rows[0, :n], rows[1, :n], rows[2, :n], rows[3, :n]
     for i in range(n):
         x[i] = g[i] - v[i]
@@ -169,7 +178,7 @@ def resolve_levels(
     # e_N = Q W x, and φ_N of Equation (13) over the metric
     multiply(Q, Wx, e_N)
     if not controls:
-        return damped
+        return
     rate = rows[4, :n]
     multiply(K_N, e_N, rate)
     for i in range(n):
@@ -184,75 +193,3 @@ def resolve_levels(
     multiply(Q, Y, rate)
     for i in range(n):
         a[i] += rate[i]
-    return damped
-
-
-@kernel
-def _invert(L: Array, out: Array) -> None:
-    """Write W⁻¹ = (L Lᵀ)⁻¹."""
-    n = L.shape[0]
-    for j in range(n):
-        for i in range(n):
-            out[j, i] = 1.0 if i == j else 0.0
-        solve_lower(L, out[j])
-        solve_lower_transposed(L, out[j])
-
-
-@kernel
-def _open_level(J: Array, Q: Array, QJ: Array, G: Array, V: Array, x: Array) -> float:
-    """Write Q Jᵀ and J Q Jᵀ = Σ x_r V_r V_rᵀ; return the smallest x."""
-    m, n = J.shape
-    for k in range(m):
-        multiply(Q, J[k], QJ[:, k])
-    for p in range(m):
-        for k in range(p + 1):
-            total = 0.0
-            for i in range(n):
-                total += J[p, i] * QJ[i, k]
-            G[p, k] = G[k, p] = total
-    # G is symmetric and not negative: its rows' lengths become its eigenvalues.
-    orthogonalise_rows(G[:m, :m], V)
-    smallest = np.inf
-    for k in range(m):
-        x[k] = np.sqrt(squared_norm(G[k, :m]))
-        smallest = min(smallest, x[k])
-    return smallest
-
-
-@kernel
-def _inverted(V: Array, x: Array, threshold: float, q: Array, out: Array) -> None:
-    """Write q(G) of G = Σ x_r V_r V_rᵀ, see `pseudo_inverse.py`; q is overwritten."""
-    m, floor = out.shape[0], threshold * threshold
-    for r in range(m):
-        q[r] = 1.0 / x[r] if x[r] >= floor else (2.0 - x[r] / floor) / floor
-    for p in range(m):
-        for k in range(m):
-            total = 0.0
-            for r in range(m):
-                total += V[r, p] * q[r] * V[r, k]
-            out[p, k] = total
-
-
-@kernel
-def _add_level(QJ: Array, G_inverse: Array, rest: Array, row: Array, a: Array) -> None:
-    """Add Q Jᵀ q(G) times what is left to do to a."""
-    n, m = QJ.shape
-    multiply(G_inverse, rest[:m], row[:m])
-    for i in range(n):
-        for k in range(m):
-            a[i] += QJ[i, k] * row[k]
-
-
-@kernel
-def _close_level(Q: Array, QJ: Array, G_inverse: Array, row: Array) -> None:
-    """Overwrite Q by Q - QJᵀ q(G) JQ, which stays symmetric."""
-    n, m = QJ.shape
-    for i in range(n):
-        multiply_transposed(G_inverse, QJ[i], row[:m])
-        for j in range(i + 1):
-            total = 0.0
-            for k in range(m):
-                total += row[k] * QJ[j, k]
-            Q[i, j] -= total
-            if j < i:
-                Q[j, i] = Q[i, j]

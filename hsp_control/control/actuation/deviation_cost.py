@@ -12,8 +12,8 @@ import numpy as np
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Flags, Indices
 from hsp_control.compiled.kernels import KernelCall
-from hsp_control.law import Resolution
-from hsp_control.law.resolution import Factors, Projectors
+from hsp_control.edge import Resolution
+from hsp_control.edge.step import Factors, Projectors
 
 _LEAST = 1e-6
 """Least cost of null-space deviation relative to the first level. The smaller it is,
@@ -33,7 +33,6 @@ class Levels(NamedTuple):
     size: float  # robot's size [m]
     first: int  # first level that may deviate: 1 below contacts, else 0
     least: float  # least cost of a level relative to the one above it
-    held: Array  # how much tasks are held, from 0 to 1, shape (1,)
     # singular value of each level below which a direction belongs to it in part, shape
     # (levels,)
     thresholds: Array
@@ -57,7 +56,6 @@ class Levels(NamedTuple):
             size,
             int(supported),
             _LEAST ** (1.0 / max(levels, 1)),
-            edge.held,
             resolution.thresholds,
             resolution.factors,
             resolution.projectors,

@@ -1,24 +1,22 @@
-"""What a step comes near to where a limit binds, and how dear the null space is then.
+"""What a step comes near to where a limit binds.
 
 The law promises nothing where a limit binds. Then it is taken apart,
 
-    a = a_t + a_n,      a_n = P a,
+    a = a_t + φ_N,
 
-into what moves the tasks and the self-motion. Two things change, as far as a is beyond
-a limit, so that the step is a continuous function of the state:
+into what the tasks make of it and the self-motion (`self_motion.py`). Two things
+change, as far as a is beyond a limit, so that the step is a continuous function of the
+state:
 
 *The tasks are damped.* An arm that is held at its edge, or rushes to it, asks for more
 than its motors give, from one side and then from the other: the nearest step within the
 limits would swing with it. So as far as a_t alone is beyond the limits, the step comes
-near to the damped law instead (`law/edge.py`).
+near to the damped law instead (`shares.py`).
 
-*What a field asks for is bounded.* That is a_n + K_N P v, the self-motion without what
-brakes it. A field may ask for anything; at most what the limits permit far from them is
-asked of the QP, and what brakes stays whole: else it would swing at the limits.
-
-Where a_t alone is within the limits, the null space gives way at a millionth of what a
-task costs, and no field takes a task away. Where it is not, or the law is damped, the
-null space is dearer, see `deviation_cost.py`.
+*What a field asks for is bounded.* That is φ_N + P K_N P v, the self-motion without
+what brakes it. A field may ask for anything; at most what the limits permit far from
+them is asked of the QP, and a tenth of that where the tasks are held, by their edge or
+by a limit. What brakes stays whole: else it would swing at the limits.
 
 An excess is relative to what the limit permits: of an effort, the maximum; of an
 acceleration, what the barriers of `Limits` permit far from them. It counts wholly from
@@ -33,10 +31,10 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.compiled.kernels import kernel
 from hsp_control.compiled.linalg import multiply, squared_norm
-from hsp_control.constraints.limits.acceleration_bounds import Bounds, MotionLimits
 
 LARGE = 0.1
-"""Excess from which on it counts wholly."""
+"""Excess from which on it counts wholly, and the part of what the limits permit that a
+field gets where the tasks are held."""
 
 
 class Permitted(NamedTuple):
@@ -46,12 +44,20 @@ class Permitted(NamedTuple):
     acceleration: Array  # [rad/s² or m/s²]
 
     @classmethod
-    def by(cls, effort: Array, motion: MotionLimits) -> Self:
-        """Return it for maximum efforts and the limits of the motion."""
-        bandwidth = motion.bandwidth[0]
-        half = 0.5 * (motion.upper - motion.lower)
-        acceleration = np.minimum(bandwidth * motion.velocity, bandwidth**2 * half)
-        return cls(np.array(effort), np.minimum(acceleration, motion.acceleration))
+    def by(
+        cls, effort: Array, span: Array, speed: Array, most: Array, bandwidth: float
+    ) -> Self:
+        """Return it.
+
+        Args:
+            effort: Maximum efforts, shape (nv,) as all of these.
+            span: Upper minus lower position limits.
+            speed: Maximum speeds.
+            most: Maximum accelerations.
+            bandwidth: α of the barriers that keep positions and speeds [1/s].
+        """
+        acceleration = np.minimum(bandwidth * speed, bandwidth**2 * (0.5 * span))
+        return cls(np.array(effort), np.minimum(acceleration, most))
 
 
 class Parts(NamedTuple):
@@ -59,10 +65,17 @@ class Parts(NamedTuple):
 
     law: Array  # shape (nv,) each
     damped: Array
-    law_self_motion: Array  # P a
+    law_self_motion: Array  # φ_N
     damped_self_motion: Array
-    law_braking: Array  # K_N P v
+    law_braking: Array  # P K_N P v
     damped_braking: Array
+
+
+class Within(NamedTuple):
+    """Bounds on the acceleration, shape (nv,) each."""
+
+    lower: Array
+    upper: Array
 
 
 class Barred(NamedTuple):
@@ -78,12 +91,11 @@ def write_limited_target(
     a: Array,
     effort: Array,
     parts: Parts,
-    bounds: Bounds,
+    bounds: Within,
     permitted: Permitted,
     barred: Barred,
     scratch: Array,
     share: Array,
-    held: Array,
 ) -> None:
     """Overwrite what is wanted by what the step is to come near to.
 
@@ -96,8 +108,7 @@ def write_limited_target(
         permitted: What excesses are relative to.
         barred: Rows of barriers; ``lower`` then is for deviations from the new a.
         scratch: Shape (4, nv).
-        share: How much the law is damped already, shape (1,); see `law/edge.py`.
-        held: How much the tasks are held, by their edge or by limits, shape (1,).
+        share: How much the law is damped already, shape (1,); see `shares.py`.
     """
     n = a.shape[0]
     a_t, tau_t, change, part = scratch[0], scratch[1], scratch[2], scratch[3]
@@ -108,15 +119,16 @@ def write_limited_target(
         tau_t[i] = effort[i] - part[i]
         change[i] = -parts.law_self_motion[i]
     tasks = min(_excess(a_t, tau_t, bounds, permitted, barred, change, 1.0), whole)
-    held[0] = max(share[0], tasks)
+    held = max(share[0], tasks)
     for i in range(n):
         change[i] = tasks * (parts.damped[i] - parts.law[i])
     asked, asked_damped = scratch[0], scratch[1]
     for i in range(n):
         asked[i] = parts.law_self_motion[i] + parts.law_braking[i]
         asked_damped[i] = parts.damped_self_motion[i] + parts.damped_braking[i]
-    ours = 1.0 - _permitted_part(M, asked, permitted, part)
-    theirs = 1.0 - _permitted_part(M, asked_damped, permitted, part)
+    leave = 1.0 - (1.0 - LARGE) * held
+    ours = 1.0 - _permitted_part(M, asked, permitted, leave, part)
+    theirs = 1.0 - _permitted_part(M, asked_damped, permitted, leave, part)
     for i in range(n):
         change[i] -= whole * (1.0 - tasks) * ours * asked[i]
         change[i] -= whole * tasks * theirs * asked_damped[i]
@@ -133,7 +145,7 @@ def write_limited_target(
 def _excess(
     a: Array,
     effort: Array,
-    bounds: Bounds,
+    bounds: Within,
     permitted: Permitted,
     barred: Barred,
     change: Array,
@@ -144,7 +156,7 @@ def _excess(
     most, least = 0.0, np.inf
     for i in range(a.shape[0]):
         most = max(most, abs(effort[i]) / permitted.effort[i] - 1.0)
-        beyond = max(a[i] - bounds.a_upper[i], bounds.a_lower[i] - a[i])
+        beyond = max(a[i] - bounds.upper[i], bounds.lower[i] - a[i])
         most = max(most, beyond / permitted.acceleration[i])
         least = min(least, permitted.acceleration[i])
     for r in range(barred.lower.shape[0]):
@@ -158,11 +170,13 @@ def _excess(
 
 
 @kernel
-def _permitted_part(M: Array, asked: Array, permitted: Permitted, tau: Array) -> float:
-    """Return which part of an acceleration the limits permit far from them."""
+def _permitted_part(
+    M: Array, asked: Array, permitted: Permitted, leave: float, tau: Array
+) -> float:
+    """Return which part of an acceleration is a part of what the limits permit."""
     multiply(M, asked, tau)
-    most = 1.0
+    most = leave
     for i in range(tau.shape[0]):
         most = max(most, abs(tau[i]) / permitted.effort[i])
         most = max(most, abs(asked[i]) / permitted.acceleration[i])
-    return 1.0 / most
+    return leave / most

@@ -5,11 +5,11 @@ is above the threshold ε, and s (2 - s²/ε²) d/ε² below. The steepest of bo
 at s = 0. Let f = Kp s(e) be what the feedback asks for at rest, the part of d that
 persists while a task cannot be met. With
 
-    ε² = max(ε_0², (‖f‖ - f_0)/L)
+    ε² = max(ε_0², ‖f‖/L)
 
-the acceleration that it causes changes by at most 2 (L + f_0/ε_0²) for each unit of s,
-whatever the target. A task that is tracked has f = 0 nearly, at any speed: for it the
-law is exact down to ε_0. ``docs/law.md``, The edge, has the proposition.
+the acceleration that it causes changes by at most 2 L for each unit of s, whatever the
+target. A task that is tracked has f = 0 nearly, at any speed: for it the law is exact
+down to ε_0. ``docs/edge.md`` has the propositions and where each constant is from.
 
 How hard the spring at the edge draws is 2 L |∂s/∂q|. At a stretched elbow |∂s/∂q| is up
 to a quarter of the robot's size. Where only a height counts, or x and y, it is up to
@@ -18,7 +18,7 @@ third of L, one of two components half.
 
 Below a level of the singular value s_1 the null space turns by up to |∂J/∂q|/s_1, and
 what is asked for there with it. A level follows with L s_1/size where that is less; a
-field costs those above it an ε that grows with g, where they are held.
+field costs a spring above it an ε that grows with g, as far as the spring slips.
 
 A level that is held at its edge leaves to those below the very directions in which it
 is drawn there: along them its spring must outweigh what they ask for. They ask for
@@ -48,14 +48,14 @@ WHOLE = 3
 BELOW = 40.0
 """By how much L is less below a held level: its feedback then accelerates a joint by at
 most 1/40 of the spring of the level above."""
-MODEST, MODEST_ON_LEGS = 0.5, 10.0
-"""f_0 over the robot's size [1/s²]: what a position 0.5 % of the size away asks for
-at 10 rad/s; and with a floating base, whose feet ask for more where they land."""
+MODEST_ON_LEGS = 10.0
+"""f_0 over the robot's size [1/s²] with a floating base: ε follows ‖f‖ - f_0 there,
+since feet ask for that much where they land."""
 
-TURNING, QUARTER, QUICKEST = 50.0, 0.25, 7.0
+TURNING, QUICKEST = 50.0, 7.0
 """How fast what a field asks for may change as its null space turns [1/s]: what is held
-for a period h is stable below 2/h, and periods are up to 10 ms. A velocity counts for a
-quarter, and nothing for more than 7 rad/s: no field costs the task all that it has."""
+for a period h is stable below 2/h, and periods are up to 10 ms. No field counts for
+more than 7 rad/s: none costs a spring all that it has."""
 
 
 class Following(NamedTuple):
@@ -64,7 +64,7 @@ class Following(NamedTuple):
     size: float  # the robot's [m]; 0: they do not
     # L [rad/s² for each unit of a singular value]; inf: it does not follow
     steepest: float
-    modest: float  # f_0 [m/s² or rad/s²]
+    modest: float  # f_0 [m/s² or rad/s²]; 0 on a fixed base
     legs: bool  # whether the base floats
 
     @classmethod
@@ -72,8 +72,8 @@ class Following(NamedTuple):
         """Return it for a robot of a size [m]."""
         if size == 0.0:
             return cls(*NOT)
-        modest = MODEST_ON_LEGS if on_legs else MODEST
-        return cls(size, STIFFNESS / size, size * modest, on_legs)
+        modest = size * MODEST_ON_LEGS if on_legs else 0.0
+        return cls(size, STIFFNESS / size, modest, on_legs)
 
 
 NOT = Following(0.0, np.inf, 0.0, False)  # nothing follows
@@ -93,16 +93,10 @@ class Thresholds(NamedTuple):
 
 
 @kernel
-def turning_threshold(g: Array, v: Array, following: Following) -> float:
-    """Return the ε that a field and a speed need where an arm is held.
-
-    Args:
-        g: The field, shape (nv,).
-        v: The velocity, shape (nv,).
-        following: What they count.
-    """
-    quickest = max(np.sqrt(squared_norm(g)), QUARTER * np.sqrt(squared_norm(v)))
-    return float(following.size / TURNING * min(quickest, QUICKEST))
+def turning_threshold(g: Array, following: Following) -> float:
+    """Return the ε that a field g, shape (nv,), needs where a spring slips."""
+    quickest = min(np.sqrt(squared_norm(g)), QUICKEST)
+    return float(following.size / TURNING * quickest)
 
 
 @kernel
@@ -130,8 +124,8 @@ def write_thresholds(
         springs: Whether a row is that of a spring, shape (m,).
         ends: Where each level's rows end in the stack, shape (levels,).
         least: ε_0.
-        turning: See `turning_threshold`; for levels that ask for f_0, or springs that
-            pull with all their force, and for others as much as they do of it.
+        turning: See `turning_threshold`; of springs that pull with all their force,
+            and of others as much as they do of it.
         following: L and f_0.
         thresholds: Where they are written.
 
@@ -153,13 +147,10 @@ def write_thresholds(
                 square += asked[k] * asked[k]
                 more += (yields[k] - 1.0) * asked[k] * asked[k]
         scale = np.sqrt(max(whitened / plain, 1.0)) if plain > 0.0 else 1.0
-        norm, share = np.sqrt(square), np.sqrt(pull)
-        if following.modest > 0.0:
-            share = max(share, norm / following.modest)
-        beyond = max(norm - following.modest, 0.0)
+        beyond = max(np.sqrt(square) - following.modest, 0.0)
         if beyond > 0.0:
             beyond *= 1.0 + more / square
-        part = min(share, 1.0)
+        part = min(np.sqrt(pull), 1.0)
         follows = scale * np.sqrt(beyond / following.steepest)
         own = max(least, follows, scale * part * turning)
         largest = max(largest, own)
@@ -200,19 +191,23 @@ def threshold_below(
 
 
 @kernel
-def how_held(lacking: float, wanted: float, following: Following) -> float:
+def how_held(
+    lacking: float, wanted: float, least: float, following: Following
+) -> float:
     """Return how much a level is held at the edge, from 0 (exact) to nearly 1.
 
-    It grows slowly as the level begins to ask for more than f_0: as fast as the level
-    is lost to what is below it, both would swing from one to the other.
+    It grows slowly as the level begins to ask for what its threshold follows: as fast
+    as the level is lost to what is below it, both would swing from one to the other.
 
     Args:
         lacking: ‖f - J a_f‖², what the level does not get of what it asks for at rest.
         wanted: ‖f‖².
-        following: f_0.
+        least: ε_0.
+        following: L and f_0.
     """
     beyond = np.sqrt(wanted) - following.modest
     if beyond <= 0.0:
         return 0.0
     lacks = min(np.sqrt(lacking / wanted), 1.0)
-    return float(lacks * beyond / (beyond + following.modest))
+    slowly = following.steepest * least * least + following.modest
+    return float(lacks * beyond / (beyond + slowly))

@@ -14,17 +14,15 @@ So μ is the largest of three shares, each of them 0 in the middle:
     limits  a_exact is within all limits: 0;  a tenth beyond one: 1
 
 with σ the smallest singular value of the stack J, whatever the metric. The first two
-are here, the last is where limits are known, in `control/actuation/limited_target.py`.
+are here, the last is where limits are known, in `limited_target.py`.
 All are continuous, so a is.
 
-``docs/law.md``, The edge, has what follows from it.
+``docs/edge.md`` has what follows from it.
 """
-
-from typing import NamedTuple, Self
 
 import numpy as np
 
-from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.arrays import Array
 from hsp_control.compiled.kernels import kernel
 from hsp_control.compiled.linalg import copy, orthogonalise_rows, squared_norm
 
@@ -34,42 +32,6 @@ singular one, whatever a step asks for."""
 
 FAR = 0.85
 """Part of ℓ up to which errors are far from being those of a hand that is held."""
-
-
-class EdgeMemory(NamedTuple):
-    """What the two laws leave, between the steps of the law."""
-
-    Q: Array  # factors of the exact inverse, see `pseudo_inverse.py`: (m, nv)
-    X: Array  # (m, m)
-    turned: Array  # scratch, (m, nv)
-    exact: Array  # a_exact, shape (nv,), where μ < 1 and the laws differ
-    damped: Array  # a_damped, shape (nv,), where they differ or a limit is violated
-    exact_e_N: Array  # shape (nv,)
-    # P a of a and of a_damped, and what brakes them, K_N P v, shape (2, nv) each; they
-    # are written where a limit is violated
-    self_motions: Array
-    brakings: Array
-    share: Array  # μ, without the share of the limits, shape (1,)
-    # how much the tasks are held, by their edge or by limits, where a limit binds, (1,)
-    held: Array
-    code: Indices  # of a_damped, see `outcome_of`, shape (1,)
-
-    @classmethod
-    def allocate(cls, m: int, nv: int) -> Self:
-        """Return memory for m rows."""
-        return cls(
-            Q=np.zeros((m, nv)),
-            X=np.zeros((m, m)),
-            turned=np.zeros((m, nv)),
-            exact=np.zeros(nv),
-            damped=np.zeros(nv),
-            exact_e_N=np.zeros(nv),
-            self_motions=np.zeros((2, nv)),
-            brakings=np.zeros((2, nv)),
-            share=np.zeros(1),
-            held=np.ones(1),
-            code=np.zeros(1, dtype=np.int64),
-        )
 
 
 @kernel
