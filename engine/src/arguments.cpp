@@ -1,8 +1,8 @@
 #include "arguments.hpp"
 
-#include <nanobind/ndarray.h>
 #include <nanobind/stl/string.h>
 
+#include "numpy.hpp"
 #include "python_objects.hpp"
 
 namespace nb = nanobind;
@@ -13,17 +13,6 @@ namespace {
 
 const char* entries(char entry) {
   return entry == 'd' ? "float64" : entry == 'i' ? "int64" : "bool";
-}
-
-bool is_packed(const nb::ndarray<nb::ro>& x, Order order) {
-  if (x.size() == 0) return true;  // NumPy's strides of nothing are zero
-  std::int64_t stride = 1;
-  for (std::size_t i = 0; i < x.ndim(); ++i) {
-    const std::size_t axis = order == Order::Rows ? x.ndim() - 1 - i : i;
-    if (x.shape(axis) > 1 && x.stride(axis) != stride) return false;
-    stride *= static_cast<std::int64_t>(x.shape(axis));
-  }
-  return true;
 }
 
 std::string use_text(const Field& field) {
@@ -42,22 +31,21 @@ std::string use_text(const Field& field) {
 
 // The memory of an array, not a copy: a call reads what is there when it is made.
 Argument array(const Kind& kind, const Field& field, nb::handle given) {
-  if (!nb::isinstance<nb::ndarray<nb::ro>>(given)) refuse(kind, field, text_of(nb::repr(given)));
-  const auto x = nb::cast<nb::ndarray<nb::ro>>(given);
-  const bool is_entry = field.entry == 'd'   ? x.dtype() == nb::dtype<double>()
-                        : field.entry == 'i' ? x.dtype() == nb::dtype<std::int64_t>()
-                                             : x.dtype() == nb::dtype<bool>();
-  const bool writeable =
-      field.access == Access::In || nb::cast<bool>(given.attr("flags").attr("writeable"));
-  if (!is_entry || static_cast<std::int32_t>(x.ndim()) != field.rank ||
-      !is_packed(x, field.order) || !writeable)
+  if (!PyArray_Check(given.ptr())) refuse(kind, field, text_of(nb::repr(given)));
+  auto* x = reinterpret_cast<PyArrayObject*>(given.ptr());
+  const int entry = field.entry == 'd' ? NPY_DOUBLE : field.entry == 'i' ? NPY_INT64 : NPY_BOOL;
+  const bool packed =
+      field.order == Order::Rows ? PyArray_IS_C_CONTIGUOUS(x) : PyArray_IS_F_CONTIGUOUS(x);
+  const bool writeable = field.access == Access::In || PyArray_ISWRITEABLE(x);
+  if (!PyArray_EquivTypenums(PyArray_TYPE(x), entry) || PyArray_NDIM(x) != field.rank || !packed ||
+      !PyArray_ISBEHAVED_RO(x) || !writeable)
     refuse(kind, field,
            "an array of " + text_of(given.attr("dtype")) + " with the shape " +
                text_of(given.attr("shape")) + " and the strides " + text_of(given.attr("strides")) +
                (writeable ? "" : ", read-only"));
   Argument found;
-  found.data = const_cast<void*>(x.data());
-  for (std::size_t i = 0; i < x.ndim(); ++i) found.shape[i] = static_cast<std::int64_t>(x.shape(i));
+  found.data = PyArray_DATA(x);
+  for (int i = 0; i < field.rank; ++i) found.shape[i] = PyArray_DIM(x, i);
   return found;
 }
 

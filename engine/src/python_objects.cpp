@@ -2,10 +2,7 @@
 
 #include <nanobind/stl/pair.h>
 
-#define NPY_NO_DEPRECATED_API NPY_2_0_API_VERSION
-#define PY_ARRAY_UNIQUE_SYMBOL hsp_engine_numpy
-#define NO_IMPORT_ARRAY
-#include <numpy/arrayobject.h>
+#include "numpy.hpp"
 
 namespace nb = nanobind;
 

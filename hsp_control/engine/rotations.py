@@ -12,7 +12,7 @@ quaternion is x, y, z, w. The equations stand in the engine's ``rotations.hpp``.
 - ``rotation_from_quaternion(q)``: of a quaternion of any length but zero.
 - ``stumpff(s)``: the functions C0 to C5 of which all of them are made, at s = |y|².
 
-They raise TypeError for an array of another shape, or of no numbers.
+They take what NumPy takes for an array, and raise TypeError for another shape.
 """
 
 from ._engine import exp3 as exp3

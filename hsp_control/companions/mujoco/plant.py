@@ -141,8 +141,9 @@ class MujocoEngine(SampledPlant):
             for k in np.flatnonzero((touched >= 0).any(axis=1)).tolist():
                 self._mujoco.mj_contactForce(self.model, data, k, local[k])
             points = np.array([origins[name] for name in names])
-            places = contact.pos, contact.frame.reshape(count, 3, 3)
-            engine.AddContactWrenches(touched, *places, local, points, sums)()
+            where = np.ascontiguousarray(contact.pos)  # both are members of structs
+            axes = np.ascontiguousarray(contact.frame).reshape(count, 3, 3)
+            engine.AddContactWrenches(touched, where, axes, local, points, sums)()
         return dict(zip(names, sums, strict=True))
 
 
