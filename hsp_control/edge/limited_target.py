@@ -28,9 +28,9 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.compiled.kernels import kernel
-from hsp_control.compiled.linalg import multiply, squared_norm
+from hsp_control.compiled.kernels import KernelCall
 
 LARGE = 0.1
 """Excess from which on it counts wholly, and the part of what the limits permit that a
@@ -85,8 +85,7 @@ class Barred(NamedTuple):
     lower: Array  # shape (k,)
 
 
-@kernel
-def write_limited_target(
+def limited_target(
     M: Array,
     a: Array,
     effort: Array,
@@ -94,10 +93,9 @@ def write_limited_target(
     bounds: Within,
     permitted: Permitted,
     barred: Barred,
-    scratch: Array,
     share: Array,
-) -> None:
-    """Overwrite what is wanted by what the step is to come near to.
+) -> KernelCall:
+    """Return the call that overwrites what is wanted by what the step comes near to.
 
     Args:
         M: Mass matrix, shape (nv, nv).
@@ -107,76 +105,7 @@ def write_limited_target(
         bounds: Bounds on the acceleration.
         permitted: What excesses are relative to.
         barred: Rows of barriers; ``lower`` then is for deviations from the new a.
-        scratch: Shape (4, nv).
         share: How much the law is damped already, shape (1,); see `shares.py`.
     """
-    n = a.shape[0]
-    a_t, tau_t, change, part = scratch[0], scratch[1], scratch[2], scratch[3]
-    whole = _excess(a, effort, bounds, permitted, barred, change, 0.0)
-    multiply(M, parts.law_self_motion, part)
-    for i in range(n):
-        a_t[i] = a[i] - parts.law_self_motion[i]
-        tau_t[i] = effort[i] - part[i]
-        change[i] = -parts.law_self_motion[i]
-    tasks = min(_excess(a_t, tau_t, bounds, permitted, barred, change, 1.0), whole)
-    held = max(share[0], tasks)
-    for i in range(n):
-        change[i] = tasks * (parts.damped[i] - parts.law[i])
-    asked, asked_damped = scratch[0], scratch[1]
-    for i in range(n):
-        asked[i] = parts.law_self_motion[i] + parts.law_braking[i]
-        asked_damped[i] = parts.damped_self_motion[i] + parts.damped_braking[i]
-    leave = 1.0 - (1.0 - LARGE) * held
-    ours = 1.0 - _permitted_part(M, asked, permitted, leave, part)
-    theirs = 1.0 - _permitted_part(M, asked_damped, permitted, leave, part)
-    for i in range(n):
-        change[i] -= whole * (1.0 - tasks) * ours * asked[i]
-        change[i] -= whole * tasks * theirs * asked_damped[i]
-    multiply(M, change, part)
-    for i in range(n):
-        a[i] += change[i]
-        effort[i] += part[i]
-    for r in range(barred.lower.shape[0]):
-        for i in range(n):
-            barred.lower[r] -= barred.A[r, i] * change[i]
-
-
-@kernel
-def _excess(
-    a: Array,
-    effort: Array,
-    bounds: Within,
-    permitted: Permitted,
-    barred: Barred,
-    change: Array,
-    changed: float,
-) -> float:
-    """Return by how much an acceleration is beyond limits, from 0 to 1."""
-    # ``changed`` is 1 if a differs by ``change`` from what ``barred`` is for.
-    most, least = 0.0, np.inf
-    for i in range(a.shape[0]):
-        most = max(most, abs(effort[i]) / permitted.effort[i] - 1.0)
-        beyond = max(a[i] - bounds.upper[i], bounds.lower[i] - a[i])
-        most = max(most, beyond / permitted.acceleration[i])
-        least = min(least, permitted.acceleration[i])
-    for r in range(barred.lower.shape[0]):
-        row = barred.A[r, : a.shape[0]]
-        missing = barred.lower[r]
-        for i in range(a.shape[0]):
-            missing -= changed * row[i] * change[i]
-        if missing > 0.0:
-            most = max(most, missing / (np.sqrt(squared_norm(row)) * least))
-    return float(min(most / LARGE, 1.0))
-
-
-@kernel
-def _permitted_part(
-    M: Array, asked: Array, permitted: Permitted, leave: float, tau: Array
-) -> float:
-    """Return which part of an acceleration is a part of what the limits permit."""
-    multiply(M, asked, tau)
-    most = leave
-    for i in range(tau.shape[0]):
-        most = max(most, abs(tau[i]) / permitted.effort[i])
-        most = max(most, abs(asked[i]) / permitted.acceleration[i])
-    return leave / most
+    given = M, a, effort, parts, bounds, permitted, barred, share, LARGE
+    return engine.LimitedTarget, given

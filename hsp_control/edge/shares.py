@@ -20,51 +20,9 @@ All are continuous, so a is.
 ``docs/edge.md`` has what follows from it.
 """
 
-import numpy as np
-
-from hsp_control.common.arrays import Array
-from hsp_control.compiled.kernels import kernel
-from hsp_control.compiled.linalg import copy, orthogonalise_rows, squared_norm
-
 NEAR = 0.1
 """σ_x over the robot's size: the law is exact in every posture that is farther from a
 singular one, whatever a step asks for."""
 
 FAR = 0.85
 """Part of ℓ up to which errors are far from being those of a hand that is held."""
-
-
-@kernel
-def smooth_share(x: float) -> float:
-    """Return 0 for x ≤ 0 and 1 for x ≥ 1, and between them 3x² - 2x³."""
-    x = min(max(x, 0.0), 1.0)
-    return x * x * (3.0 - 2.0 * x)
-
-
-@kernel
-def near_share(J: Array, size: float, least: float, turned: Array) -> float:
-    """Return how near a singular posture is, from 0 to 1.
-
-    Args:
-        J: The stack, shape (m, nv).
-        size: The robot's size [m].
-        least: ε_0: no exact law is asked for below twice of it.
-        turned: Scratch, shape (m, nv).
-    """
-    smallest = np.inf
-    for k in range(J.shape[0]):
-        copy(J[k], turned[k])
-    orthogonalise_rows(turned, turned[:0, :0])
-    for k in range(J.shape[0]):
-        smallest = min(smallest, squared_norm(turned[k]))
-    edge = max(NEAR * size, 2.0 * least)
-    return float(smooth_share(2.0 - 2.0 * np.sqrt(smallest) / edge))
-
-
-@kernel
-def far_share(stretched: Array) -> float:
-    """Return how far an error is, from 0 to 1; ``stretched`` is |e|/ℓ of each row."""
-    most = 0.0
-    for k in range(stretched.shape[0]):
-        most = max(most, stretched[k])
-    return float(smooth_share((most - FAR) / (1.0 - FAR)))

@@ -1,4 +1,6 @@
-"""Where an inverse begins to be bounded: a threshold that follows the errors.
+"""Where an inverse begins to be bounded: the constants, and where each is from.
+
+The mathematics is in the engine, ``engine/edge/threshold.hpp``.
 
 A level asks for J a = d. Along a direction of the singular value s it gets d/s where s
 is above the threshold ε, and s (2 - s²/ε²) d/ε² below. The steepest of both is 2 d/ε²,
@@ -34,9 +36,8 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from hsp_control.common.arrays import Array, Flags, Indices
-from hsp_control.compiled.kernels import kernel
-from hsp_control.compiled.linalg import squared_norm
+from hsp_control.common.arrays import Array
+from hsp_control.edge.shares import FAR, NEAR
 
 STIFFNESS = 200.0
 """L times the robot's size [1/s²]. A stretched elbow is then drawn to its singular
@@ -59,24 +60,29 @@ more than 7 rad/s: none costs a spring all that it has."""
 
 
 class Following(NamedTuple):
-    """How the thresholds follow what is asked for."""
+    """How the thresholds follow what is asked for, and when the exact law counts."""
 
     size: float  # the robot's [m]; 0: they do not
     # L [rad/s² for each unit of a singular value]; inf: it does not follow
     steepest: float
     modest: float  # f_0 [m/s² or rad/s²]; 0 on a fixed base
-    legs: bool  # whether the base floats
+    below: float  # by how much L is less below a held level
+    turning: float  # ε for each rad/s of a field where a spring slips
+    quickest: float  # the most that counts of a field [rad/s]
+    near: float  # σ_x: the exact law counts wholly above
+    far: float  # part of the largest error up to which it counts wholly
 
     @classmethod
     def of(cls, size: float, *, on_legs: bool) -> Self:
-        """Return it for a robot of a size [m]."""
-        if size == 0.0:
-            return cls(*NOT)
+        """Return it for a robot of a size [m]; for 0 nothing follows."""
         modest = size * MODEST_ON_LEGS if on_legs else 0.0
-        return cls(size, STIFFNESS / size, modest, on_legs)
+        steepest = STIFFNESS / size if size else np.inf
+        return cls(
+            size, steepest, modest, BELOW, size / TURNING, QUICKEST, NEAR * size, FAR
+        )
 
 
-NOT = Following(0.0, np.inf, 0.0, False)  # nothing follows
+NOT = Following.of(0.0, on_legs=False)  # nothing follows
 
 
 class Thresholds(NamedTuple):
@@ -90,124 +96,3 @@ class Thresholds(NamedTuple):
     def allocate(cls, levels: int) -> Self:
         """Return those of a number of levels."""
         return cls(*np.zeros((3, levels)))
-
-
-@kernel
-def turning_threshold(g: Array, following: Following) -> float:
-    """Return the ε that a field g, shape (nv,), needs where a spring slips."""
-    quickest = min(np.sqrt(squared_norm(g)), QUICKEST)
-    return float(following.size / TURNING * quickest)
-
-
-@kernel
-def write_thresholds(
-    J: Array,
-    B: Array,
-    asked: Array,
-    yields: Array,
-    pulls: Array,
-    springs: Flags,
-    ends: Indices,
-    least: float,
-    turning: float,
-    following: Following,
-    thresholds: Thresholds,
-) -> float:
-    """Write the threshold of each level.
-
-    Args:
-        J: The levels' Jacobians, one below the other, shape (m, nv).
-        B: J L⁻ᵀ, shape (m, nv).
-        asked: f, what the feedback asks for at rest, level after level, shape (m,).
-        yields: By how much L is less for a row, shape (m,); 0: it does not count.
-        pulls: With how much of its largest force a spring pulls, shape (m,).
-        springs: Whether a row is that of a spring, shape (m,).
-        ends: Where each level's rows end in the stack, shape (levels,).
-        least: ε_0.
-        turning: See `turning_threshold`; of springs that pull with all their force,
-            and of others as much as they do of it.
-        following: L and f_0.
-        thresholds: Where they are written.
-
-    Returns:
-        A singular value of the stack from which on no level is bounded.
-    """
-    largest, start = least, 0
-    above = 0.0  # the largest scale of those above
-    for level in range(ends.shape[0]):
-        square = more = pull = whitened = plain = 0.0
-        sprung, tracks = True, False
-        for k in range(start, ends[level]):
-            sprung = sprung and springs[k]
-            pull += pulls[k] * pulls[k]
-            whitened += squared_norm(B[k])
-            plain += squared_norm(J[k])
-            if yields[k] > 0.0:
-                tracks = True
-                square += asked[k] * asked[k]
-                more += (yields[k] - 1.0) * asked[k] * asked[k]
-        scale = np.sqrt(max(whitened / plain, 1.0)) if plain > 0.0 else 1.0
-        beyond = max(np.sqrt(square) - following.modest, 0.0)
-        if beyond > 0.0:
-            beyond *= 1.0 + more / square
-        part = min(np.sqrt(pull), 1.0)
-        follows = scale * np.sqrt(beyond / following.steepest)
-        own = max(least, follows, scale * part * turning)
-        largest = max(largest, own)
-        if above > 0.0:
-            # No s is below that of the stack: `threshold_below` is not above it then.
-            turns = np.cbrt(follows * follows * following.size * above)
-            largest = max(largest, turns)
-        thresholds.own[level], thresholds.follows[level] = own, follows
-        thresholds.scales[level] = scale
-        above = max(above, scale) if sprung or tracks else above
-        start = ends[level]
-    return float(largest)
-
-
-@kernel
-def threshold_below(
-    asked: Array,
-    held: float,
-    above: float,
-    level: int,
-    following: Following,
-    thresholds: Thresholds,
-) -> float:
-    """Return the ε that a level below others has at least.
-
-    Args:
-        asked: f - J a_f of the level, shape (m,).
-        held: How much levels above are held, see `how_held`.
-        above: Their least singular value s_1, in their scale; inf: nobody turns.
-        level: Which one.
-        following: f_0 and L.
-        thresholds: Those of `write_thresholds`.
-    """
-    beyond = max(np.sqrt(squared_norm(asked)) - following.modest, 0.0)
-    scale, follows = thresholds.scales[level], thresholds.follows[level]
-    square = scale * scale * held * BELOW * beyond / following.steepest
-    return float(np.sqrt(square + follows * follows * following.size / above))
-
-
-@kernel
-def how_held(
-    lacking: float, wanted: float, least: float, following: Following
-) -> float:
-    """Return how much a level is held at the edge, from 0 (exact) to nearly 1.
-
-    It grows slowly as the level begins to ask for what its threshold follows: as fast
-    as the level is lost to what is below it, both would swing from one to the other.
-
-    Args:
-        lacking: ‖f - J a_f‖², what the level does not get of what it asks for at rest.
-        wanted: ‖f‖².
-        least: ε_0.
-        following: L and f_0.
-    """
-    beyond = np.sqrt(wanted) - following.modest
-    if beyond <= 0.0:
-        return 0.0
-    lacks = min(np.sqrt(lacking / wanted), 1.0)
-    slowly = following.steepest * least * least + following.modest
-    return float(lacks * beyond / (beyond + slowly))

@@ -9,4 +9,3 @@ from .samples import VARYING as VARYING
 from .samples import FieldSample as FieldSample
 from .samples import MetricSample as MetricSample
 from .samples import TaskSample as TaskSample
-from .samples import raise_covector as raise_covector

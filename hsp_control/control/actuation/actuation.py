@@ -36,7 +36,6 @@ from hsp_control.control.actuation.limits_in_force import LimitSet
 from hsp_control.control.actuation.support import Support
 from hsp_control.edge import Resolution
 from hsp_control.edge.limited_target import Permitted
-from hsp_control.law.outcome import BEYOND_ANY_LEVEL
 from hsp_control.robot import RobotState
 
 _BEYOND = 4

@@ -38,14 +38,14 @@ class Levels(NamedTuple):
     thresholds: Array
     factors: Factors  # law's pseudo-inverse of the stack
     projectors: Projectors  # what its levels left, where it went level by level
-    code: Indices  # outcome of the damped law, see `Resolution.edge`
+    code: Indices  # outcome of the damped law, see `Resolution.damped_code`
     alone: bool  # see `Resolution`
 
     @classmethod
     def of(cls, resolution: Resolution, supported: bool, size: float) -> Self:
         """Return those of a law; ``supported``: its first level is that of contacts."""
         levels = len(resolution.ends) - supported
-        problem, edge = resolution.problem, resolution.edge
+        problem = resolution.problem
         return cls(
             problem.task.jacobian,
             problem.metric.L,
@@ -59,7 +59,7 @@ class Levels(NamedTuple):
             resolution.thresholds,
             resolution.factors,
             resolution.projectors,
-            edge.code,
+            resolution.damped_code,
             resolution.alone,
         )
 

@@ -31,12 +31,14 @@ from hsp_control.control.actuation.deviation_cost import (
     write_inverse_root,
 )
 from hsp_control.control.actuation.dual_active_set import QP, Workspace
+from hsp_control.control.actuation.support import Support
+from hsp_control.edge import Resolution
 from hsp_control.edge.limited_target import (
     Barred,
     Parts,
     Permitted,
     Within,
-    write_limited_target,
+    limited_target,
 )
 from hsp_control.robot import RobotState
 
@@ -207,11 +209,11 @@ class LimitedStep:
         if permitted is not None:
             kept, edge = slice(barriers, contacts), resolution.edge
             law = resolution.acceleration, edge.damped
-            parts = Parts(*law, *edge.self_motions, *edge.brakings)
+            own, (self_motions, brakings) = resolution.self_motions(state.v)
+            parts = Parts(*law, *self_motions, *brakings)
             barred = Barred(A[kept], lower[kept])
             target = *wanted, parts, Within(*bounds[:2]), permitted, barred
-            rows.append(resolution.self_motions(state.v))
-            rows.append((write_limited_target, (*target, zeros((4, n)), edge.share)))
+            rows += own, limited_target(*target, edge.share)
         rows.append((engine.LimitedRows, (*around, A, lower, upper)))
         write = write_directions(levels, directions)
         closest = write, *nearest(standing=p > 0, warm=True)

@@ -17,6 +17,7 @@ from hsp_control import (
     JointPosture,
     Robot,
     TargetPosture,
+    engine,
 )
 from hsp_control.common.arrays import Array
 from hsp_control.edge.threshold import (
@@ -24,14 +25,12 @@ from hsp_control.edge.threshold import (
     STIFFNESS,
     Following,
     Thresholds,
-    how_held,
-    threshold_below,
-    write_thresholds,
 )
 from hsp_control.null_space.fields import Rest
 
 seeds = st.integers(0, 2**32 - 1)
 LEAST = 0.03
+SLOW = Following.of(0.8, on_legs=False)._replace(steepest=150.0, modest=1.3)
 STEP = 1e-6  # of differences; the law bends within ε of 0.03 or more
 
 
@@ -49,10 +48,10 @@ def written(
     m, thresholds = len(asked), Thresholds.allocate(len(ends))
     J, pulling = np.ones((m, 7)), np.broadcast_to(pulls, m)
     springs = np.full(m, bool(pulling.any()))
-    largest = write_thresholds(
-        J, J * whitened, asked, np.full(m, yields), np.array(pulling), springs,
-        np.array(ends), LEAST, turning, following, thresholds,
-    )  # fmt: skip
+    asked_of = np.array(ends), asked, np.full(m, yields), np.array(pulling), springs
+    largest = engine.WriteThresholds(
+        J, J * whitened, *asked_of, np.zeros(m), LEAST, turning, following, thresholds
+    )()
     return largest, thresholds
 
 
@@ -66,7 +65,7 @@ def test_it_bounds_what_the_feedback_asks_for_over_its_square(
     than J the same holds for ε in its scale.
     """
     asked = 10.0**size * np.random.default_rng(seed).standard_normal(9)
-    following = Following(0.8, 150.0, 1.3, False)
+    following = SLOW
     ends = [3, 3, 5, 9]
     largest, (own, *_) = written(asked, ends, following)
     _, scaled = written(asked, ends, following, whitened=scale)
@@ -89,18 +88,18 @@ def test_a_level_below_a_held_one_asks_for_less_than_draws_that_one(
     seed: int, lacks: float
 ) -> None:
     """It gets 2 s ‖f‖/ε² at most along s; held for good, that is 2 L s/40."""
-    rng, following = np.random.default_rng(seed), Following(0.8, 150.0, 1.3, False)
+    rng, following = np.random.default_rng(seed), SLOW
     asked, above = 10.0 ** rng.uniform(-1.0, 4.0, (2, 1)) * unit(rng, 3)
     square = above @ above
-    held = how_held(lacks**2 * square, square, LEAST, following)
+    held = engine.HowHeld(lacks**2 * square, square, LEAST, following)()
     assert 0.0 <= held <= 1.0
     assert held == 0.0 or (lacks > 0.0 and square > 1.3**2)
     # it fades with what is asked for: nothing jumps where an error vanishes
     arm = following._replace(modest=0.0)
-    least = how_held(lacks**2 * 1e-12 * square, 1e-12 * square, LEAST, arm)
+    least = engine.HowHeld(lacks**2 * 1e-12 * square, 1e-12 * square, LEAST, arm)()
     assert least <= 1e-6 * np.sqrt(square) / (150.0 * LEAST**2)
     _, thresholds = written(np.zeros(6), [3, 6], following)
-    below = threshold_below(asked, held, np.inf, 1, following, thresholds)
+    below = engine.ThresholdBelow(asked, held, np.inf, 1, following, thresholds)()
     beyond = max(np.linalg.norm(asked) - 1.3, 0.0)
     assert below**2 == pytest.approx(held * beyond * 40.0 / 150.0)
 
@@ -110,13 +109,13 @@ def test_a_level_below_follows_as_slowly_as_those_above_turn(
     seed: int, size: float, log_s: float
 ) -> None:
     """ε² = f size/(L s_1); and it is below s where all are resolved at once."""
-    rng, following = np.random.default_rng(seed), Following(0.8, 150.0, 1.3, False)
+    rng, following = np.random.default_rng(seed), SLOW
     asked = 10.0**size * rng.standard_normal(6)
     scales = 10.0 ** rng.uniform(-1.0, 1.0, (6, 1))
     largest, thresholds = written(asked, [3, 6], following, whitened=scales)
     s = largest * 10.0 ** (log_s * rng.random(2))  # of both levels
     above = s[0] / thresholds.scales[0]
-    below = threshold_below(np.zeros(3), 0.0, above, 1, following, thresholds)
+    below = engine.ThresholdBelow(np.zeros(3), 0.0, above, 1, following, thresholds)()
     assert below**2 == pytest.approx(thresholds.follows[1] ** 2 * 0.8 / above)
     assert below <= s[1] * (1.0 + 1e-12)
 
@@ -125,7 +124,7 @@ def test_a_level_below_follows_as_slowly_as_those_above_turn(
 def test_springs_need_what_a_field_needs_as_far_as_they_pull(
     seed: int, pull: float
 ) -> None:
-    rng, following = np.random.default_rng(seed), Following(0.8, 150.0, 1.3, False)
+    rng, following = np.random.default_rng(seed), SLOW
     pulls = np.zeros(6)
     pulls[:3] = pull * unit(rng, 3)
     springs: dict[str, Any] = {"yields": 0.0, "pulls": pulls, "turning": 0.05}
