@@ -5,9 +5,13 @@
 
 namespace hsp {
 
+const Kind* const* contact_kinds();
 const Kind* const* robot_kinds();
+const Kind* const* task_kinds();
 const Kind* const* trajectory_kinds();
 
-inline std::vector<const Kind* const*> rooms() { return {robot_kinds(), trajectory_kinds()}; }
+inline std::vector<const Kind* const*> rooms() {
+  return {contact_kinds(), robot_kinds(), task_kinds(), trajectory_kinds()};
+}
 
 }  // namespace hsp

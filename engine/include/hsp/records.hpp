@@ -34,12 +34,24 @@ template <template <int...> class As> struct OrientationSample {
   As<3> angular_velocity, angular_acceleration;
 };
 
+// A pose: x and R, in world axes.
+template <template <int...> class As> struct PoseSample {
+  TrajectorySample<As, 3> position;
+  OrientationSample<As> orientation;
+};
+
 // A frame in the axes of the frame that it is relative to, linear rows before angular rows.
 template <template <int...> class As> struct FrameMotion {
   As<6, 'n'> jacobian, jacobian_dot;
   As<3, 3> rotation;
   As<3> position;
   As<6> velocity;  // J v
+};
+
+// A point: the part of a frame's motion that does not turn.
+template <template <int...> class As> struct PointMotion {
+  As<3, 'n'> jacobian, jacobian_dot;
+  As<3> position, velocity;
 };
 
 }  // namespace hsp
