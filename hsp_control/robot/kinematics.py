@@ -129,6 +129,23 @@ class FrameKinematics:
         """Return the motion as an argument of a kernel; see `planned`."""
         return self.motion, self.calls
 
+    @property
+    def point(self) -> "FramePoint":
+        """The frame's origin, as an argument of a kernel."""
+        return FramePoint(self)
+
+
+class FramePoint:
+    """The origin of a frame, without its axes."""
+
+    def __init__(self, frame: FrameKinematics) -> None:
+        self._frame = frame
+
+    def supplied(self) -> tuple[PointMotion, KernelCalls]:
+        """Return the origin's motion as an argument of a kernel; see `planned`."""
+        (J, J_dot, _, p, velocity), calls = self._frame.supplied()
+        return PointMotion(J[:3], J_dot[:3], p, velocity[:3]), calls
+
 
 class ShownFrame(FrameKinematics):
     """A frame whose arrays can be read, but not written."""
@@ -145,17 +162,6 @@ class ShownFrame(FrameKinematics):
     def supplied(self) -> tuple[FrameMotion, KernelCalls]:
         """Return the motion as an argument of a kernel; see `planned`."""
         return self._own.supplied()
-
-
-@kernel
-def copy_rows(
-    J_frame: Array, J_frame_dot: Array, first: int, J: Array, J_dot: Array
-) -> None:
-    """Write J and J': rows ``first``, ``first`` + 1, ... of the frame's."""
-    for i in range(J.shape[0]):
-        for j in range(J.shape[1]):
-            J[i, j] = J_frame[first + i, j]
-            J_dot[i, j] = J_frame_dot[first + i, j]
 
 
 class Term(NamedTuple):

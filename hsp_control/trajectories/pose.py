@@ -87,13 +87,10 @@ class PoseTrajectory(Part, ABC, family="poses", error=TrajectoryError):
         """Return the calls that write ``out`` at a time; see `Trajectory.calls`."""
         return [(write_sample, (self.sample, out, TIME))]
 
-    def supplied(self) -> tuple[Array, KernelCalls]:
-        """Return its sample as an argument of a kernel, in one array; see `planned`.
-
-        The rows are x, x', x'', R (three), ω and ω', shape (8, 3).
-        """
-        desired = np.zeros((8, 3))
-        return desired, self.calls(PoseSample.over(desired))
+    def supplied(self) -> tuple[PoseSample, KernelCalls]:
+        """Return its sample as an argument of a kernel; see `planned`."""
+        desired = PoseSample.over(np.zeros((8, 3)))
+        return desired, self.calls(desired)
 
 
 class ComposedPose(PoseTrajectory, type="composed"):
