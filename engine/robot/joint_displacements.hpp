@@ -1,25 +1,25 @@
-// Differences of joint positions.
+// q ⊖ reference of joints with one degree of freedom.
 #pragma once
 #include <cmath>
 #include <hsp/view.hpp>
 
 namespace hsp {
 
-// Write q ⊖ reference of joints with one degree of freedom; continuous ones, whose coordinates
-// are (cos, sin), are within ±π. A row of the joints is an index in v, one in q, and how many
-// coordinates there are.
+// Of one joint: `row` is its index in v, its index in q, and the number of its entries in q. A
+// continuous joint has two, (cos, sin), and its displacement is within ±π [rad or m].
+template <class Q, class Reference, class Row>
+double joint_displacement(const Q& q, const Reference& reference, const Row& row) {
+  const Index at = row[1];
+  if (row[2] == 1) return q[at] - reference[at];
+  const double c = q[at], s = q[at + 1], c_ref = reference[at], s_ref = reference[at + 1];
+  return std::atan2(s * c_ref - c * s_ref, c * c_ref + s * s_ref);
+}
+
+// Of several joints, each at its index in v; the other entries stay as they are.
 template <class Q, class Reference, class Joints, class Out>
-void joint_displacements(const Q& q, const Reference& reference, const Joints& single_dof_joints,
-                         Out& out) {
-  for (Index k = 0; k < single_dof_joints.rows(); ++k) {
-    const Index i = single_dof_joints(k, 0), at = single_dof_joints(k, 1);
-    if (single_dof_joints(k, 2) == 1) {
-      out[i] = q[at] - reference[at];
-    } else {
-      const double c = q[at], s = q[at + 1], c_ref = reference[at], s_ref = reference[at + 1];
-      out[i] = std::atan2(s * c_ref - c * s_ref, c * c_ref + s * s_ref);
-    }
-  }
+void joint_displacements(const Q& q, const Reference& reference, const Joints& joints, Out& out) {
+  for (Index k = 0; k < joints.rows(); ++k)
+    out[joints(k, 0)] = joint_displacement(q, reference, joints.row(k));
 }
 
 }  // namespace hsp

@@ -16,11 +16,11 @@ from hsp_control.compiled.rotations import (
     jexp3_dot,
     jlog3,
     log3,
-    quaternion_from_rotation,
     rotate,
     rotate_back,
 )
 from hsp_control.declaration import AnyOf
+from hsp_control.engine.rotations import quaternion_from_rotation
 from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
 from hsp_control.robot.kinematics import FrameKinematics, FrameMotion, copy_rows
@@ -99,9 +99,7 @@ class FrameOrientation(
 
 def _quaternions(desired: Array, actual: Array) -> tuple[Array, Array]:
     """Return two rotations as quaternions; q and -q are one: of the nearer sign."""
-    q_d, q = np.zeros((2, 4))
-    quaternion_from_rotation(desired, q_d)
-    quaternion_from_rotation(actual, q)
+    q_d, q = quaternion_from_rotation(desired), quaternion_from_rotation(actual)
     return q_d, q if q_d @ q >= 0.0 else -q
 
 

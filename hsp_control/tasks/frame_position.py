@@ -10,8 +10,7 @@ from hsp_control.compiled.kernels import KernelCall, kernel
 from hsp_control.declaration.quantities import Axes
 from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
-from hsp_control.robot.inertia import PointMotion
-from hsp_control.robot.kinematics import FrameKinematics, FrameMotion
+from hsp_control.robot.kinematics import FrameKinematics, FrameMotion, PointMotion
 from hsp_control.tasks.compliant_task import CompliantTask
 from hsp_control.tasks.feedback import ErrorPart, Feedback, add_feedback
 from hsp_control.tasks.frame_task import FrameTask, TrackingTask, place_point

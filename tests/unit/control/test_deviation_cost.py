@@ -18,8 +18,8 @@ from hsp_control.constraints.limits import StaticEffort
 from hsp_control.control.actuation import Status
 from hsp_control.control.actuation.deviation_cost import (
     Directions,
+    Levels,
     write_directions,
-    write_directions_at_once,
     write_inverse_root,
 )
 from hsp_control.law import Resolution
@@ -47,11 +47,13 @@ METRICS: dict[str, hsp.metrics.Metric] = {
 
 def inverse_cost(resolution: Resolution) -> Array:
     """Return J Jᵀ, which is to be H⁻¹."""
-    directions = Directions.of(resolution, False, panda().size)
+    levels, directions = Levels.of(resolution, False, panda().size), Directions.of(7)
     JT, moving = np.zeros((7, 7)), np.zeros(1, dtype=np.int64)
-    write = write_directions_at_once if resolution.alone else write_directions
-    write(directions)
-    write_inverse_root(directions, 0, JT, moving)
+    for kind, arguments in (
+        write_directions(levels, directions),
+        write_inverse_root(levels, directions, False, JT, moving),
+    ):
+        kind(*arguments)()
     assert moving[0] == 7
     return JT.T @ JT
 
