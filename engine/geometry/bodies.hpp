@@ -26,6 +26,7 @@ struct Bodies {
 
   std::int64_t kind(Index i) const { return kinds(i, 0); }
   bool is_link(Index i) const { return kinds(i, 1) >= 0; }
+  Vector3 size(Index i) const { return sizes.row(i).head<3>(); }
   double radius(Index i) const { return sizes(i, 6); }
   auto own_columns(Index i) const {
     return columns.segment(kinds(i, 2), kinds(i, 3) - kinds(i, 2));
@@ -71,19 +72,13 @@ inline Twist twist_of(const WorldKinematics& world, const Bodies& bodies, Index 
   return {twist.head<3>(), twist.tail<3>()};
 }
 
-// A force at x as a wrench about the world's origin: f and x × f.
+// A force at x as a wrench about the world's origin: f and x × f. A joint's column of J times a
+// wrench is its effort.
 inline Vector6 wrench(const Vector3& x, const Vector3& force) {
   Vector6 found;
-  found << force, x.cross(force);
+  found.head<3>() = force;
+  found.tail<3>() = x.cross(force);
   return found;
-}
-
-// Add Jᵀ w to the degrees of freedom of these columns. A joint that mimics another has columns of
-// its own, and the other's index in v.
-template <class J, class Columns, class Dofs, class Out>
-void add_effort(const J& jacobian, const Columns& columns, const Dofs& dofs, const Vector6& w,
-                Out& out) {
-  for (Index p = 0; p < columns.size(); ++p) out[dofs[p]] += jacobian.col(columns[p]).dot(w);
 }
 
 }  // namespace hsp

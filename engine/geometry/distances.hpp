@@ -31,12 +31,15 @@ struct MeasureDistances {
     for (const Index i : used) {
       const auto [R, p] = placement_of(placements, bodies, i);
       const Vector3 start = bodies.sizes.row(i).head<3>(), axis = bodies.sizes.row(i).segment<3>(3);
-      segments[i] << (R * start + p).transpose(), (R * axis).transpose();
+      segments[i].row(0) = R * start + p;
+      segments[i].row(1) = R * axis;
     }
     for (Index k = 0; k < pairs.rows(); ++k) {
       const Index i = pairs(k, 0), j = pairs(k, 1);
       const auto [distance, x, y, n] = nearest(i, j);
-      cores[k] << x.transpose(), y.transpose(), n.transpose();
+      cores[k].row(0) = x;
+      cores[k].row(1) = y;
+      cores[k].row(2) = n;
       distances[pairs(k, 2)] = distance - bodies.radius(i) - bodies.radius(j);
     }
   }
@@ -45,9 +48,7 @@ struct MeasureDistances {
 
   Nearest nearest(Index i, Index j) const {
     if (bodies.kind(j) == SEGMENT) return between_segments(segment(i), segment(j));
-    const Vector3 x = segments[i].row(0);
-    const auto [distance, n, H] = to_solid(bodies, j, x);
-    return {distance, x, x - distance * n, n};
+    return to_solid(bodies, j, segments[i].row(0));
   }
 };
 
@@ -85,19 +86,22 @@ struct DistanceGradients {
     const Twist first = twist_of(world, bodies, i), second = twist_of(world, bodies, j);
     if (bodies.kind(j) == SEGMENT) return between_segments(segment(i, first), segment(j, second));
     const Vector3 x = segments[i].row(0);
-    return to_moving_solid(bodies, j, second, x, first.at(x));
+    return to_solid(bodies, j, second, x, first.at(x));
   }
 
-  // Add J(x)ᵀ f and its rate, J the linear Jacobian of a link's point.
+  // Add J(x)ᵀ f and its rate, J the linear Jacobian of a link's point. A joint that mimics another
+  // has a column of its own, and the other's index in v.
   void push(Index i, const Vector3& x, const Vector3& x_dot, const Vector3& force,
             const Vector3& force_dot) {
     const auto columns = bodies.own_columns(i), dofs = bodies.own_dofs(i);
     const Vector6 w = wrench(x, force);
     Vector6 w_dot = wrench(x, force_dot);
     w_dot.tail<3>() += x_dot.cross(force);
-    add_effort(world.jacobian, columns, dofs, w, gradient);
-    add_effort(world.jacobian_dot, columns, dofs, w, rate);
-    add_effort(world.jacobian, columns, dofs, w_dot, rate);
+    for (Index p = 0; p < columns.size(); ++p) {
+      const auto J = world.jacobian.col(columns[p]), J_dot = world.jacobian_dot.col(columns[p]);
+      gradient[dofs[p]] += J.dot(w);
+      rate[dofs[p]] += J_dot.dot(w) + J.dot(w_dot);
+    }
   }
 };
 
@@ -108,7 +112,10 @@ struct AddForce {
   In<3> point, force;
   InOut<'n'> out;
 
-  void operator()() { add_effort(jacobian, columns, dofs, wrench(point, force), out); }
+  void operator()() {
+    const Vector6 w = wrench(point, force);
+    for (Index p = 0; p < columns.size(); ++p) out[dofs[p]] += jacobian.col(columns[p]).dot(w);
+  }
 };
 
 }  // namespace hsp

@@ -42,21 +42,25 @@ inline MovingNearest between_segments(const MovingSegment& first, const MovingSe
   return {now, x_dot, y_dot, (apart - now.n.dot(apart) * now.n) / now.distance};
 }
 
-// The distance of a point in the world to a solid, in the world's axes.
-inline SolidDistance to_solid(const Bodies& bodies, Index i, const Vector3& x) {
+// From a sphere's centre to a solid, which moves with a twist. In the solid's axes the normal is
+// the gradient of the distance at x, so that n' = ω × n + R H Rᵀ(x' - y'), where y' is the velocity
+// of the solid's point at x.
+inline MovingNearest to_solid(const Bodies& bodies, Index i, const Twist& twist, const Vector3& x,
+                              const Vector3& x_dot) {
   const auto [R, p] = placement_of_obstacle(bodies, i);
-  const auto [distance, n, H] =
-      distance_to_solid(bodies.kind(i), bodies.sizes.row(i).head<3>(), R.transpose() * (x - p));
-  return {distance, R * n, R * H * R.transpose()};
+  const Vector3 y_dot = twist.at(x);
+  const auto [distance, normal, turning] = distance_to_solid(
+      bodies.kind(i), bodies.size(i), R.transpose() * (x - p), R.transpose() * (x_dot - y_dot));
+  const Vector3 n = R * normal, n_dot = twist.angular.cross(n) + R * turning;
+  return {{distance, x, x - distance * n, n}, x_dot, y_dot, n_dot};
 }
 
-// The normal is the gradient of the distance at x, in the solid's axes, so that
-// n' = ω × n + R H Rᵀ(x' - y'), where y' is the velocity of the solid's point at x.
-inline MovingNearest to_moving_solid(const Bodies& bodies, Index i, const Twist& twist,
-                                     const Vector3& x, const Vector3& x_dot) {
-  const auto [distance, n, H] = to_solid(bodies, i, x);
-  const Vector3 y_dot = twist.at(x), n_dot = twist.angular.cross(n) + H * (x_dot - y_dot);
-  return {{distance, x, x - distance * n, n}, x_dot, y_dot, n_dot};
+inline Nearest to_solid(const Bodies& bodies, Index i, const Vector3& x) {
+  const auto [R, p] = placement_of_obstacle(bodies, i);
+  const auto [distance, normal, _] =
+      distance_to_solid(bodies.kind(i), bodies.size(i), R.transpose() * (x - p), Vector3::Zero());
+  const Vector3 n = R * normal;
+  return {distance, x, x - distance * n, n};
 }
 
 }  // namespace hsp
