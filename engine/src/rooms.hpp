@@ -25,20 +25,9 @@ const Kind* const* library_kinds(const std::string& path);
 
 inline std::vector<const Kind* const*> rooms() {
   return {
-          plan_kinds(),
-          contact_kinds(),
-          edge_kinds(),
-          field_kinds(),
-          geometry_kinds(),
-          integrator_kinds(),
-          law_kinds(),
-          limit_kinds(),
-          metric_kinds(),
-          qp_kinds(),
-          robot_kinds(),
-          simulation_kinds(),
-          task_kinds(),
-          trajectory_kinds(),
+      plan_kinds(),       contact_kinds(),    edge_kinds(),  field_kinds(),      geometry_kinds(),
+      integrator_kinds(), law_kinds(),        limit_kinds(), metric_kinds(),     qp_kinds(),
+      robot_kinds(),      simulation_kinds(), task_kinds(),  trajectory_kinds(),
   };
 }
 

@@ -108,7 +108,8 @@ template <class T> void prepare(T& x, const Sizes& size) {
   boost::pfr::for_each_field(x, [&](auto& member) {
     using M = std::remove_cvref_t<decltype(member)>;
     if constexpr (IsMemory<M>) member.prepare(size);
-    else if constexpr (!IsView<M> && !std::is_arithmetic_v<M>) prepare(member, size);
+    else if constexpr (!IsView<M> && !IsShared<M> && !std::is_arithmetic_v<M>)
+      prepare(member, size);
   });
 }
 

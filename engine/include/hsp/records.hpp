@@ -48,4 +48,10 @@ template <template <int...> class As> struct FrameMotion {
   As<6> velocity;  // J v
 };
 
+// A point: the part of a frame's motion that does not turn.
+template <template <int...> class As> struct PointMotion {
+  As<3, 'n'> jacobian, jacobian_dot;
+  As<3> position, velocity;
+};
+
 }  // namespace hsp
