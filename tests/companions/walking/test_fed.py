@@ -4,6 +4,7 @@ import pickle
 from copy import deepcopy
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from hsp_control import FramePose
@@ -27,6 +28,18 @@ def test_between_two_writings_its_derivatives_fit_it():
     assert (after.velocity - before.velocity) / (2 * H) == pytest.approx(
         now.acceleration, abs=1e-8
     )
+
+
+def test_in_between_an_orientation_turns_about_its_mean_rate():
+    reference, R = FedOrientation(), pin.exp3(np.array([0.2, -0.4, 1.0]))
+    w, w_dot = np.random.default_rng(0).normal(size=(2, 3))
+    reference.write(2.0, R, w, w_dot)
+    now = reference.sample(2.3)
+    turned = pin.exp3(0.3 * (w + 0.15 * w_dot)) @ R
+    assert now.rotation == pytest.approx(turned, abs=1e-15)
+    assert now.angular_velocity == pytest.approx(w + 0.3 * w_dot, abs=1e-15)
+    assert now.angular_acceleration.tolist() == w_dot.tolist()
+    assert reference.sample(1.0).rotation == pytest.approx(R, abs=1e-15)
 
 
 def test_its_calls_read_what_is_written_later():

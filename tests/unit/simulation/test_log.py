@@ -22,8 +22,10 @@ from hsp_control import (
 from hsp_control.cli import main
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LogError, ShapeError
+from hsp_control.constraints.limits.limits import own_limits
 from hsp_control.null_space.metrics import MassMatrixMetric
 from hsp_control.robot.integrators import Rk4
+from hsp_control.simulation.limit_excess import LimitExcess
 from hsp_control.trajectories import Lissajous
 
 
@@ -322,3 +324,20 @@ def test_the_log_says_how_far_the_robot_is_beyond_its_limits(
     said = " ".join(capsys.readouterr().out.split())
     assert f"panda_joint{dof + 1} is {beyond.max():.3g} rad/s beyond its speed" in said
     assert f"at {rollout.t[row]:g} s" in said
+
+
+def test_the_most_beyond_a_limit_is_kept_until_it_is_collected() -> None:
+    robot = load("panda")
+    limits, excess = own_limits(robot), LimitExcess(robot)
+    middle, rest = 0.5 * (limits.lower + limits.upper), np.zeros(robot.nv)
+    for beyond in (0.1, 0.3, 0.2):  # of joint 2 below, of joint 4 above, of a speed
+        q, v = middle.copy(), rest.copy()
+        q[1], q[3] = limits.lower[1] - beyond, limits.upper[3] + 2.0 * beyond
+        v[5] = -limits.velocity[5] - 3.0 * beyond
+        excess.record(limits, q, v)
+    most = [0.0, 0.3, 0.0, 0.6, 0.0, 0.0, 0.0]
+    for position, velocity in ((most, [0.0] * 5 + [0.9, 0.0]), ([0.0] * 7, [0.0] * 7)):
+        found = excess.collect(limits)
+        assert found["position_excess"].value == pytest.approx(position, abs=1e-14)
+        assert found["velocity_excess"].value == pytest.approx(velocity, abs=1e-14)
+        excess.record(limits, middle, rest)

@@ -19,6 +19,7 @@ from hsp_control.trajectories import (
     TrajectorySample,
 )
 from hsp_control.trajectories.streams import inbox
+from hsp_control.trajectories.streams.chart import Chart
 from hsp_control.trajectories.streams.mailbox import read_recording
 from hsp_control.trajectories.streams.running import SenderClock
 
@@ -435,3 +436,17 @@ def test_a_wrong_recording_names_its_line(
         read_recording(file)
     with pytest.raises(StreamError, match="cannot be read"):
         read_recording(tmp_path / "none.jsonl")
+
+
+# --- local coordinates ---------------------------------------------------------------
+
+
+def test_rotation_vectors_go_on_beyond_half_a_turn() -> None:
+    """A spin of two turns about a base is one line, whatever the quaternions' signs."""
+    axis, base = np.array([2.0, -1.0, 2.0]) / 3.0, pin.exp3(np.array([0.3, 1.0, -0.2]))
+    angles = np.linspace(0.1, 4.0 * np.pi + 0.1, 41)
+    turns = [pin.Quaternion(base @ pin.exp3(a * axis)).coeffs() for a in angles]
+    values = np.hstack([np.ones((41, 2)), turns])
+    x = Chart(2, True).local(values, base)
+    np.testing.assert_allclose(x[:, 2:], np.outer(angles, axis), rtol=0, atol=1e-13)
+    assert (x[:, :2] == 1.0).all()
