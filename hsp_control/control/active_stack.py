@@ -14,9 +14,10 @@ from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.contacts.contact import UnactuatedRows, unactuated_count
 from hsp_control.control.actuation.support import Support
 from hsp_control.control.setup import PlannedTask
-from hsp_control.law import CONSTANT, FieldSample, Outcome, Resolution, TaskSample
-from hsp_control.law.resolution import outcome_of
-from hsp_control.law.threshold import Following
+from hsp_control.edge import Resolution
+from hsp_control.edge.threshold import Following
+from hsp_control.law import CONSTANT, FieldSample, Outcome, TaskSample
+from hsp_control.law.outcome import outcome_of
 from hsp_control.null_space.fields import FieldSum, NullSpaceField
 from hsp_control.null_space.metrics import Metric
 from hsp_control.robot import Robot, RobotState

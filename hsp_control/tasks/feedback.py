@@ -10,7 +10,7 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HspControlError, TaskError
 from hsp_control.declaration.quantities import Positive, plain
-from hsp_control.law.threshold import WHOLE
+from hsp_control.edge.threshold import WHOLE
 from hsp_control.robot import Robot
 
 UNBOUNDED = np.zeros((0, 3))
@@ -73,7 +73,7 @@ class ErrorPart(NamedTuple):
 
     @property
     def yields(self) -> float:
-        """By how much L is less for it; see `hsp_control.law.threshold`."""
+        """By how much L is less for it; see `hsp_control.edge.threshold`."""
         return 1.0 if self.unit == "rad" else max(WHOLE + 1.0 - self.size, 1.0)
 
 

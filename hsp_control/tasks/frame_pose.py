@@ -9,8 +9,8 @@ import pinocchio as pin
 from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.compiled.kernels import KernelCall
-from hsp_control.compiled.rotations import quaternion_from_rotation
 from hsp_control.declaration import AnyOf
+from hsp_control.engine.rotations import quaternion_from_rotation
 from hsp_control.robot import RobotState
 from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.tasks.compliant_task import CompliantTask, Rotating
@@ -82,9 +82,7 @@ class FrameOrientation(
 
 def _quaternions(desired: Array, actual: Array) -> tuple[Array, Array]:
     """Return two rotations as quaternions; q and -q are one: of the nearer sign."""
-    q_d, q = np.zeros((2, 4))
-    quaternion_from_rotation(desired, q_d)
-    quaternion_from_rotation(actual, q)
+    q_d, q = quaternion_from_rotation(desired), quaternion_from_rotation(actual)
     return q_d, q if q_d @ q >= 0.0 else -q
 
 

@@ -11,8 +11,9 @@ import daqp
 import numpy as np
 from numpy.typing import NDArray
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.control.actuation.dual_active_set import QP, Workspace, minimise
+from hsp_control.control.actuation.dual_active_set import QP, Workspace
 
 Generator = np.random.Generator
 
@@ -35,7 +36,7 @@ class Case(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """What the kernel returned."""
+    """What the solver returned."""
 
     code: int
     x: Array
@@ -226,7 +227,7 @@ def spans(A: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 
 
 def packed(case: Case, softness: Array | None = None) -> QP:
-    """Return the kernel's argument; J's last columns with one entry are apart."""
+    """Return the solver's argument; J's last columns with one entry are apart."""
     soft = np.zeros(0) if softness is None else softness
     A, (nz, n) = np.ascontiguousarray(case.A), case.JT.shape
     own = 0
@@ -245,13 +246,16 @@ def _is_alone(JT: Array, row: int, column: int) -> bool:
 
 
 def answer(
-    case: Case, softness: Array | None = None, work: Workspace | None = None
+    case: Case,
+    softness: Array | None = None,
+    work: Workspace | None = None,
+    iterations: int = 10,
 ) -> Answer:
-    """Return the kernel's solution; ``work``: a workspace to begin warm with."""
+    """Return the solver's solution; ``work``: a workspace to begin warm with."""
     x, warm = case.x0.copy(), work is not None
     if work is None:
         work = Workspace.of(len(x), len(case.A), softness is not None)
-    code = minimise(packed(case, softness), warm, x, work)
+    code = engine.Minimise(packed(case, softness), iterations, warm, x, work)()
     active = work.active[: work.counts[0]].copy()
     return Answer(
         int(code),

@@ -34,7 +34,7 @@ template <template <int...> class As> struct OrientationSample {
   As<3> angular_velocity, angular_acceleration;
 };
 
-// A pose: x and R, in world axes.
+// A body's origin and its rotation.
 template <template <int...> class As> struct PoseSample {
   TrajectorySample<As, 3> position;
   OrientationSample<As> orientation;
@@ -46,12 +46,6 @@ template <template <int...> class As> struct FrameMotion {
   As<3, 3> rotation;
   As<3> position;
   As<6> velocity;  // J v
-};
-
-// A point: the part of a frame's motion that does not turn.
-template <template <int...> class As> struct PointMotion {
-  As<3, 'n'> jacobian, jacobian_dot;
-  As<3> position, velocity;
 };
 
 }  // namespace hsp

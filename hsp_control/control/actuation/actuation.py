@@ -18,19 +18,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.compiled.kernels import KernelCall, KernelCalls, kernel
-from hsp_control.compiled.linalg import copy
-from hsp_control.constraints.limits.acceleration_bounds import (
-    EFFORT,
-    MOTION,
-    Bounds,
-    Ends,
-    MotionLimits,
-    is_beyond,
-    violated_limits,
-    within,
-)
+from hsp_control.compiled.kernels import KernelCall, KernelCalls
+from hsp_control.constraints.limits.acceleration_bounds import EFFORT, MOTION
 from hsp_control.control.actuation.limited_step import (
     BEYOND,
     EXACT,
@@ -41,12 +32,10 @@ from hsp_control.control.actuation.limited_step import (
     Status,
     Wanted,
 )
-from hsp_control.control.actuation.limited_target import Permitted
 from hsp_control.control.actuation.limits_in_force import LimitSet
-from hsp_control.control.actuation.sent_effort import Held, observe
 from hsp_control.control.actuation.support import Support
-from hsp_control.law import Resolution
-from hsp_control.law.resolution import BEYOND_ANY_LEVEL
+from hsp_control.edge import Resolution
+from hsp_control.edge.limited_target import Permitted
 from hsp_control.robot import RobotState
 
 _BEYOND = 4
@@ -83,15 +72,15 @@ class Actuation:
         # what is delivered there of the law's own acceleration
         self.own = Delivered(state.effort, law.acceleration, np.zeros(0), EXACT, 0.0)
         self._wanted = wanted = Wanted(state.mass_matrix, np.zeros(nv), np.zeros(nv))
-        # which limits are violated, see `violated_limits`; and the `Status` of the QP
-        # if it was solved at once
+        # which limits are violated, a sum of `MOTION`, `EFFORT` and `_BEYOND`; and the
+        # `Status` of the QP if it was solved at once
         self.found: Indices = np.zeros(2, dtype=np.int64)
         self._solve_if = np.zeros(2)
         self._checks = [state.rnea(wanted.acceleration), self._check()]
         self._check_wanted = state.plan(self._checks)
         self._tau = support.tau if support.size else wanted.effort
         self._effort_within, self._tau_within = (
-            state.plan([(within, (effort, *bounds[2:]))]).call()
+            state.plan([(engine.Within, (effort, *bounds[2:]))]).call()
             for effort in (wanted.effort, self._tau)
         )
         self._qp: LimitedStep | None = None
@@ -106,11 +95,11 @@ class Actuation:
         """Return the call that compares a and M a + N with their bounds."""
         state, limits, found = self._state, self._limits, (self._law.code, self.found)
         if limits.limits is None:
-            return _unlimited, found
+            return engine.CheckLaw, found
         moving = state.time, state.q, state.v, self._wanted.acceleration, state.effort
         within = limits.motion, limits.ends, limits.sent.held, limits.bounds
         given = *moving, state.robot.dof_indices, *within, *found, self._solve_if
-        return _check, given
+        return engine.CheckLimits, given
 
     def calls(self) -> list[Callable[[float], Any]]:
         """Return the calls of the time that deliver the law's own acceleration.
@@ -120,9 +109,9 @@ class Actuation:
         that is needed where a bound is violated, it is solved at once.
         """
         law, wanted = self._law.acceleration, self._wanted
-        calls: KernelCalls = [(copy, (law, wanted.acceleration)), *self._checks]
+        calls: KernelCalls = [(engine.Copy, (law, wanted.acceleration)), *self._checks]
         if self._qp is not None and self.direct:
-            keep = copy, (self._state.effort, wanted.effort)
+            keep = engine.Copy, (self._state.effort, wanted.effort)
             calls = [*calls, self._qp.nearest_if(keep, self._solve_if)]
         return self._state.plan(calls).steps()
 
@@ -221,47 +210,14 @@ class Actuation:
         capacity = 1 << (count - 1).bit_length() if count else 0
         permitted = None
         if limits is not None and not self._support.base.size:
-            permitted = Permitted.by(limits.effort, self._limits.motion)
+            motion = self._limits.motion
+            permitted = Permitted.by(
+                limits.effort,
+                motion.upper - motion.lower,
+                motion.velocity,
+                motion.acceleration,
+                motion.bandwidth[0],
+            )
         law = self._state, self._law, self._support, self._limits.bounds, self._wanted
         status = self.found[1:]
         return LimitedStep(*law, motors[some[motors]], status, capacity, permitted)
-
-
-@kernel
-def _unlimited(code: Indices, found: Indices) -> float:
-    """Return what `_check` does where nothing is limited."""
-    found[0], found[1] = 0, UNSOLVED
-    if code[0] >= BEYOND_ANY_LEVEL:
-        return LOOK
-    return 1.0 if code[0] > 0 else 0.0
-
-
-@kernel
-def _check(
-    time: Array,
-    q: Array,
-    v: Array,
-    a: Array,
-    tau: Array,
-    where: Indices,
-    limits: MotionLimits,
-    ends: Ends,
-    held: Held,
-    bounds: Bounds,
-    code: Indices,
-    found: Indices,
-    solve_if: Array,
-) -> float:
-    """Observe the last period's effort, and return whether to look; see `LOOK`."""
-    # Which limits the next effort violates is written to ``found``; and to
-    # ``solve_if``, as `OnlyIf` reads it.
-    observe(v, held, time[0])
-    flags = violated_limits(
-        q, v, a, tau, where, limits, held.error, held.least, held.most, held.lasting,
-        held.steady, held.disturbance, bounds,
-    )  # fmt: skip
-    beyond = _BEYOND if is_beyond(q, v, where, ends) else 0
-    look = _unlimited(code, found) if flags + beyond == 0 else LOOK
-    found[0], found[1] = flags + beyond, UNSOLVED
-    solve_if[0], solve_if[1] = look, flags
-    return look

@@ -20,35 +20,26 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.compiled.kernels import (
-    AnyCall,
-    KernelCall,
-    KernelCalls,
-    OnlyIf,
-    kernel,
-)
+from hsp_control.compiled.kernels import AnyCall, KernelCall, KernelCalls, OnlyIf
 from hsp_control.constraints.limits.acceleration_bounds import Bounds
 from hsp_control.control.actuation.deviation_cost import (
     Directions,
+    Levels,
     write_directions,
-    write_directions_at_once,
     write_inverse_root,
 )
-from hsp_control.control.actuation.dual_active_set import (
-    QP,
-    SOLVED,
-    Workspace,
-    minimise,
-)
-from hsp_control.control.actuation.limited_target import (
+from hsp_control.control.actuation.dual_active_set import QP, Workspace
+from hsp_control.control.actuation.support import Support
+from hsp_control.edge import Resolution
+from hsp_control.edge.limited_target import (
     Barred,
     Parts,
     Permitted,
-    write_limited_target,
+    Within,
+    limited_target,
 )
-from hsp_control.control.actuation.support import Support
-from hsp_control.law import Resolution
 from hsp_control.robot import RobotState
 
 
@@ -76,8 +67,6 @@ BEYOND = Status.BEYOND
 _FORCE_COST = 1e-6
 """Cost of squared forces, in robot weights, relative to accelerations. It makes the
 forces unique, and is small beside the cost of any deviation."""
-_LEAST_INVERSE_COST = 1e-6
-"""While a contact fades its forces become dear, but not infinitely so."""
 UNSOLVED = 0
 """No `Status` of a QP: the constraints contradict each other, or the solver gave up."""
 
@@ -117,104 +106,6 @@ class Result(NamedTuple):
     effort: Array
     acceleration: Array
     forces: Array
-
-
-@kernel
-def _begin(forces: Forces, cost: float, own: Array, x: Array) -> None:
-    """Write the forces' part of J, and no deviation, with forces of minimum norm."""
-    n = x.shape[0] - forces.first.shape[0]
-    for i in range(n):
-        x[i] = 0.0
-    for j in range(own.shape[0]):
-        own[j] = np.sqrt(max(forces.inverse_cost[j], _LEAST_INVERSE_COST) / cost)
-        x[n + j] = forces.first[j] / forces.weight
-
-
-@kernel
-def _solve(
-    solved: int,
-    warm: int,
-    problem: QP,
-    moving: Indices,
-    x: Array,
-    work: Workspace,
-    status: Indices,
-) -> None:
-    """Overwrite x with the optimum, where ``moving`` says how many rows of Jᵀ move.
-
-    The `Status` is then ``solved``, else `UNSOLVED`.
-    """
-    JT, own, A, begin, end, lower, upper, softness, equalities = problem
-    rows = JT[: moving[0]]
-    found = QP(rows, own, A, begin, end, lower, upper, softness, equalities)
-    code = minimise(found, warm != 0, x, work)
-    status[0] = solved if code == SOLVED else UNSOLVED
-
-
-@kernel
-def _write_rows(
-    wanted: Wanted, forces: Forces, bounds: Bounds, places: Places, rows: QP
-) -> None:
-    """Write the rows of base and efforts, and the bounds of x."""
-    M, a, effort = wanted
-    F, _, f_lower, f_upper, _, weight = forces
-    A, lower, upper = rows.A, rows.lower, rows.upper
-    n, p = F.shape
-    for r in range(places.dofs.shape[0]):
-        i = places.dofs[r]
-        for j in range(n):
-            A[r, j] = M[i, j]
-        for j in range(p):
-            A[r, n + j] = -F[i, j] * weight
-        no_motor = r < places.base
-        lower[r] = (0.0 if no_motor else bounds.tau_lower[i]) - effort[i]
-        upper[r] = (0.0 if no_motor else bounds.tau_upper[i]) - effort[i]
-    k = A.shape[0]
-    for i in range(n):
-        lower[k + i] = bounds.a_lower[i] - a[i]
-        upper[k + i] = bounds.a_upper[i] - a[i]
-    for j in range(p):
-        lower[k + n + j], upper[k + n + j] = f_lower[j] / weight, f_upper[j] / weight
-
-
-@kernel
-def _write_result(
-    wanted: Wanted,
-    forces: Forces,
-    bounds: Bounds,
-    places: Places,
-    x: Array,
-    result: Result,
-    status: Indices,
-    unsolved: Array,
-) -> int:
-    """Write the result without the solver's violations; return the `Status`.
-
-    It is `UNSOLVED` if there is none, or none that is finite. ``unsolved`` is as an
-    `OnlyIf` reads it.
-    """
-    M, a, effort = wanted
-    F, _, f_lower, f_upper, _, weight = forces
-    n, p = F.shape
-    sum_of_efforts = 0.0
-    if status[0] != UNSOLVED:
-        for j in range(p):
-            result.forces[j] = min(max(x[n + j] * weight, f_lower[j]), f_upper[j])
-        for i in range(n):
-            total = effort[i]
-            for j in range(n):
-                total += M[i, j] * x[j]
-            for j in range(p):
-                total -= F[i, j] * result.forces[j]
-            result.effort[i] = min(max(total, bounds.tau_lower[i]), bounds.tau_upper[i])
-            result.acceleration[i] = a[i] + x[i]
-            sum_of_efforts += total
-        for r in range(places.base):
-            result.effort[places.dofs[r]] = 0.0
-    if not np.isfinite(sum_of_efforts):
-        status[0] = UNSOLVED
-    unsolved[0], unsolved[1] = status[0], status[0] == UNSOLVED
-    return int(status[0])
 
 
 _RELAXATION_COST = {"contacts": 1e3, "barriers": 30.0, "motion": 1.0, "holding": 0.1}
@@ -293,7 +184,8 @@ class LimitedStep:
         cost = support.inverse_cost, support.weight
         forces = Forces(support.map, first, *edges, *cost)
         places = Places(np.array([*base, *limited], dtype=np.int64), len(base))
-        directions = Directions.of(resolution, p > 0, state.robot.size or 1.0)
+        levels = Levels.of(resolution, p > 0, state.robot.size or 1.0)
+        directions = Directions.of(n)
         x, moving, none = self._x, np.zeros(1, np.int64), np.zeros(1, np.int64)
         unsolved, around = np.zeros(2), (wanted, forces, bounds, places)
 
@@ -301,33 +193,34 @@ class LimitedStep:
         def optimum(
             qp: QP, count: Indices, work: Workspace, reached: Status, *, warm: bool
         ) -> KernelCalls:
-            solve = int(reached), int(warm), qp, count, x, work, status
+            solve = int(reached), warm, qp, count, x, work, status
             outcome = *around, x, self.result, status, unsolved
-            return [(_solve, solve), (_write_result, outcome)]
+            return [(engine.SolveLimitedStep, solve), (engine.LimitedResult, outcome)]
 
         def nearest(*, standing: bool, warm: bool) -> KernelCalls:
-            root = directions, int(standing), self._rows.JT, moving
+            root = write_inverse_root(
+                levels, directions, standing, self._rows.JT, moving
+            )
             begin = forces, _FORCE_COST, self._rows.own, x
             found = optimum(self._rows, moving, memories[0], LIMITED, warm=warm)
-            return [(write_inverse_root, root), (_begin, begin), *found]
+            return [root, (engine.BeginLimitedStep, begin), *found]
 
         rows: list[AnyCall] = [*state.inertia.calls]
         if permitted is not None:
             kept, edge = slice(barriers, contacts), resolution.edge
             law = resolution.acceleration, edge.damped
-            parts = Parts(*law, *edge.self_motions, *edge.brakings)
+            own, (self_motions, brakings) = resolution.self_motions(state.v)
+            parts = Parts(*law, *self_motions, *brakings)
             barred = Barred(A[kept], lower[kept])
-            target = *wanted, parts, bounds, permitted, barred, zeros((4, n))
-            shares = edge.share, edge.held
-            rows.append(resolution.self_motions(state.v))
-            rows.append((write_limited_target, (*target, *shares)))
-        rows.append((_write_rows, (*around, self._rows)))
-        write = write_directions_at_once if resolution.alone else write_directions
-        closest = (write, (directions,)), *nearest(standing=p > 0, warm=True)
+            target = *wanted, parts, Within(*bounds[:2]), permitted, barred
+            rows += own, limited_target(*target, edge.share)
+        rows.append((engine.LimitedRows, (*around, A, lower, upper)))
+        write = write_directions(levels, directions)
+        closest = write, *nearest(standing=p > 0, warm=True)
         self._nearest = [*rows, *closest]
         self._find_nearest = self._find_forces = state.plan(self._nearest).call()
         if p > 0:
-            begun = _begin, (forces, 1.0, redistributed.own, x)
+            begun = engine.BeginLimitedStep, (forces, 1.0, redistributed.own, x)
             at_once = optimum(
                 redistributed, none, memories[1], Status.REDISTRIBUTED, warm=True
             )

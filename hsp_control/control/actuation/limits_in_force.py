@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.compiled.kernels import KernelCall, kernel
+from hsp_control.compiled.kernels import KernelCall
 from hsp_control.constraints.limits import RobotLimits
 from hsp_control.constraints.limits.acceleration_bounds import (
     Bounds,
@@ -16,19 +17,6 @@ from hsp_control.constraints.limits.acceleration_bounds import (
 from hsp_control.control.actuation.sent_effort import SentEffort
 from hsp_control.control.evolution import Evolution, PlannedLimits
 from hsp_control.robot import Robot, RobotState
-
-
-@kernel
-def effort_window(
-    last: Array, effort: Array, rate: Array, lower: Array, upper: Array
-) -> None:
-    """Write the range of the next effort, which limits on it and its rate leave."""
-    # Shapes: last (nv + 1,), see `SentEffort`, the others (nv,).
-    period = last[effort.shape[0]]
-    for i in range(effort.shape[0]):
-        # The last effort may lie outside the limits: then move towards them.
-        lower[i] = min(max(last[i] - rate[i] * period, -effort[i]), effort[i])
-        upper[i] = max(min(last[i] + rate[i] * period, effort[i]), -effort[i])
 
 
 class LimitSet:
@@ -58,7 +46,7 @@ class LimitSet:
         # writes the bounds on the next effort
         most = np.array(limits.effort), np.array(limits.effort_rate)
         window = self.bounds.tau_lower, self.bounds.tau_upper
-        self.updating: KernelCall = effort_window, (sent.last, *most, *window)
+        self.updating: KernelCall = engine.EffortWindow, (sent.last, *most, *window)
         self.update: Callable[[], object] = state.plan([self.updating]).call()
         self.update()
 

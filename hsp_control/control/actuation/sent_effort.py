@@ -4,20 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.compiled.kernels import KernelCall, kernel
-from hsp_control.compiled.linalg import copy
+from hsp_control.compiled.kernels import KernelCall
 from hsp_control.robot import RobotState
-
-_WINDOW = 0.01
-"""The acceleration is observed over this time, or over one period if that is longer
-[s]: over 1 ms noise of 0.02 rad/s would be 28 rad/s², over 10 ms it is 3."""
-_QUICK = 0.03
-"""A mean error that a position limit has to hold against is taken over this time [s]:
-noise of a velocity is then that over this time, 0.3 rad/s² for 0.01 rad/s."""
-_MEMORY = 0.1
-"""An error counts less after this time; over it the error that persists is averaged
-[s]."""
 
 
 class Held(NamedTuple):
@@ -26,10 +16,10 @@ class Held(NamedTuple):
     # when the period ends, NaN once that was looked at, and its length [s]
     timing: Array
     expected: Array  # velocity that is expected then, shape (nv,) [rad/s or m/s]
-    stray: Array  # differences from it, summed over about `_WINDOW`
+    stray: Array  # differences from it, summed over about 10 ms
     error: Array  # largest error of late [rad/s² or m/s²]
     drift: Array  # mean error of late
-    quick: Array  # mean error of the last `_QUICK`
+    quick: Array  # mean error of the last 30 ms
     least: Array  # the lowest that mean was of late, 0 or less
     most: Array  # the highest, 0 or more
     lasting: Array  # what that mean and that of the last hundredth of a second share
@@ -50,7 +40,7 @@ class SentEffort:
     expected. So it includes whatever else the model lacks. A position limit is exceeded
     by a mean error over the bandwidth's square. An error of 20 rad/s², as a light wrist
     has it with a load that nobody declared, would be 0.2 rad; the mean follows it in
-    `_QUICK`, and its worst is kept for `_MEMORY`, because the next one may be as large.
+    30 ms, and its worst is kept for 0.1 s, because the next one may be as large.
     """
 
     def __init__(self, state: RobotState) -> None:
@@ -82,11 +72,11 @@ class SentEffort:
         """
         state, held = self._state, self.held
         arrays = acceleration, held.disturbance, held.timing, held.expected
-        return _expect, (state.time, state.v, *arrays)
+        return engine.ExpectedVelocity, (state.time, state.v, *arrays)
 
     def recording(self) -> KernelCall:
         """Return a call that makes `RobotState.effort` the last effort."""
-        return copy, (self._state.effort, self.last[:-1])
+        return engine.Copy, (self._state.effort, self.last[:-1])
 
     def forget_rate(self) -> None:
         """Forget the last effort: the rate of the next one has no limit."""
@@ -108,43 +98,3 @@ class SentEffort:
         """Set what `memory` returned."""
         for each, value in zip((self.last, *self.held), memory, strict=True):
             each[:] = value
-
-
-@kernel
-def _expect(
-    time: Array, v: Array, a: Array, disturbance: Array, timing: Array, expected: Array
-) -> None:
-    """Write the end of a period that begins now, and the velocity there."""
-    timing[0] = time[0] + timing[1]
-    for i in range(v.shape[0]):
-        expected[i] = v[i] + timing[1] * (a[i] + disturbance[i])
-
-
-@kernel
-def observe(v: Array, held: Held, t: float) -> None:
-    """Add a period to the differences of velocity, and update the largest error."""
-    timing, expected, stray, error, drift, quick, least, most, lasting, steady, _ = held
-    period = timing[1]
-    if not abs(t - timing[0]) < 0.01 * period:
-        return
-    timing[0] = np.nan
-    fresh = min(period / _WINDOW, 1.0)
-    fading = np.exp(-period / _MEMORY)
-    quickly = np.exp(-period / _QUICK)
-    for i in range(v.shape[0]):
-        gained = v[i] - expected[i]
-        drift[i] = fading * drift[i] + (1.0 - fading) * gained / period
-        quick[i] = quickly * quick[i] + (1.0 - quickly) * gained / period
-        least[i] = min(fading * least[i], quick[i])
-        most[i] = max(fading * most[i], quick[i])
-        stray[i] = (1.0 - fresh) * stray[i] + gained
-        present = stray[i] / max(period, _WINDOW)
-        error[i] = max(fading * error[i], abs(present))
-        steady[i] = _shared(drift[i], present)
-        lasting[i] = _shared(quick[i], present)
-
-
-@kernel
-def _shared(a: float, b: float) -> float:
-    """Return what two numbers have in common: the nearer to 0 of one sign, or 0."""
-    return max(min(a, b), 0.0) + min(max(a, b), 0.0)

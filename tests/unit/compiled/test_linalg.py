@@ -10,7 +10,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from hsp_control.common.arrays import Array
-from hsp_control.compiled import linalg, moves
+from hsp_control.compiled import linalg
 from hsp_control.compiled.linalg import (
     cholesky,
     multiply,
@@ -270,11 +270,6 @@ def arguments(name: str) -> tuple[Any, ...]:
             *(normal(14, m, n), triangular(4), sample[0], sample[2]),
             *(np.zeros((6, n)), np.zeros(n)),
         ),
-        "copy_valid": (
-            *(0.5, np.array([0.6, 0.8, 3.0]), sample[0]),
-            *(np.zeros(1), np.zeros(3), np.zeros(n)),
-            *(np.array([[0, 2]]), np.array([4])),
-        ),
     }[name]
 
 
@@ -285,7 +280,6 @@ KERNELS: dict[str, Callable[..., Any]] = {
         if callable(function) and uncompiled(function).__module__ == linalg.__name__
     },
     "acceleration": law.acceleration,
-    "copy_valid": moves.copy_valid,
 }
 
 

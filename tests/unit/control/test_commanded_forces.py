@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from runs import check_null_space, continuous
 
 import hsp_control as hsp
+from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ContactError, ControllerError
 from hsp_control.constraints.contacts import (
@@ -26,7 +27,6 @@ from hsp_control.constraints.contacts import (
     SurfaceContact,
 )
 from hsp_control.control.actuation import Status
-from hsp_control.control.actuation.support import minimum_norm_forces
 from hsp_control.simulation.plants import ContactPlant, ContinuousPlant, RigidContact
 from hsp_control.trajectories import CallableTrajectory, Hold, Schedule, Stream
 
@@ -99,9 +99,8 @@ def test_the_closed_form_is_the_optimum(without_support: int, seed: int) -> None
     lost = np.linalg.qr(rng.standard_normal((n, n)))[0][:, :without_support]
     F[:n] -= lost @ (lost.T @ F[:n])
     wanted[:n] -= lost @ (lost.T @ wanted[:n])
-    forces, tau, zeros = np.zeros(size), np.zeros(nv), np.zeros
-    scratch = zeros((n, size)), zeros((n, n)), zeros((n, n)), zeros((2, n))
-    minimum_norm_forces(F, base, e, r, wanted, *scratch, forces, tau)
+    forces, tau = np.zeros(size), np.zeros(nv)
+    engine.MinimumNormForces(F, base, e, r, wanted, forces, tau)()
     A = F[:n]
     np.testing.assert_allclose(A @ forces, wanted[:n], atol=1e-9)
     multipliers = np.linalg.lstsq(A.T, (forces - r) / e, rcond=None)[0]

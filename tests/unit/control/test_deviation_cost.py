@@ -18,11 +18,11 @@ from hsp_control.constraints.limits import StaticEffort
 from hsp_control.control.actuation import Status
 from hsp_control.control.actuation.deviation_cost import (
     Directions,
+    Levels,
     write_directions,
-    write_directions_at_once,
     write_inverse_root,
 )
-from hsp_control.law import Resolution
+from hsp_control.edge import Resolution
 
 seeds = st.integers(0, 2**32 - 1)
 NOWHERE = np.zeros(0, dtype=np.int64)
@@ -47,11 +47,13 @@ METRICS: dict[str, hsp.metrics.Metric] = {
 
 def inverse_cost(resolution: Resolution) -> Array:
     """Return J Jᵀ, which is to be H⁻¹."""
-    directions = Directions.of(resolution, False, panda().size)
+    levels, directions = Levels.of(resolution, False, panda().size), Directions.of(7)
     JT, moving = np.zeros((7, 7)), np.zeros(1, dtype=np.int64)
-    write = write_directions_at_once if resolution.alone else write_directions
-    write(directions)
-    write_inverse_root(directions, 0, JT, moving)
+    for kind, arguments in (
+        write_directions(levels, directions),
+        write_inverse_root(levels, directions, False, JT, moving),
+    ):
+        kind(*arguments)()
     assert moving[0] == 7
     return JT.T @ JT
 
@@ -97,8 +99,8 @@ def test_levels_share_directions_as_the_law_does(
     np.testing.assert_allclose(inverse_cost(resolution) @ H, np.eye(7), atol=1e-5)
 
 
-FIELD = 0.01 * hsp.JointCentering()
-"""It asks for less than the limits permit far from them."""
+FIELD = 1e-3 * hsp.JointCentering()
+"""It asks for less than a tenth of what the limits permit far from them."""
 
 
 def on_springs(limits: hsp.Limits | None, *below: hsp.FramePosition) -> hsp.Controller:

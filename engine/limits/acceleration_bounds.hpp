@@ -1,0 +1,132 @@
+// Position, velocity and acceleration limits as bounds on the acceleration.
+//
+// With the bandwidth α a position barrier h(q) ≥ 0 is kept by h'' + 2α h' + α² h ≥ 0, and a speed
+// limit by v' ≤ 2α (v_max - v). Where barriers contradict each other, position has priority over
+// velocity, and velocity over acceleration: each narrows the range that the earlier ones leave, as
+// far as it can.
+#pragma once
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "records.hpp"
+
+namespace hsp {
+
+struct Range {
+  double low = -std::numeric_limits<double>::infinity();
+  double high = std::numeric_limits<double>::infinity();
+
+  // The part of it within another range, or its nearest point.
+  Range within(const Range& other) const {
+    return {std::max(low, std::min(other.low, high)), std::min(high, std::max(other.high, low))};
+  }
+};
+
+namespace barriers {
+
+// How much steeper the velocity barrier is beyond the guarded speed.
+constexpr double steeper = 4.0;
+
+// How much of a joint's range a mean error may take away at one end: a joint that something
+// blocks errs by all that it should accelerate.
+constexpr double most_shift = 0.1;
+
+// What the effort's rate can do in this time [s] is held against a force that lasts, where that
+// is more: a light wrist with a tool that nobody declared.
+constexpr double held_time = 0.002;
+
+// The accelerations that a position limit permits.
+//
+// A mean error would pass the limit by the error over α². So the barrier makes up for the worst
+// mean of late that leads beyond it, `least` at the lower end and `most` at the upper one, and for
+// all that is `lasting` now.
+template <class Held>
+Range of_position(Index i, double q, double v, const MotionLimits<In>& limits, const Held& held) {
+  const double alpha = limits.bandwidth[0], lower = limits.lower[i], upper = limits.upper[i];
+  const double damping = 2.0 * alpha * v;
+  const double shift = most_shift * alpha * alpha * (upper - lower);
+  const double lasting = std::max(shift, held_time * limits.jerk[i]);
+  Range range = {-alpha * alpha * (q - lower) - damping, alpha * alpha * (upper - q) - damping};
+  range.low += std::max(std::min(-held.least[i], shift), std::min(-held.lasting[i], lasting));
+  range.high -= std::max(std::min(held.most[i], shift), std::min(held.lasting[i], lasting));
+  range.low -= std::max(held.steady[i], 0.0);
+  range.high -= std::min(held.steady[i], 0.0);
+  return range;
+}
+
+// The largest acceleration towards a speed limit that is so far away.
+//
+// It is 2α gap, and √(jerk gap) where that is less: then the acceleration ends at the limit though
+// it can fall by half the jerk only, and the rest of the effort's rate is for what the other
+// joints do.
+inline double towards_speed(double gap, double alpha, double jerk) {
+  const double barrier = 2.0 * alpha * gap;
+  return gap > 0.0 && jerk < std::numeric_limits<double>::infinity()
+             ? std::min(barrier, std::sqrt(jerk * gap))
+             : barrier;
+}
+
+// The accelerations that a speed limit permits. Its margin covers the largest error that the
+// acceleration had of late, up to half the speed.
+template <class Held>
+Range of_speed(Index i, double v, const MotionLimits<In>& limits, const Held& held) {
+  const double alpha = limits.bandwidth[0], jerk = limits.jerk[i], most = limits.velocity[i];
+  const double speed = std::max(most - held.error[i] / (2.0 * alpha * steeper), 0.5 * most);
+  double rising = towards_speed(speed - v, alpha, jerk) - std::min(held.steady[i], 0.0);
+  double slowing = -towards_speed(speed + v, alpha, jerk) - std::max(held.steady[i], 0.0);
+  if (slowing > 0.0) {
+    slowing *= steeper;
+    rising = std::max(rising, slowing);
+  }
+  if (rising < 0.0) {
+    rising *= steeper;
+    slowing = std::min(slowing, rising);
+  }
+  return {slowing, rising};
+}
+
+}  // namespace barriers
+
+// Write the bounds on the acceleration that the barriers of `Limits` require. `where` is the index
+// in q of each dof's coordinate, -1 for none.
+//
+// What is commanded against a steady force moves nothing, and the barriers are wider by as much:
+// `held.steady` is what of a longer mean of the error is still there.
+template <class Held>
+void write_acceleration_bounds(const In<'q'>& q, const In<'n'>& v, const Ints<'n'>& where,
+                               const MotionLimits<In>& limits, const Held& held, Out<'n'>& a_lower,
+                               Out<'n'>& a_upper) {
+  for (Index i = 0; i < v.size(); ++i) {
+    Range range;
+    if (where[i] >= 0) range = barriers::of_position(i, q[where[i]], v[i], limits, held);
+    range = range.within(barriers::of_speed(i, v[i], limits, held));
+    range = range.within({-limits.acceleration[i], limits.acceleration[i]});
+    a_lower[i] = range.low;
+    a_upper[i] = range.high;
+  }
+}
+
+struct AccelerationBounds {
+  static constexpr const char* doc =
+      "The accelerations that position, velocity and acceleration limits permit.";
+  In<'q'> q;
+  In<'n'> v;
+  Ints<'n'> where;
+  MotionLimits<In> limits;
+  Errors<In> held;
+  Out<'n'> a_lower, a_upper;
+
+  void operator()() { write_acceleration_bounds(q, v, where, limits, held, a_lower, a_upper); }
+};
+
+struct Within {
+  static constexpr const char* doc = "Whether lower ≤ x ≤ upper, each component.";
+  In<'n'> x, lower, upper;
+
+  bool operator()() {
+    return (lower.array() <= x.array()).all() && (x.array() <= upper.array()).all();
+  }
+};
+
+}  // namespace hsp

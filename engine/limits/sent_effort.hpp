@@ -1,0 +1,91 @@
+// What is remembered of the efforts sent, and what that leaves for the next one.
+#pragma once
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "records.hpp"
+
+namespace hsp {
+
+struct EffortWindow {
+  static constexpr const char* doc =
+      "The range of the next effort that limits on it and on its rate leave: tau ± rate T.";
+  In<'w'> last;  // the last effort, and how long it is held: n + 1 numbers
+  In<'n'> effort, rate;
+  Out<'n'> lower, upper;
+
+  void operator()() {
+    const Index n = effort.size();
+    const auto tau = last.head(n).array();
+    const auto most = effort.array();
+    const auto change = rate.array() * last[n];
+    // The last effort may lie outside the limits: then move towards them.
+    lower = (tau - change).max(-most).min(most);
+    upper = (tau + change).min(most).max(-most);
+  }
+};
+
+struct ExpectedVelocity {
+  static constexpr const char* doc =
+      "v + T (a + disturbance) at the end of a period T that begins now, and when that is.";
+  In<1> time;
+  In<'n'> v, a, disturbance;
+  InOut<2> timing;
+  Out<'n'> expected;
+
+  void operator()() {
+    timing[0] = time[0] + timing[1];
+    expected = v + timing[1] * (a + disturbance);
+  }
+};
+
+namespace sent {
+
+// The acceleration is observed over this time, or over one period if that is longer [s]: over 1 ms
+// noise of 0.02 rad/s would be 28 rad/s², over 10 ms it is 3.
+constexpr double window = 0.01;
+// A mean error that a position limit has to hold against is taken over this time [s]: noise of a
+// velocity is then that over this time, 0.3 rad/s² for 0.01 rad/s.
+constexpr double quick_time = 0.03;
+// An error counts less after this time; over it the error that persists is averaged [s].
+constexpr double memory = 0.1;
+
+// What two numbers have in common: the nearer to 0 of one sign, or 0.
+inline double shared(double a, double b) {
+  return std::max(std::min(a, b), 0.0) + std::min(std::max(a, b), 0.0);
+}
+
+}  // namespace sent
+
+// Add a period that ends at the time t to the differences of velocity, and update the errors.
+inline void observe(const In<'n'>& v, Held<InOut>& held, double t) {
+  const double period = held.timing[1];
+  if (!(std::abs(t - held.timing[0]) < 0.01 * period)) return;
+  held.timing[0] = std::numeric_limits<double>::quiet_NaN();
+  const double fresh = std::min(period / sent::window, 1.0);
+  const double fading = std::exp(-period / sent::memory);
+  const double quickly = std::exp(-period / sent::quick_time);
+  for (Index i = 0; i < v.size(); ++i) {
+    const double gained = v[i] - held.expected[i], error = gained / period;
+    held.drift[i] = fading * held.drift[i] + (1.0 - fading) * error;
+    held.quick[i] = quickly * held.quick[i] + (1.0 - quickly) * error;
+    held.least[i] = std::min(fading * held.least[i], held.quick[i]);
+    held.most[i] = std::max(fading * held.most[i], held.quick[i]);
+    held.stray[i] = (1.0 - fresh) * held.stray[i] + gained;
+    const double present = held.stray[i] / std::max(period, sent::window);
+    held.error[i] = std::max(fading * held.error[i], std::abs(present));
+    held.steady[i] = sent::shared(held.drift[i], present);
+    held.lasting[i] = sent::shared(held.quick[i], present);
+  }
+}
+
+struct Observe {
+  static constexpr const char* doc = "Compare the velocity with what was expected of an effort.";
+  In<'n'> v;
+  Held<InOut> held;
+
+  void operator()(double t) { observe(v, held, t); }
+};
+
+}  // namespace hsp

@@ -1,0 +1,114 @@
+// Contact forces: their map to generalised forces, those of minimum norm, friction cones.
+#pragma once
+#include <cmath>
+#include <hsp/linalg.hpp>
+#include <hsp/records.hpp>
+#include <hsp/rotations.hpp>
+
+namespace hsp {
+
+struct ForceMap {
+  static constexpr const char* doc =
+      "The points of a contact, and the generalised forces of unit forces at them.";
+  // A force s at an arm r has the wrench (s, r × s): column Jᵀ(s, r × s).
+  FrameMotion<In> frame;
+  In<'k', 3> points;   // in the frame's axes
+  In<3> shift;         // of all of them, in world axes
+  In<3, 3> axes;       // directions of the unit forces, as columns
+  std::int64_t first;  // index of the first of these points among all
+  InOut<'a', 3> positions;
+  InOut<'n', 'f'> out;  // three columns for each of all points
+
+  void operator()() {
+    Eigen::Matrix<double, 6, 3> wrenches;
+    wrenches.topRows<3>() = axes;
+    for (Index k = 0; k < points.rows(); ++k) {
+      const Vector3 arm = frame.rotation * points.row(k).transpose() + shift;
+      wrenches.bottomRows<3>() = skew(arm) * axes;
+      positions.row(first + k) = (frame.position + arm).transpose();
+      out.middleCols<3>(3 * (first + k)) = frame.jacobian.transpose().lazyProduct(wrenches);
+    }
+  }
+};
+
+struct MinimumNormForces {
+  static constexpr const char* doc =
+      "f = r + E Aᵀ(A E Aᵀ)⁺(w - A r), of minimum Σ (f - r)²/e, and the remaining effort.";
+  // A are the base's rows of F, E = diag(e), w the base's rows of the wanted effort, and r what is
+  // commanded. w lies in the range of A: directions without support are left out. The effort of
+  // the base, which has no motor, is zero.
+  In<'n', 'f'> F;
+  Ints<'b'> base;
+  In<'f'> inverse_cost, reference;  // e, r
+  In<'n'> wanted;
+  Out<'f'> forces;
+  Out<'n'> tau;
+  Scratch<'b', 'f'> A, AE;
+  Scratch<'b', 'b'> G, U;
+  Scratch<'b'> w, multipliers;
+
+  void operator()() {
+    for (Index i = 0; i < base.size(); ++i) {
+      A.row(i) = F.row(base[i]);
+      w[i] = wanted[base[i]] - A.row(i).dot(reference);
+    }
+    AE = A * inverse_cost.asDiagonal();
+    G = AE.lazyProduct(A.transpose());
+    if (well_conditioned()) {
+      multipliers = w;
+      solve_lower(U, multipliers);
+      solve_lower_transposed(U, multipliers);
+    } else {
+      least_squares();
+    }
+    forces = reference;
+    forces.noalias() += AE.transpose() * multipliers;
+    tau = wanted;
+    tau.noalias() -= F * forces;
+    for (Index i = 0; i < base.size(); ++i) tau[base[i]] = 0.0;
+  }
+
+ private:
+  // Whether the Cholesky factor U of G can be trusted: no pivot is so much smaller than the
+  // largest that a direction might be without support.
+  bool well_conditioned() {
+    constexpr double trusted = 1e-6;
+    if (!cholesky(G, U)) return false;
+    if (U.rows() == 0) return true;
+    const double least = U.diagonal().minCoeff(), most = U.diagonal().maxCoeff();
+    return least * least > trusted * most * most;
+  }
+
+  // multipliers = G⁺ w. G is symmetric and positive semidefinite: where U G has orthogonal rows
+  // their lengths are its eigenvalues, and the rows of U its eigenvectors.
+  void least_squares() {
+    constexpr double negligible = 1e-10;  // relative to the largest eigenvalue: no support
+    orthogonalise_rows(G, U);
+    const double largest = std::sqrt(G.rowwise().squaredNorm().maxCoeff());
+    multipliers.setZero();
+    for (Index r = 0; r < G.rows(); ++r) {
+      const double eigenvalue = G.row(r).norm();
+      if (eigenvalue > negligible * largest)
+        multipliers += U.row(r).dot(w) / eigenvalue * U.row(r).transpose();
+    }
+  }
+};
+
+struct WithinCones {
+  static constexpr const char* doc =
+      "Whether forces are within friction cones, cone f ≥ 0, and lower ≤ f ≤ upper.";
+  In<'c', 'f'> cone;  // four rows for each point, which has three forces
+  In<'f'> forces, lower, upper;
+
+  bool operator()() {
+    bool inside =
+        (lower.array() <= forces.array()).all() && (forces.array() <= upper.array()).all();
+    for (Index point = 0; point < forces.size() / 3; ++point) {
+      const auto f = forces.segment<3>(3 * point);
+      inside &= ((cone.block<4, 3>(4 * point, 3 * point) * f).array() >= 0.0).all();
+    }
+    return inside;
+  }
+};
+
+}  // namespace hsp

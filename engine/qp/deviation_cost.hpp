@@ -1,0 +1,300 @@
+// Cost of deviations from the law's acceleration, level by level.
+//
+// The cost of a deviation δ is ½ δᵀH δ with H = Σ ρ_k (Lᵀδ·n_k)², over directions n_k that are
+// orthonormal in whitened coordinates Lᵀδ. So H⁻¹ = J Jᵀ, with the columns L⁻ᵀ n_k / √ρ_k in J: no
+// matrix is factorised.
+//
+// What is below a level costs a small part of what the level itself does, and the more of it the
+// larger the level's own error is: priorities are strict where the errors are small. With a fixed
+// tiny part, a hand that cannot reach its target would move the null space as far as limits permit
+// for the last bit of it, from one bound of the efforts to the other between two periods.
+//
+// Springs do not come first: what is below a level of springs costs as much as it does. Over the
+// mass matrix, their metric, the deviation is then what Gauss's principle of least constraint
+// gives: joints that limits hold get the reaction of mechanical stops, which does no work, and a
+// spring feeds no oscillation.
+//
+// With P_k what the law leaves to the levels below k, P_0 = 1, a level has the share P_{k-1} - P_k
+// of all motions, and the null space what remains, P_K. Their costs are ρ_k = ρ_N^t_k, t_1 = 0 to
+// t_N = 1, and that of all is
+//
+//     log H = log ρ_N Σ t_k (P_{k-1} - P_k),      in whitened coordinates
+//
+// Away from singularities each share is a projector, and each n_k belongs to one level. Near one
+// the law leaves a part of a direction to the levels below, and so it does here: H is a continuous
+// function of the law's own projectors.
+#pragma once
+#include <algorithm>
+#include <cmath>
+#include <hsp/linalg.hpp>
+#include <hsp/records.hpp>
+
+namespace hsp {
+
+// The two factors of the law's pseudo-inverse of all rows, B# = Qᵀ X.
+struct LawFactors {
+  In<'m', 'n'> Q;
+  In<'m', 'm'> X;
+};
+
+// What the law's levels left, where it went level by level.
+struct LawProjectors {
+  In<'n', 'n'> Q;          // what the last level leaves, Q_K = P W⁻¹
+  In<'n', 'm'> QJ;         // Q_{k-1} J_kᵀ of all levels side by side
+  In<'m', 'm'> G_inverse;  // q(G_k) of all levels along the diagonal
+};
+
+// What level k and then the null space cost: ρ_k = ρ_N^t_k.
+struct LevelCosts {
+  Vector t, root;  // 1/√ρ
+
+  void prepare(const Sizes& size) {
+    t.setZero(size('l') + 1);
+    root.setZero(size('l') + 1);
+  }
+};
+
+struct Directions {
+  static constexpr const char* doc =
+      "Directions of the law's levels and of the null space, and what deviating in each costs.";
+  In<'m', 'n'> jacobian;  // of all tasks, level after level
+  In<'n', 'n'> L;         // Cholesky factor of the metric
+  std::int64_t form;      // metric's form
+  Ints<'l'> ends;         // where each level's rows end
+  In<'m'> error;          // error e of all tasks
+  Flags<'m'> springs;     // whether a row is that of a spring
+  double size;            // robot's size [m]
+  std::int64_t first;     // first level that may deviate: 1 below contacts, else 0
+  double least;           // least cost of a level relative to the one above it
+  In<'l'> thresholds;     // singular value below which a direction belongs to a level in part
+  LawFactors factors;
+  LawProjectors projectors;
+  Ints<1> code;     // outcome of the damped law: 0, or its first damped level from 1 on
+  bool alone;       // whether the law resolves its one level at once, whatever happens
+  Out<'n', 'n'> N;  // directions n_k as rows
+  OutInts<1> kept;  // how many of the first belong to the first level alone
+  Out<'n'> root;    // 1/√ρ of each
+  LevelCosts costs;
+  Scratch<'m', 'n'> B;  // whitened rows
+  Scratch<'m', 'm'> square;
+  Scratch<'n', 'n'> F, FQ, T, U;
+  Scratch<'n', 'm'> FJ, FG;
+  Scratch<'n'> remainders, shares;
+
+  void operator()() {
+    write_costs();
+    const Index levels = ends.size(), damped = code[0], rows = jacobian.rows();
+    if (damped == 0) {
+      const Index count = is_law_orthonormal() ? rows : write_levels(levels);
+      write_roots(count);
+      complete(count);
+    } else if (alone) {
+      complete(write_damped_level());
+    } else {
+      const Index count = write_levels(std::min(damped, levels));
+      write_roots(count);
+      complete(count);
+      share_rest(count);
+    }
+  }
+
+ private:
+  // What is below a level costs this, another level or the null space, for an error of the robot's
+  // size, relative to the level itself, and the most that it costs.
+  static constexpr double below_level = 1.0, below_last = 0.2, most = 0.1;
+
+  // Singular value, relative to the threshold, below which rounding decides where a direction
+  // points; the null space has all of it but 2e-6.
+  static constexpr double lost = 1e-3;
+
+  double free_root() const { return costs.root[costs.root.size() - 1]; }
+
+  // t and 1/√ρ of each level and of the null space.
+  void write_costs() {
+    const Index last = ends.size();
+    const bool standing = first > 0;
+    double log_cost = 0.0;
+    Index start = 0;
+    for (Index k = 0; k < last; ++k) {
+      costs.t[k] = log_cost;
+      const Index rows = ends[k] - start;
+      const double of_error = k < last - 1 ? below_level : below_last;
+      const double length = error.segment(start, rows).norm();
+      // Whoever stands keeps the balance at any cost.
+      const double below = standing ? 0.0 : of_error * length / size;
+      const bool is_spring = springs.segment(start, rows).all();
+      if (k >= first && (standing || !is_spring))
+        log_cost += std::log(std::min(std::max(below, least), most));
+      start = ends[k];
+    }
+    // Nothing but contacts: the null space is cheap.
+    if (last <= first) log_cost = std::log(least);
+    costs.t[last] = log_cost;
+    costs.root = (-0.5 * costs.t).array().exp();
+    if (log_cost < 0.0) costs.t /= log_cost;
+  }
+
+  // Copy the law's rows Q = X B, if they are orthonormal and X is lower triangular. Both hold
+  // unless the law needed the spectrum: then the rows of Q are orthogonal, but not of length 1, or
+  // X combines each row with those after it.
+  bool is_law_orthonormal() {
+    const auto& [Q, X] = factors;
+    for (Index r = 0; r < Q.rows(); ++r) {
+      if (!(std::abs(Q.row(r).squaredNorm() - 1.0) < 1e-12)) return false;
+      if (!(X.row(r).tail(X.cols() - 1 - r).array() == 0.0).all()) return false;
+    }
+    N.topRows(Q.rows()) = Q;
+    return true;
+  }
+
+  void whiten() {
+    B = jacobian;
+    if (form != IDENTITY) solve_rows(L, B);
+  }
+
+  // Write the directions that the first levels have for themselves; return how many. The last of
+  // them may have singular values below the threshold: these are left out.
+  Index write_levels(Index levels) {
+    whiten();
+    Index count = 0, start = 0;
+    for (Index k = 0; k < levels; ++k) {
+      auto rows = B.middleRows(start, ends[k] - start);
+      for (Index r = 0; r < rows.rows(); ++r)
+        for (Index i = 0; i < count; ++i) rows.row(r) -= N.row(i).dot(rows.row(r)) * N.row(i);
+      if (k < code[0] - 1 || code[0] == 0) {
+        // No singular value is small: any orthonormal rows will do, at a tenth of the cost.
+        auto own = N.middleRows(count, rows.rows());
+        auto factor = square.topLeftCorner(rows.rows(), rows.rows());
+        orthonormalise_rows(rows, own, factor);
+        count += rows.rows();
+      } else {
+        auto none = square.topRows(0);
+        orthogonalise_rows(rows, none);
+        for (Index r = 0; r < rows.rows(); ++r) {
+          const double value = rows.row(r).norm();
+          if (value >= thresholds[k] && count < N.rows()) N.row(count++) = rows.row(r) / value;
+        }
+      }
+      start = ends[k];
+    }
+    return count;
+  }
+
+  // 1/√ρ of directions that each belong to one level.
+  void write_roots(Index count) {
+    Index k = 0;
+    for (Index r = 0; r < count; ++r) {
+      while (r >= ends[k]) ++k;
+      root[r] = costs.root[k];
+    }
+    kept[0] = std::min<Index>(count, ends[0]);
+  }
+
+  // Write the directions of the only level, where the law has found its spectrum; return how many.
+  //
+  // First those that it has for itself. Of a direction with the singular value s below the
+  // threshold the null space has the share (1 - s²/threshold²)².
+  Index write_damped_level() {
+    const auto& Q = factors.Q;
+    const double threshold = thresholds[0], own = costs.root[0];
+    Index count = 0;
+    const auto add = [&](bool partly) {
+      for (Index r = 0; r < Q.rows(); ++r) {
+        const double s = Q.row(r).norm();
+        if ((s < threshold) != partly || s <= lost * threshold) continue;
+        const double left = std::max(1.0 - (s / threshold) * (s / threshold), 0.0);
+        root[count] = own * std::pow(free_root() / own, left * left);
+        N.row(count++) = Q.row(r) / s;
+      }
+    };
+    add(false);
+    kept[0] = count;
+    add(true);
+    return count;
+  }
+
+  // Overwrite the directions after the first ones, which levels share.
+  //
+  // These are the eigenvectors of T = Σ t_k (P_{k-1} - P_k) + P_K in the rows of N from `count` on,
+  // and their costs ρ_N^t for the eigenvalues t.
+  void share_rest(Index count) {
+    const Index d = N.rows() - count;
+    if (d == 0) return;
+    auto rest = N.bottomRows(d);
+    auto F_d = F.topRows(d), FQ_d = FQ.topRows(d);
+    auto T_d = T.topLeftCorner(d, d), U_d = U.topLeftCorner(d, d);
+    // Lᵀ Q L is what Q is in whitened coordinates.
+    if (form == IDENTITY) F_d = rest;
+    else F_d.noalias() = rest * L.transpose();
+    FQ_d.noalias() = F_d * projectors.Q.transpose();
+    T_d.noalias() = FQ_d * F_d.transpose();
+    Index start = 0;
+    for (Index k = 0; k < ends.size(); ++k) {
+      const Index rows = ends[k] - start;
+      if (costs.t[k] > 0.0 && rows > 0) {
+        auto J = FJ.topLeftCorner(d, rows), G = FG.topLeftCorner(d, rows);
+        J.noalias() = F_d * projectors.QJ.middleCols(start, rows);
+        G.noalias() = J * projectors.G_inverse.block(start, start, rows, rows).transpose();
+        T_d.noalias() += costs.t[k] * G * J.transpose();
+      }
+      start = ends[k];
+    }
+    T_d.diagonal().array() += 1.0;  // eigenvalues between 1 and 2: their vectors are well defined
+    orthogonalise_rows(T_d, U_d);
+    for (Index r = 0; r < d; ++r)
+      root[count + r] = std::pow(free_root(), std::clamp(T_d.row(r).norm() - 1.0, 0.0, 1.0));
+    F_d.noalias() = U_d * rest;
+    rest = F_d;
+  }
+
+  // Complete the first directions to an orthonormal basis, with the null space.
+  //
+  // Each new row is what the others leave of the unit vector of which they leave most. The
+  // components of a unit vector are entries of N. Where less than half of it remains, what
+  // rounding left is subtracted ("twice is enough", Giraud et al. 2005).
+  void complete(Index count) {
+    remainders.setOnes();
+    for (Index k = 0; k < count; ++k) remainders -= N.row(k).cwiseAbs2().transpose();
+    for (Index k = count; k < N.rows(); ++k) {
+      const Index best =
+          std::max_element(remainders.begin(), remainders.end()) - remainders.begin();
+      const auto others = N.topRows(k);
+      auto row = N.row(k);
+      auto share = shares.head(k);
+      share = others.col(best);
+      row.setZero();
+      row[best] = 1.0;
+      row.transpose().noalias() -= others.transpose() * share;
+      if (row.squaredNorm() < 0.5) {
+        share.noalias() = others * row.transpose();
+        row.transpose().noalias() -= others.transpose() * share;
+      }
+      row /= row.norm();
+      remainders -= row.cwiseAbs2().transpose();
+      root[k] = free_root();
+    }
+  }
+};
+
+struct InverseRoot {
+  static constexpr const char* doc =
+      "Jᵀ of H⁻¹ = J Jᵀ, without the levels before the first that may move.";
+  In<'n', 'n'> N;
+  Ints<1> kept;
+  In<'n'> root;
+  In<'n', 'n'> L;
+  std::int64_t form;
+  bool standing;  // whether the first level may not move
+  Out<'n', 'n'> JT;
+  OutInts<1> moving;  // how many of its rows these are
+
+  void operator()() {
+    const Index rows = N.rows() - (standing ? kept[0] : 0);
+    auto moves = JT.topRows(rows);
+    moves = root.tail(rows).asDiagonal() * N.bottomRows(rows);
+    if (form != IDENTITY) solve_rows_transposed(L, moves);
+    moving[0] = rows;
+  }
+};
+
+}  // namespace hsp

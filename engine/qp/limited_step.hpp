@@ -1,0 +1,144 @@
+// The QP of a step within limits: its rows, where it begins, its solution.
+//
+// The unknowns are x = (δ, g): δ the deviation from the law's acceleration, and g the contact
+// forces in robot weights. The first rows are
+//
+//   base        (M a + N - F f)_base = 0                          no motor acts there
+//   effort      bounds on M a + N - F f, within the rate limit of the last effort
+//
+// and then those of cones, barriers and contacts, which Python writes. The bounds of x are those
+// on a from position, velocity and acceleration limits, and those of f.
+#pragma once
+#include <cmath>
+
+#include "../limits/records.hpp"
+#include "dual_active_set.hpp"
+
+namespace hsp {
+
+// What the law wants; the effort is M a + N and friction, without contact forces.
+struct Wanted {
+  Columns<'n', 'n'> mass_matrix;
+  In<'n'> acceleration, effort;
+};
+
+// The contact forces that are possible; none where they have no size.
+struct Forces {
+  In<'n', 'p'> map;  // F
+  In<'p'> first;     // forces nearest to the commanded ones
+  In<'p'> lower, upper;
+  In<'p'> inverse_cost;  // e: the cost is Σ (f - f_ref)²/e
+  double weight;         // robot's weight
+};
+
+// Degrees of freedom of the first rows: those without a motor, of which there are `base`, then
+// those with a limit on their effort.
+struct Places {
+  Ints<'d'> dofs;
+  std::int64_t base;
+};
+
+// What is delivered.
+struct Result {
+  InOut<'n'> effort, acceleration;
+  InOut<'p'> forces;
+};
+
+struct BeginLimitedStep {
+  static constexpr const char* doc =
+      "No deviation, with forces of minimum norm; and the forces' part of J.";
+  Forces forces;
+  double cost;  // of squared forces
+  Out<'p'> own;
+  Out<'x'> x;
+
+  void operator()() {
+    // While a contact fades its forces become dear, but not infinitely so.
+    constexpr double least_inverse_cost = 1e-6;
+    const Index p = own.size();
+    own = (forces.inverse_cost.array().max(least_inverse_cost) / cost).sqrt();
+    x.head(x.size() - p).setZero();
+    x.tail(p) = forces.first / forces.weight;
+  }
+};
+
+struct LimitedRows {
+  static constexpr const char* doc = "The rows of base and efforts, and the bounds of x.";
+  Wanted wanted;
+  Forces forces;
+  Bounds<In> bounds;
+  Places places;
+  InOut<'k', 'x'> A;
+  InOut<'c'> lower, upper;
+
+  void operator()() {
+    const auto& [M, a, effort] = wanted;
+    const Index n = a.size(), p = forces.first.size(), k = A.rows();
+    for (Index r = 0; r < places.dofs.size(); ++r) {
+      const Index i = places.dofs[r];
+      const bool has_motor = r >= places.base;
+      A.row(r).head(n) = M.col(i).transpose();  // M is symmetric
+      A.row(r).tail(p) = -forces.weight * forces.map.row(i);
+      lower[r] = (has_motor ? bounds.tau_lower[i] : 0.0) - effort[i];
+      upper[r] = (has_motor ? bounds.tau_upper[i] : 0.0) - effort[i];
+    }
+    lower.segment(k, n) = bounds.a_lower - a;
+    upper.segment(k, n) = bounds.a_upper - a;
+    lower.tail(p) = forces.lower / forces.weight;
+    upper.tail(p) = forces.upper / forces.weight;
+  }
+};
+
+struct SolveLimitedStep {
+  static constexpr const char* doc = "The optimum of the QP, and what is reached with it.";
+  std::int64_t reached;  // the status if it is solved
+  bool warm;
+  QP problem;
+  Ints<1> moving;  // how many rows of Jᵀ move
+  InOut<'n'> x;
+  ActiveSet work;
+  OutInts<1> status;  // 0: none
+  ActiveSetMemory memory;
+
+  void operator()() {
+    DualActiveSet solver(problem, moving[0], x, work, memory);
+    status[0] = solver.minimise(warm) == DualActiveSet::SOLVED ? reached : 0;
+  }
+};
+
+struct LimitedResult {
+  static constexpr const char* doc =
+      "Effort, acceleration and forces of x, without the solver's violations; the status.";
+  Wanted wanted;
+  Forces forces;
+  Bounds<In> bounds;
+  Places places;
+  In<'x'> x;
+  Result result;
+  InOutInts<1> status;  // 0: there is no result, or none that is finite
+  Out<2> unsolved;      // the status, and whether it is 0
+
+  std::int64_t operator()() {
+    if (status[0] != 0 && !write()) status[0] = 0;
+    unsolved << status[0], status[0] == 0;
+    return status[0];
+  }
+
+ private:
+  bool write() {
+    const Index n = wanted.acceleration.size(), p = forces.first.size();
+    auto& [effort, acceleration, f] = result;
+    const auto deviation = x.head(n);
+    f = (forces.weight * x.tail(p)).cwiseMax(forces.lower).cwiseMin(forces.upper);
+    acceleration = wanted.acceleration + deviation;
+    effort = wanted.effort;
+    effort.noalias() += wanted.mass_matrix * deviation;
+    effort.noalias() -= forces.map * f;
+    const bool finite = effort.allFinite();
+    effort = effort.cwiseMax(bounds.tau_lower).cwiseMin(bounds.tau_upper);
+    for (Index r = 0; r < places.base; ++r) effort[places.dofs[r]] = 0.0;
+    return finite;
+  }
+};
+
+}  // namespace hsp
