@@ -64,21 +64,21 @@ struct ImpedanceGains {
     solve_rows(L, B);  // B = J_e L⁻ᵀ
     X = B;
     solve_rows_transposed(L, X);  // X = J_e M⁻¹
-    G.noalias() = B * B.transpose();
+    G = B.lazyProduct(B.transpose());
     // G' = A Xᵀ + X Aᵀ with A = J_e' - ½ X M'.
-    J_e_dot.noalias() -= 0.5 * X * M_dot;
-    G_dot.noalias() = J_e_dot * X.transpose();
-    G_dot.noalias() += X * J_e_dot.transpose();
+    J_e_dot -= 0.5 * X.lazyProduct(M_dot);
+    G_dot = J_e_dot.lazyProduct(X.transpose());
+    G_dot += X.lazyProduct(J_e_dot.transpose());
 
-    Kv.noalias() = G * D;
+    Kv = G.lazyProduct(D);
     if (ratio[0] > 0.0) {
       write_natural_root();
       Kv += 2.0 * ratio[0] * root;
     }
     write_bounded_inertia();
-    Kv.noalias() -= 0.5 * G_dot * Lambda;
-    if (bounded.write(impedance, ends, sample.error, S)) Kp.noalias() = G * S;
-    else Kp.noalias() = G * K;
+    Kv -= 0.5 * G_dot.lazyProduct(Lambda);
+    if (bounded.write(impedance, ends, sample.error, S)) Kp = G.lazyProduct(S);
+    else Kp = G.lazyProduct(K);
   }
 
  private:
@@ -102,12 +102,13 @@ struct ImpedanceGains {
   // natural frequencies of the modes [rad/s].
   void write_natural_root() {
     cholesky(impedance.K, C);
-    Z.noalias() = C.transpose() * B;
+    Z = C.transpose().lazyProduct(B);
     orthogonalise_rows(Z, U);  // Cᵀ G C = Uᵀ diag(ω²) U
     frequency = Z.rowwise().norm();
-    S.noalias() = U.transpose() * frequency.asDiagonal() * U;
+    root.noalias() = frequency.asDiagonal() * U;
+    S = U.transpose().lazyProduct(root);
     solve_lower_transposed(C, S);
-    root.noalias() = S * C.transpose();
+    root = S.lazyProduct(C.transpose());
   }
 
   // Λ = (B#)ᵀ B# = Xᵀ Q Qᵀ X with B# = Qᵀ X, the inverse of B Bᵀ; it fades to zero where B loses
@@ -115,7 +116,8 @@ struct ImpedanceGains {
   // the singular values of J L⁻ᵀ may be less than those of J by √(largest eigenvalue of M).
   void write_bounded_inertia() {
     bounded_inverse(B, threshold / std::sqrt(1.0 + M.trace()), Q, factor);
-    Lambda.noalias() = factor.transpose() * Q.rowwise().squaredNorm().asDiagonal() * factor;
+    for (Index k = 0; k < Q.rows(); ++k) factor.row(k) *= Q.row(k).norm();
+    Lambda = factor.transpose().lazyProduct(factor);
   }
 };
 
