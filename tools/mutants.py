@@ -23,7 +23,10 @@ from time import perf_counter
 from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[1]
-COPIED = ("hsp_control", "tests", "robots", "configs", "docs", "pyproject.toml")
+COPIED = (
+    *("hsp_control", "tests", "robots", "configs", "docs", "pyproject.toml"),
+    *("engine", "hatch_build.py"),
+)
 TESTS_FAILED = 1
 """The exit status of pytest when tests ran and one failed."""
 LONGEST, MEMORY = 900.0, 16 << 30
@@ -68,7 +71,8 @@ def read(text: str) -> tuple[Mutant, ...]:
         elif not line.startswith("#"):
             name, _, word = line.partition(" | ")
             chosen = f"tests/{tests} -k {word}" if word else f"tests/{tests}"
-            found.append((name, f"hsp_control/{file}", {"-": [], "+": []}, chosen))
+            path = file if file.startswith("engine/") else f"hsp_control/{file}"
+            found.append((name, path, {"-": [], "+": []}, chosen))
     return tuple(
         Mutant(name, file, "\n".join(edit["-"]), "\n".join(edit["+"]), chosen)
         for name, file, edit, chosen in found
@@ -131,8 +135,12 @@ def tried(copy: Path, mutants: Sequence[Mutant]) -> Iterator[tuple[str, str]]:
         text = file.read_text(encoding="utf-8")
         file.write_text(mutated(mutant, text), encoding="utf-8")
         start = perf_counter()
+        compiles = rebuilt(copy, mutant)
         verdict = run(copy, mutant.tests)
         file.write_text(text, encoding="utf-8")
+        rebuilt(copy, mutant)
+        if not compiles:
+            verdict = Verdict("BROKEN", "it does not compile")
         if sound[mutant.tests].word != "SURVIVED":
             verdict = Verdict("BROKEN", "its tests do not pass without the edit")
         print(
@@ -141,6 +149,16 @@ def tried(copy: Path, mutants: Sequence[Mutant]) -> Iterator[tuple[str, str]]:
             flush=True,
         )
         yield mutant.name, verdict.word
+
+
+def rebuilt(copy: Path, mutant: Mutant) -> bool:
+    """Build the engine anew if the mutant is in it; return whether it compiles."""
+    if not mutant.file.startswith("engine/"):
+        return True
+    made = subprocess.run(
+        [sys.executable, "hatch_build.py"], cwd=copy, capture_output=True, check=False
+    )
+    return made.returncode == 0
 
 
 def mutated(mutant: Mutant, text: str) -> str:

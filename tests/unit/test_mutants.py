@@ -25,7 +25,8 @@ def test_the_edit_fits_one_place_and_is_still_python(mutant: Mutant) -> None:
     text = (ROOT / mutant.file).read_text(encoding="utf-8")
     changed = mutants.mutated(mutant, text)
     assert changed != text
-    compile(changed, mutant.file, "exec")
+    if mutant.file.endswith(".py"):
+        compile(changed, mutant.file, "exec")
 
 
 @every_mutant
